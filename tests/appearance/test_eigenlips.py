@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -38,11 +36,9 @@ def test_coefficients_are_what_the_paper_says(space: Eigenlips) -> None:
     images = pictures(1, 3)
     coefficients = space.project(images)
     assert (coefficients.shape, coefficients.dtype) == ((3, 15), np.float32)
-    for t in range(3):
-        for colour in range(3):
-            left = images[t, :, :, colour].astype(float).ravel() - space.mean[colour]
-            for k in range(5):
-                assert coefficients[t, 5 * colour + k] == pytest.approx(space.basis[colour, k] @ left, abs=1e-2)
+    for t, colour, k in np.ndindex(3, 3, 5):
+        left = images[t, :, :, colour].astype(float).ravel() - space.mean[colour]
+        assert coefficients[t, 5 * colour + k] == pytest.approx(space.basis[colour, k] @ left, abs=1e-2)
 
 
 def test_all_components_restore_the_pictures() -> None:
@@ -77,15 +73,11 @@ def test_channels_say_colour_and_number(space: Eigenlips) -> None:
     assert space.summary.startswith("15 of 12 × 9 px, 9")
 
 
-def test_as_arrays_and_back(space: Eigenlips) -> None:
-    again = eigenlips_from_arrays(eigenlips_to_arrays(space))
-    images = pictures(3)
+def test_as_arrays_and_back_and_damaged_arrays(space: Eigenlips) -> None:
+    whole, images = eigenlips_to_arrays(space), pictures(3)
+    again = eigenlips_from_arrays(whole)
     assert np.array_equal(again.project(images), space.project(images))
     assert (again.size, again.explained.tolist()) == (space.size, space.explained.tolist())
-
-
-def test_damaged_arrays(space: Eigenlips) -> None:
-    whole = eigenlips_to_arrays(space)
     for what, array in whole.items():
         number = np.full_like(array, -1 if what == "size" else np.nan)
         for damaged in ({}, {what: array[:-1]}, {what: number}):

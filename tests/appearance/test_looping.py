@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -105,14 +103,11 @@ def test_a_motion_that_repeats_is_looped_forwards():
 def test_jumps_go_on_in_the_same_direction():
     path = np.abs(np.arange(240) % 80 - 40) * 0.2  # to and fro: the same places, in both directions
     order = loop_order(background(path), 2000, RATE_HZ)
-    for join in order.joins:
-        if join.kind == "jump":
-            old, new = order.first[join.at - FADE_FRAMES], order.first[min(join.at + FADE_FRAMES, 1999)]
-            way = 1 if order.first[join.at - FADE_FRAMES] > order.first[join.at - FADE_FRAMES - 1] else -1
-            before = path[old] - path[old - way]
-            after = path[new] - path[new - way]
-            is_near_turn = min(old % 40, 40 - old % 40) <= 2 * FADE_FRAMES  # of the path itself
-            assert np.sign(before) == np.sign(after) or is_near_turn
+    for at in (join.at for join in order.joins if join.kind == "jump"):
+        old, new = order.first[at - FADE_FRAMES], order.first[min(at + FADE_FRAMES, 1999)]
+        way = 1 if old > order.first[at - FADE_FRAMES - 1] else -1
+        is_near_turn = min(old % 40, 40 - old % 40) <= 2 * FADE_FRAMES  # of the path itself
+        assert np.sign(path[old] - path[old - way]) == np.sign(path[new] - path[new - way]) or is_near_turn
 
 
 def test_no_join_in_a_blink_or_near_one():
@@ -187,20 +182,23 @@ def maps(moves) -> np.ndarray:
     return result
 
 
-def test_equal_frames_have_no_distance():
-    descriptors = describe_frames(scene(), maps(np.zeros((4, 2))))
-    assert len(descriptors) == 4
-    assert row_distances(descriptors.standardise([(0, 4)])).max() < 1e-5
+def distances_of(frames: np.ndarray, moves=None) -> np.ndarray:
+    """Distances between frames whose face moves, or not."""
+    count = len(frames)
+    descriptors = describe_frames(frames, maps(np.zeros((count, 2)) if moves is None else moves))
+    assert len(descriptors) == count
+    return row_distances(descriptors.standardise([(0, count)]))
 
 
-def test_the_mouth_does_not_count():
+def test_equal_frames_have_no_distance_and_the_mouth_does_not_count():
     frames = scene()
+    assert distances_of(frames).max() < 1e-5
     frames[2, 95:130, 60:100] = 0  # below the nose
-    same = describe_frames(frames, maps(np.zeros((4, 2))))
-    assert row_distances(same.standardise([(0, 4)]))[2].max() < 1e-5
+    assert distances_of(frames)[2].max() < 1e-5
     frames[2, 50:66, 50:110] = 0  # the eyes
-    other = describe_frames(frames, maps(np.zeros((4, 2))))
-    assert row_distances(other.standardise([(0, 4)]))[2, 0] > 0.5
+    assert distances_of(frames)[2, 0] > 0.5
+    for size in ((20, 30), (1, 1)):
+        assert np.isfinite(distances_of(np.zeros((2, *size, 3), np.uint8))).all()
 
 
 def test_the_aligned_face_does_not_move():
@@ -216,16 +214,9 @@ def test_the_aligned_face_does_not_move():
 def test_neighbours_differ_by_about_one():
     frames = scene(30)
     noisy = np.clip(frames + np.random.default_rng(0).normal(scale=20, size=frames.shape), 0, 255).astype(np.uint8)
-    moves = np.cumsum(np.random.default_rng(1).normal(size=(30, 2)), axis=0)
-    distances = row_distances(describe_frames(noisy, maps(moves)).standardise([(0, 30)]))
+    distances = distances_of(noisy, np.cumsum(np.random.default_rng(1).normal(size=(30, 2)), axis=0))
     assert 0.7 < np.median(np.diag(distances, 1)) < 1.4
     np.testing.assert_allclose(np.diag(distances), 0, atol=1e-5)
-
-
-def test_any_size():
-    for size in ((20, 30), (1, 1)):
-        frames = np.zeros((2, *size, 3), np.uint8)
-        assert np.isfinite(describe_frames(frames, maps(np.zeros((2, 2)))).standardise([(0, 2)])).all()
 
 
 def test_other_frames_than_maps_are_refused():

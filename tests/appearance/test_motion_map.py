@@ -1,7 +1,3 @@
-"""From motion to pictures: known functions are found, and nothing is believed far from all footage."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -70,14 +66,12 @@ def test_a_channel_that_never_moves_is_left_out(fitted: MotionMap) -> None:
 
 def test_components_have_unit_variance_and_are_as_many_as_move() -> None:
     draw = np.random.default_rng(3)
-    values = draw.normal(0, 1, (600, 6)) @ draw.normal(0, 0.1, (6, 50))
-    found = fit_motion_map(values, tuple(Channel(f"x_{n}") for n in range(50)), values[:, :2])
-    assert found.basis.shape == (50, 6)
-    components = (values - found.mean) / found.scale @ found.basis
-    assert np.cov(components.T) == pytest.approx(np.eye(6), abs=0.01)
-    values = draw.normal(0, 1, (900, 30))
-    more = fit_motion_map(values, tuple(Channel(f"x_{n}") for n in range(30)), values[:, :2])
-    assert more.basis.shape == (30, COMPONENTS)
+    for values, count in ((draw.normal(0, 1, (600, 6)) @ draw.normal(0, 0.1, (6, 50)), 6),
+                          (draw.normal(0, 1, (900, 30)), COMPONENTS)):  # fmt: skip
+        found = fit_motion_map(values, tuple(Channel(f"x_{n}") for n in range(values.shape[1])), values[:, :2])
+        assert found.basis.shape == (values.shape[1], count)
+        components = (values - found.mean) / found.scale @ found.basis
+        assert np.cov(components.T) == pytest.approx(np.eye(count), abs=0.01)
 
 
 def test_far_from_all_footage_it_is_as_at_its_edge(fitted: MotionMap) -> None:
@@ -107,11 +101,9 @@ def test_short_footage_is_trusted_less(fitted: MotionMap) -> None:
     """What footage does not say is the mean picture: coefficients shrink as frames become few."""
     sizes = []
     for frames in (30, 300, FRAMES):
-        values = poses(frames)
-        wanted = pictured(values)
+        values, wanted = poses(frames), pictured(poses(frames))
         found = fitted if frames == FRAMES else fit_motion_map(values, CHANNELS, wanted)
-        spread = found.predict(motion(values)).std(axis=0)[:3] / wanted.std(axis=0)[:3]
-        sizes.append(spread.mean())
+        sizes.append((found.predict(motion(values)).std(axis=0)[:3] / wanted.std(axis=0)[:3]).mean())
     assert sizes[0] < 0.6 < sizes[1] < sizes[2] < 1.01
 
 
@@ -148,34 +140,25 @@ def test_channels_are_found_by_name(fitted: MotionMap) -> None:
     assert fitted.predict(turned) == pytest.approx(fitted.predict(motion(values)))
 
 
-def test_as_arrays_and_back(fitted: MotionMap) -> None:
-    again = motion_map_from_arrays(motion_map_arrays(fitted), 4)
-    values = motion(poses(50, seed=6))
+def test_as_arrays_and_back_and_damaged_arrays(fitted: MotionMap) -> None:
+    arrays, values = motion_map_arrays(fitted), motion(poses(50, seed=6))
+    again = motion_map_from_arrays(arrays, 4)
     assert (again.names, np.array_equal(again.predict(values), fitted.predict(values))) == (fitted.names, True)
-
-
-def test_damaged_arrays_are_refused(fitted: MotionMap) -> None:
-    arrays = motion_map_arrays(fitted)
     assert arrays.keys() == MOTION_MAP.keys()
     for name in arrays:
         with pytest.raises(ModelFormatError, match=f"{name} is missing.*build the face again"):
             motion_map_from_arrays({key: value for key, value in arrays.items() if key != name}, 4)
-    tried = 0
-    for _name, _what, changed in damaged(arrays, {damage: DAMAGES[damage] for damage in UNREADABLE}):
-        tried += 1
+    broken = list(damaged(arrays, {damage: DAMAGES[damage] for damage in UNREADABLE}))
+    assert len(broken) >= 6 * 6
+    for _name, _what, changed in broken:
         with pytest.raises(ModelFormatError, match="the map from motion to pictures is damaged"):
             motion_map_from_arrays(changed, 4)
-    assert tried >= 6 * 6
-
-
-def test_arrays_that_do_not_fit_together(fitted: MotionMap) -> None:
-    for change, words in (
-        ({"scale": np.zeros(3)}, "scale holds 0 to 0, required more than 0"),
-        ({"names": np.array(["opening", "width", "width"])}, "channels twice, or limits the wrong way round"),
-        ({"limits": np.array([[1.0] * 3, [-1.0] * 3])}, "channels twice, or limits the wrong way round"),
-        ({"coefficients": np.zeros((5, 4), np.float32)}, "5 coefficients, required 404"),
+    for change, targets, words in (
+        ({"scale": np.zeros(3)}, 4, "scale holds 0 to 0, required more than 0"),
+        ({"names": np.array(["opening", "width", "width"])}, 4, "channels twice, or limits the wrong way round"),
+        ({"limits": np.array([[1.0] * 3, [-1.0] * 3])}, 4, "channels twice, or limits the wrong way round"),
+        ({"coefficients": np.zeros((5, 4), np.float32)}, 4, "5 coefficients, required 404"),
+        ({}, 5, "coefficients of shape"),
     ):
         with pytest.raises(ModelFormatError, match=words):
-            motion_map_from_arrays(motion_map_arrays(fitted) | change, 4)
-    with pytest.raises(ModelFormatError, match="coefficients of shape"):
-        motion_map_from_arrays(motion_map_arrays(fitted), 5)
+            motion_map_from_arrays(arrays | change, targets)

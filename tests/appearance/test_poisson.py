@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -92,13 +90,12 @@ def test_another_colour_of_the_light_vanishes() -> None:
 def test_floats_and_grey_levels_give_the_same() -> None:
     system = cloning_system(MASKS["parts"])
     source, background = (noise((2, *system.mask.shape, 3), seed) for seed in (1, 2))
-    between = background + 0.4
-    copies = source.copy(), background.copy(), between.copy()
+    given = source, background, background + 0.4
+    copies = [each.copy() for each in given]
     expected = system.clone(source, background)
     assert (system.clone(source.astype(np.float32), background.astype(np.float64)) == expected).all()
-    assert (system.clone(source, between)[:, ~system.mask] == background[:, ~system.mask]).all()
-    for given_one, copy in zip((source, background, between), copies, strict=True):
-        assert (given_one == copy).all()
+    assert (system.clone(source, given[2])[:, ~system.mask] == background[:, ~system.mask]).all()
+    assert all((one == copy).all() for one, copy in zip(given, copies, strict=True))
 
 
 def test_many_pictures_give_what_each_gives_alone() -> None:
@@ -160,10 +157,7 @@ def test_other_than_a_mask_is_refused() -> None:
 
 
 def disc(height: int, width: int) -> np.ndarray:
-    y, x = np.mgrid[:height, :width]
-    region = ((x + 0.5) / width - 0.5) ** 2 + ((y + 0.5) / height - 0.5) ** 2 < 0.24
-    region[[0, -1]] = region[:, [0, -1]] = False
-    return region
+    return np.pad(ellipse(height, width)[1:-1, 1:-1], 1)
 
 
 @pytest.mark.parametrize("shape", [(57, 71), (130, 101), (5, 40), (3, 3)])
@@ -190,11 +184,7 @@ def test_cubic_functions_are_exact() -> None:
 
 
 def test_all_pixels_near_the_edge_are_nodes_and_few_inside() -> None:
-    region = np.zeros((200, 200), bool)
-    region[1:-1, 1:-1] = True
-    grids = nested_grids(region)
-    nodes = np.zeros(region.size, bool)
-    nodes[np.concatenate(grids.nodes)] = True
-    nodes = nodes.reshape(region.shape)
+    nodes = np.zeros((200, 200), bool)
+    nodes.flat[np.concatenate(nested_grids(np.pad(np.ones((198, 198), bool), 1)).nodes)] = True
     assert nodes[1 : 1 + CLEARANCE, 1:-1].all()
     assert nodes[80:120, 80:120].mean() < 0.01

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np
@@ -48,12 +46,11 @@ def test_the_paper_frame_by_frame(space: Eigenlips, refiner: Refiner) -> None:
             assert result[frame, :, :, colour].ravel() == pytest.approx(np.clip(expected, 0, 255), abs=1.1)
 
 
-def test_a_candidate_comes_back_whole(space: Eigenlips) -> None:
-    images = TRAINING[::4]
-    coefficients = space.project(images)
+def test_a_candidate_comes_back_whole(space: Eigenlips, refiner: Refiner) -> None:
+    images, coefficients = TRAINING[::4], space.project(TRAINING[::4])
     for options in (PAPER, RefinementOptions(steadiness=0.0, neighbours=1)):
-        refiner = Refiner(space, make_candidates(space, images), options)
-        assert np.abs(refiner.refine(coefficients).astype(int) - images).max() <= 1
+        restored = Refiner(space, refiner.candidates, options).refine(coefficients)
+        assert np.abs(restored.astype(int) - images).max() <= 1
     assert np.abs(space.restore(coefficients).astype(int) - images).max() > 4  # which eigenlips alone do not give
 
 
@@ -87,14 +84,13 @@ def test_the_search_finds_the_cheapest_of_all_sequences(space: Eigenlips, togeth
         assert cost(tuple(chosen[:, colours[0]])) == pytest.approx(least, rel=1e-4)
 
 
-def test_a_steadier_sequence_changes_detail_less(space: Eigenlips) -> None:
-    candidates = make_candidates(space, TRAINING[::4])
-    draw = np.random.default_rng(0)
-    wanted = space.project(HELD_OUT)[:30].repeat(2, axis=0) + draw.normal(0, 30, (60, 12))
-    changes = []
+def test_a_steadier_sequence_changes_detail_less(space: Eigenlips, refiner: Refiner) -> None:
+    noise = np.random.default_rng(0).normal(0, 30, (60, 12))
+    wanted, changes = space.project(HELD_OUT)[:30].repeat(2, axis=0) + noise, []
     for steadiness in (0.0, 1.0, 10.0):
-        chosen = Refiner(space, candidates, RefinementOptions(steadiness=steadiness)).choose(wanted)[:, 0]
-        changes.append(candidates.detail_distances.sum(axis=0)[chosen[:-1], chosen[1:]].sum())
+        steady = Refiner(space, refiner.candidates, RefinementOptions(steadiness=steadiness))
+        chosen = steady.choose(wanted)[:, 0]
+        changes.append(refiner.candidates.detail_distances.sum(axis=0)[chosen[:-1], chosen[1:]].sum())
     assert changes[0] > changes[1] > changes[2]
 
 

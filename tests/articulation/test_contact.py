@@ -1,7 +1,3 @@
-"""Contact: when lips touch, for how long, and in which pictures."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -49,42 +45,35 @@ def test_the_gap_is_0_where_trackers_see_closed_lips_and_grows_with_the_opening(
     assert opening_to_gap(people) == pytest.approx(people + TRACKER_DEFICIT, abs=1e-3)
 
 
-def test_an_opening_has_the_gap_that_it_was_made_of():
+def test_an_opening_has_the_gap_that_it_was_made_of_or_its_own():
     gap = np.array([0.0, LEAST_GAP, 0.02, 0.1, 0.25, 0.4])
     assert opening_to_gap(gap_to_opening(gap)) == pytest.approx(gap, abs=1e-3)
     assert opening_to_gap(gap_to_opening(np.zeros(1)))[0] == 0
-
-
-def test_motion_with_a_gap_of_its_own_has_that_gap():
     both = Motion(np.array([[0.3, 0.1], [0.3, -0.1]]), 100.0, (Channel("opening"), Channel(GAP)))
     assert read_gap(both) == pytest.approx([0.1, 0.0])
 
 
-def test_lips_touch_once_in_every_p_b_and_m_for_longer_than_a_picture():
-    for phone in ("p", "b", "m", "em"):
-        for start_s in (0.2, 0.213, 0.227):
-            for length_s in (0.02, 0.08, 0.15):
-                dip = 0.1 - 0.06 * np.exp(-(((np.arange(101) / 100 - start_s - length_s / 2) / 0.04) ** 2))
-                units = said((0, start_s, "aa"), (start_s, start_s + length_s, phone), (start_s + length_s, 1, "aa"))
-                gap = close_lips(opening_to_gap(dip), motion(dip), units)
-                [(first, stop)] = runs(gap == 0)
-                assert CONTACT_S[0] - 0.011 <= (stop - first) / 100 <= CONTACT_S[1] + 0.021
-                assert start_s - 0.04 < (first + stop - 1) / 200 < start_s + length_s + 0.04
-                assert gap[gap > 0].min() >= LEAST_GAP
-                assert np.abs(np.diff(gap)).max() < 0.04
-                for fps in RATES:
-                    assert show_contact(gap == 0, 100.0, np.arange(int(fps)) / fps).any()
+@pytest.mark.parametrize("phone", ["p", "b", "m", "em"])
+@pytest.mark.parametrize("start_s", [0.2, 0.213, 0.227])
+@pytest.mark.parametrize("length_s", [0.02, 0.08, 0.15])
+def test_lips_touch_once_in_every_p_b_and_m_for_longer_than_a_picture(phone, start_s, length_s):
+    dip = 0.1 - 0.06 * np.exp(-(((np.arange(101) / 100 - start_s - length_s / 2) / 0.04) ** 2))
+    units = said((0, start_s, "aa"), (start_s, start_s + length_s, phone), (start_s + length_s, 1, "aa"))
+    gap = close_lips(opening_to_gap(dip), motion(dip), units)
+    [(first, stop)] = runs(gap == 0)
+    assert CONTACT_S[0] - 0.011 <= (stop - first) / 100 <= CONTACT_S[1] + 0.021
+    assert start_s - 0.04 < (first + stop - 1) / 200 < start_s + length_s + 0.04
+    assert gap[gap > 0].min() >= LEAST_GAP
+    assert np.abs(np.diff(gap)).max() < 0.04
+    for fps in RATES:
+        assert show_contact(gap == 0, 100.0, np.arange(int(fps)) / fps).any()
 
 
 def test_a_contact_that_the_motion_has_is_neither_longer_nor_shorter():
-    opening = np.full(101, 0.1)
+    opening, wide = np.full(101, 0.1), np.full(101, EDITED_GAP + 0.05)  # lips wide open in all of a p are meant so
     opening[40:55] = 0.005
-    assert runs(close_lips(opening_to_gap(opening), motion(opening), said((0.35, 0.6, "m"))) == 0) == [(40, 55)]
-
-
-def test_lips_that_are_wide_open_in_all_of_a_p_are_meant_so():
-    opening = np.full(101, EDITED_GAP + 0.05)
-    assert not (close_lips(opening_to_gap(opening), motion(opening), said((0.3, 0.5, "p"))) == 0).any()
+    for curve, units, contacts in ((opening, said((0.35, 0.6, "m")), [(40, 55)]), (wide, said((0.3, 0.5, "p")), [])):
+        assert runs(close_lips(opening_to_gap(curve), motion(curve), units) == 0) == contacts
 
 
 def test_closing_twice_changes_nothing():

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
@@ -8,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formats.cue_examples import result, spoken, timeline
+from formats.examples import result, spoken, timeline
 from lipmotion import CueSheet
 from lipmotion.articulation.cue_sheets import (
     ANY_OPEN,
@@ -41,9 +39,8 @@ def shapes(sheet: CueSheet) -> str:
 def is_seen(sheet: CueSheet, shape: str, start_s: float, end_s: float) -> bool:
     """Return whether a shape is shown during a phone, or one frame before or after it."""
     reach_s = 1 / sheet.fps
-    return any(
-        cue.label == shape and cue.start_s < end_s + reach_s and cue.end_s > start_s - reach_s for cue in sheet.cues
-    )
+    shown = (cue for cue in sheet.cues if cue.label == shape)
+    return any(cue.start_s < end_s + reach_s and cue.end_s > start_s - reach_s for cue in shown)
 
 
 def check(sheet: CueSheet, duration_s: float, hold: int) -> None:
@@ -60,14 +57,14 @@ def check(sheet: CueSheet, duration_s: float, hold: int) -> None:
 
 def random_result(seed: int, phones: int, channels: str) -> Generation:
     rng = np.random.default_rng(seed)
-    said = [(str(rng.choice(PHONES)), float(rng.uniform(0.01, 0.2))) for _ in range(phones)]
-    units = timeline(said)
-    frames = int(units[-1].end_s * 100) + 1
-    names = channels.split()
-    motion = Motion(
-        np.cumsum(rng.normal(0, 0.05, (frames, len(names))), axis=0), 100.0, tuple(Channel(name) for name in names)
-    )
-    return result(units, motion)
+    units = timeline([(str(rng.choice(PHONES)), float(rng.uniform(0.01, 0.2))) for _ in range(phones)])
+    names = tuple(map(Channel, channels.split()))
+    values = np.cumsum(rng.normal(0, 0.05, (int(units[-1].end_s * 100) + 1, len(names))), axis=0)
+    return result(units, Motion(values, 100.0, names))
+
+
+def with_values(generation: Generation, values: np.ndarray) -> Generation:
+    return replace(generation, motion=replace(generation.motion, values=values))
 
 
 @settings(max_examples=30)
@@ -130,9 +127,8 @@ def test_silence_is_rest() -> None:
 
 def test_what_moves_in_silence_does_not_open_the_mouth() -> None:
     generation = spoken("b aa b")
-    loud = generation.motion.values + np.abs(np.random.default_rng(3).normal(0, 0.2, generation.motion.values.shape))
-    breathing = replace(generation, motion=replace(generation.motion, values=loud))
-    first, last = choose_cues(breathing).cues[0], choose_cues(breathing).cues.spans[-1]
+    noise = np.abs(np.random.default_rng(3).normal(0, 0.2, generation.motion.values.shape))
+    first, *_, last = choose_cues(with_values(generation, generation.motion.values + noise)).cues
     assert (first.label, last.label) == ("X", "X")
     assert first.end_s == pytest.approx(0.3, abs=0.09)
 
@@ -144,10 +140,9 @@ def test_gaps_between_phones_are_silence() -> None:
 
 
 def test_p_b_m_win_over_f_v_where_there_is_no_room_for_both() -> None:
-    crowded = spoken("aa b v b aa", 0.04)
-    assert choose_cues(crowded, 24.0, 3).cues[1].label != "G"
-    assert "G" not in shapes(choose_cues(crowded, 24.0, 3))
-    assert "A" in shapes(choose_cues(crowded, 24.0, 3))
+    crowded = choose_cues(spoken("aa b v b aa", 0.04), 24.0, 3)
+    assert "G" not in shapes(crowded)
+    assert "A" in shapes(crowded)
     assert "G" in shapes(choose_cues(spoken("aa b v b aa", 0.13), 24.0, 3))
 
 
@@ -162,19 +157,17 @@ def test_a_shape_is_there_with_its_sound_or_a_frame_before() -> None:
 def test_the_mouth_opens_as_far_as_the_motion_does(vowel: str, wide: str, narrow: str) -> None:
     """The phones are the same; in the second vowel the mouth hardly opens."""
     generation = spoken(f"s {vowel} s {vowel} s", 0.2)
-    values = generation.motion.values.copy()
-    time_s = generation.motion.time_s
+    values, time_s = generation.motion.values.copy(), generation.motion.time_s
     values[(time_s > 0.45) & (time_s < 0.75), 0] *= 2
     values[(time_s > 0.85) & (time_s < 1.15), 0] *= 0.7
-    sheet = choose_cues(replace(generation, motion=replace(generation.motion, values=values)))
-    assert [c.label for c in sheet.cues if c.start_s < 0.6 < c.end_s] == [wide]
-    assert [c.label for c in sheet.cues if c.start_s < 1.0 < c.end_s] == [narrow]
+    sheet = choose_cues(with_values(generation, values))
+    for at_s, shape in ((0.6, wide), (1.0, narrow)):
+        assert [c.label for c in sheet.cues if c.start_s < at_s < c.end_s] == [shape]
 
 
 def test_the_size_of_the_face_does_not_matter(toy_sentence: ToySentence) -> None:
     generation = result(toy_sentence.units)
-    larger = replace(generation, motion=replace(generation.motion, values=generation.motion.values * 40))
-    assert choose_cues(larger) == choose_cues(generation)
+    assert choose_cues(with_values(generation, generation.motion.values * 40)) == choose_cues(generation)
 
 
 @pytest.mark.parametrize("pause_s", [0.6, 5.0])
@@ -185,7 +178,7 @@ def test_how_far_one_line_opens_the_mouth_says_nothing_of_another(pause_s: float
     both = result(units)
     values, second = both.motion.values.copy(), both.motion.time_s > 2.5 + pause_s / 2
     values[second] /= 3
-    cues = choose_cues(replace(both, motion=replace(both.motion, values=values))).cues
+    cues = choose_cues(with_values(both, values)).cues
     first, other = ([cue.label for cue in cues if cue.label != "X" and (cue.start_s > 2.6) == late] for late in (0, 1))
     assert len({*first}) >= 3
     assert first == other
@@ -206,6 +199,9 @@ def test_no_time_at_all_and_less_than_the_hold() -> None:
     for duration_s in (0.01, 0.05, 0.09):
         (cue,) = choose_cues(result(timeline([("b", duration_s)])), 24.0, 4).cues
         assert (cue.start_s, cue.end_s, cue.label) == (0.0, duration_s, "A")
+    for drawn, rest in (("ABCDEFX", "X"), ("ABCDEF", "A")):  # no segments are rest
+        (cue,) = lay_out_cues([], 0.0, 24, drawn).cues
+        assert (cue.start_s, cue.end_s, cue.label) == (0.0, 0.0, rest)
 
 
 def test_the_usual_hold_is_two_frames_at_24() -> None:
@@ -220,18 +216,11 @@ def test_phones_outside_the_motion() -> None:
     assert sheet.cues.spans[-1].label == "A"
 
 
-BLAIR = "AI E O U FV L MBP WQ etc rest".split()
-"""The names that OpenToonz knows."""
-
-
-def test_every_phone_but_h_has_shapes() -> None:
+def test_every_phone_but_h_has_shapes_whose_parts_are_the_whole() -> None:
     assert set(PHONES) - set(PHONE_SHAPES) == {"hh"}
     assert set(PHONE_SHAPES) <= set(PHONES)
     assert shapes_of_phone("hh") == shapes_of_phone("a phone of another language") == ANY_OPEN
     assert shapes_of_phone("") == ANY_SHAPE
-
-
-def test_the_parts_of_a_phone_are_the_whole() -> None:
     for phone in PHONES:
         assert sum(look.share for look in shapes_of_phone(phone)) == pytest.approx(1)
         for look in shapes_of_phone(phone):
@@ -240,15 +229,10 @@ def test_the_parts_of_a_phone_are_the_whole() -> None:
             assert not set(look.best) & set(look.allowed)
 
 
-def shown(name: str) -> set[str]:
-    return {phone for phone in PHONES if any(name in look.best for look in shapes_of_phone(phone))}
-
-
 def test_the_special_shapes_belong_to_their_sounds() -> None:
-    assert shown("A") == set(LIP_CLOSING)
-    assert shown("G") == set(VISEMES["ld"])
-    assert shown("H") == {"l", "el"}
-    assert shown("X") == {phone for phone in PHONES if is_silent(phone)}
+    silent = {phone for phone in PHONES if is_silent(phone)}
+    for shape, phones in (("A", set(LIP_CLOSING)), ("G", set(VISEMES["ld"])), ("H", {"l", "el"}), ("X", silent)):
+        assert {phone for phone in PHONES if any(shape in look.best for look in shapes_of_phone(phone))} == phones
 
 
 def test_optional_shapes_fall_back_as_rhubarb_does() -> None:
@@ -278,12 +262,6 @@ def test_the_last_frame_begins_before_the_end() -> None:
             assert duration_s - 0.01 < sheet.duration_s <= duration_s
             assert frames == pytest.approx(duration_s * fps, abs=1.7)
             assert all(cue.start_s < cue.end_s for cue in sheet.cues) or duration_s < 0.01
-
-
-def test_no_segments_are_rest() -> None:
-    for drawn, rest in (("ABCDEFX", "X"), ("ABCDEF", "A")):
-        (cue,) = lay_out_cues([], 0.0, 24, drawn).cues
-        assert (cue.start_s, cue.end_s, cue.label) == (0.0, 0.0, rest)
 
 
 def test_a_time_in_whole_hundredths_is_not_rounded_up() -> None:

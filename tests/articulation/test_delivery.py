@@ -1,15 +1,14 @@
-"""Intensity, anticipation, offset and held poses, on motion with known closures."""
-
-from __future__ import annotations
-
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from lipmotion import Delivery
 from lipmotion.articulation.contact import find_closures
 from lipmotion.articulation.delivery import (
+    choose_holds,
     close_on_frame_grid,
     delay_units,
     find_closed_times,
@@ -61,12 +60,11 @@ def test_everything_comes_later(said: Generation) -> None:
 
 @pytest.mark.parametrize("offset_ms", [1000.0, -250.0])
 def test_phones_that_end_after_the_last_frame_are_not_cut(said: Generation, offset_ms: float) -> None:
-    last = len(said.units) - 1
-    spans = [*list(said.units)[:-1], replace(said.units[last], end_s=2.005)]
-    longer = replace(said, units=Timeline(tuple(spans)))
+    *spans, last = said.units
+    longer = Timeline((*spans, replace(last, end_s=2.005)))
     delivery, end_s = Delivery(offset_ms=offset_ms), pytest.approx(2.005 + offset_ms / 1000)
-    assert shift_in_time(longer, delivery).units[last].end_s == end_s
-    assert delay_units(longer.units, delivery, 2.0)[last].end_s == end_s
+    assert shift_in_time(replace(said, units=longer), delivery).units[len(spans)].end_s == end_s
+    assert delay_units(longer, delivery, 2.0)[len(spans)].end_s == end_s
 
 
 def test_what_is_before_the_beginning_is_cut(said: Generation) -> None:
@@ -79,7 +77,7 @@ def test_what_is_before_the_beginning_is_cut(said: Generation) -> None:
 
 def test_closures_survive_a_shift_between_two_frames(said: Generation) -> None:
     spiky = said.motion.values.copy()
-    (column,) = [said.motion.column("opening")]
+    column = said.motion.column("opening")
     spiky[90:101, column] = 0.1
     spiky[95, column] = 0.0
     early = shift_in_time(replace(said, motion=replace(said.motion, values=spiky)), Delivery(anticipation_ms=33))
@@ -132,3 +130,48 @@ def test_holds_in_frames() -> None:
         (Delivery(min_hold_ms=1), 25, 1),
     ):
         assert delivery.hold_frames(rate_hz) == frames
+
+
+def error(rows: NDArray[np.float64], borders: list[int], fixed: list[int]) -> float:
+    """Return the sum of squared differences between curves and held poses."""
+    total = 0.0
+    for first, stop in pairwise(borders):
+        inside = [frame for frame in fixed if first <= frame < stop] or slice(first, stop)
+        total += float(((rows[first:stop] - rows[inside].mean(axis=0)) ** 2).sum())
+    return total
+
+
+def least_error(rows: NDArray[np.float64], hold: int, fixed: list[int]) -> float:
+    """Return the least error of all divisions into poses of ``hold`` frames or more, one after another.
+
+    With fixed frames, of those into poses of ``hold`` to 2 · ``hold`` − 1 frames.
+    """
+    longest = 2 * hold - 1 if fixed else len(rows)
+    best = {0: 0.0}
+    for stop in range(1, len(rows) + 1):
+        starts = [first for first in best if hold <= stop - first <= longest]
+        if starts:
+            best[stop] = min(best[first] + error(rows, [first, stop], fixed) for first in starts)
+    return best[len(rows)]
+
+
+def test_no_division_is_nearer() -> None:
+    for seed in (*range(10), 189):  # in the last, a pose of twice the hold would be nearer
+        rng = np.random.default_rng(seed)
+        hold = int(rng.integers(1, 6))
+        rows = rng.normal(size=(int(rng.integers(2 * hold, 30)), 2)).cumsum(axis=0)
+        fixed = sorted(rng.choice(len(rows), int(rng.integers(0, 3)), replace=False).tolist())
+        borders = choose_holds(rows, hold, fixed)
+        assert borders[0] == 0
+        assert borders[-1] == len(rows)
+        assert np.diff(borders).min() >= hold
+        assert error(rows, borders, fixed) == pytest.approx(least_error(rows, hold, fixed), abs=1e-9)
+
+
+def test_a_curve_of_steps_is_found_again_and_few_frames_are_one_pose() -> None:
+    rows = np.repeat([0.0, 3.0, 1.0, 2.0], [5, 4, 6, 7])[:, None]
+    borders = choose_holds(rows, 4)
+    assert {5, 9, 15} <= set(borders)
+    assert error(rows, borders, []) == pytest.approx(0, abs=1e-12)
+    for frames, borders in ((0, [0]), (1, [0, 1]), (7, [0, 7])):
+        assert choose_holds(np.arange(frames, dtype=float)[:, None], 4) == borders

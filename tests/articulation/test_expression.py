@@ -1,5 +1,3 @@
-"""Moods: a table of facts, curves over time, and a mouth that still says what it says."""
-
 import numpy as np
 import pytest
 
@@ -22,13 +20,9 @@ ACTION_UNITS = {1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 20, 23, 24, 25, 26, 43,
 """Those that faces show."""
 SOURCES = {"EMFACS", "Ekman2003", "Harrigan1996", "Sundelin2013", "ours"}
 PROTOTYPES = {
-    "happy": {6, 12},
-    "sad": {1, 4, 15},
-    "angry": {4, 5, 7, 23},
-    "afraid": {1, 2, 4, 5, 7, 20},
-    "disgusted": {9, 15},
+    "happy": {6, 12}, "sad": {1, 4, 15}, "angry": {4, 5, 7, 23}, "afraid": {1, 2, 4, 5, 7, 20}, "disgusted": {9, 15},
     "surprised": {1, 2, 5, 26},
-}
+}  # fmt: skip
 """Action units without which an emotion is another one, by EMFACS."""
 
 
@@ -75,8 +69,7 @@ def test_neutral_adds_nothing():
 
 @pytest.mark.parametrize("mood", MOODS)
 def test_round_lips_stay_round_in_every_mood(mood):
-    plain = spoken_mouth(motion(), units())
-    mouth = spoken_mouth(with_moods(motion(), parse_moods(mood)), units())
+    plain, mouth = (spoken_mouth(with_moods(motion(), parse_moods(each)), units()) for each in ("", mood))
     round_ = slice(108, 122)  # in uw
     assert mouth.width[round_].max() <= plain.width[round_].max() + 0.03
     assert mouth.width[round_].max() < ROUND_WIDTH + 0.001

@@ -46,11 +46,8 @@ def test_every_blink_is_seen_at_25_frames_a_second():
 
 def test_blinks_prefer_the_ends_of_phrases():
     ends = np.array([end for _, end in find_phrases(SAID)])
-    near = [
-        np.abs(ends - blink / 100).min() < 0.2
-        for seed in range(10)
-        for blink in closings(compute_liveliness(frames(100), MINUTE, SAID, None, seed=seed).lids)
-    ]
+    lids = (compute_liveliness(frames(100), MINUTE, SAID, None, seed=seed).lids for seed in range(10))
+    near = [np.abs(ends - blink / 100).min() < 0.2 for each in lids for blink in closings(each)]
     assert np.mean(near) > 0.25  # 0.4 of every 4 s: 0.1 by chance
 
 
@@ -72,8 +69,7 @@ def test_a_seed_gives_the_same_and_another_seed_something_else():
 
 @pytest.mark.parametrize(("part", "curve"), [("blinks", "lids"), ("brows", "brows"), ("head", "turn")])
 def test_each_part_can_be_off_and_leaves_the_others(part, curve):
-    whole = compute_liveliness(frames(25), MINUTE, SAID, None)
-    without = compute_liveliness(frames(25), MINUTE, SAID, None, **{part: False})
+    whole, without = (compute_liveliness(frames(25), MINUTE, SAID, None, **{part: on}) for on in (True, False))
     for name in CURVES:
         one, other = getattr(whole, name), getattr(without, name)
         if name == curve:
@@ -116,11 +112,10 @@ def test_brows_are_level_at_rest_and_never_below():
 
 
 def test_the_head_moves_slowly_and_less_in_silence():
-    turn = compute_liveliness(frames(100), MINUTE, SAID, None).turn
+    turn, silent = (compute_liveliness(frames(100), MINUTE, units, None).turn for units in (SAID, SILENT))
     assert np.abs(np.diff(turn, axis=0)).max() * 100 < 0.8  # radians a second
     assert 0.01 < turn.std(axis=0).max() < 0.08
     assert np.abs(turn).max() < 0.25
-    silent = compute_liveliness(frames(100), MINUTE, SILENT, None).turn
     assert 0 < silent.std(axis=0).max() < 0.7 * turn.std(axis=0).max()
 
 

@@ -1,5 +1,3 @@
-"""Manners of speaking: larger and smaller movements, closures that stay."""
-
 import numpy as np
 import pytest
 
@@ -14,18 +12,14 @@ from meshes.speech import motion, units
 @pytest.fixture(scope="module")
 def generation() -> Generation:
     moved = motion()
-    return Generation(
-        moved, np.zeros(moved.values.shape), units(), StateTrace(("a",), np.zeros(len(moved.values), int))
-    )
-
-
-def test_every_manner_has_a_factor() -> None:
-    assert {*FACTORS} == {PLAIN, *MANNERS}
+    trace = StateTrace(("a",), np.zeros(len(moved.values), int))
+    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
 
 
 def test_shouted_vowels_are_more_open_and_mumbled_ones_less(generation: Generation) -> None:
+    assert {*FACTORS} == {PLAIN, *MANNERS}
     gaps = {}
-    for manner in (PLAIN, *MANNERS):
+    for manner in FACTORS:
         found = with_manners(generation, parse_moods(manner))
         mouth = spoken_mouth(found.motion, found.units)
         assert mouth.contact[55]  # m

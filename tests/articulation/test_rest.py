@@ -1,7 +1,3 @@
-"""Pauses: the mouth rests in them, softly, and starts no earlier than a breath before the next phrase."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -33,22 +29,21 @@ def motion(opening: list[float], name: str = "opening") -> Motion:
     return Motion(np.array(opening)[:, None], 10.0, (Channel(name),))
 
 
-def test_silence_is_rest():
-    assert np.flatnonzero(find_rest_frames(motion([0.01] * 2 + [0.1] * 9), SILENCE)).tolist() == [0, 1]
+def rests(*given) -> list[int]:
+    return np.flatnonzero(find_rest_frames(*given)).tolist()
 
 
-def test_open_silence_is_speech_and_the_most_closed_frames_are_rest():
+def test_silence_is_rest_unless_it_is_open_and_else_the_most_closed_frames_are():
+    assert rests(motion([0.01] * 2 + [0.1] * 9), SILENCE) == [0, 1]
     opening = [LARGEST_REST + 0.02] * 2 + [0.1] * 8 + [0.0]
-    assert np.flatnonzero(find_rest_frames(motion(opening), SILENCE)).tolist() == [10]
-    assert np.flatnonzero(find_rest_frames(motion(opening), Timeline(()))).tolist() == [10]
+    assert rests(motion(opening), SILENCE) == rests(motion(opening), Timeline(())) == [10]
 
 
 def test_where_no_opening_is_known_silence_counts_or_else_everything():
     weights = motion([0.0] * 11, "jawOpen")
-    assert np.flatnonzero(find_rest_frames(weights, SILENCE)).tolist() == [0, 1]
-    assert find_rest_frames(weights, Timeline(())).all()
-    opening = np.array([0.1] * 10 + [0.0])
-    assert np.flatnonzero(find_rest_frames(weights, Timeline(()), opening)).tolist() == [10]
+    assert rests(weights, SILENCE) == [0, 1]
+    assert rests(weights, Timeline(())) == [*range(11)]
+    assert rests(weights, Timeline(()), np.array([0.1] * 10 + [0.0])) == [10]
 
 
 def test_sizes_at_rest_are_positive():
@@ -112,15 +107,12 @@ def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():
         assert rest_in_pauses(given, style) is given
 
 
-def test_a_pin_in_a_pause_holds():
+def test_a_pin_in_a_pause_holds_and_all_silence_is_rest():
     moved = rest_in_pauses(generation(LINE), REST, [1.25])
     assert moved.motion["opening"][125] == pytest.approx(0.1)
     assert moved.motion["opening"][20] <= CLOSED_OPENING
-
-
-def test_all_silence_is_rest():
-    moved = rest_in_pauses(generation(said((0, 3, "sil"))), REST)
-    assert moved.motion["opening"].max() <= CLOSED_OPENING
+    silent = rest_in_pauses(generation(said((0, 3, "sil"))), REST)
+    assert silent.motion["opening"].max() <= CLOSED_OPENING
 
 
 def test_short_pauses_are_shared_by_the_phones_beside_them():
@@ -143,8 +135,7 @@ def test_a_breath_that_is_detected_parts_the_lips_and_they_close_after_it():
 
 
 def test_laughter_opens_the_mouth_with_its_calls_and_leaves_speech_alone():
-    moved = rest_in_pauses(generation(QUIET), REST, events=[LAUGH]).motion
-    opening = moved["opening"]
+    opening = rest_in_pauses(generation(QUIET), REST, events=[LAUGH]).motion["opening"]
     assert opening[50] == pytest.approx(LAUGH_GAP, rel=0.02)
     assert opening[100] == pytest.approx(LAUGH_SHARE * LAUGH_GAP, rel=0.02)
     assert opening[100] < opening[70] < opening[50]

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -30,16 +28,17 @@ def test_sounds_with_arrays(folder):
     (folder / "test.txt").write_text("two\n")
     found = discover(folder)
     assert found.kind == "FACEGOOD blendshape weights"
-    assert [(item.name, item.split, item.words) for item in found.recordings] == [
-        ("one", "train", ("hello",)),
-        ("two", "test", None),
-    ]
-    assert found.recordings[0].file == folder / "one.wav"
-    assert found.recordings[0].motion_file == MotionFile(folder / "bs_value_one.npy", 30.0, CHANNELS)
-    assert found.recordings[0].rights == {"licence": "The MIT License", "attribution": "Copyright (c) Anna"}
-    motion = read_bare_motion(found.recordings[0].motion_file)
+    read = [(item.name, item.split, item.words) for item in found.recordings]
+    assert read == [("one", "train", ("hello",)), ("two", "test", None)]
+    one = found.recordings[0]
+    assert one.file == folder / "one.wav"
+    assert one.motion_file == MotionFile(folder / "bs_value_one.npy", 30.0, CHANNELS)
+    assert one.rights == {"licence": "The MIT License", "attribution": "Copyright (c) Anna"}
+    motion = read_bare_motion(one.motion_file)
     assert (motion.rate_hz, motion.channels) == (30.0, CHANNELS)
     np.testing.assert_array_equal(motion.values, np.load(folder / "bs_value_one.npy"))
+    (folder / "LICENSE").write_text("MIT License\n" + "x" * 20_000 + "\nCopyright (c) nobody\n")
+    assert discover(folder).recordings[0].rights == {"licence": "MIT License"}  # of which the beginning is read
 
 
 def test_an_array_needs_one_sound(folder):
@@ -83,13 +82,16 @@ def test_nothing_is_unpickled(folder, name):
 
 
 def test_names_that_are_none(folder):
-    for names, message in (
-        *[(names, "required one row of different texts") for names in (np.arange(3.0), np.array(["a", "a", "b"]))],
-        *[(np.array([name, "b", "c"]), "begins as a spreadsheet's formula") for name in ("=1+1", "@SUM(A1)", "\t=1")],
-    ):
+    twice, text = (np.arange(3.0), np.array(["a", "a", "b"])), "required one row of different texts"
+    formulas = (np.array([name, "b", "c"]) for name in ("=1+1", "@SUM(A1)", "\t=1"))
+    wrong = [(names, text) for names in twice] + [(names, "begins as a spreadsheet's formula") for names in formulas]
+    for names, message in wrong:
         np.save(folder / "anna_bs_name.npy", names)
         with pytest.raises(InputError, match=message):
             discover(folder)
+    np.save(folder / "ben_bs_name.npy", NAMES)
+    with pytest.raises(InputError, match="2 lists of channel names"):
+        discover(folder)
 
 
 def test_arrays_that_do_not_fit(folder):
@@ -103,15 +105,3 @@ def test_arrays_that_do_not_fit(folder):
         np.save(folder / "bs_value_one.npy", values)
         with pytest.raises(InputError, match=message):
             read_bare_motion(MotionFile(folder / "bs_value_one.npy", 30.0, CHANNELS))
-
-
-def test_two_lists_of_names(folder):
-    np.save(folder / "ben_bs_name.npy", NAMES)
-    with pytest.raises(InputError, match="2 lists of channel names"):
-        discover(folder)
-
-
-def test_of_a_licence_the_beginning_is_read(folder):
-    (folder / "LICENSE").write_text("MIT License\n" + "x" * 20_000 + "\nCopyright (c) nobody\n")
-    rights = discover(folder).recordings[0].rights
-    assert rights == {"licence": "MIT License"}

@@ -1,7 +1,3 @@
-"""Sounds of recorders, and tables of offsets."""
-
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

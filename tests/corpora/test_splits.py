@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -16,9 +14,8 @@ from lipmotion.errors import CorpusError
 
 
 def recordings(count: int) -> RecordingFolder:
-    return RecordingFolder(
-        "folder", tuple(SourceRecording(f"name{i}", Path(f"name{i}.wav"), None) for i in range(count))
-    )
+    found = (SourceRecording(f"name{i}", Path(f"name{i}.wav"), None) for i in range(count))
+    return RecordingFolder("folder", tuple(found))
 
 
 def test_names_elsewhere_are_names_without_a_recording(tmp_path: Path) -> None:
@@ -37,13 +34,8 @@ def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
 
 def test_a_list_of_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MAX_MISSING_NAMES + 1)))
-    with pytest.raises(
-        CorpusError, match=f"name {MAX_MISSING_NAMES + 1} recordings that are not in it, at most {MAX_MISSING_NAMES}"
-    ):
+    with pytest.raises(CorpusError, match=f"name {MAX_MISSING_NAMES + 1} recordings .* at most {MAX_MISSING_NAMES}"):
         assign_splits(recordings(2), tmp_path)
-
-
-def test_a_list_is_small(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_bytes(b"\n" * (LARGEST_LIST_BYTES + 1))
     with pytest.raises(CorpusError, match="required at most 16777216: is it a list"):
         read_names(tmp_path / "train.txt")
@@ -54,17 +46,9 @@ def test_a_list_may_name_files(tmp_path: Path) -> None:
     dotted = RecordingFolder("folder", (*recordings(3).recordings, SourceRecording("name0.b", Path("c"), None)))
     (tmp_path / "val.txt").write_text("name0.b\n")
     found = assign_splits(dotted, tmp_path)
-    assert {item.name: item.split for item in found.recordings} == {
-        "name0": "train",
-        "name1": "test",
-        "name2": "test",
-        "name0.b": "val",
-    }
+    splits = {item.name: item.split for item in found.recordings}
+    assert splits == {"name0": "train", "name1": "test", "name2": "test", "name0.b": "val"}
     assert list(found.problems) == ["name7.wav"]
-
-
-def test_a_file_and_its_name_in_two_lists_are_an_error(tmp_path: Path) -> None:
-    (tmp_path / "test.txt").write_text("name1.wav\n")
     (tmp_path / "val.txt").write_text("name1\n")
     with pytest.raises(CorpusError, match=r"name1 is in val\.txt and in test\.txt"):
         assign_splits(recordings(3), tmp_path)

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
@@ -41,21 +39,23 @@ def corpus(tmp_path: Path) -> Corpus:
 
 @pytest.mark.parametrize("crops", [True, False])
 def test_an_utterance_survives_the_round_trip(tmp_path, crops):
-    given = utterance(crops=crops)
-    Corpus.create(tmp_path / "corpus").add(given)
-    found = Corpus.open(tmp_path / "corpus").utterance("one")
-    np.testing.assert_array_equal(found.audio.samples, given.audio.samples)
-    np.testing.assert_array_equal(found.features.values, given.features.values)
-    np.testing.assert_array_equal(found.track.motion.values, given.track.motion.values.astype(np.float32))
-    np.testing.assert_array_equal(found.track.seen, given.track.seen)
-    assert (found.track.crops is None) == (given.track.crops is None)
-    if given.track.crops is not None:
+    given = replace(utterance(crops=crops), speaker="anna", phones=PHONES)
+    made = Corpus.create(tmp_path / "corpus")
+    made.add(given, {"crops": "yes"})
+    entry = read_entry(made.folder("one"))
+    assert (entry["settings"], entry["unseen_frames"]) == ({"crops": "yes"}, 3)
+    for corpus in (made, Corpus.open(tmp_path / "corpus")):
+        found = corpus.utterance("one")
+        np.testing.assert_array_equal(found.audio.samples, given.audio.samples)
+        np.testing.assert_array_equal(found.features.values, given.features.values)
+        np.testing.assert_array_equal(found.track.motion.values, given.track.motion.values.astype(np.float32))
+        np.testing.assert_array_equal(found.track.seen, given.track.seen)
         np.testing.assert_array_equal(found.track.crops, given.track.crops)
-    assert found.track.motion.channels == given.track.motion.channels
-    assert found.track.motion.rate_hz == given.track.motion.rate_hz
-    assert found.features.duration_s == given.features.duration_s
-    for name in ("name", "words", "split", "source"):
-        assert getattr(found, name) == getattr(given, name)
+        assert found.track.motion.channels == given.track.motion.channels
+        assert found.track.motion.rate_hz == given.track.motion.rate_hz
+        assert found.features.duration_s == given.features.duration_s
+        for name in ("name", "words", "split", "source", "speaker", "phones"):
+            assert getattr(found, name) == getattr(given, name)
 
 
 def test_large_arrays_stay_on_disk(corpus):
@@ -67,19 +67,22 @@ def test_large_arrays_stay_on_disk(corpus):
 
 def test_sixteen_bit_sound_is_kept_exactly():
     samples = np.array([-32768, -1, 0, 1, 32767], np.float32) / np.float32(32768)
-    np.testing.assert_array_equal(quantise(Audio(samples, 16_000)).samples, samples)
-    np.testing.assert_array_equal(
-        quantise(Audio(np.array([1.0, -1.5], np.float32), 16_000)).samples, [32767 / 32768, -1]
-    )
+    beyond = np.array([1.0, -1.5], np.float32)
+    for given, kept in ((samples, samples), (beyond, [32767 / 32768, -1])):
+        np.testing.assert_array_equal(quantise(Audio(given, 16_000)).samples, kept)
 
 
 def test_names_and_splits(corpus):
-    for each in (corpus, Corpus.open(corpus.path)):
+    for each in (corpus, Corpus.open(corpus.path), Corpus.create(corpus.path)):
         assert len(each) == 3
         assert each.names() == ("one", "three", "two")
         assert each.names("train") == ("one", "two")
         assert each.names("val") == ()
         assert each.splits == {"train": 2, "val": 0, "test": 1}
+    manifest = corpus.path / "corpus.json"
+    manifest.write_text(manifest.read_text().replace('"version": 2', '"version": 3'))
+    with pytest.raises(CorpusError, match="corpus version 3, this lipmotion reads versions up to 2; upgrade lipmotion"):
+        Corpus.open(corpus.path)
 
 
 def test_an_utterance_is_replaced(corpus):
@@ -96,10 +99,6 @@ def test_the_bytes_do_not_depend_on_the_order(corpus, tmp_path):
     assert files == [path.relative_to(other.path) for path in sorted(other.path.rglob("*")) if path.is_file()]
     for path in files:
         assert (corpus.path / path).read_bytes() == (other.path / path).read_bytes()
-
-
-def test_creating_again_keeps_what_is_there(corpus):
-    assert Corpus.create(corpus.path).names() == ("one", "three", "two")
 
 
 def test_leftovers_of_a_killed_run_are_removed(corpus):
@@ -146,13 +145,6 @@ def test_not_a_corpus(tmp_path):
             Corpus.open(tmp_path)
 
 
-def test_a_newer_version(corpus):
-    manifest = corpus.path / "corpus.json"
-    manifest.write_text(manifest.read_text().replace('"version": 2', '"version": 3'))
-    with pytest.raises(CorpusError, match="corpus version 3, this lipmotion reads versions up to 2; upgrade lipmotion"):
-        Corpus.open(corpus.path)
-
-
 def test_a_damaged_utterance(corpus):
     folder = corpus.folder("one")
     entry = read_entry(folder)
@@ -174,14 +166,6 @@ def test_a_damaged_utterance(corpus):
     assert corpus.utterance("one").words == ("bin", "näh")
 
 
-def test_settings_are_kept(tmp_path):
-    corpus = Corpus.create(tmp_path / "corpus")
-    corpus.add(utterance(), {"crops": "yes"})
-    entry = read_entry(corpus.folder("one"))
-    assert entry["settings"] == {"crops": "yes"}
-    assert entry["unseen_frames"] == 3
-
-
 def test_reading_needs_no_video_packages(corpus):
     code = (
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = sys.modules['av'] = None; "
@@ -191,35 +175,19 @@ def test_reading_needs_no_video_packages(corpus):
     run_child([sys.executable, "-c", code], check=True)
 
 
-def phones() -> Timeline[Unit]:
-    return Timeline((Span(0.0, 0.25, Unit("sil")), Span(0.25, 1.0, Unit("aa"))))
-
-
-def test_speaker_and_phones_survive_the_round_trip(tmp_path):
-    corpus = Corpus.create(tmp_path / "corpus")
-    corpus.add(replace(utterance(), speaker="anna", phones=phones()))
-    for each in (corpus, Corpus.open(corpus.path)):
-        assert each.utterance("one").speaker == "anna"
-        assert each.utterance("one").phones == phones()
+PHONES = Timeline((Span(0.0, 0.25, Unit("sil")), Span(0.25, 1.0, Unit("aa"))))
 
 
 def test_speakers(tmp_path):
     corpus = Corpus.create(tmp_path / "corpus")
-    for name, split, speaker in (
-        ("a", "train", "anna"),
-        ("b", "test", "anna"),
-        ("c", "train", "ben"),
-        ("d", "val", ""),
-    ):
+    for each in ("a train anna", "b test anna", "c train ben", "d val "):
+        name, split, speaker = each.split(" ")
         corpus.add(replace(utterance(name, split), speaker=speaker))
     assert corpus.speakers == {"": (1, 1.0), "anna": (2, 2.0), "ben": (1, 1.0)}
     assert corpus.names(speakers=["anna"]) == ("a", "b")
     assert corpus.names("train", ["anna", "ben"]) == ("a", "c")
     assert corpus.required("test", ["anna"]) == ("b",)
-    with pytest.raises(
-        CorpusError,
-        match=r"no utterances of split 'val' by anna \(there are train: 1, val: 0, test: 1\); choose .*test\.txt",
-    ):
+    with pytest.raises(CorpusError, match=r"split 'val' by anna \(there are train: 1, val: 0, test: 1\).*test\.txt"):
         corpus.required("val", ["anna"])
     with pytest.raises(CorpusError, match=r"no speaker 'bob' \(there are: anna, ben\)"):
         corpus.required(None, ["anna", "bob"])

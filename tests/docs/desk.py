@@ -16,8 +16,7 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion.types import Audio
 from lipmotion_studio.study.answers import write_answers
-from meshes.heads import head, lip_points, write_glb
-from meshes.obj_writing import write_obj
+from meshes.heads import head, lip_points, write_glb, write_obj
 from study.analysis.simulated import Effects, rated_answers, ratings
 
 SAID = ("speech", "talk", "a", "b", "one", "lines/one", "perro")

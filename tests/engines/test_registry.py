@@ -1,7 +1,3 @@
-"""Engines as a command line asks for them."""
-
-from __future__ import annotations
-
 import pytest
 
 from lipmotion.engines import ENGINES, engine_from_settings, engine_named, preset_visual
@@ -30,21 +26,10 @@ def test_the_systems_of_xie_and_liu_are_as_printed() -> None:
 
 
 def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
-    settings = [
-        "states=4",
-        "audio_weight=2",
-        "acoustic_regression=no",
-        "variance_scaling=TRUE",
-        "chains=sVis 2vis",
-        "asynchrony=0",
-    ]
-    config = engine_from_settings("coupled", preset="ph-CHMM", settings=settings).config
-    assert (config.states, config.audio_weight, config.acoustic_regression, config.variance_scaling) == (
-        4,
-        2.0,
-        False,
-        True,
-    )
+    settings = ["states=4", "audio_weight=2", "acoustic_regression=no", "variance_scaling=TRUE", "chains=sVis 2vis"]
+    config = engine_from_settings("coupled", preset="ph-CHMM", settings=[*settings, "asynchrony=0"]).config
+    assert (config.states, config.audio_weight) == (4, 2.0)
+    assert (config.acoustic_regression, config.variance_scaling) == (False, True)
     assert (config.structure, config.chains, config.asynchrony) == ("coupled", "sVis 2vis", 0)
     assert engine_from_settings("trajectory", units="eVis", settings=["units=2vis"]).config.units == "2vis"
     assert engine_from_settings("joint", units="eVis", settings=["mixtures=2"]).config.mixtures == 2
@@ -70,14 +55,8 @@ def test_arguments_that_are_not_allowed() -> None:
 
 FORMER = {
     "trajectory": {"parts": 7, "silent_parts": 9, "listens": False, "axes": 20, "full_range": False, "joint": False},
-    "coupled": {
-        "crosses": False,
-        "more_mixtures": 2,
-        "more_steps": 3,
-        "more_weight": 0.5,
-        "follows": False,
-        "full_range": False,
-    },
+    "coupled": {"crosses": False, "more_mixtures": 2, "more_steps": 3, "more_weight": 0.5, "follows": False}
+    | {"full_range": False},
     "joint": {"sees": False, "recognises": True},
 }
 

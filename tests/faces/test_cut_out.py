@@ -1,7 +1,4 @@
-"""Characters of pictures: which file is which shape, pictures over one another, sizes and backgrounds."""
-
-from __future__ import annotations
-
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -61,19 +58,20 @@ def test_the_base_is_beneath_all(tmp_path: Path) -> None:
     assert drawn.pictures["X"][-1, 0].tolist() == [90, 90, 90, 255]
 
 
-def test_folders_that_cannot_be_a_character(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no picture of the mouth shapes C F; required: C\.png F\.png"):
-        read_cut_out(draw(tmp_path / "a", "A B D E"))
-    with pytest.raises(InputError, match=r"x-A\.png: a second picture of the mouth shape A, beside A\.png; keep one"):
-        read_cut_out(draw(tmp_path / "b", "A B C D E F x-A"))
-    draw(draw(tmp_path / "c", "A B C D E F"), "F", (22, 30))
-    with pytest.raises(
-        InputError, match=r"F\.png: the pictures are 20 × 30 and 22 × 30 pixels large, required one size"
-    ):
-        read_cut_out(tmp_path / "c")
-    (draw(tmp_path / "d", "A B C D E F") / "D.png").write_bytes(b"\x89PNG no")
-    with pytest.raises(InputError, match=r"D\.png: no picture that can be read"):
-        read_cut_out(tmp_path / "d")
-    Image.new("L", (4097, 2)).save(draw(tmp_path / "e", "A B C D E F") / "B.png")
-    with pytest.raises(InputError, match=r"B\.png: 4097 × 2 pixels, required at most 4096"):
-        read_cut_out(tmp_path / "e")
+WHOLE = "A B C D E F"
+DAMAGES: list[tuple[str, Callable[[Path], object], str]] = [
+    ("A B D E", Path.exists, r"no picture of the mouth shapes C F; required: C\.png F\.png"),
+    ("A B C D E F x-A", Path.exists, r"x-A\.png: a second picture of the mouth shape A, beside A\.png; keep one"),
+    (WHOLE, lambda path: draw(path, "F", (22, 30)), r"F\.png: the pictures are 20 × 30 and 22 × 30 pixels"),
+    (WHOLE, lambda path: (path / "D.png").write_bytes(b"\x89PNG no"), r"D\.png: no picture that can be read"),
+    (WHOLE, lambda path: Image.new("L", (4097, 2)).save(path / "B.png"), r"B\.png: 4097 × 2 pixels, required at most"),
+]
+
+
+@pytest.mark.parametrize(("names", "damage", "message"), DAMAGES)
+def test_folders_that_cannot_be_a_character(
+    tmp_path: Path, names: str, damage: Callable[[Path], object], message: str
+) -> None:
+    damage(draw(tmp_path, names))
+    with pytest.raises(InputError, match=message):
+        read_cut_out(tmp_path)

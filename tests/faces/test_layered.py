@@ -171,13 +171,14 @@ def test_any_path_is_read_or_refused(path):
 
 
 def test_a_drawing_needs_a_resting_mouth_and_known_ones(tmp_path):
-    path = tmp_path / "a.svg"
-    path.write_bytes(svg('<g id="mouth-aa"><rect width="1" height="1"/></g>'))
-    with pytest.raises(InputError, match="no layer mouth-rest"):
-        make_face(str(path))
-    path.write_bytes(svg(MOUTH_ONLY + '<g id="mouth-q"><rect width="1" height="1"/></g>'))
-    with pytest.raises(InputError, match=r"mouth-q.*mouth-oo"):
-        make_face(str(path))
+    path, square = tmp_path / "a.svg", '<rect width="1" height="1"/></g>'
+    for content, message in (
+        (f'<g id="mouth-aa">{square}', "no layer mouth-rest"),
+        (f'{MOUTH_ONLY}<g id="mouth-q">{square}', r"mouth-q.*mouth-oo"),
+    ):
+        path.write_bytes(svg(content))
+        with pytest.raises(InputError, match=message):
+            make_face(str(path))
     with pytest.raises(InputError, match="cannot be read"):
         make_face(str(tmp_path / "none.svg"))
 

@@ -3,13 +3,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lipmotion.articulation.liveliness import UpperFace
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
-from lipmotion_faces import FACES, Staging, stage_face
-from lipmotion_faces.portrait.characters import WOMAN
+from lipmotion_faces import FACES, Staging, base, stage_face
+from lipmotion_faces.base import DrawsPlanes, Face
+from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
 from lipmotion_faces.portrait.geometry import MouthPose
 from lipmotion_faces.portrait.layer import View
 from lipmotion_faces.portrait.movement import NECK_END, NECK_TOP, PIVOT_Y, HeadField, HeadPlacement, grid
+from lipmotion_faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 from lipmotion_faces.testing import check_face
 
@@ -101,12 +104,9 @@ def test_eyes_blink_and_nothing_else_moves():
     assert view.origin[1] - 0.25 * view.scale < rows.min() < rows.max() < view.origin[1] + 0.25 * view.scale
 
 
-def test_nothing_moves_where_all_is_still():
+def test_each_part_moves_where_it_is_on_and_nothing_where_all_is_still():
     drawn = frames(opening(*np.zeros(50)), size=96, **STILL)
     assert all(np.array_equal(frame, drawn[0]) for frame in drawn)
-
-
-def test_each_part_moves_where_it_is_on():
     for part in ("gaze", "brows", "head"):
         drawn = frames(opening(*np.tile([0.0, 0.2], 40)), size=64, **{**STILL, part: True})
         assert any(np.any(frame != drawn[0]) for frame in drawn[2::2])
@@ -132,18 +132,14 @@ def test_a_transparent_background_shows_through_around_the_figure_only(face):
     assert red[0, 0].tolist() == [255, 0, 0]
 
 
-def test_unusable_settings_are_refused():
+def test_unusable_settings_and_motions_are_refused():
     unusable: dict[str, tuple[Any, ...]] = {"size": (62, 129, 5000), "background": ("blue", "#12345")}
     for name, values in unusable.items():
         for value in values:
             with pytest.raises(InputError, match="required"):
                 Staging(**{name: value})
-
-
-def test_an_unusable_motion_is_refused_at_once():
-    face = stage_face("woman", Staging())
     with pytest.raises(InputError, match="no channel 'opening'"):
-        face.render(Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), NOTHING_SAID)
+        stage_face("woman", Staging()).render(Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), NOTHING_SAID)
 
 
 def test_columns_and_rows_are_those_of_the_pixel_centres():
@@ -166,3 +162,65 @@ def test_a_head_that_rolls_is_turned_about_its_neck():
     assert (right * x + down * (y - PIVOT_Y))[head] == pytest.approx(0, abs=1e-9)
     assert right[head].max() < 0  # what is shown at the top comes from the left
     assert not right[y > NECK_END].any()
+
+
+MOTION = Motion(np.linspace(0, 0.2, 30)[:, None], 25.0, (Channel("opening"),))
+POSES = (
+    FacePose(MouthPose(gap=0.0)),
+    FacePose(MouthPose(gap=0.15, jaw=0.12, tongue=0.5), gaze_x=0.03, brows=0.02, head=HeadPlacement(0.02, 0.01, 0.03)),
+    FacePose(MouthPose(gap=0.08, width=0.75, protrusion=1.0), lids=0.6, head=HeadPlacement(yaw=0.03, pitch=-0.02)),
+    FacePose(MouthPose(gap=0.044, tuck=1.0)),
+    FacePose(MouthPose(gap=0.08, tongue=1.0, jaw=0.03)),
+    FacePose(MouthPose(gap=0.04, frown=1.0, upper_raise=1.0), mood=UpperFace(lowered=1.0, squint=0.6, sneer=1.0)),
+    FacePose(MouthPose(gap=0.0, smile=1.0), mood=UpperFace(inner=0.8, outer=0.5, wide=1.0, cheek=0.7)),
+)
+
+
+def in_yuv(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return brightness [shape=(H, W)] and the means of colours of four pixels each [shape=(2, H / 2, W / 2)]."""
+    values = (picture @ FROM_RGB.T + OFFSETS).transpose(2, 0, 1)
+    _, height, width = values.shape
+    return values[0], values[1:].reshape(2, height // 2, 2, width // 2, 2).mean(axis=(2, 4))
+
+
+def decibel(difference: np.ndarray) -> float:
+    return float(10 * np.log10(255**2 / np.square(difference).mean()))
+
+
+@pytest.mark.parametrize(
+    ("design", "background"),
+    [(WOMAN, "scene"), (MAN, (40, 160, 255)), (CARTOON, "scene")],
+    ids=["woman", "man", "cartoon"],
+)
+def test_planes_are_those_of_the_picture(design, background):
+    pictures, planes = Rasteriser(design, 160, background), PlanarRasteriser(design, 160, background)
+    canvas, planar_canvas = pictures.canvas(), planes.canvas()
+    for pose in POSES:
+        luma, colours = in_yuv(pictures.picture(pose, canvas))
+        brightness, *shown = planes_of(planes.picture(pose, planar_canvas))
+        assert decibel(luma - brightness) > 50
+        assert decibel(colours - np.array(shown)) > 45
+        assert np.abs(luma - brightness).max() < 16  # a line that is off by a pixel would be
+
+
+def test_a_frame_does_not_depend_on_the_ones_before_and_all_even_sizes_have_planes():
+    drawing = PlanarRasteriser(WOMAN, 96)
+    used = drawing.canvas()
+    for pose in (*POSES, *POSES[::-1]):
+        assert np.array_equal(drawing.picture(pose, used), drawing.picture(pose, drawing.canvas()))
+    for size in (64, 66):
+        drawing = PlanarRasteriser(MAN, size)
+        frame = drawing.picture(POSES[0], drawing.canvas())
+        assert frame.shape == (size * 3 // 2, size)
+        assert [plane.shape for plane in planes_of(frame)] == [(size, size), *[(size // 2, size // 2)] * 2]
+
+
+def test_there_are_as_many_planes_as_pictures_and_none_of_a_transparent_face():
+    clear, face = stage_face("woman", Staging(background=base.TRANSPARENT)), stage_face("man", Staging(size=64))
+    assert isinstance(clear, DrawsPlanes)
+    assert clear.render_planes(MOTION, Timeline(())) is None
+    assert isinstance(face, DrawsPlanes)
+    assert isinstance(face, Face)
+    planes = face.render_planes(MOTION, Timeline(()), fps=20)
+    assert planes is not None
+    assert len(list(planes)) == len(list(face.render(MOTION, Timeline(()), fps=20)))

@@ -1,5 +1,3 @@
-"""A face tracker measures on the drawn face the motion that was drawn."""
-
 import numpy as np
 import pytest
 

@@ -1,19 +1,15 @@
-"""Weights of blendshapes as Audio2Face exports them, by their content, with either set of names."""
-
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from formats.examples import of_motion, written
 from lipmotion import read_motion
 from lipmotion.errors import InputError
-from lipmotion.formats.base import write_motion
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, with_mouth
 from lipmotion.meshes.model.shape_names import ARKIT_52
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types import WEIGHT, Channel, Motion
 
 OWN = {"exportFps": 30, "trackPath": "talk.wav", "numPoses": 4, "numFrames": 2}
 OWN |= {"facsNames": ["jawDrop", "jawDropLipTowards", "lipCornerPullerL", "eyesCloseR"], "joints": ["jaw"]}
@@ -28,9 +24,8 @@ def file(folder: Path, document: object, name: str = "a.json") -> Path:
 def test_its_members_are_those_of_the_program(tmp_path: Path) -> None:
     draw = np.random.default_rng(3)
     moved = Motion(draw.random((61, 2)), 60.0, (Channel("jawOpen", WEIGHT), Channel("eyeBlinkLeft", WEIGHT)))
-    generation = Generation(moved, moved.values, Timeline(()), StateTrace(("a",), np.zeros(61, np.intp)))
-    write_motion(tmp_path / "a.a2f.json", generation, source={"path": "b/talk.wav"}, model={})
-    document = json.loads((tmp_path / "a.a2f.json").read_text(encoding="utf-8"))
+    path = written(tmp_path / "a.a2f.json", of_motion(moved), path="b/talk.wav")
+    document = json.loads(path.read_text(encoding="utf-8"))
     assert {name: document[name] for name in ("exportFps", "trackPath", "numPoses", "numFrames")} == {
         "exportFps": 60, "trackPath": "b/talk.wav", "numPoses": 52, "numFrames": 61,
     }  # fmt: skip

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -42,12 +40,6 @@ def test_motion_comes_back(tmp_path, generation, suffix):
         assert read_motion(write(tmp_path / f"none{suffix}", nothing))[0].values.shape == (0, 2)
 
 
-@pytest.fixture
-def compound(monkeypatch):
-    """A format with a suffix of two parts, which cannot be read, beside the one of its last part."""
-    monkeypatch.setitem(MOTION_FORMATS.built_in, "take.csv", f"{__name__}:TAKE")
-
-
 def _write_take(path, generation, _source, _model):
     path.write_text(f"take of {len(generation.motion.values)}\n")
 
@@ -55,22 +47,18 @@ def _write_take(path, generation, _source, _model):
 TAKE = MotionFormat(_write_take)
 
 
-@pytest.mark.usefixtures("compound")
-def test_the_longest_suffix_chooses_the_format(tmp_path, generation):
+def test_the_longest_suffix_chooses_the_format_and_one_without_reader_is_not_offered(tmp_path, generation, monkeypatch):
+    """A format with a suffix of two parts, which cannot be read, beside the one of its last part."""
+    monkeypatch.setitem(MOTION_FORMATS.built_in, "take.csv", f"{__name__}:TAKE")
     names = {"a.take.csv": ".take.csv", "a.b.TAKE.Csv": ".take.csv", "a.mistake.csv": ".csv", "take.csv": ".csv"}
     for name, suffix in names.items():
         assert motion_suffix(Path(name)) == suffix
         text = write(tmp_path / name, generation).read_text()
         assert text.startswith("take of" if suffix == ".take.csv" else "time_s,")
-
-
-@pytest.mark.usefixtures("compound")
-def test_a_format_without_reader_is_not_offered_for_reading(tmp_path, generation):
     assert ".take.csv" in motion_suffixes()
     assert ".take.csv" not in readable_suffixes()
-    path = write(tmp_path / "a.take.csv", generation)
     with pytest.raises(InputError, match=r"cannot read motion from '\.take\.csv'; use one of \.json, \.csv, \.npz"):
-        read_motion(path)
+        read_motion(tmp_path / "a.take.csv")
 
 
 def test_an_unknown_suffix_names_the_known_ones(tmp_path, generation):
@@ -122,12 +110,8 @@ def test_rows_are_the_rounded_values(monkeypatch):
         values = np.random.default_rng(0).normal(0, 3, (50, 7)).astype(precision)
         parsed = np.array([[float(number) for number in row.split(",")] for row in format_rows(values)])
         assert (parsed == np.round(values.astype(float), 5)).all()
-
-
-def test_numbers_are_plain():
-    assert list(format_rows(np.array([[0.0, -0.0, -1e-7, 1e-5, 123456.0]]))) == [
-        "0.00000,0.00000,0.00000,0.00001,123456.00000"
-    ]
+    plain = ["0.00000,0.00000,0.00000,0.00001,123456.00000"]
+    assert list(format_rows(np.array([[0.0, -0.0, -1e-7, 1e-5, 123456.0]]))) == plain
     assert list(format_rows(np.zeros((0, 3)))) == []
 
 

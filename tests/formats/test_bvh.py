@@ -1,7 +1,3 @@
-"""BVH: read line by line, and by Blender where it is installed as a module."""
-
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path
@@ -10,12 +6,13 @@ import numpy as np
 import pytest
 
 from children import run_child
+from formats.examples import of_motion
+from formats.examples import written as write
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
-from lipmotion.formats import write_motion
 from lipmotion.formats.bvh import CENTIMETRES
 from lipmotion.meshes.fitting.blendshape_motion import move_points
-from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
 
 FRAMES = 60
 BLENDER = os.environ.get("LIPMOTION_BPY_PYTHON", "")
@@ -42,13 +39,12 @@ def talking() -> Generation:
     width = 0.6 + 0.03 * np.sin(2 * np.pi * time_s)
     motion = Motion(np.stack([opening, width], axis=1), 50.0, (Channel("opening"), Channel("width")))
     units = Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 1.2, Unit("aa"))))
-    return Generation(motion, motion.values, units, StateTrace(("a",), np.zeros(FRAMES, np.intp)))
+    return of_motion(motion, units)
 
 
 @pytest.fixture
 def written(talking: Generation, tmp_path: Path) -> Path:
-    write_motion(tmp_path / "a.bvh", talking, source={}, model={})
-    return tmp_path / "a.bvh"
+    return write(tmp_path / "a.bvh", talking)
 
 
 def expected(talking: Generation) -> np.ndarray:
@@ -94,6 +90,5 @@ def test_blender_shows_the_same_places(talking, written, tmp_path):
 
 def test_what_cannot_be_placed_is_refused(tmp_path, talking):
     other = Motion(np.zeros((3, 1)), 50.0, (Channel("jawOpen", "weight"),))
-    still = Generation(other, other.values, talking.units, talking.trace)
     with pytest.raises(ExportError, match="no channel 'opening' to place lip points by"):
-        write_motion(tmp_path / "a.bvh", still, source={}, model={})
+        write(tmp_path / "a.bvh", of_motion(other, talking.units))

@@ -1,22 +1,18 @@
-"""C3D: what is written is read by others and by us, what others write is read; movements of the head are taken out."""
-
-from __future__ import annotations
-
 import math
 import struct
-import tempfile
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from formats.examples import of_motion
+from formats.examples import written as write
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats import read_motion, write_motion
+from lipmotion.formats import read_motion
 from lipmotion.formats.c3d import BLOCK, C3dFile, read_c3d, write_c3d
 from lipmotion.formats.markers import MILLIMETRES, to_head_frame
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types import WEIGHT, Channel, Generation, Motion
 
 RNG = np.random.default_rng(11)
 POINTS = (61, 291, 13, 14, 152)
@@ -29,14 +25,12 @@ def pointed() -> Generation:
     values = RNG.normal(0, 0.02, (FRAMES, 17)) + np.array([0.1, *np.tile([0.0, -0.8, 0.2], 5), 0.5])
     names = [f"{axis}_{point}" for point in POINTS for axis in "xyz"]
     channels = (Channel("opening"), *map(Channel, names), Channel("mouthPucker", WEIGHT))
-    motion = Motion(values, 100.0, channels)
-    return Generation(motion, values, Timeline(()), StateTrace(("a",), np.zeros(FRAMES, np.intp)))
+    return of_motion(Motion(values, 100.0, channels))
 
 
 @pytest.fixture
 def written(pointed: Generation, tmp_path: Path) -> Path:
-    write_motion(tmp_path / "a.c3d", pointed, source={}, model={})
-    return tmp_path / "a.c3d"
+    return write(tmp_path / "a.c3d", pointed)
 
 
 def test_motion_comes_back(pointed, written):
@@ -134,23 +128,16 @@ def test_movements_of_the_head_are_taken_out(tmp_path, unit, per_mm):
     np.testing.assert_allclose(motion["opening"], expected, atol=1e-5)
 
 
-def test_axes_with_z_up_are_turned(tmp_path):
+def test_axes_with_z_up_and_faces_that_look_the_other_way_are_turned(tmp_path):
     still = face()
     z_up = {name: np.stack([p[:, 0], -p[:, 2], p[:, 1]], axis=1) * 90 for name, p in still.items()}
     write_c3d(tmp_path / "a.c3d", capture(z_up))
     motion = read_motion(tmp_path / "a.c3d")[0]
-    for axis, column in zip("xyz", range(3), strict=True):
-        np.testing.assert_allclose(motion[f"{axis}_13"], still["LIP_13"][:, column], atol=1e-5)
-
-
-def test_a_face_that_looks_the_other_way_is_turned():
-    still = {name.split(":")[-1]: place for name, place in face().items()}
-    found = to_head_frame({name: place * [-90.0, 90, -90] for name, place in still.items()}, "mm")
-    np.testing.assert_allclose(found["LIP_13"], still["LIP_13"], atol=1e-9)
-
-
-def test_without_eyes_an_eye_distance_is_stated(tmp_path):
-    mouth = {name: place * 90 for name, place in face().items() if ":" not in name}
+    place = np.stack([motion[f"{axis}_13"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(place, still["LIP_13"], atol=1e-5)
+    behind = {name.split(":")[-1]: p * [-90.0, 90, -90] for name, p in still.items()}
+    np.testing.assert_allclose(to_head_frame(behind, "mm")["LIP_13"], still["LIP_13"], atol=1e-9)
+    mouth = {name: p * 90 for name, p in still.items() if ":" not in name}  # no eyes: an eye distance is stated
     write_c3d(tmp_path / "a.c3d", capture(mouth))
     np.testing.assert_allclose(read_motion(tmp_path / "a.c3d")[0]["y_chin"], mouth["chin"][:, 1] / 90, atol=1e-6)
 
@@ -203,72 +190,17 @@ def test_what_is_wrong_is_said(tmp_path, written):
 
 def test_markers_of_the_mouth_are_required(tmp_path):
     still = {name: place for name, place in face().items() if ":" in name}
-    write_c3d(tmp_path / "a.c3d", capture(still))
-    with pytest.raises(InputError, match="all markers are those of the head"):
-        read_motion(tmp_path / "a.c3d")
-    write_c3d(tmp_path / "b.c3d", capture({"*1": still["Anna:EYE_L"]}))
-    with pytest.raises(InputError, match=r"no marker with a name is seen in half of the frames; the labels: \*1"):
-        read_motion(tmp_path / "b.c3d")
-    same = {"EYE_L": still["Anna:EYE_L"], "EYE_R": still["Anna:EYE_L"], "LIP_13": still["Anna:EYE_L"]}
-    write_c3d(tmp_path / "c.c3d", capture(same))
-    with pytest.raises(InputError, match="the two eye corners are in one place"):
-        read_motion(tmp_path / "c.c3d")
-
-
-def test_what_does_not_fit_is_refused(tmp_path, pointed):
-    odd = Motion(np.zeros((2, 1)), 100.0, (Channel("öffnen"),))
+    eye = still["Anna:EYE_L"]
+    for markers, message in (
+        (still, "all markers are those of the head"),
+        ({"*1": eye}, r"no marker with a name is seen in half of the frames; the labels: \*1"),
+        ({"EYE_L": eye, "EYE_R": eye, "LIP_13": eye}, "the two eye corners are in one place"),
+    ):
+        write_c3d(tmp_path / "a.c3d", capture(markers))
+        with pytest.raises(InputError, match=message):
+            read_motion(tmp_path / "a.c3d")
     with pytest.raises(ExportError, match="does not fit into"):
-        write_motion(tmp_path / "a.c3d", replace(pointed, motion=odd), source={}, model={})
-
-
-LONG = 70_000
-
-
-@pytest.fixture(scope="module")
-def long_capture() -> bytes:
-    """One marker that moves along in 70,000 frames."""
-    content = C3dFile(("LIP_13",), np.arange(1.0, LONG + 1)[:, None, None] * [1, 0, 0], 100.0)
-    with tempfile.TemporaryDirectory() as folder:
-        write_c3d(Path(folder) / "a.c3d", content)
-        return (Path(folder) / "a.c3d").read_bytes()
-
-
-TWO = b"\x02\x01\x02"
-"""What stands before a parameter of two whole numbers."""
-
-
-def two_words(number: int) -> bytes:
-    return struct.pack("<2H", number % 65_536, number // 65_536)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {},
-        {b"LONG_FRAMES": b"XXXX_FRAMES"},  # the header stops at 65,535: TRIAL counts on
-        {b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"},  # POINT:LONG_FRAMES alone
-        {b"LONG_FRAMES": b"XXXX_FRAMES", b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"},  # nothing but the data
-        {two_words(LONG): two_words(LONG + 9), TWO + two_words(1): TWO + two_words(10), b"LONG_FRAMES": b"XXXX_FRAMES"},
-    ],
-)
-def test_more_frames_than_the_header_counts(tmp_path, long_capture, change, caplog):
-    head, data = long_capture[: 3 * BLOCK], long_capture[3 * BLOCK :]
-    for old, new in change.items():
-        assert old in head
-        head = head.replace(old, new)
-    (tmp_path / "a.c3d").write_bytes(head + data)
-    places = read_c3d(tmp_path / "a.c3d").points[:, 0, 0]
-    assert np.isfinite(places).sum() == LONG
-    assert places[LONG - 1] == pytest.approx(LONG)
-    assert ("65535" in caplog.text) == (len(change) == 2)
-
-
-def test_a_number_that_began_again_is_seen(tmp_path, long_capture):
-    wrapped = LONG - 65_536
-    head = long_capture[: 3 * BLOCK].replace(b"LONG_FRAMES", b"XXXX_FRAMES").replace(b"ACTUAL_END", b"XXXXXX_END")
-    head = head.replace(struct.pack("<H", 65_535), struct.pack("<H", wrapped))
-    (tmp_path / "a.c3d").write_bytes(head + long_capture[3 * BLOCK :])
-    assert len(read_c3d(tmp_path / "a.c3d").points) == LONG
+        write(tmp_path / "d.c3d", of_motion(Motion(np.zeros((2, 1)), 100.0, (Channel("öffnen"),))))
 
 
 def test_a_header_that_says_another_number_is_named(tmp_path, written, caplog):
@@ -314,3 +246,46 @@ def test_files_of_other_processors(tmp_path, processor):
     read = read_c3d(tmp_path / "b.c3d")
     np.testing.assert_allclose(read.points, places, rtol=1e-6)
     assert (read.labels, read.rate_hz) == (("one", "two"), 120.0)
+
+
+LONG = 70_000
+
+
+def two_words(number: int) -> bytes:
+    return struct.pack("<2H", number % 65_536, number // 65_536)
+
+
+@pytest.fixture(scope="module")
+def long_capture(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """One marker that moves along in 70,000 frames."""
+    path = tmp_path_factory.mktemp("long") / "a.c3d"
+    write_c3d(path, C3dFile(("LIP_13",), np.arange(1.0, LONG + 1)[:, None, None] * [1, 0, 0], 100.0))
+    return path.read_bytes()
+
+
+TWO = b"\x02\x01\x02"
+"""What stands before a parameter of two whole numbers."""
+NO_LONG, NO_END = {b"LONG_FRAMES": b"XXXX_FRAMES"}, {b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"}
+
+
+@pytest.mark.parametrize(
+    ("change", "warns"),
+    [
+        ({}, False),
+        (NO_LONG, False),  # the header stops at 65,535: TRIAL counts on
+        (NO_END, False),  # POINT:LONG_FRAMES alone
+        (NO_LONG | NO_END, True),  # nothing but the data
+        ({two_words(LONG): two_words(LONG + 9), TWO + two_words(1): TWO + two_words(10), **NO_LONG}, False),
+        (NO_LONG | NO_END | {struct.pack("<H", 65_535): struct.pack("<H", LONG - 65_536)}, None),  # it began again
+    ],
+)
+def test_more_frames_than_the_header_counts(tmp_path, long_capture, change, warns, caplog):
+    head, data = long_capture[: 3 * BLOCK], long_capture[3 * BLOCK :]
+    for old, new in change.items():
+        assert old in head
+        head = head.replace(old, new)
+    (tmp_path / "a.c3d").write_bytes(head + data)
+    places = read_c3d(tmp_path / "a.c3d").points[:, 0, 0]
+    assert np.isfinite(places).sum() == LONG
+    assert places[LONG - 1] == pytest.approx(LONG)
+    assert warns is None or ("65535" in caplog.text) == warns

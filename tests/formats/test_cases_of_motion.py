@@ -1,7 +1,5 @@
 """Motion files as people bring them: cases of public bug reports, and others of their kind."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -83,9 +81,7 @@ def test_motion_of_a_camera_alone_is_named(tmp_path: Path) -> None:
 
 def spelled(separator: str, quote: bool, decimal: str, above: str = "", end: str = "\n") -> str:
     text = io.StringIO()
-    rows = csv.writer(
-        text, delimiter=separator, quoting=csv.QUOTE_ALL if quote else csv.QUOTE_MINIMAL, lineterminator=end
-    )
+    rows = csv.writer(text, delimiter=separator, quoting=csv.QUOTE_ALL if quote else 0, lineterminator=end)
     rows.writerow(["Timecode", "BlendshapeCount", "JawOpen", "MouthClose"])
     for number, jaw in enumerate(JAW):
         rows.writerow([code(number).replace(".", decimal), 2, str(jaw).replace(".", decimal), 0])
@@ -95,15 +91,9 @@ def spelled(separator: str, quote: bool, decimal: str, above: str = "", end: str
 @pytest.mark.parametrize(
     "content",
     [
-        spelled(",", True, "."),
-        spelled(";", False, ","),
-        spelled(";", True, ","),
-        spelled("\t", False, "."),
-        spelled(",", True, ","),
-        spelled(",", False, ".", "\ufeff"),
-        spelled(",", False, ".", "\n\n,,,\r\n"),
-        spelled(";", False, ",", "\ufeffsep=;\r\n", "\r\n"),
-        spelled(",", False, ".", "# FPS: 60\n"),
+        *(spelled(",", True, "."), spelled(";", False, ","), spelled(";", True, ","), spelled("\t", False, ".")),
+        *(spelled(",", True, ","), spelled(";", False, ",", "\ufeffsep=;\r\n", "\r\n")),
+        *(spelled(",", False, ".", above) for above in ("\ufeff", "\n\n,,,\r\n", "# FPS: 60\n")),
         spelled(",", False, ".").encode("utf-16"),
         spelled(",", False, ".").encode("utf-16-le"),
         spelled(",", False, ".").replace("\n", "\r"),
@@ -203,7 +193,9 @@ def event(piece: dict[str, Any], start: int, key: str = "AudioOffset") -> dict[s
     return {key: round(start / 60 * 1e7), "VisemeId": 2, "Animation": json.dumps(piece)}
 
 
-NEUTRAL = {"categoryName": "_neutral", "score": 0.1}
+def categories(jaw: float) -> dict[str, Any]:
+    named = [{"categoryName": name, "score": score} for name, score in (("_neutral", 0.1), ("jawOpen", jaw))]
+    return {"faceBlendshapes": [{"categories": named}]}
 
 
 @pytest.mark.parametrize(
@@ -217,18 +209,7 @@ NEUTRAL = {"categoryName": "_neutral", "score": 0.1}
         ([[{"timestamp_ms": n * 40, "blendshapes": {"jawOpen": jaw}} for n, jaw in enumerate(JAW)]], 25),
         ([[{"timeCode": n / 30, "blendShapes": {"JawOpen": jaw}} for n, jaw in enumerate(JAW)]], 30),
         ([{"time": n / 30, "jawOpen": jaw, "mouthClose": 0} for n, jaw in enumerate(JAW)], 30),
-        (
-            [
-                {
-                    "fps": 24,
-                    "frames": [
-                        {"faceBlendshapes": [{"categories": [NEUTRAL, {"categoryName": "jawOpen", "score": jaw}]}]}
-                        for jaw in JAW
-                    ],
-                }
-            ],
-            24,
-        ),
+        ([{"fps": 24, "frames": [categories(jaw) for jaw in JAW]}], 24),
     ],
 )
 def test_frames_of_weights_in_json(tmp_path: Path, documents: list[Any], rate_hz: float) -> None:

@@ -1,9 +1,7 @@
-"""Each format is read by a small parser that reads it as its consumers do."""
-
-from __future__ import annotations
-
 import json
+import math
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,13 +9,15 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from formats.cue_examples import result, spoken
+import programs
+from formats.examples import result, spoken
 from lipmotion import CueSheet
 from lipmotion.articulation.cue_sheets import choose_cues
 from lipmotion.errors import ExportError
 from lipmotion.formats.cues import CUE_FORMATS, format_of, write_cue_file
+from lipmotion.formats.papagayo import UNKNOWN
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Channel, Motion, Timeline
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units.visemes import SHAPES
 
 NAMES = ["hi.wav", "C:\\av\\hi.wav", 'Größe & <"tea\'s"> 茶 😀.wav', "line\nbreak\ttab.wav", "bell\x07\x00.wav", ""]
@@ -74,13 +74,31 @@ def shown_by_opentoonz(text: str) -> list[str]:
     return frames
 
 
-def test_what_is_written_is_read(sheet: CueSheet) -> None:
+def test_what_is_written_is_read(sheet: CueSheet, tmp_path: Path) -> None:
     for form, read in [("tsv", read_tsv), ("json", read_json), ("xml", read_xml)]:
         for name in NAMES:
             text = CUE_FORMATS[form].text(sheet, name)
             assert read(text) == rows(sheet)
             assert text.isascii()
             assert text.endswith("\n")
+    lines = CUE_FORMATS["tsv"].text(sheet, "").splitlines()
+    assert lines[-1] == f"{sheet.duration_s:.2f}\tX"
+    assert all(re.fullmatch(r"\d+\.\d\d\t[A-HX]", line) for line in lines)
+    for name in NAMES:
+        document = json.loads(CUE_FORMATS["json"].text(sheet, name))
+        assert document["metadata"] == {"soundFile": name, "duration": sheet.duration_s}
+        assert list(document) == ["metadata", "mouthCues"]
+        root = ElementTree.fromstring(CUE_FORMATS["xml"].text(sheet, name))  # noqa: S314
+        assert float(root.findtext("metadata/duration") or "") == sheet.duration_s
+        said = root.findtext("metadata/soundFile") or ""
+        assert said == name.replace("\x07", "\\x07").replace("\x00", "\\x00")
+    for name, kind in CUE_FORMATS.items():
+        path = tmp_path / f"Größe.{name.upper()}"
+        write_cue_file(path, sheet, "a.wav", format_of(path))
+        assert path.read_bytes().decode() == kind.text(sheet, "a.wav")
+    for name in ("a.txt", "a"):
+        with pytest.raises(ExportError, match=r"unknown cue format .*; required one of: \.tsv \.xml \.json \.dat"):
+            format_of(Path(name))
 
 
 def test_what_opentoonz_shows_in_every_frame(sheet: CueSheet) -> None:
@@ -100,44 +118,131 @@ def _end(sheet: CueSheet, end_s: float) -> float:
     return np.inf if end_s == sheet.duration_s else int(end_s * sheet.fps)
 
 
-def test_the_last_line_of_tsv_is_the_end_at_rest(sheet: CueSheet) -> None:
-    lines = CUE_FORMATS["tsv"].text(sheet, "").splitlines()
-    assert lines[-1] == f"{sheet.duration_s:.2f}\tX"
-    assert all(re.fullmatch(r"\d+\.\d\d\t[A-HX]", line) for line in lines)
-
-
-def test_rest_without_x() -> None:
-    sheet = choose_cues(spoken("b aa b"), optional="")
-    assert CUE_FORMATS["tsv"].text(sheet, "").splitlines()[-1] == "0.90\tA"
-    assert CUE_FORMATS["dat"].text(sheet, "").splitlines()[-1].endswith(" MBP")
-
-
-def test_nothing_is_one_cue_of_no_length(empty: CueSheet) -> None:
+def test_nothing_is_one_cue_of_no_length_and_rest_may_have_no_shape_of_its_own(empty: CueSheet) -> None:
     assert CUE_FORMATS["tsv"].text(empty, "") == "0.00\tX\n0.00\tX\n"
     assert CUE_FORMATS["dat"].text(empty, "") == "MohoSwitch1\n1 rest\n2 rest\n"
     assert read_json(CUE_FORMATS["json"].text(empty, "")) == [(0.0, 0.0, "X")]
     assert read_xml(CUE_FORMATS["xml"].text(empty, "")) == [(0.0, 0.0, "X")]
+    sheet = choose_cues(spoken("b aa b"), optional="")
+    assert CUE_FORMATS["tsv"].text(sheet, "").splitlines()[-1] == "0.90\tA"
+    assert CUE_FORMATS["dat"].text(sheet, "").splitlines()[-1].endswith(" MBP")
+    _, phrases = read_project(CUE_FORMATS["pgo"].text(sheet, ""))
+    assert {shown(phrases, frame) for frame in range(20)} <= {shape.blair for shape in SHAPES.values()} - {"rest"}
 
 
-def test_metadata(sheet: CueSheet) -> None:
-    for name in NAMES:
-        document = json.loads(CUE_FORMATS["json"].text(sheet, name))
-        assert document["metadata"] == {"soundFile": name, "duration": sheet.duration_s}
-        assert list(document) == ["metadata", "mouthCues"]
-        root = ElementTree.fromstring(CUE_FORMATS["xml"].text(sheet, name))  # noqa: S314
-        assert float(root.findtext("metadata/duration") or "") == sheet.duration_s
-        said = root.findtext("metadata/soundFile") or ""
-        assert said == name.replace("\x07", "\\x07").replace("\x00", "\\x00")
+Word = tuple[str, int, int, list[tuple[int, str]]]
 
 
-def test_files(sheet: CueSheet, tmp_path: Path) -> None:
-    for name, form in CUE_FORMATS.items():
-        path = tmp_path / f"Größe.{name.upper()}"
-        write_cue_file(path, sheet, "a.wav", format_of(path))
-        assert path.read_bytes().decode() == form.text(sheet, "a.wav")
+def read_project(text: str) -> tuple[dict[str, str], list[tuple[str, int, int, list[Word]]]]:
+    """Read line by line, and parts of lines at spaces; what is indented is stripped, as Papagayo does."""
+    lines = iter(text.splitlines())
+    assert next(lines) == "lipsync version 1"
+    about = {name: next(lines).strip() for name in ("sound", "fps", "frames", "voices", "voice", "text")}
+    phrases = []
+    for _ in range(int(next(lines))):
+        said, first, last = next(lines).strip(), int(next(lines)), int(next(lines))
+        words: list[Word] = []
+        for _ in range(int(next(lines))):
+            word, start, end, count = next(lines).split()
+            shapes = [next(lines).split() for _ in range(int(count))]
+            words.append((word, int(start), int(end), [(int(frame), name) for frame, name in shapes]))
+        phrases.append((said, first, last, words))
+    assert next(lines, None) is None
+    return about, phrases
 
 
-def test_a_suffix_that_is_no_format() -> None:
-    for name in ("a.txt", "a"):
-        with pytest.raises(ExportError, match=r"unknown cue format .*; required one of: \.tsv \.xml \.json \.dat"):
-            format_of(Path(name))
+def shown(phrases: list[tuple[str, int, int, list[Word]]], frame: int) -> str:
+    """Return what Papagayo shows in a frame: the last shape of the word that the frame is in, else rest."""
+    for _, first, last, words in phrases:
+        if first <= frame <= last:
+            for _, start, end, shapes in words:
+                if start <= frame <= end:
+                    return next((name for at, name in reversed(shapes) if frame >= at), "rest")
+    return "rest"
+
+
+def said(sentence: ToySentence) -> Timeline[Unit]:
+    """Return the units with a word for every three phones that are no silence."""
+    spans, count = [], 0
+    for span in sentence.units:
+        count += span.label.phone != "sil"
+        word = "" if span.label.phone == "sil" else f"word{count // 3}"
+        spans.append(replace(span, label=replace(span.label, word=word)))
+    return Timeline(tuple(spans))
+
+
+@pytest.mark.parametrize("fps", [12.0, 25.0])
+def test_every_frame_shows_the_cue_and_words_follow_each_other(toy_sentence: ToySentence, fps: float) -> None:
+    sheet = choose_cues(result(said(toy_sentence)), fps)
+    about, phrases = read_project(CUE_FORMATS["pgo"].text(sheet, "a b.wav"))
+    assert (about["sound"], about["fps"], about["voices"]) == ("a b.wav", f"{fps:.0f}", "1")
+    frames = shown_by_opentoonz(CUE_FORMATS["dat"].text(sheet, ""))
+    assert int(about["frames"]) == pytest.approx(len(frames), abs=1)
+    assert [shown(phrases, frame).lower() for frame in range(len(frames))] == frames
+    words = [word for *_, words in phrases for word, *_ in words]
+    assert {part for word in words for part in word.split("-")} <= {f"word{n}" for n in range(99)} | {UNKNOWN}
+    assert len(words) > 1
+    for text, first, last, said_in in phrases:
+        assert text == " ".join(word for word, *_ in said_in)
+        assert (said_in[0][1], said_in[-1][2]) == (first, last)
+        assert all(after[1] == before[2] + 1 for before, after in pairwise(said_in))
+        assert all(start <= end and shapes[0][0] == start for _, start, end, shapes in said_in)
+
+
+def test_words_of_less_than_a_frame_are_joined() -> None:
+    base = spoken("b aa b aa b")
+    words = Timeline(tuple(Span(0.3 + 0.01 * n, 0.31 + 0.01 * n, f"w{n}") for n in range(4)))
+    sheet = replace(choose_cues(base), words=words)
+    _, phrases = read_project(CUE_FORMATS["pgo"].text(sheet, ""))
+    found = [word for *_, words in phrases for word, *_ in words]
+    assert len(found) < 4
+    assert "-".join(found) == "w0-w1-w2-w3"
+
+
+def test_speech_without_words_and_nothing_at_all() -> None:
+    _, phrases = read_project(CUE_FORMATS["pgo"].text(choose_cues(spoken("b aa b")), ""))
+    assert [word for *_, words in phrases for word, *_ in words] == [UNKNOWN]
+    nothing = CueSheet(Timeline((Span(0.0, 0.0, "X"),)), 24.0, "ABCDEFX")
+    about, phrases = read_project(CUE_FORMATS["pgo"].text(nothing, "line\nbreak"))
+    assert (phrases, about["sound"]) == ([], "line break")
+
+
+@pytest.mark.parametrize(("fps", "whole"), [(29.97, 30), (12.5, 13)])
+def test_times_stay_at_a_rate_that_is_not_whole(fps: float, whole: int) -> None:
+    """After ten minutes, 29.97 frames a second would be 18 frames behind 30."""
+    times_s = [frame / fps for frame in (0, 1, *range(int(600 * fps), int(600 * fps) + 6))]
+    starts = [math.ceil(time_s * 100) / 100 for time_s in times_s]
+    spans = [Span(start, end, "XADAXADA"[n]) for n, (start, end) in enumerate(pairwise([*starts, 601.0]))]
+    about, phrases = read_project(CUE_FORMATS["pgo"].text(CueSheet(Timeline(tuple(spans)), fps, "ABCDEFX"), "a.wav"))
+    assert about["fps"] == str(whole)
+    for span in spans:
+        assert shown(phrases, int(span.start_s * whole)) == SHAPES[span.label].blair
+
+
+@pytest.fixture
+def puppet() -> CueSheet:
+    return choose_cues(spoken("m aa m uw"), optional="GX")
+
+
+def test_every_cue_is_a_key_of_an_attachment_that_there_is(puppet: CueSheet, tmp_path: Path) -> None:
+    path = tmp_path / "a.spine.json"
+    write_cue_file(path, puppet, "talk.wav", format_of(path))
+    document = json.loads(path.read_text(encoding="ascii"))
+    keys = document["animations"]["speech"]["slots"]["mouth"]["attachment"]
+    expected = [(cue.start_s, cue.label) for cue in puppet.cues] + [(puppet.duration_s, "X")]
+    assert [(key["time"], key["name"]) for key in keys] == expected
+    assert "A" in {key["name"] for key in keys} <= {*document["skins"][0]["attachments"]["mouth"]} == {*"ABCDEFGX"}
+    assert document["slots"] == [{"name": "mouth", "bone": "root", "attachment": "X"}]
+    assert document["events"] == {"speech": {"audio": "talk.wav"}}
+    write_cue_file(path, puppet, "", "spine.json")
+    assert "events" not in json.loads(path.read_text(encoding="ascii"))
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not programs.node_package("@esotericsoftware/spine-core"), reason="no spine-core")
+def test_spine_reads_it(puppet: CueSheet, tmp_path: Path) -> None:
+    write_cue_file(tmp_path / "a.spine.json", puppet, "talk.wav", "spine.json")
+    found = programs.run_node("spine_keys.mjs", "@esotericsoftware/spine-core", tmp_path / "a.spine.json")
+    assert (found["slot"], found["attachments"], found["audio"]) == ("mouth", [*"ABCDEFGX"], ["talk.wav"])
+    assert found["names"] == [*(cue.label for cue in puppet.cues), "X"]
+    assert found["times"] == pytest.approx([*(cue.start_s for cue in puppet.cues), puppet.duration_s], abs=1e-5)

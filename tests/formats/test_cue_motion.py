@@ -1,7 +1,3 @@
-"""Cue files as motion: every format that is written is read, closures stay closed, and what is damaged is named."""
-
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace
@@ -67,22 +63,19 @@ TABLES = {
     "spans.csv": "start,end,value\n0,0.5,X\n0.5,1,A\n1,2,D\n",
     "ms.csv": "start,end,value\n0,500,X\n500,1000,A\n1000,2000,D\n",
     "events.json": json.dumps([{"time": t, "viseme": v} for t, v in ((0, "sil"), (0.5, "PP"), (1, "aa"), (2, "sil"))]),
-    "visemes.json": json.dumps(
-        {"visemes": [{"start": f"{t},0", "end": t + 1, "name": f"viseme_{v}"} for t, v in enumerate(("sil", "aa"))]}
-    ),
-    "comma.json": json.dumps(
-        {"mouthCues": [{"start": f"{t},0", "end": f"{t + 1},0", "value": v} for t, v in enumerate("XD")]}
-    ),
-}
+    "visemes.json": json.dumps({"visemes": [
+        {"start": f"{t},0", "end": t + 1, "name": f"viseme_{v}"} for t, v in enumerate(("sil", "aa"))]}),
+    "comma.json": json.dumps({"mouthCues": [
+        {"start": f"{t},0", "end": f"{t + 1},0", "value": v} for t, v in enumerate("XD")]}),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", TABLES)
 def test_cues_of_tables_and_events_of_visemes(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(TABLES[name])
     motion, units = read_motion(tmp_path / name)
-    closed = (
-        [("sil", 0.0, 0.5), ("p", 0.5, 1.0)] if "A" in TABLES[name] or "PP" in TABLES[name] else [("sil", 0.0, 1.0)]
-    )
+    closes = "A" in TABLES[name] or "PP" in TABLES[name]
+    closed = [("sil", 0.0, 0.5), ("p", 0.5, 1.0)] if closes else [("sil", 0.0, 1.0)]
     found = [(span.label.phone, span.start_s, span.end_s) for span in units]
     assert found == [(phone, *map(pytest.approx, times)) for phone, *times in (*closed, ("aa", 1.0, 2.0))]
     assert motion.time_s[-1] == pytest.approx(2.0)

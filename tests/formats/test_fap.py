@@ -1,18 +1,15 @@
-"""MPEG-4's parameters: a round trip, and files of others."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from formats.examples import of_motion
 from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import read_motion, write_motion
 from lipmotion.formats.fap import FAP, MOUTH_TO_NOSE, PARAMETERS, STEPS, move_faps
-from lipmotion.types import Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types import Channel, Generation, Motion
 from meshes.speech import motion, units
 
 NONE = ["0"] * 68
@@ -21,8 +18,7 @@ NONE = ["0"] * 68
 def generation(frames: int = 50, rate_hz: float = 25.0) -> Generation:
     values = np.rint(np.random.default_rng(5).normal(0, 200, (frames, len(PARAMETERS))))
     channels = tuple(Channel(f"fap{number}_{name}", FAP) for number, name, *_ in PARAMETERS)
-    motion = Motion(values, rate_hz, channels)
-    return Generation(motion, values, Timeline(()), StateTrace(("a",), np.zeros(frames, np.intp)))
+    return of_motion(Motion(values, rate_hz, channels))
 
 
 @pytest.mark.parametrize("rate_hz", [25.0, 29.97, 100.0])
@@ -77,41 +73,22 @@ def test_what_is_wrong_is_said(tmp_path):
     for lines, message in WRONG:
         with pytest.raises(InputError, match=message):
             read(tmp_path, *lines)
-
-
-def test_other_channels_are_refused(tmp_path):
     other = replace(generation(), motion=Motion(np.zeros((2, 1)), 25.0, (Channel("opening"),)))
     with pytest.raises(ExportError, match="no parameters of MPEG-4 but opening"):
         write_motion(tmp_path / "a.fap", other, source={}, model={})
 
 
-@pytest.fixture(scope="module")
-def parameters():
-    return move_faps(motion(), units())
-
-
-def test_rest_is_0(parameters):
+def test_lips_rest_at_0_meet_in_p_and_m_and_go_as_the_standard_says():
+    """Values are whole; a gap is its share of the unit."""
+    parameters = move_faps(motion(), units())
+    np.testing.assert_allclose(parameters.values, np.rint(parameters.values), atol=1e-12)
     assert np.abs(parameters.values[5:30]).max() <= 1
-
-
-def test_lips_meet_in_p_and_m(parameters):
-    apart = parameters["fap4_lower_t_midlip"] + parameters["fap5_raise_b_midlip"]
+    apart = -(parameters["fap4_lower_t_midlip"] + parameters["fap5_raise_b_midlip"])
     assert np.abs(apart[[55, 95]]).max() <= 1
-
-
-def test_the_directions_are_those_of_the_standard(parameters):
+    gap = opening_to_gap(motion()["opening"][75:76].astype(np.float64))
+    assert apart[75] / STEPS * MOUTH_TO_NOSE == pytest.approx(float(gap[0]), abs=0.002)
     assert parameters["fap3_open_jaw"][75] > 0
     assert parameters["fap5_raise_b_midlip"][75] < 0
     assert parameters["fap4_lower_t_midlip"][75] < 0
     assert parameters["fap6_stretch_l_cornerlip"][115] < 0  # oo is narrow
     assert parameters["fap7_stretch_r_cornerlip"][115] < 0
-
-
-def test_a_gap_is_its_share_of_the_unit(parameters):
-    apart = -(parameters["fap4_lower_t_midlip"][75] + parameters["fap5_raise_b_midlip"][75])
-    gap = opening_to_gap(motion()["opening"][75:76].astype(np.float64))
-    assert apart / STEPS * MOUTH_TO_NOSE == pytest.approx(float(gap[0]), abs=0.002)
-
-
-def test_values_are_whole(parameters):
-    np.testing.assert_allclose(parameters.values, np.rint(parameters.values), atol=1e-12)

@@ -1,16 +1,11 @@
-"""Animations of Godot: the text of a resource that Godot saved, and keys that are those of the motion."""
-
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from formats.curve_examples import generation
+from formats.examples import generation, written
 from lipmotion.errors import ExportError
-from lipmotion.formats.base import write_motion
 
 TRACK = re.compile(
     r'tracks/(\d+)/type = "blend_shape"\ntracks/\1/imported = false\ntracks/\1/enabled = true\n'
@@ -21,16 +16,12 @@ TRACK = re.compile(
 
 def test_a_resource_has_the_tracks_of_the_motion(tmp_path: Path) -> None:
     talking = generation("jawOpen", "viseme_PP", "headYaw", stepped=("viseme_PP",))
-    write_motion(tmp_path / "a.tres", talking, source={}, model={})
-    text = (tmp_path / "a.tres").read_text(encoding="utf-8")
+    text = written(tmp_path / "a.tres", talking).read_text(encoding="utf-8")
     head = '[gd_resource type="Animation" format=3]\n\n[resource]\nresource_name = "speech"\n'
     head += "length = 1\nstep = 0.0333333\n"
     assert text.startswith(head)
     found = TRACK.findall(text)
-    assert [(number, name, interp) for number, name, interp, _ in found] == [
-        ("0", "jawOpen", "1"),
-        ("1", "viseme_PP", "0"),
-    ]
+    assert [match[:3] for match in found] == [("0", "jawOpen", "1"), ("1", "viseme_PP", "0")]
     assert head + "".join(match[0] for match in TRACK.finditer(text)) == text
     keys = [np.array([float(number) for number in each[3].split(",")]).reshape(-1, 3) for each in found]
     assert {*keys[0][:, 1]} == {1.0}
@@ -43,24 +34,29 @@ def test_a_resource_has_the_tracks_of_the_motion(tmp_path: Path) -> None:
 def test_godot_parser_reads_the_same_tracks(tmp_path: Path) -> None:
     godot_parser = pytest.importorskip("godot_parser")
     talking = generation("jawOpen", "viseme_PP", "headYaw", stepped=("viseme_PP",))
-    write_motion(tmp_path / "a.tres", talking, source={}, model={})
-    read = godot_parser.load(str(tmp_path / "a.tres"))
+    read = godot_parser.load(str(written(tmp_path / "a.tres", talking)))
     (resource,) = read.get_sections("resource")
-    assert (read.find_section("gd_resource").header.attributes["type"], resource["resource_name"]) == (
-        "Animation",
-        "speech",
-    )
+    kind = read.find_section("gd_resource").header.attributes["type"]
+    assert (kind, resource["resource_name"]) == ("Animation", "speech")
     assert [str(resource[f"tracks/{n}/path"].path) for n in range(2)] == [".:jawOpen", ".:viseme_PP"]
     keys = np.array(resource["tracks/0/keys"].args, float).reshape(-1, 3)
     again = np.interp(talking.motion.time_s, keys[:, 0], keys[:, 2])
     assert again == pytest.approx(talking.motion["jawOpen"], abs=2e-4)
 
 
-def test_names_that_no_path_has_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match=r"'Face\.jawOpen' has one of the letters"):
-        write_motion(tmp_path / "a.tres", generation("Face.jawOpen"), source={}, model={})
-    with pytest.raises(ExportError, match="no blendshapes"):
-        write_motion(tmp_path / "a.tres", generation("headYaw"), source={}, model={})
+@pytest.mark.parametrize(
+    ("name", "channel", "message"),
+    [
+        ("a.tres", "Face.jawOpen", r"'Face\.jawOpen' has one of the letters"),
+        ("a.tres", "headYaw", "no blendshapes"),
+        ("a.anim", "headYaw", "no blendshapes, or no two frames"),
+    ],
+)
+def test_names_that_no_path_has_and_motion_without_weights_are_refused(
+    tmp_path: Path, name: str, channel: str, message: str
+) -> None:
+    with pytest.raises(ExportError, match=message):
+        written(tmp_path / name, generation(channel))
 
 
 HEAD = "%YAML 1.1\n%TAG !u! tag:unity3d.com,2011:\n--- !u!74 &7400000\nAnimationClip:\n  m_ObjectHideFlags: 0\n"
@@ -83,8 +79,7 @@ def curves(text: str, part: str) -> dict[str, list[dict[str, float]]]:
 
 def test_a_clip_has_the_curves_of_the_motion(tmp_path: Path) -> None:
     talking = generation("jawOpen", "Mund auf", "headYaw")
-    write_motion(tmp_path / "a.anim", talking, source={}, model={})
-    text = (tmp_path / "a.anim").read_text(encoding="utf-8")
+    text = written(tmp_path / "a.anim", talking).read_text(encoding="utf-8")
     assert text.startswith(HEAD)
     assert "\n  m_SampleRate: 30\n" in text
     assert "\n    m_StopTime: 1.000000\n" in text
@@ -105,8 +100,8 @@ def test_a_clip_has_the_curves_of_the_motion(tmp_path: Path) -> None:
 def test_unityparser_reads_the_same_clip(tmp_path: Path) -> None:
     unityparser = pytest.importorskip("unityparser")
     talking = generation("jawOpen", "Mund auf", "aa", stepped=("aa",))
-    write_motion(tmp_path / "a.anim", talking, source={"path": "lines/Anna 1.wav"}, model={})
-    clip = unityparser.UnityDocument.load_yaml(str(tmp_path / "a.anim")).entry
+    path = written(tmp_path / "a.anim", talking, path="lines/Anna 1.wav")
+    clip = unityparser.UnityDocument.load_yaml(str(path)).entry
     assert (clip.anchor, clip.m_Name, clip.m_AnimationClipSettings["m_StopTime"]) == ("7400000", "Anna 1", "1.000000")
     assert clip.m_FloatCurves == clip.m_EditorCurves
     names = [curve["attribute"] for curve in clip.m_FloatCurves]
@@ -118,12 +113,7 @@ def test_unityparser_reads_the_same_clip(tmp_path: Path) -> None:
 
 
 def test_held_poses_have_constant_tangents(tmp_path: Path) -> None:
-    write_motion(tmp_path / "a.anim", generation("aa", stepped=("aa",)), source={}, model={})
-    keys = curves((tmp_path / "a.anim").read_text(), "m_FloatCurves")["blendShape.aa"]
+    text = written(tmp_path / "a.anim", generation("aa", stepped=("aa",))).read_text()
+    keys = curves(text, "m_FloatCurves")["blendShape.aa"]
     assert [(round(key["time"], 3), key["value"]) for key in keys] == [(0, 25), (0.333, 75), (0.667, 50), (1, 50)]
     assert {(key["inSlope"], key["outSlope"], key["tangentMode"]) for key in keys} == {(np.inf, np.inf, 103)}
-
-
-def test_motion_without_weights_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match="no blendshapes, or no two frames"):
-        write_motion(tmp_path / "a.anim", generation("headYaw"), source={}, model={})

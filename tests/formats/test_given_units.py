@@ -1,7 +1,3 @@
-"""Phones in time that users give: motion files, units alone, labels of other programs; gaps are silence."""
-
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +17,8 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import UNKNOWN_PHONES, close_gaps, is_silent
 
-ROWS = [(0.0, 0.4, "sil"), (0.4, 0.5, "m"), (0.5, 0.7, "aa")]
+Row = tuple[float, float, str]
+ROWS: list[Row] = [(0.0, 0.4, "sil"), (0.4, 0.5, "m"), (0.5, 0.7, "aa")]
 
 
 def timeline(*rows: tuple[float, float, str]) -> Timeline[Unit]:
@@ -34,56 +31,56 @@ def phones(units: Timeline[Unit]) -> list[tuple[float, float, str]]:
 
 def test_units_alone_without_names_of_units(tmp_path: Path) -> None:
     rows = [{"start_s": a, "end_s": b, "phone": phone} for a, b, phone in ROWS]
-    (tmp_path / "a.json").write_text(json.dumps({"units": rows}), encoding="utf-8")
+    again = [{**row, "word": "oh", "again": n == 1} for n, row in enumerate(rows)]
+    for name, content in (("a", {"units": rows}), ("b", {"units": again})):
+        (tmp_path / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
     assert read_units(tmp_path / "a.json") == timeline(*ROWS)
-    again = {"units": [{**row, "word": "oh", "again": n == 1} for n, row in enumerate(rows)]}
-    (tmp_path / "d.json").write_text(json.dumps(again), encoding="utf-8")
-    assert [span.label.again for span in read_units(tmp_path / "d.json")] == [n == 1 for n in range(len(rows))]
-    (tmp_path / "b.json").write_text('{"units": [{"start_s": 0, "phone": "m"}]}', encoding="utf-8")
-    with pytest.raises(InputError, match=r"b\.json: .*end_s is missing.*; export it again"):
-        read_units(tmp_path / "b.json")
-    (tmp_path / "c.json").write_text('{"phones": []}', encoding="utf-8")
-    with pytest.raises(InputError, match=r"c\.json: not a motion document"):
-        read_units(tmp_path / "c.json")
+    assert [span.label.again for span in read_units(tmp_path / "b.json")] == [n == 1 for n in range(len(rows))]
 
 
 def test_labels_of_audacity_with_a_gap(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("0.0\t0.4\tsil\n0.5\t0.7\taa\n", encoding="utf-8")
     assert phones(read_units(tmp_path / "a.txt")) == [ROWS[0], ROWS[2]]
-    (tmp_path / "b.txt").write_text("please speak\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"b\.txt: holds no phones in time"):
-        read_units(tmp_path / "b.txt")
-    with pytest.raises(InputError, match=r"c\.txt: no such units file"):
-        read_units(tmp_path / "c.txt")
 
 
-def test_gaps_are_silence() -> None:
-    filled = close_gaps(timeline((0.2, 0.4, "m"), (0.5, 0.7, "aa")), 1.0)
-    expected = [(0.0, 0.2, "sil"), (0.2, 0.4, "m"), (0.4, 0.5, "sil"), (0.5, 0.7, "aa"), (0.7, 1.0, "sil")]
-    assert phones(filled) == expected
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("b.json", '{"units": [{"start_s": 0, "phone": "m"}]}', r"b\.json: .*end_s is missing.*; export it again"),
+        ("c.json", '{"phones": []}', r"c\.json: not a motion document"),
+        ("b.txt", "please speak\n", r"b\.txt: holds no phones in time"),
+        ("c.txt", None, r"c\.txt: no such units file"),
+        ("a.wav", "RIFF", r"a\.wav: cannot read phones from '\.wav'; use one of \.json, \.npz, \.TextGrid"),
+    ],
+)
+def test_other_files_are_no_units(tmp_path: Path, name: str, content: str | None, message: str) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        read_units(tmp_path / name)
 
 
-def test_gaps_of_rounding_belong_to_the_phone_before() -> None:
-    filled = close_gaps(timeline((0.0, 0.4, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")), 1.0)
-    assert phones(filled) == [(0.0, 0.404, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")]
-
-
-def test_whole_timelines_stay_as_they_are() -> None:
-    assert close_gaps(timeline(*ROWS), 0.7) == timeline(*ROWS)
+@pytest.mark.parametrize(
+    ("given", "end_s", "wanted"),
+    [
+        (
+            [(0.2, 0.4, "m"), (0.5, 0.7, "aa")],
+            1.0,
+            [(0.0, 0.2, "sil"), (0.2, 0.4, "m"), (0.4, 0.5, "sil"), (0.5, 0.7, "aa"), (0.7, 1.0, "sil")],
+        ),
+        (  # gaps of rounding belong to the phone before
+            [(0.0, 0.4, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")],
+            1.0,
+            [(0.0, 0.404, "sil"), (0.404, 0.5, "m"), (0.5, 0.994, "aa")],
+        ),
+        (ROWS, 0.7, ROWS),
+        ([(0.0, float("inf"), "aa")], 0.8, [(0.0, 0.8, "aa")]),
+    ],
+)
+def test_gaps_are_silence(given: list[Row], end_s: float, wanted: list[Row]) -> None:
+    assert phones(close_gaps(timeline(*given), end_s)) == wanted
     named = Timeline((Span(0.1, 0.2, Unit("", "bilabial")),))
     assert close_gaps(named, 1.0) is named
-
-
-def test_a_last_phone_without_an_end_ends_with_the_recording() -> None:
-    assert phones(close_gaps(timeline((0.0, float("inf"), "aa")), 0.8)) == [(0.0, 0.8, "aa")]
-
-
-def test_other_files_are_no_units(tmp_path: Path) -> None:
-    (tmp_path / "a.wav").write_bytes(b"RIFF")
-    with pytest.raises(
-        InputError, match=r"a\.wav: cannot read phones from '\.wav'; use one of \.json, \.npz, \.TextGrid"
-    ):
-        read_units(tmp_path / "a.wav")
 
 
 WELCOME = Path("examples/welcome.flac")

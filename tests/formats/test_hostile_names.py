@@ -1,7 +1,3 @@
-"""Each writer keeps names that could break its format, or refuses them; ``hostile_names`` says how they are read."""
-
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

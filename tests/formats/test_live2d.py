@@ -1,7 +1,3 @@
-"""Motions of Live2D: counts are exact, and the curves through the keys are those of the mouth."""
-
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -9,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from formats.examples import of_motion, written
 from lipmotion.errors import ExportError
-from lipmotion.formats import write_motion
 from lipmotion.formats.live2d import TOLERANCE, mouth_form, mouth_open
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 
 FRAMES = 300
 
@@ -26,7 +22,7 @@ def talking() -> Generation:
     width = 0.6 + 0.08 * speaking * np.sin(2 * np.pi * time_s)
     motion = Motion(np.stack([opening, width], axis=1), 100.0, (Channel("opening"), Channel("width")))
     units = Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 3.0, Unit("aa"))))
-    return Generation(motion, motion.values, units, StateTrace(("a",), np.zeros(FRAMES, np.intp)))
+    return of_motion(motion, units)
 
 
 def read(path: Path) -> tuple[dict, dict[str, tuple[np.ndarray, np.ndarray]]]:
@@ -56,8 +52,7 @@ def read(path: Path) -> tuple[dict, dict[str, tuple[np.ndarray, np.ndarray]]]:
 
 
 def test_curves_through_the_keys_are_those_of_the_mouth(tmp_path, talking):
-    write_motion(tmp_path / "a.motion3.json", talking, source={}, model={})
-    meta, curves = read(tmp_path / "a.motion3.json")
+    meta, curves = read(written(tmp_path / "a.motion3.json", talking))
     assert meta["Duration"] == pytest.approx(2.99)
     for name, values in (("ParamMouthOpenY", mouth_open(talking)), ("ParamMouthForm", mouth_form(talking))):
         times_s, keys = curves[name]
@@ -71,14 +66,12 @@ def test_curves_through_the_keys_are_those_of_the_mouth(tmp_path, talking):
 def test_held_poses_change_at_once(tmp_path, talking):
     values = np.repeat([[0.01, 0.6], [0.16, 0.6], [0.01, 0.65]], 100, axis=0)
     steps = replace(talking, motion=replace(talking.motion, values=values), stepped=("opening", "width"))
-    write_motion(tmp_path / "a.motion3.json", steps, source={}, model={})
-    _, curves = read(tmp_path / "a.motion3.json")
-    assert curves["ParamMouthOpenY"][0].tolist() == [0, 1, 2, 2.99]
-    document = json.loads((tmp_path / "a.motion3.json").read_text())
-    assert document["Curves"][0]["Segments"][2::3] == [2, 2, 2]
-    write_motion(tmp_path / "b.motion3.json", replace(steps, stepped=()), source={}, model={})
-    smooth = json.loads((tmp_path / "b.motion3.json").read_text())
-    assert set(smooth["Curves"][0]["Segments"][2::3]) == {0}
+    paths = [
+        written(tmp_path / f"{n}.motion3.json", each) for n, each in enumerate((steps, replace(steps, stepped=())))
+    ]
+    assert read(paths[0])[1]["ParamMouthOpenY"][0].tolist() == [0, 1, 2, 2.99]
+    held, smooth = (json.loads(path.read_text())["Curves"][0]["Segments"][2::3] for path in paths)
+    assert (held, set(smooth)) == ([2, 2, 2], {0})
 
 
 def test_the_mouth_rests_opens_and_is_wide(talking):
@@ -101,12 +94,11 @@ def test_blendshapes_open_it_as_well(tmp_path, talking):
     assert opened[100:150].min() > 0.3
     assert opened[150:200].max() < 0.05
     assert form[200:].max() < -0.3
-    write_motion(tmp_path / "a.motion3.json", moved, source={}, model={})
-    assert read(tmp_path / "a.motion3.json")[0]["CurveCount"] == 2
+    assert read(written(tmp_path / "a.motion3.json", moved))[0]["CurveCount"] == 2
 
 
 def test_what_does_not_open_is_refused(tmp_path, talking):
     still = replace(talking, motion=Motion(np.zeros((5, 1)), 100.0, (Channel("brow", WEIGHT),)))
     with pytest.raises(ExportError, match="no channel 'opening' or 'jawOpen'"):
-        write_motion(tmp_path / "a.motion3.json", still, source={}, model={})
+        written(tmp_path / "a.motion3.json", still)
     assert not list(tmp_path.iterdir())

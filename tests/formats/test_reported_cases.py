@@ -1,7 +1,5 @@
 """Labels that users of other tools have reported, and their siblings: words and phones as they are said."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence
@@ -54,51 +52,38 @@ def write(tmp_path: Path) -> Any:
 
 
 def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
-    rows = (
-        f'"IntervalTier"\n"{name.replace("__", " - ").replace("_", "-")}"\n0\n{end}\n{len(labels)}\n'
-        + "".join(f'{start}\n{stop}\n"{text}"\n' for start, stop, text in labels)
-        for name, labels in tiers.items()
-    )
-    return f'File type = "ooTextFile"\n"TextGrid"\n0\n{end}\n<exists>\n{len(tiers)}\n{"".join(rows)}'
+    rows = ""
+    for name, labels in tiers.items():
+        rows += f'"IntervalTier"\n"{name.replace("__", " - ").replace("_", "-")}"\n0\n{end}\n{len(labels)}\n'
+        rows += "".join(f'{start}\n{stop}\n"{text}"\n' for start, stop, text in labels)
+    return f'File type = "ooTextFile"\n"TextGrid"\n0\n{end}\n<exists>\n{len(tiers)}\n{rows}'
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "said", "sounds"),
     [
-        ("two-tiers-mau.TextGrid", MOTHER),
-        ("three-tiers-mau.TextGrid", MOTHER),
-        ("sampa-three-tiers.TextGrid", "she thought"),
-        ("spoken-noise-phone.TextGrid", MOTHER),
-        ("unknown-word-label.TextGrid", "my mother moved the baby"),
-        ("elan-utterances.TextGrid", "mama went home"),
-        ("noise-words.txt", "mama"),
-        ("said-not-in-transcript.json", "hi mama moon"),
-        ("word-time-nan.json", "hello big moon"),
-        ("words-in-ms.json", MOTHER),
-        ("two-speakers.TextGrid", "mama papa"),
-        ("u16le-nobom.TextGrid", "mama"),
-        ("fragments.json", "hello big moon"),
-        ("stt-utterances.json", "hello big moon"),
-        ("stt-nested-alternatives.json", "hello big moon"),
-        ("list-text-start_time.json", "hello big moon"),
+        ("two-tiers-mau.TextGrid", MOTHER, ""),
+        ("three-tiers-mau.TextGrid", MOTHER, ""),
+        ("sampa-three-tiers.TextGrid", "she thought", "sil sh iy th ao t sil"),
+        ("spoken-noise-phone.TextGrid", MOTHER, ""),
+        ("unknown-word-label.TextGrid", "my mother moved the baby", ""),
+        ("elan-utterances.TextGrid", "mama went home", ""),
+        ("noise-words.txt", "mama", ""),
+        ("said-not-in-transcript.json", "hi mama moon", "hh ay m aa m ah m uw n"),
+        ("word-time-nan.json", "hello big moon", ""),
+        ("words-in-ms.json", MOTHER, ""),
+        ("two-speakers.TextGrid", "mama papa", "m aa m ax p aa p ax"),
+        ("u16le-nobom.TextGrid", "mama", "sil m aa m ax sil"),
+        ("fragments.json", "hello big moon", ""),
+        ("stt-utterances.json", "hello big moon", ""),
+        ("stt-nested-alternatives.json", "hello big moon", ""),
+        ("list-text-start_time.json", "hello big moon", ""),
+        ("city-flap-ipa.TextGrid", "", "sil s ih d iy s ih d iy s ih d iy sil"),
     ],
 )
-def test_the_words_that_are_said(name: str, said: str) -> None:
-    assert words(CASES / name) == said
-
-
-@pytest.mark.parametrize(
-    ("name", "wanted"),
-    [
-        ("sampa-three-tiers.TextGrid", "sil sh iy th ao t sil"),
-        ("city-flap-ipa.TextGrid", "sil s ih d iy s ih d iy s ih d iy sil"),
-        ("said-not-in-transcript.json", "hh ay m aa m ah m uw n"),
-        ("two-speakers.TextGrid", "m aa m ax p aa p ax"),
-        ("u16le-nobom.TextGrid", "sil m aa m ax sil"),
-    ],
-)
-def test_the_phones_that_are_said(name: str, wanted: str) -> None:
-    assert phones(CASES / name) == wanted.split()
+def test_the_words_and_phones_that_are_said(name: str, said: str, sounds: str) -> None:
+    assert not said or words(CASES / name) == said
+    assert not sounds or phones(CASES / name) == sounds.split()
 
 
 def test_tiers_of_webmaus_have_their_roles(write: Any) -> None:
@@ -132,16 +117,14 @@ def test_a_part_of_a_word_that_is_unknown_has_no_word(write: Any) -> None:
 @pytest.mark.parametrize("per_s", [1000, 10_000_000])
 def test_units_of_time_follow_from_how_long_words_last(write: Any, per_s: int) -> None:
     edges = ((0, 0), (25, 21), (85, 11), (135, 0), (185, 21))
-    whole = [{"audioOffset": ms * per_s // 1000, "visemeId": number} for ms, number in edges]
-    seconds = [{"audioOffset": ms / 1000, "visemeId": number} for ms, number in edges]
-    for events in (whole, seconds):
-        starts_s = [span.start_s for span in read_phones(write(events))]
-        assert starts_s == pytest.approx([0, 0.025, 0.085, 0.135, 0.185])
-    assert times(write({"words": [{"text": w, "start": round(a * per_s), "end": round(b * per_s)} for w, a, b in W]}))[
-        2
-    ] == pytest.approx((1.2, 1.6))
+    for events in (
+        [{"audioOffset": ms * per_s // 1000, "visemeId": number} for ms, number in edges],
+        [{"audioOffset": ms / 1000, "visemeId": number} for ms, number in edges],
+    ):
+        assert [span.start_s for span in read_phones(write(events))] == pytest.approx([0, 0.025, 0.085, 0.135, 0.185])
     labels = [(round(a * per_s), round(b * per_s), w) for w, a, b in W]
     for path in (
+        write({"words": [{"text": w, "start": a, "end": b} for a, b, w in labels]}),
         write(grid(2 * per_s, words=labels), "a.TextGrid"),
         write("".join(f"{a}\t{b}\t{w}\n" for a, b, w in labels), "a.txt"),
     ):
@@ -245,99 +228,69 @@ def test_no_form_of_words_speaks_what_is_no_word(write: Any) -> None:
         assert words(write(content, name)) == "mama uh", name
 
 
+DOT = {"type": "punctuation", "alternatives": [{"content": "."}]}
 SERVICES: dict[str, Any] = {
-    "AWS": {
-        "results": {
-            "transcripts": [{"transcript": "no"}],
-            "items": [
-                *(
-                    {
-                        "start_time": str(a),
-                        "end_time": str(b),
-                        "type": "pronunciation",
-                        "alternatives": [{"content": w}],
-                    }
-                    for w, a, b in W
-                ),
-                {"type": "punctuation", "alternatives": [{"content": "."}]},
-            ],
-        }
-    },
+    "AWS": {"results": {"transcripts": [{"transcript": "no"}], "items": [
+        *({"start_time": str(a), "end_time": str(b), "type": "pronunciation", "alternatives": [{"content": w}]}
+          for w, a, b in W), DOT]}},
     "AssemblyAI": {
-        "audio_duration": 2,
-        "words": [{"text": w, "start": round(1000 * a), "end": round(1000 * b), "speaker": None} for w, a, b in W],
-        "utterances": None,
-        "chapters": [{"summary": "no", "start": 0, "end": 2000}],
-    },
-    "Google": {
-        "results": [
-            {
-                "alternatives": [
-                    {"words": [{"word": w, "startTime": f"{a:.3f}s", "endTime": f"{b:.3f}s"} for w, a, b in W]},
-                    {"transcript": "jello"},
-                ]
-            }
-        ]
-    },
-    "Google in Python": {
-        "results": [
-            {
-                "alternatives": [
-                    {
-                        "words": [
-                            {
-                                "word": w,
-                                "start_time": {"seconds": int(a), "nanos": round(a % 1 * 1e9)},
-                                "end_time": {"seconds": str(int(b)), "nanos": round(b % 1 * 1e9)},
-                            }
-                            for w, a, b in W
-                        ]
-                    }
-                ]
-            }
-        ]
-    },
-    "Speechmatics": {
-        "format": "2.9",
-        "results": [
-            *({"type": "word", "start_time": a, "end_time": b, "alternatives": [{"content": w}]} for w, a, b in W),
-            {"type": "punctuation", "start_time": 1.6, "end_time": 1.6, "alternatives": [{"content": "."}]},
-        ],
-    },
+        "audio_duration": 2, "utterances": None, "chapters": [{"summary": "no", "start": 0, "end": 2000}],
+        "words": [{"text": w, "start": round(1000 * a), "end": round(1000 * b), "speaker": None} for w, a, b in W]},
+    "Google": {"results": [{"alternatives": [
+        {"words": [{"word": w, "startTime": f"{a:.3f}s", "endTime": f"{b:.3f}s"} for w, a, b in W]},
+        {"transcript": "jello"}]}]},
+    "Google in Python": {"results": [{"alternatives": [{"words": [
+        {"word": w, "start_time": {"seconds": int(a), "nanos": round(a % 1 * 1e9)},
+         "end_time": {"seconds": str(int(b)), "nanos": round(b % 1 * 1e9)}} for w, a, b in W]}]}]},
+    "Speechmatics": {"format": "2.9", "results": [
+        *({"type": "word", "start_time": a, "end_time": b, "alternatives": [{"content": w}]} for w, a, b in W),
+        DOT | {"start_time": 1.6, "end_time": 1.6}]},
     "Watson": {"results": [{"alternatives": [{"transcript": "no", "timestamps": [list(row) for row in W]}]}]},
-    "Azure": {
-        "Offset": 4_000_000,
-        "Duration": 12_000_000,
-        "NBest": [
-            {
-                "Display": "No.",
-                "Words": [{"Word": w, "Offset": round(a * 1e7), "Duration": round((b - a) * 1e7)} for w, a, b in W],
-            }
-        ],
-    },
-    "ElevenLabs Scribe": {
-        "text": "no",
-        "words": [
-            *({"text": w, "start": a, "end": b, "type": "word"} for w, a, b in W),
-            {"text": " ", "start": 1.6, "end": 1.7, "type": "spacing"},
-            {"text": "(laughter)", "start": 1.7, "end": 2, "type": "audio_event"},
-        ],
-    },
+    "Azure": {"Offset": 4_000_000, "Duration": 12_000_000, "NBest": [{"Display": "No.", "Words": [
+        {"Word": w, "Offset": round(a * 1e7), "Duration": round((b - a) * 1e7)} for w, a, b in W]}]},
+    "ElevenLabs Scribe": {"text": "no", "words": [
+        *({"text": w, "start": a, "end": b, "type": "word"} for w, a, b in W),
+        {"text": " ", "start": 1.6, "end": 1.7, "type": "spacing"},
+        {"text": "(laughter)", "start": 1.7, "end": 2, "type": "audio_event"}]},
     "words under another name": {"answer": {"list": [{"word": w, "start": a, "duration": b - a} for w, a, b in W]}},
     "a table": "start;end;word\n" + "".join(f"{a}".replace(".", ",") + f";{b};{w}\n" for w, a, b in W),
     "JSON lines": "".join(json.dumps({"word": w, "start": a, "end": b}) + "\n" for w, a, b in W),
     "JSON with a mark": b"\xef\xbb\xbf" + json.dumps([{"text": w, "from": a, "to": b} for w, a, b in W]).encode(),
     "TTML of words": '<tt xmlns="http://www.w3.org/ns/ttml"><body begin="0.1s"><p begin="0.1s" end="2s">'
-    + " ".join(f'<span begin="{a - 0.2:.2f}s" end="{b - 0.2:.2f}s">{w}</span>' for w, a, b in W)
-    + "</p></body></tt>",
-}
+    + " ".join(f'<span begin="{a - 0.2:.2f}s" end="{b - 0.2:.2f}s">{w}</span>' for w, a, b in W) + "</p></body></tt>",
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", SERVICES)
-def test_word_times_of_services(write: Any, name: str) -> None:
-    path = write(SERVICES[name])
+MS = [(w, 1000 * a, 1000 * b) for w, a, b in W]
+OTHERS: dict[str, Any] = {
+    "Speechify": [
+        {"type": "word", "start": 6 * i, "end": 6 * i + 5, "start_time": a, "end_time": b, "value": w}
+        for i, (w, a, b) in enumerate(MS)
+    ],
+    "Soniox": {"tokens": [
+        {"text": text, "start_ms": a, "end_ms": b}
+        for text, a, b in (("hel", 400, 600), ("lo", 600, 800), (" big", 850, 1100), (" moon", 1200, 1600))
+    ]},
+    "Hume": [{"text": w, "time": {"begin": a, "end": b}} for w, a, b in MS],
+    "PlayHT": [{"type": "word", "word": w, "time": {"start": a, "end": b}} for w, a, b in W],
+    "MiniMax": [{"timestamped_words": [{"word": w, "time_begin": a, "time_end": b} for w, a, b in MS]}],
+    "Inworld": {"timestampInfo": {"wordAlignment": {
+        "words": [w for w, *_ in W],
+        "wordStartTimeSeconds": [a for _, a, _ in W],
+        "wordEndTimeSeconds": [b for *_, b in W],
+    }}},
+    "milliseconds with decimals": [{"word": w, "start": a + 0.01, "end": b + 0.01} for w, a, b in MS],
+    "milliseconds as lines": "".join(f"{a:.1f}\t{b:.1f}\t{w}\n" for w, a, b in MS),
+    "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*SERVICES, *OTHERS])
+def test_word_times_of_services_and_voices(write: Any, name: str) -> None:
+    path = write((SERVICES | OTHERS)[name])
     assert words(path) == "hello big moon"
-    assert [time for pair in times(path) for time in pair] == pytest.approx([t for _, *pair in W for t in pair])
+    expected = [t for _, *pair in W for t in pair]
+    assert [t for pair in times(path) for t in pair] == pytest.approx(expected, abs=1e-3 if name in OTHERS else None)
 
 
 TTML = '<tt xmlns="http://www.w3.org/ns/ttml" xmlns:p="http://www.w3.org/ns/ttml#parameter" {}>{}</tt>'
@@ -349,23 +302,13 @@ LINES = {
     "TTML in ticks": TTML.format(RATES, BODY.format("4000000t", "dur", "12000000t")),
     "TTML in frames": TTML.format(RATES, BODY.format("00:00:00:10", "end", "40f")),
     "YouTube": '<transcript><text start="0.4" dur="1.2">hello big moon</text></transcript>',
-    "YouTube's JSON": {
-        "events": [{"tStartMs": 400, "dDurationMs": 1200, "segs": [{"utf8": "hello big"}, {"utf8": " moon"}]}]
-    },
-    "whisper.cpp": {
-        "transcription": [{"offsets": {"from": 400, "to": 1600}, "text": "hello big moon", "tokens": [{"text": "h"}]}]
-    },
-    "Azure in batch": {
-        "recognizedPhrases": [
-            {
-                "offset": "PT0.4S",
-                "offsetInTicks": 4e6,
-                "durationInTicks": 1.2e7,
-                "nBest": [{"display": "hello big moon"}],
-            }
-        ]
-    },
-}
+    "YouTube's JSON": {"events": [{"tStartMs": 400, "dDurationMs": 1200, "segs": [{"utf8": "hello big"}, {"utf8":
+        " moon"}]}]},
+    "whisper.cpp": {"transcription": [{"offsets": {"from": 400, "to": 1600}, "text": "hello big moon", "tokens": [{
+        "text": "h"}]}]},
+    "Azure in batch": {"recognizedPhrases": [{"offset": "PT0.4S", "offsetInTicks": 4e6, "durationInTicks": 1.2e7,
+        "nBest": [{"display": "hello big moon"}]}]},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", LINES)
@@ -420,43 +363,6 @@ XSAMPA = {"4": "d", "{": "ae", "3`": "er", "@U": "ow", "t_h": "t", '"i:': "iy", 
 def test_xsampa_is_read_where_it_makes_sense(write: Any) -> None:
     rows = [(i / 10, (i + 1) / 10, label.replace('"', '""')) for i, label in enumerate(XSAMPA)]
     assert phones(write(grid(phones=rows), "a.TextGrid")) == list(XSAMPA.values())
-
-
-MS = [(w, 1000 * a, 1000 * b) for w, a, b in W]
-OTHERS: dict[str, Any] = {
-    "Speechify": [
-        {"type": "word", "start": 6 * i, "end": 6 * i + 5, "start_time": a, "end_time": b, "value": w}
-        for i, (w, a, b) in enumerate(MS)
-    ],
-    "Soniox": {
-        "tokens": [
-            {"text": text, "start_ms": a, "end_ms": b}
-            for text, a, b in (("hel", 400, 600), ("lo", 600, 800), (" big", 850, 1100), (" moon", 1200, 1600))
-        ]
-    },
-    "Hume": [{"text": w, "time": {"begin": a, "end": b}} for w, a, b in MS],
-    "PlayHT": [{"type": "word", "word": w, "time": {"start": a, "end": b}} for w, a, b in W],
-    "MiniMax": [{"timestamped_words": [{"word": w, "time_begin": a, "time_end": b} for w, a, b in MS]}],
-    "Inworld": {
-        "timestampInfo": {
-            "wordAlignment": {
-                "words": [w for w, *_ in W],
-                "wordStartTimeSeconds": [a for _, a, _ in W],
-                "wordEndTimeSeconds": [b for *_, b in W],
-            }
-        }
-    },
-    "milliseconds with decimals": [{"word": w, "start": a + 0.01, "end": b + 0.01} for w, a, b in MS],
-    "milliseconds as lines": "".join(f"{a:.1f}\t{b:.1f}\t{w}\n" for w, a, b in MS),
-    "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
-}
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_word_times_of_voices_and_other_units(write: Any, name: str) -> None:
-    path = write(OTHERS[name])
-    assert words(path) == "hello big moon"
-    assert [t for pair in times(path) for t in pair] == pytest.approx([t for _, *pair in W for t in pair], abs=1e-3)
 
 
 @pytest.mark.parametrize(("start", "end"), [("start_offset", "end_offset"), ("start", "end")])

@@ -1,24 +1,19 @@
-"""Takes of Live Link Face: the app's own columns, and times as Unreal's importer reads them."""
-
-from __future__ import annotations
-
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from formats.examples import of_motion, written
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import read_motion
-from lipmotion.formats.base import write_motion
-from lipmotion.formats.tables import CURVES, timecode
+from lipmotion.formats.tables import CURVES, SPEECH_CURVES, is_live_link, speech_curves, timecode
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types import WEIGHT, Channel, Generation, Motion
+from meshes.live_link_app import COLUMNS, HEAD, write_take
 
 
 def test_the_table_is_as_specified(tmp_path, generation):
-    path = tmp_path / "a.csv"
-    write_motion(path, generation, source={}, model={})
+    path = written(tmp_path / "a.csv", generation)
     lines = path.read_text(encoding="utf-8").split("\n")
     assert lines[0] == "time_s,opening,x_17"
     assert lines[4] == "0.03,0.00000,0.12346"
@@ -71,29 +66,24 @@ def test_what_is_wrong_is_said(tmp_path):
         path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=message):
             read_motion(path)
+    path.write_text("time_s," + "a," * 600_000 + "b\n0,1\n")  # a line without end is not read whole
+    with pytest.raises(InputError, match="fields, required"):
+        read_motion(path)
 
 
 def test_names_that_other_separators_would_part_are_refused_and_odd_ones_come_back(tmp_path, generation):
     path = tmp_path / "a.csv"
 
-    def written(name: str) -> None:
-        odd = Motion(generation.motion.values[:, :1], 100.0, (Channel(name),))
-        write_motion(path, replace(generation, motion=odd), source={}, model={})
+    def write(name: str) -> None:
+        written(path, of_motion(Motion(generation.motion.values[:, :1], 100.0, (Channel(name),))))
 
     for name in ("a,b", 'a"b', "a\nb", "a;b", "a\tb", "a\u2028b", "a\x1bb"):
         with pytest.raises(ExportError, match=r"does not fit in a table; write .json or .npz"):
-            written(name)
+            write(name)
         assert not list(tmp_path.iterdir())
     for name in ("jaw open", "Mouth (L)", "a=b", "p1.x", "öffnen", "a|b", "x-y", "'x"):
-        written(name)
+        write(name)
         assert read_motion(path)[0].names == (name,)
-
-
-def test_a_line_without_end_is_not_read_whole(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("time_s," + "a," * 600_000 + "b\n0,1\n")
-    with pytest.raises(InputError, match="fields, required"):
-        read_motion(path)
 
 
 @pytest.mark.parametrize(
@@ -119,25 +109,10 @@ def test_uneven_times_of_other_programs_are_evened_out(tmp_path):
     np.testing.assert_allclose(motion["jaw"][:-1], motion.time_s[:-1], atol=1e-9)
 
 
-APP = (
-    "Timecode,BlendshapeCount,EyeBlinkLeft,EyeLookDownLeft,EyeLookInLeft,EyeLookOutLeft,EyeLookUpLeft,EyeSquintLeft,"
-    "EyeWideLeft,EyeBlinkRight,EyeLookDownRight,EyeLookInRight,EyeLookOutRight,EyeLookUpRight,EyeSquintRight,"
-    "EyeWideRight,JawForward,JawRight,JawLeft,JawOpen,MouthClose,MouthFunnel,MouthPucker,MouthRight,MouthLeft,"
-    "MouthSmileLeft,MouthSmileRight,MouthFrownLeft,MouthFrownRight,MouthDimpleLeft,MouthDimpleRight,"
-    "MouthStretchLeft,MouthStretchRight,MouthRollLower,MouthRollUpper,MouthShrugLower,MouthShrugUpper,"
-    "MouthPressLeft,MouthPressRight,MouthLowerDownLeft,MouthLowerDownRight,MouthUpperUpLeft,MouthUpperUpRight,"
-    "BrowDownLeft,BrowDownRight,BrowInnerUp,BrowOuterUpLeft,BrowOuterUpRight,CheekPuff,CheekSquintLeft,"
-    "CheekSquintRight,NoseSneerLeft,NoseSneerRight,TongueOut,HeadYaw,HeadPitch,HeadRoll,LeftEyeYaw,LeftEyePitch,"
-    "LeftEyeRoll,RightEyeYaw,RightEyePitch,RightEyeRoll"
-)
-"""The first line of a take as the app records it."""
-
-
-def generation(rate_hz: float, count: int = 61) -> Generation:
-    rng = np.random.default_rng(1)
+def all_curves(rate_hz: float, count: int = 61) -> Generation:
     names = (*ARKIT_MOUTH, *ARKIT_OTHERS, "headYaw", "opening")
-    moved = Motion(rng.random((count, len(names))), rate_hz, tuple(Channel(name, WEIGHT) for name in names))
-    return Generation(moved, np.zeros(moved.values.shape), Timeline(()), StateTrace(("a",), np.zeros(count, np.intp)))
+    values = np.random.default_rng(1).random((count, len(names)))
+    return of_motion(Motion(values, rate_hz, tuple(Channel(name, WEIGHT) for name in names)))
 
 
 def as_unreal_reads(path: Path) -> tuple[list[str], list[float], np.ndarray]:
@@ -157,22 +132,20 @@ def as_unreal_reads(path: Path) -> tuple[list[str], list[float], np.ndarray]:
 
 
 def test_the_columns_are_those_of_the_app(tmp_path: Path) -> None:
-    write_motion(tmp_path / "a.livelink.csv", generation(60.0), source={}, model={})
-    lines = (tmp_path / "a.livelink.csv").read_text().splitlines()
-    assert lines[0] == APP
+    lines = written(tmp_path / "a.livelink.csv", all_curves(60.0)).read_text().splitlines()
+    assert lines[0] == HEAD.replace("BlendShape", "Blendshape")
     assert len(CURVES) == 61
     assert all(line.split(",")[1] == "61" and line.count(",") == 62 for line in lines[1:])
 
 
 @pytest.mark.parametrize("rate_hz", [29.97, 100.0])
 def test_unreal_reads_the_same_times_and_values(tmp_path: Path, rate_hz: float) -> None:
-    written = generation(rate_hz)
-    write_motion(tmp_path / "a.livelink.csv", written, source={}, model={})
-    names, times, values = as_unreal_reads(tmp_path / "a.livelink.csv")
-    assert times == pytest.approx(written.motion.time_s.tolist(), abs=1e-5)
+    given = all_curves(rate_hz)
+    names, times, values = as_unreal_reads(written(tmp_path / "a.livelink.csv", given))
+    assert times == pytest.approx(given.motion.time_s.tolist(), abs=1e-5)
     for column, name in enumerate(names):
         own = name[0].lower() + name[1:]
-        wanted = written.motion[own] if own in written.motion.names else np.zeros(len(times))
+        wanted = given.motion[own] if own in given.motion.names else np.zeros(len(times))
         assert values[:, column] == pytest.approx(wanted, abs=1e-6)
     assert "opening" not in (tmp_path / "a.livelink.csv").read_text()
 
@@ -181,3 +154,128 @@ def test_times_carry_over() -> None:
     codes = {0.999999999: "00:00:01:00.000", 1 / 60: "00:00:00:01.000", 59.99: "00:00:59:59.400"}
     codes |= {3600 + 59.5: "01:00:59:30.000", 2 * 3600 + 5 * 60: "02:05:00:00.000"}
     assert {time_s: timecode(time_s) for time_s in codes} == codes
+
+
+RATE_HZ = 60.0
+
+
+@pytest.fixture
+def curves() -> Motion:
+    """Ten seconds of all curves: slow waves between 0 and 1."""
+    time_s = np.arange(601) / RATE_HZ
+    phase = np.linspace(0, 3, len(COLUMNS))
+    values = 0.5 + 0.5 * np.sin(2 * np.pi * 1.5 * time_s[:, None] + phase)
+    return Motion(values, RATE_HZ, tuple(Channel(name, WEIGHT) for name in COLUMNS))
+
+
+def row(code: str, *values: object, count: int = 61) -> str:
+    held = [*values, *[0] * (61 - len(values))]
+    return ",".join(map(str, [code, count, *held]))
+
+
+def read(tmp_path: Path, text: str) -> Motion:
+    (tmp_path / "take.csv").write_text(text, encoding="utf-8")
+    return read_motion(tmp_path / "take.csv")[0]
+
+
+def test_a_take_comes_back(tmp_path, curves):
+    write_take(tmp_path / "take.csv", curves)
+    motion, units = read_motion(tmp_path / "take.csv")
+    assert (motion.rate_hz, len(units)) == (60.0, 0)
+    assert set(motion.names) == {*ARKIT_MOUTH, *ARKIT_OTHERS} | {name[0].lower() + name[1:] for name in COLUMNS[52:]}
+    assert {c.unit for c in motion.channels if not c.name.endswith(("Yaw", "Pitch", "Roll"))} == {WEIGHT}
+    assert {c.unit for c in motion.channels if c.name.endswith(("Yaw", "Pitch", "Roll"))} == {"radian"}
+    np.testing.assert_allclose(motion.values, curves.values, atol=6e-11)
+
+
+@pytest.mark.parametrize("rate", [24.0, 25.0, 30.0, 60.0])
+@pytest.mark.parametrize("start_s", [0.0, 3_599.5, 86_395.0])
+def test_the_rate_of_the_timecode_is_found_and_midnight_passed(tmp_path, curves, rate, start_s):
+    write_take(tmp_path / "take.csv", curves, rate=rate, start_s=start_s)
+    motion = read_motion(tmp_path / "take.csv")[0]
+    assert motion.rate_hz == 60.0
+    np.testing.assert_allclose(motion.values, curves.values, atol=6e-11)
+
+
+@pytest.mark.parametrize("form", ["00:{0:02d}:{1:02d}.0", "00:{0:02d}:{1:02d}", "00:00:{0:02d}.0", "00:00:{0:02d}"])
+@pytest.mark.parametrize("rate", [24, 60])
+def test_frames_that_a_spreadsheet_made_seconds_of_are_frames(tmp_path, caplog, form, rate):
+    rows = [row(form.format(n // rate, n % rate), n / 1000) for n in range(4 * rate)]
+    motion = read(tmp_path, "\n".join([HEAD, *rows]))
+    assert (motion.rate_hz, len(motion.values)) == (pytest.approx(rate), 4 * rate)
+    assert "frames" in caplog.text
+
+
+def test_uneven_times_and_lost_frames_are_evened_out(tmp_path, curves):
+    rng = np.random.default_rng(3)
+    times_s = curves.time_s + rng.uniform(-0.3, 0.3, len(curves.values)) / RATE_HZ
+    times_s[0] = 0.0
+    kept = np.sort(rng.permutation(len(times_s) - 1)[:570])
+    kept = np.concatenate([[0], kept[kept > 0], [600]])
+    write_take(tmp_path / "take.csv", curves, np.maximum(times_s[kept], 0))
+    motion = read_motion(tmp_path / "take.csv")[0]
+    assert motion.rate_hz == 60.0
+    assert len(motion.values) == 601
+    inner = slice(1, 600)
+    assert np.abs(motion.values[inner] - curves.values[inner]).max() < 0.03
+    assert np.abs(motion.values[inner] - curves.values[inner]).mean() < 0.002
+
+
+@pytest.mark.parametrize(("before", "first"), [("00:00:59", 2), ("00:09:59", 0)])  # none is left out at each tenth
+def test_drop_frame_timecode_is_real_time(tmp_path, before, first):
+    """At 29.97 frames a second, 00:00:59;29 is followed by 00:01:00;02."""
+    after = f"00:{int(before[3:5]) + 1:02d}:00"
+    codes = [f"{before};{n:02d}" for n in range(30)] + [f"{after};{n:02d}" for n in range(first, 30)]
+    motion = read(tmp_path, "\n".join([HEAD, *(row(code, n / 100) for n, code in enumerate(codes))]))
+    assert motion.rate_hz == pytest.approx(30 / 1.001, abs=1e-3)
+    assert motion["eyeBlinkLeft"] == pytest.approx(np.arange(len(codes)) / 100)
+
+
+def test_rows_without_a_face_are_bridged_and_a_short_take_has_the_rate_of_the_app(tmp_path):
+    lines = [row(f"10:00:0{n // 60}:{n % 60:02d}.000", 0.01 * n) for n in range(90)]
+    lines[10:13] = [lines[10].split(",")[0] + ",0", lines[11].split(",")[0] + ",0,,,", lines[12].split(",")[0] + ",0"]
+    motion = read(tmp_path, "\n".join([HEAD + ",", *lines]) + "\n")
+    np.testing.assert_allclose(motion["eyeBlinkLeft"], 0.01 * np.arange(90), atol=1e-9)
+    motion = read(tmp_path, "\n".join([HEAD, *(row(f"10:00:00:{n:02d}.000") for n in range(10, 21))]))
+    assert motion.rate_hz == 60.0
+
+
+def test_curves_that_speech_moves(curves, tmp_path):
+    write_take(tmp_path / "take.csv", curves)
+    kept = speech_curves(read_motion(tmp_path / "take.csv")[0])
+    assert set(kept.names) == SPEECH_CURVES
+    with pytest.raises(InputError, match="none of its curves is one of mouth or jaw"):
+        speech_curves(Motion(np.zeros((3, 1)), 60.0, (Channel("browInnerUp", WEIGHT),)))
+
+
+def test_what_is_a_table_of_the_app():
+    for head in (HEAD, "timecode,BlendshapeCount,x", "Timecode,JawOpen"):
+        assert is_live_link(head.split(","))
+    for head in ("time_s,jawOpen", "Timecode,text", "timeCode,blendShapes.JawOpen"):
+        assert not is_live_link(head.split(","))
+
+
+GOOD_ROWS = [row(f"10:00:00:{n:02d}.000") for n in range(10)]
+
+
+WRONG_TAKES = [
+    ([], "there are no rows"),
+    (GOOD_ROWS[:1], "1 rows with values, required two or more"),
+    ([*GOOD_ROWS, "10:00:00:12.000,61,0.1"], "line 12 has 1 curves, required 61; delete it if it is the last"),
+    ([*GOOD_ROWS, row("soon")], "line 12 begins with 'soon', required a timecode as"),
+    ([*GOOD_ROWS, row("10:61:00:00.000")], "line 12 begins with '10:61:00:00.000', required a timecode"),
+    ([*GOOD_ROWS, row("10:00:00:13.000", "wide")], "could not convert string to float"),
+    ([*GOOD_ROWS, row("09:00:00:00.000")], r"the time of row 11 goes back by 3600"),
+    ([*GOOD_ROWS, row("11:00:00:00.000")], "11 rows in 3600.0 s at 60 rows a second: most of the time there are none"),
+    ([row(f"10:00:00:{n:02d}.000", count=0) for n in range(5)], "could not|0 rows with values"),
+    ([row(f"10:00:0{n // 200}:{n % 200}.000") for n in range(300)], "has frame 199, required less than 120"),
+]
+
+
+def test_what_is_wrong_in_a_take_is_said(tmp_path):
+    for lines, message in WRONG_TAKES:
+        with pytest.raises(InputError, match=message):
+            read(tmp_path, "\n".join([HEAD, *lines]))
+    (tmp_path / "take.csv").write_bytes(HEAD.encode() + b"\n\xff\xfe\x00")
+    with pytest.raises(InputError, match="not a table of"):
+        read_motion(tmp_path / "take.csv")

@@ -1,7 +1,3 @@
-"""Transcripts with times, as people and recognisers write them."""
-
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable
@@ -100,49 +96,21 @@ OF_LINES = {
     "lyrics": "[ar:Anna]\n[offset:+50]\n[00:02.80] How are\nyou\n[00:01.05] Hello there\n[00:02.55]\n[00:04.05]\n",
     "lines that begin with times": "[0:01] Hello there\n[00:00:02.50]\n[0:00:02.75]How are you\n[0:04]",
     "Whisper's table": "start\tend\ttext\n1000\t2500\tHello there!\n2750\t4000\tHow are you?\n",
-    "Whisper": json.dumps(
-        {
-            "text": " Hello there! How are you?",
-            "language": "en",
-            "segments": [
-                {"id": 0, "start": 1.0, "end": 2.5, "text": " Hello there!", "avg_logprob": math.nan},
-                {"id": 1, "start": 2.75, "end": 4, "text": " How are you?", "tokens": [1, 2]},
-            ],
-        }
-    ),
-    "faster-whisper's segments": json.dumps(
-        [
-            {"start": 1.0, "end": 2.5, "text": " Hello there!", "words": None},
-            {"start": 2.75, "end": 4.0, "text": "How are you?", "words": None},
-        ],
-        indent=1,
-    ),
-    "whisper.cpp": json.dumps(
-        {
-            "systeminfo": "AVX = 1",
-            "transcription": [
-                {
-                    "timestamps": {"from": "00:00:01,000", "to": "00:00:02,500"},
-                    "offsets": {"from": 1000, "to": 2500},
-                    "text": " Hello there!",
-                    "tokens": [{"text": " Hello"}],
-                },
-                {"offsets": {"from": 2750, "to": 4000}, "text": " How are you?"},
-            ],
-        }
-    ),
-    "transformers": json.dumps(
-        {
-            "text": "Hello there! How are you?",
-            "chunks": [
-                {"timestamp": [1.0, 2.5], "text": " Hello there!"},
-                {"timestamp": [2.75, 4.0], "text": " How are you?"},
-            ],
-        }
-    ),
+    "Whisper": json.dumps({"text": " Hello there! How are you?", "language": "en", "segments": [
+        {"id": 0, "start": 1.0, "end": 2.5, "text": " Hello there!", "avg_logprob": math.nan},
+        {"id": 1, "start": 2.75, "end": 4, "text": " How are you?", "tokens": [1, 2]}]}),
+    "faster-whisper's segments": json.dumps([
+        {"start": 1.0, "end": 2.5, "text": " Hello there!", "words": None},
+        {"start": 2.75, "end": 4.0, "text": "How are you?", "words": None}], indent=1),
+    "whisper.cpp": json.dumps({"systeminfo": "AVX = 1", "transcription": [
+        {"timestamps": {"from": "00:00:01,000", "to": "00:00:02,500"}, "offsets": {"from": 1000, "to": 2500},
+         "text": " Hello there!", "tokens": [{"text": " Hello"}]},
+        {"offsets": {"from": 2750, "to": 4000}, "text": " How are you?"}]}),
+    "transformers": json.dumps({"text": "Hello there! How are you?", "chunks": [
+        {"timestamp": [1.0, 2.5], "text": " Hello there!"}, {"timestamp": [2.75, 4.0], "text": " How are you?"}]}),
     "Audacity's labels": "1.000000\t2.500000\tHello there!\n2.750000\t4.000000\tHow are you?\n",
     "lines out of order": "00:00:02,750 --> 00:00:04,000\nHow are you\n\n00:00:01,000 --> 00:00:02,500\nHello there\n",
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", OF_LINES)
@@ -161,9 +129,7 @@ VOSK: list[dict[str, Any]] = [{"result": segment(0, 2, space="")["words"], "text
 VOSK += [{"result": segment(2, 5, space="")["words"], "text": "how are you"}]
 OF_WORDS = {
     "Whisper": json.dumps({"text": "", "segments": [segment(0, 2), segment(2, 5)]}),
-    "OpenAI's API": json.dumps(
-        {"duration": 4, "segments": [{"start": 1, "end": 4, "text": "-"}], "words": segment(0, 5)["words"]}
-    ),
+    "OpenAI's API": json.dumps({"segments": [{"start": 1, "end": 4, "text": "-"}], "words": segment(0, 5)["words"]}),
     "Vosk, a list": json.dumps(VOSK),
     "Vosk, one after another": "\n".join(json.dumps(result, indent=2) for result in VOSK),
     "Vosk, one of several": json.dumps({"alternatives": [VOSK[0] | {"confidence": 9}, VOSK[2]]})
@@ -180,9 +146,7 @@ OF_WORDS = {
     + "\n\nEND",
     "a TextGrid": '"ooTextFile" "TextGrid" 0 4 <exists> 1 "IntervalTier" "words" 0 4 5\n'
     + "\n".join(f'{start_s} {end_s} "{word}"' for word, start_s, end_s in HELLO_WORDS),
-    "HTK's labels": "\n".join(
-        f"{round(start_s * 1e7)} {round(end_s * 1e7)} {word}" for word, start_s, end_s in HELLO_WORDS
-    ),
+    "HTK's labels": "\n".join(f"{round(a * 1e7)} {round(b * 1e7)} {word}" for word, a, b in HELLO_WORDS),
 }
 
 
@@ -194,18 +158,16 @@ def test_words_in_time(read: Read, kind: str) -> None:
         assert word[1:] == pytest.approx(wanted[1:])
 
 
-def test_some_words_have_no_time(read: Read) -> None:
+def test_some_words_have_no_time_some_share_one_and_an_end_just_before_its_start_is_its_start(read: Read) -> None:
     items = [{"word": "In", "start": 0.5, "end": 0.6}, {"word": "1999"}, {"word": "we", "start": 2.0, "end": None}]
     found = words(read(json.dumps({"segments": [{"start": 0.5, "end": 2.5, "text": "", "words": items}]})))
     assert [word for word, *_ in found] == ["in", "1999", "we"]
     assert [time is None for _, time, _ in found] == [False, True, False]
     assert found[-1] == ("we", 2.0, None)
-
-
-def test_several_words_share_the_time_of_one(read: Read) -> None:
     found = words(read('{"words": [{"word": "20-foot", "start": 1.0, "end": 2.0}]}'))
     assert [word for word, *_ in found] == ["20", "foot"]
     assert [time for row in found for time in row[1:]] == pytest.approx([1.0, 1.6, 1.6, 2.0])
+    assert words(read('{"words": [{"word": "a", "start": 7.0, "end": 6.98}]}')) == [("a", 7.0, 7.0)]
 
 
 SCROLLING = """WEBVTT
@@ -237,24 +199,17 @@ def test_captions_that_scroll_say_each_line_once(read: Read) -> None:
     assert [start_s for _, start_s, _ in found] == pytest.approx([0.24, 0.64, 0.8, 1.92, 2.32])
     without_times = SCROLLING.replace("<c>", "").replace("</c>", "").replace("<00:00:", "<").replace("<0", "<i 0")
     assert read(without_times).words == ("let", "us", "look", "look", "again")
-
-
-def test_what_is_said_twice_stays(read: Read) -> None:
-    text = "00:00:01,000 --> 00:00:02,000\nno\n\n00:00:02,000 --> 00:00:03,000\nno\nno\n\n"
-    assert read(text).words == ("no", "no", "no")
+    twice = "00:00:01,000 --> 00:00:02,000\nno\n\n00:00:02,000 --> 00:00:03,000\nno\nno\n\n"
+    assert read(twice).words == ("no", "no", "no")
 
 
 def test_what_is_spoken(read: Read) -> None:
     for text, said in (
-        ("ANNA: hi\nBOB #2: you", "hi you"),
-        ("Speaker 1: hi\n[SPEAKER_02]: you", "hi you"),
-        ("It is AT 10:30 now", "it is at 10:30 now"),
-        ("Tom &amp; Jerry&#39;s", "tom & jerry's"),
-        ("♪ la la ♪", "la la"),
-        ("(all) hi [laughs\nloudly] you", "hi you"),
-        ("5 < 6 and 7 > 3", "5 6 and 7 3"),
+        ("ANNA: hi\nBOB #2: you", "hi you"), ("Speaker 1: hi\n[SPEAKER_02]: you", "hi you"),
+        ("It is AT 10:30 now", "it is at 10:30 now"), ("Tom &amp; Jerry&#39;s", "tom & jerry's"),
+        ("♪ la la ♪", "la la"), ("(all) hi [laughs\nloudly] you", "hi you"), ("5 < 6 and 7 > 3", "5 6 and 7 3"),
         ("Note: hi", "note hi"),
-    ):
+    ):  # fmt: skip
         assert " ".join(read(f"00:01,000 --> 00:02,000\n{text}\n").words) == said
 
 
@@ -264,19 +219,12 @@ def test_names_that_come_again_and_again_are_not_said(read: Read) -> None:
 
 
 DAMAGED = {
-    "times without seconds": (
-        "1\n00:00:01,000 --> 07\nhi\n\n2\n00:04 --> 00:05\nyou",
-        r"a\.txt: line 2 is '00:00:01",
-    ),
+    "times without seconds": ("1\n00:00:01,000 --> 07\nhi\n\n2\n00:04 --> 00:05\nyou", r"a\.txt: line 2 is '00:00:01"),
     "a time with letters": (SRT.replace("00:00:02,750 -->", "00:00:0x,7 -->"), r"a\.txt: line 6 is '00:00:0x,7 -->"),
-    "an end before its start": (
-        SRT.replace("02,750", "09,750"),
-        r"a\.txt: line 6 ends at 4 s, before its start at 9.75 s",
-    ),
-    "a table with a broken row": (
-        "start\tend\ttext\n0\t1\ta\n2 3 b\n",
-        r"a\.txt: line 3 is '2 3 b'; required: start, end",
-    ),
+    "an end before its start": (SRT.replace("02,750", "09,750"),
+        r"a\.txt: line 6 ends at 4 s, before its start at 9.75 s"),
+    "a table with a broken row": ("start\tend\ttext\n0\t1\ta\n2 3 b\n",
+        r"a\.txt: line 3 is '2 3 b'; required: start, end"),
     "no word": (SRT.replace("Hello there!", "♪").replace("How are\nyou?", "[music]"), "holds no word"),
     "JSON cut off": ('{"segments": [\n{"start": 0,', r"a\.txt: line 2: damaged JSON"),
     "JSON with more after it": ('{"segments": []}\n]', r"a\.txt: line 2: damaged JSON"),
@@ -288,21 +236,17 @@ DAMAGED = {
     "a segment that is a number": ('{"segments": [{"text": "a"}, 7]}', "'segments', item 2 is 7, required an object"),
     "a word without text": ('{"words": [{"start": 7}]}', "words 1: no text"),
     "a text that is a list": ('{"segments": [{"text": [1], "start": 7}]}', r"its text is \[1\], required a text"),
-    "a word that ends long before it starts": (
-        '{"words": [{"word": "a", "start": 7, "end": 2}]}',
-        "ends at 2 s, before",
-    ),
+    "a word that ends long before it starts": ('{"words": [{"word": "a", "start": 7, "end": 2}]}',
+        "ends at 2 s, before"),
     "CTM of two recordings": ("a 1 0.0 0.5 hi\nb 1 0.5 0.5 you\n", r"line 2: words of two recordings, 'a' and 'b'"),
     "CTM with a broken line": ("a 1 0.0 0.5 hi\na 1 0.5 you\n", r"line 2 is 'a 1 0\.5 you'; required, as in line 1"),
     "CTM with a time that is none": ("a 1 0.0 0.5 hi\na 1 nan 0.5 you\n", "line 2 has the time 'nan"),
     "CTM with a negative duration": ("a 1 0.0 0.5 hi\na 1 1.0 -0.5 you\n", r"line 2: a duration of -0\.5 s"),
-    "LRS with a broken line": (
-        "Text:  HI\n\nWORD START END\nHI 0.1 0.2 9\nYOU 0.2\n",
-        r"line 5 is 'YOU.*0\.2'; required",
-    ),
+    "LRS with a broken line": ("Text:  HI\n\nWORD START END\nHI 0.1 0.2 9\nYOU 0.2\n",
+        r"line 5 is 'YOU.*0\.2'; required"),
     "LRS with a time that is none": ("Text:  HI\n\nWORD START END\nHI 0.1 nan\n", "line 4 has the time 'nan"),
     "phones alone": ("0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "phones in time, but no words"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", DAMAGED)
@@ -310,10 +254,6 @@ def test_what_is_damaged_is_refused_with_its_place(read: Read, kind: str) -> Non
     text, message = DAMAGED[kind]
     with pytest.raises(InputError, match=message):
         read(text)
-
-
-def test_an_end_a_little_before_its_start_is_its_start(read: Read) -> None:
-    assert words(read('{"words": [{"word": "a", "start": 7.0, "end": 6.98}]}')) == [("a", 7.0, 7.0)]
 
 
 HOSTILE: list[tuple[Callable[[], bytes], str]] = [
@@ -343,8 +283,9 @@ def test_other_encodings(read: Read, caplog: pytest.LogCaptureFixture) -> None:
 
 
 def test_plain_text_stays_as_it_is(tmp_path: Path) -> None:
-    (tmp_path / "a.txt").write_text("Hello, [you] (all)\n")
-    assert read_transcript(tmp_path / "a.txt") == "Hello, [you] (all)\n"
+    for text in ("Hello, [you] (all)\n", "The 5:30 - 6:00 train", "5:30 - 6:00", "a -> b", "3 - 4 -> 5"):
+        (tmp_path / "a.txt").write_text(text)
+        assert read_transcript(tmp_path / "a.txt") == text
     with pytest.raises(InputError, match=r"b\.txt: no such transcript file"):
         read_transcript(tmp_path / "b.txt")
 
@@ -420,14 +361,7 @@ def test_times_are_never_spoken(tmp_path: Path) -> None:
         assert message in str(refused.value)
 
 
-def test_texts_with_times_of_day_or_arrows_are_texts(tmp_path: Path) -> None:
-    for text in ("The 5:30 - 6:00 train", "5:30 - 6:00", "a -> b", "3 - 4 -> 5"):
-        (tmp_path / "a.txt").write_text(text)
-        assert read_transcript(tmp_path / "a.txt") == text
-
-
 def test_an_empty_file_is_no_transcript(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "take1.txt").write_text(" \n")
     assert find_labels(tmp_path / "take1.mp4").words is None
-    (text,) = caplog.messages
-    assert "take1.txt: is empty: it counts as no transcript" in text
+    assert "take1.txt: is empty: it counts as no transcript" in caplog.messages[0]

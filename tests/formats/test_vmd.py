@@ -1,7 +1,5 @@
 """Motions of MikuMikuDance: bytes by the published layout, and as mmd-parser of three.js reads them, where it is."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -10,14 +8,14 @@ import numpy as np
 import pytest
 
 import programs
+from formats.examples import of_motion, written
 from lipmotion import read_motion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.base import write_motion
 from lipmotion.formats.vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import gaze_to_weights, weights_to_gaze
 from lipmotion.pipeline.outputs.motion_files import check_rate
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types import WEIGHT, Channel, Generation, Motion
 
 FRAMES = 31
 NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", "headYaw", "headPitch", "headRoll")
@@ -31,13 +29,12 @@ def generation() -> Generation:
     values[:, 7], values[:, 8:] = values[:, 6], values[:, 8:] - 0.5
     values[5:25, 1] = 0.25
     channels = tuple(Channel(name, "radian" if name.startswith("head") else WEIGHT) for name in NAMES)
-    return Generation(Motion(values, 30.0, channels), values, Timeline(()), StateTrace(("a",), np.zeros(FRAMES, int)))
+    return of_motion(Motion(values, 30.0, channels))
 
 
 @pytest.fixture
 def path(tmp_path: Path, generation: Generation) -> Path:
-    write_motion(tmp_path / "a.vmd", generation, source={}, model={})
-    return tmp_path / "a.vmd"
+    return written(tmp_path / "a.vmd", generation)
 
 
 def test_the_bytes_are_those_of_the_format(path: Path, generation: Generation) -> None:
@@ -55,9 +52,8 @@ def test_the_bytes_are_those_of_the_format(path: Path, generation: Generation) -
     assert [frame for _, frame, _ in keys] == sorted(frame for _, frame, _ in keys)
     held = [frame for name, frame, _ in keys if name.startswith("い".encode("cp932")) and 5 <= frame < 25]
     assert held == [5, 24]
-    assert generation.motion["aa"][0] == pytest.approx(
-        next(w for n, _, w in keys if n.startswith("あ".encode("cp932")))
-    )
+    first = next(weight for name, _, weight in keys if name.startswith("あ".encode("cp932")))
+    assert generation.motion["aa"][0] == pytest.approx(first)
 
 
 def test_what_is_written_is_read(path: Path, generation: Generation) -> None:
@@ -67,8 +63,8 @@ def test_what_is_written_is_read(path: Path, generation: Generation) -> None:
         assert motion[name] == pytest.approx(generation.motion[name], abs=1e-6)
     assert with_mouth(motion)["lip_gap"].max() > 0.1
     lowered = replace(generation, motion=replace(generation.motion, channels=(*generation.motion.channels[:6], *BROWS)))
-    write_motion(path, lowered, source={}, model={})
-    assert read_motion(path)[0]["browDownLeft"] == pytest.approx(generation.motion["eyeBlinkLeft"], abs=1e-6)
+    brow = read_motion(written(path, lowered))[0]["browDownLeft"]
+    assert brow == pytest.approx(generation.motion["eyeBlinkLeft"], abs=1e-6)
 
 
 def test_eyes_turn_in_one_bone(tmp_path: Path, generation: Generation) -> None:
@@ -76,13 +72,7 @@ def test_eyes_turn_in_one_bone(tmp_path: Path, generation: Generation) -> None:
     looks = gaze_to_weights(gaze)
     values = np.concatenate([generation.motion.values, np.stack(list(looks.values()), axis=1)], axis=1)
     channels = (*generation.motion.channels, *(Channel(name, WEIGHT) for name in looks))
-    write_motion(
-        tmp_path / "a.vmd",
-        replace(generation, motion=Motion(values, 30.0, channels), spread=values),
-        source={},
-        model={},
-    )
-    motion, _ = read_motion(tmp_path / "a.vmd")
+    motion, _ = read_motion(written(tmp_path / "a.vmd", of_motion(Motion(values, 30.0, channels))))
     assert weights_to_gaze({name: motion[name].astype(np.float64) for name in looks}) == pytest.approx(gaze, abs=1e-6)
     assert motion["headYaw"] == pytest.approx(generation.motion["headYaw"], abs=1e-6)
 
@@ -91,19 +81,16 @@ def test_the_head_turns_to_its_left_and_up(tmp_path: Path, generation: Generatio
     """MikuMikuDance's x is to the character's left, y up, z into its face."""
     values = np.zeros((2, len(NAMES)))
     values[1, 8] = 0.3
-    write_motion(
-        tmp_path / "a.vmd", replace(generation, motion=replace(generation.motion, values=values)), source={}, model={}
-    )
-    x, y, z, w = struct.unpack_from("<4f", (tmp_path / "a.vmd").read_bytes(), 54 + 111 + 31)
+    path = written(tmp_path / "a.vmd", of_motion(replace(generation.motion, values=values)))
+    x, y, z, w = struct.unpack_from("<4f", path.read_bytes(), 54 + 111 + 31)
     face = np.array([-2 * (x * z + w * y), -2 * (y * z - w * x), -(1 - 2 * (x * x + y * y))])  # of (0, 0, -1)
     assert face == pytest.approx([np.sin(0.3), 0, -np.cos(0.3)], abs=1e-6)
 
 
 def test_held_poses_change_from_one_frame_to_the_next(tmp_path: Path, generation: Generation) -> None:
     values = np.repeat([[0.1] * len(NAMES), [0.6] * len(NAMES)], [10, 21], axis=0)
-    held = replace(generation, motion=replace(generation.motion, values=values), stepped=NAMES)
-    write_motion(tmp_path / "a.vmd", held, source={}, model={})
-    assert read_motion(tmp_path / "a.vmd")[0]["aa"] == pytest.approx(values[:, 0], abs=1e-6)
+    held = of_motion(replace(generation.motion, values=values), stepped=NAMES)
+    assert read_motion(written(tmp_path / "a.vmd", held))[0]["aa"] == pytest.approx(values[:, 0], abs=1e-6)
 
 
 def test_it_has_one_rate() -> None:

@@ -1,7 +1,5 @@
 """VRM animations: read back, and by three-vrm and Khronos' validator, where they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,10 +7,9 @@ import numpy as np
 import pytest
 
 import programs
-from formats.curve_examples import generation
+from formats.examples import generation, written
 from lipmotion import read_motion
 from lipmotion.errors import ExportError
-from lipmotion.formats.base import write_motion
 from lipmotion.meshes.files.gltf_document import read_gltf_document
 from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
 from lipmotion.types import Generation
@@ -27,15 +24,21 @@ def talking() -> Generation:
 
 @pytest.fixture
 def path(talking: Generation, tmp_path: Path) -> Path:
-    write_motion(tmp_path / "a.vrma", talking, source={"path": "a.wav"}, model={})
-    return tmp_path / "a.vrma"
+    return written(tmp_path / "a.vrma", talking, path="a.wav")
 
 
-def test_what_is_written_is_read(path: Path, talking: Generation) -> None:
+def test_what_is_written_is_read_with_moods_where_there_are_some(
+    path: Path, talking: Generation, tmp_path: Path
+) -> None:
     motion, _ = read_motion(path)
     assert motion.rate_hz == 30
     for name in ("aa", "oh", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES):
         assert motion[name] == pytest.approx(talking.motion[name], abs=1e-6)
+    happy = generation("aa", "happy")
+    read = read_motion(written(tmp_path / "b.vrma", happy))[0]
+    assert read["mood_happy"] == pytest.approx(happy.motion["happy"], abs=1e-6)
+    with pytest.raises(ExportError, match="none of the vowels aa ih ou ee oh"):
+        written(tmp_path / "c.vrma", generation("jawOpen"))
 
 
 def test_the_extension_is_as_its_rules_say(path: Path) -> None:
@@ -49,30 +52,15 @@ def test_the_extension_is_as_its_rules_say(path: Path) -> None:
     assert len(used) == len({*used})
 
 
-def test_expressions_of_moods_are_there_where_a_mood_is(tmp_path: Path) -> None:
-    happy = generation("aa", "happy")
-    write_motion(tmp_path / "a.vrma", happy, source={}, model={})
-    assert read_motion(tmp_path / "a.vrma")[0]["mood_happy"] == pytest.approx(happy.motion["happy"], abs=1e-6)
-
-
 def test_equal_blinks_are_one_and_held_poses_jump(tmp_path: Path, talking: Generation) -> None:
     values = talking.motion.values.copy()
     values[:, 7] = values[:, 6]
-    held = generation("aa", stepped=("aa",))
-    write_motion(
-        tmp_path / "a.vrma", replace(talking, motion=replace(talking.motion, values=values)), source={}, model={}
-    )
-    preset = read_gltf_document(tmp_path / "a.vrma").json["extensions"]["VRMC_vrm_animation"]["expressions"]["preset"]
+    path = written(tmp_path / "a.vrma", replace(talking, motion=replace(talking.motion, values=values)))
+    preset = read_gltf_document(path).json["extensions"]["VRMC_vrm_animation"]["expressions"]["preset"]
     assert "blink" in preset
     assert "blinkLeft" not in preset
-    write_motion(tmp_path / "b.vrma", held, source={}, model={})
-    motion, _ = read_motion(tmp_path / "b.vrma")
+    motion, _ = read_motion(written(tmp_path / "b.vrma", generation("aa", stepped=("aa",))))
     assert motion.at(np.array([19 / 60, 20.1 / 60]))[:, 0] == pytest.approx([0.25, 0.75], abs=1e-4)
-
-
-def test_motion_without_vowels_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match="none of the vowels aa ih ou ee oh"):
-        write_motion(tmp_path / "a.vrma", generation("jawOpen"), source={}, model={})
 
 
 @pytest.mark.long

@@ -1,7 +1,5 @@
 """Files of voices and aligners as the services document them, written for these tests."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -43,16 +41,10 @@ ELEVENLABS = {
 CARTESIA = lines(
     {"type": "chunk", "data": "AAAA", "done": False},
     {"type": "timestamps", "word_timestamps": {"words": ["Hi", "you"], "start": [0, 0.5], "end": [0.4, 0.9]}},
-    {
-        "type": "phoneme_timestamps",
-        "phoneme_timestamps": {
-            "phonemes": ["h", "aɪ", "j", "u"],
-            "start": [0.0, 0.1, 0.5, 0.6],
-            "end": [0.1, 0.4, 0.6, 0.9],
-        },
-    },
+    {"type": "phoneme_timestamps", "phoneme_timestamps": {
+        "phonemes": ["h", "aɪ", "j", "u"], "start": [0.0, 0.1, 0.5, 0.6], "end": [0.1, 0.4, 0.6, 0.9]}},
     {"type": "done", "done": True},
-)
+)  # fmt: skip
 GOOGLE = {
     "audioContent": "AAAA",
     "timepoints": [{"markName": "hello", "timeSeconds": 0.25}, {"markName": "you", "timeSeconds": 0.75}],
@@ -60,10 +52,8 @@ GOOGLE = {
 PIPER = {
     "sample_rate": 20000,
     "phoneme_alignments": [
-        {"phoneme": phoneme, "phoneme_ids": [1, 0], "num_samples": count}
-        for phoneme, count in zip(
-            "^hˈaɪ ju.$", (1000, 2000, 1000, 2000, 2000, 1000, 1000, 2000, 4000, 1000), strict=True
-        )
+        {"phoneme": phoneme, "phoneme_ids": [1, 0], "num_samples": 1000 * count}
+        for phoneme, count in zip("^hˈaɪ ju.$", (1, 2, 1, 2, 2, 1, 1, 2, 4, 1), strict=True)
     ],
 }
 KOKORO = {
@@ -79,15 +69,11 @@ KOKORO = {
 GENTLE = {
     "transcript": "hi there you",
     "words": [
-        {
-            "case": "success", "alignedWord": "hi", "word": "Hi", "start": 0.1, "end": 0.4, "startOffset": 0,
-            "phones": [{"duration": 0.1, "phone": "hh_B"}, {"duration": 0.2, "phone": "ay_E"}],
-        },
+        {"case": "success", "alignedWord": "hi", "word": "Hi", "start": 0.1, "end": 0.4, "startOffset": 0,
+         "phones": [{"duration": 0.1, "phone": "hh_B"}, {"duration": 0.2, "phone": "ay_E"}]},
         {"case": "not-found-in-audio", "word": "there", "startOffset": 3, "endOffset": 8},
-        {
-            "case": "success", "alignedWord": "<unk>", "word": "you", "start": 0.5, "end": 0.8,
-            "phones": [{"duration": 0.3, "phone": "oov_S"}],
-        },
+        {"case": "success", "alignedWord": "<unk>", "word": "you", "start": 0.5, "end": 0.8,
+         "phones": [{"duration": 0.3, "phone": "oov_S"}]},
     ],
 }  # fmt: skip
 MFA = {
@@ -106,17 +92,8 @@ MFA_CSV = "Begin,End,Label,Type,Speaker\n0.1,0.5,my,words,ann\n0.1,0.2,M,phones,
 SERVERS = {"timestamps": [{"word": "Hi,", "start_time": 0.1, "end_time": 0.4}]}
 
 SAMPLES = {
-    "polly": POLLY,
-    "words": AZURE_WORDS,
-    "visemes": AZURE_VISEMES,
-    "characters": ELEVENLABS,
-    "messages": CARTESIA,
-    "marks": GOOGLE,
-    "piper": PIPER,
-    "kokoro": KOKORO,
-    "gentle": GENTLE,
-    "mfa": MFA,
-    "table": MFA_CSV,
+    "polly": POLLY, "words": AZURE_WORDS, "visemes": AZURE_VISEMES, "characters": ELEVENLABS, "messages": CARTESIA,
+    "marks": GOOGLE, "piper": PIPER, "kokoro": KOKORO, "gentle": GENTLE, "mfa": MFA, "table": MFA_CSV,
     "servers": SERVERS,
-}
+}  # fmt: skip
 """A text, or a value for JSON, of every kind."""

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lipmotion.hmm.align import align_units, choose_pronunciations
 from lipmotion.hmm.model import HmmConfig, UnitHmm, make_plain_states
+from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures
@@ -94,6 +96,23 @@ def sentences(seed: int, count: int, words: int = 4) -> list[tuple[tuple[str, ..
     draw = np.random.default_rng(seed)
     lexicon = [("a",), ("b", "c"), ("d", "a"), ("e", "b"), ("c", "d"), ("e",)]
     return [tuple(lexicon[i] for i in draw.integers(len(lexicon), size=words)) for _ in range(count)]
+
+
+def within_silence(words: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """Return the units of words, with silence at both ends."""
+    return (SILENCE, *(unit for word in words for unit in word), SILENCE)
+
+
+def align(hmm: UnitHmm, features: np.ndarray, units: Sequence[str]) -> np.ndarray:
+    return align_units(hmm, compute_log_likelihoods(hmm, features), units)
+
+
+def choose(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]):
+    return choose_pronunciations(hmm, compute_log_likelihoods(hmm, features), words, PAUSE)
+
+
+def chosen_units(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]) -> tuple[str, ...]:
+    return tuple(unit for part in choose(hmm, features, words) for unit in part.units)
 
 
 def recordings(seed: int, count: int, who: Speaker, pauses: bool = False):

@@ -1,15 +1,9 @@
 import numpy as np
 import pytest
 
-from hmm.synthetic import PAUSE, SILENCE, known_hmm, random_hmm, recordings, speaker
+from hmm.synthetic import PAUSE, SILENCE, align, choose, known_hmm, random_hmm, speaker
 from lipmotion.errors import AlignmentError
-from lipmotion.hmm.align import (
-    align_units,
-    choose_pronunciations,
-    expand_states,
-    place_words,
-    spread_windows,
-)
+from lipmotion.hmm.align import align_units, expand_states, place_words, spread_windows
 from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.kernels.paths import Windows
 from oracles import sequences
@@ -30,36 +24,17 @@ def test_chains_name_states_in_context_and_fall_back_where_unseen():
 
 
 def test_no_segmentation_is_better():
-    for seed in range(2):
+    for seed, units in enumerate([("a", "b"), ("sil", "b")]):
         hmm = random_hmm(seed, contexts=4)
         features = np.random.default_rng(seed).normal(0, 1.5, (10, 2)).astype(np.float32)
-        units = ("sil", "b") if seed % 2 else ("a", "b")
-        _, wanted, _ = sequences.best(hmm, features, [units])
-        assert align_units(hmm, compute_log_likelihoods(hmm, features), units).tolist() == wanted
-
-
-def test_known_boundaries_are_found():
-    who = speaker()
-    transcribed, said, edges = recordings(3, 8, who)
-    for utterance, units, where in zip(transcribed, said, edges, strict=True):
-        assert align_units(
-            known_hmm(who), compute_log_likelihoods(known_hmm(who), utterance.features), units
-        ) == pytest.approx(where, abs=1)
+        assert align(hmm, features, units).tolist() == sequences.best(hmm, features, [units])[1]
 
 
 def test_too_short_a_recording_says_so():
-    hmm = random_hmm(7)
+    hmm, units = random_hmm(7), ("sil", "a", "b", "sil")
     with pytest.raises(AlignmentError, match="12 states in 11 frames"):
-        align_units(hmm, compute_log_likelihoods(hmm, np.zeros((11, 2), np.float32)), ("sil", "a", "b", "sil"))
-    assert align_units(
-        hmm, compute_log_likelihoods(hmm, np.zeros((12, 2), np.float32)), ("sil", "a", "b", "sil")
-    ).tolist() == [
-        0,
-        3,
-        6,
-        9,
-        12,
-    ]
+        align(hmm, np.zeros((11, 2), np.float32), units)
+    assert align(hmm, np.zeros((12, 2), np.float32), units).tolist() == [0, 3, 6, 9, 12]
 
 
 WORDS = ((("a",), ("b", "c")), (("d",),), (("c", "e"), ("b",), ("e", "e")))
@@ -74,29 +49,21 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen():
             wanted.append((word, variant, WORDS[word][variant]))
         wanted.append((-1, 0, (SILENCE,)))
         features, _ = who.say(np.random.default_rng(first + 2 * last), [unit for part in wanted for unit in part[2]])
-        assert (
-            choose_pronunciations(known_hmm(who), compute_log_likelihoods(known_hmm(who), features), WORDS, PAUSE)
-            == wanted
-        )
+        assert choose(known_hmm(who), features, WORDS) == wanted
 
 
 def test_a_pause_inside_of_a_pronunciation_may_be_left_out():
     who = speaker()
-    hmm, words = known_hmm(who), [[("a", PAUSE, "b"), ("c", PAUSE, "d")]]
     for said in (("a", "b"), ("a", PAUSE, "b"), ("c", PAUSE, "d"), ("c", "d")):
         features, _ = who.say(np.random.default_rng(3), (SILENCE, *said, SILENCE))
-        found = choose_pronunciations(hmm, compute_log_likelihoods(hmm, features), words, PAUSE)
+        found = choose(known_hmm(who), features, [[("a", PAUSE, "b"), ("c", PAUSE, "d")]])
         assert [item.units for item in found] == [(SILENCE,), said, (SILENCE,)]
         assert found[1][:2] == (0, int(said[0] == "c"))
 
 
 def test_pronunciations_without_number_are_refused_before_a_network_is_built():
-    hmm = random_hmm(2)
-    features = np.zeros((60, 2), np.float32)
-    with pytest.raises(
-        AlignmentError, match=r"4 words in all their pronunciations make \d+ arcs, required at most 1000600"
-    ):
-        choose_pronunciations(hmm, compute_log_likelihoods(hmm, features), [[("a",)] * 800] * 4, PAUSE)
+    with pytest.raises(AlignmentError, match=r"\d+ arcs, required at most 1000600"):
+        choose(random_hmm(2), np.zeros((60, 2), np.float32), [[("a",)] * 800] * 4)
 
 
 def test_words_are_placed_within_their_windows():

@@ -97,27 +97,17 @@ def stranger():
     return known_hmm(who), features, edges, loud
 
 
-def test_loud_frames_are_not_aligned_with_silence():
+def test_loud_frames_are_neither_aligned_with_silence_nor_chosen_as_pauses():
     hmm, features, edges, loud = stranger()
-    units = (SILENCE, "a", "b", SILENCE)
-    log_likelihoods = compute_log_likelihoods(hmm, features)
-    without, bounds = (
-        align_units(hmm, given, units) for given in (log_likelihoods, penalise_silence(hmm, log_likelihoods, loud))
-    )
+    units, words = (SILENCE, "a", "b", SILENCE), ((("a",),), (("b",),))
+    free = compute_log_likelihoods(hmm, features)
+    bound = penalise_silence(hmm, free, loud)
+    without, bounds = align_units(hmm, free, units), align_units(hmm, bound, units)
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
-
-
-def test_loud_frames_are_not_chosen_as_pauses():
-    hmm, features, _, loud = stranger()
-    words = ((("a",),), (("b",),))
-    log_likelihoods = compute_log_likelihoods(hmm, features)
-    free, bound = (
-        choose_pronunciations(hmm, given, words, PAUSE)
-        for given in (log_likelihoods, penalise_silence(hmm, log_likelihoods, loud))
-    )
-    assert PAUSE in [unit for part in free for unit in part.units]
-    assert PAUSE not in [unit for part in bound for unit in part.units]
+    for densities, pauses in ((free, True), (bound, False)):
+        parts = choose_pronunciations(hmm, densities, words, PAUSE)
+        assert (PAUSE in [unit for part in parts for unit in part.units]) == pauses
 
 
 def test_quiet_frames_are_far_under_the_loud_ones_and_away_from_them():

@@ -1,14 +1,23 @@
-"""The whole training, on utterances of a speaker whose units are known."""
-
 from itertools import groupby, pairwise
 
 import numpy as np
 import pytest
 
-from hmm.synthetic import INVENTORY, PAUSE, SILENCE, UNITS, recordings, sentences, speaker
+from hmm.synthetic import (
+    INVENTORY,
+    PAUSE,
+    SILENCE,
+    UNITS,
+    align,
+    chosen_units,
+    recordings,
+    sentences,
+    speaker,
+    within_silence,
+)
 from lipmotion.errors import CorpusError
 from lipmotion.hmm import unit_training
-from lipmotion.hmm.align import align_units, choose_pronunciations
+from lipmotion.hmm.align import choose_pronunciations
 from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES
 from lipmotion.hmm.decode import build_unit_loop, decode_units
 from lipmotion.hmm.model import HmmConfig
@@ -42,19 +51,15 @@ def test_no_iteration_of_any_stage_lowers_the_likelihood(trained):
 
 def test_boundaries_are_found_within_two_frames(trained):
     hmm, _, transcribed, said, edges, _ = trained
-    errors = [
-        align_units(hmm, compute_log_likelihoods(hmm, utterance.features), units) - where
-        for utterance, units, where in zip(transcribed, said, edges, strict=True)
-    ]
-    assert np.abs(np.concatenate(errors)).max() <= 2
-    assert np.abs(np.concatenate(errors)).mean() < 0.15
+    parts = zip(transcribed, said, edges, strict=True)
+    errors = np.concatenate([align(hmm, utterance.features, units) - where for utterance, units, where in parts])
+    assert np.abs(errors).max() <= 2
+    assert np.abs(errors).mean() < 0.15
 
 
 def test_pauses_are_found_where_they_were_made(trained):
     hmm, _, transcribed, said, _, _ = trained
-    for utterance, units in zip(transcribed, said, strict=True):
-        chosen = choose_pronunciations(hmm, compute_log_likelihoods(hmm, utterance.features), utterance.words, PAUSE)
-        assert tuple(unit for part in chosen for unit in part.units) == units
+    assert [chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
 
 
 def test_pauses_are_found_at_the_first_choice_already(monkeypatch):
@@ -75,7 +80,7 @@ def test_new_sentences_are_recognised(trained):
     hmm, who, _, said, *_ = trained
     seen = {pair for units in said for pair in pairwise(units)}
     for number, words in enumerate(sentences(99, 15)):
-        units = (SILENCE, *(unit for word in words for unit in word), SILENCE)
+        units = within_silence(words)
         features, edges = who.say(np.random.default_rng([99, number]), units)
         found, bounds = decode_units(build_unit_loop(hmm, (SILENCE, *UNITS)), compute_log_likelihoods(hmm, features))
         assert found == units, f"{set(pairwise(units)) - seen} were never seen in training"
@@ -88,14 +93,11 @@ def test_the_pronunciation_said_is_learned():
     variants = (("a", "b"), ("c", "b"))
     transcribed, said = [], []
     for number, words in enumerate(sentences(5, 30)):
-        units = [SILENCE, *variants[number % 2], *(unit for word in words for unit in word), SILENCE]
-        features, _ = who.say(draw, units)
+        said.append(within_silence([variants[number % 2], *words]))
+        features, _ = who.say(draw, said[-1])
         transcribed.append(TranscribedUtterance(features, (variants, *((word,) for word in words))))
-        said.append(tuple(units))
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
-    for utterance, units in zip(transcribed, said, strict=True):
-        chosen = choose_pronunciations(hmm, compute_log_likelihoods(hmm, utterance.features), utterance.words, PAUSE)
-        assert tuple(unit for part in chosen for unit in part.units) == units
+    assert [chosen_units(hmm, utterance.features, utterance.words) for utterance in transcribed] == said
 
 
 def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
@@ -103,24 +105,19 @@ def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
     who, draw = speaker(6), np.random.default_rng(6)
     transcribed, said, edges = [], [], []
     for number, sentence in enumerate(sentences(6, 30, words=3)):
-        last = ("b", "c") if number % 2 else ("e",)
         words = [tuple("a" if unit == "e" else unit for unit in word) for word in sentence]
-        units = (SILENCE, *(unit for word in words for unit in word), *last, SILENCE)
-        features, where = who.say(draw, units)
+        words.append(("b", "c") if number % 2 else ("e",))
+        said.append(within_silence(words))
+        features, where = who.say(draw, said[-1])
         room = np.repeat(who.means[SILENCE][:1], 60, axis=0) + draw.normal(0, who.spread, (60, 4))
         for click in draw.integers(5, 55, size=3):
             room[click : click + 2] = draw.normal([3.0, 0, 0, 0], 2, (2, 4))
-        transcribed.append(
-            TranscribedUtterance(np.r_[features, room].astype(np.float32), tuple((w,) for w in (*words, last)))
-        )
-        said.append(units)
+        sound = np.r_[features, room].astype(np.float32)
+        transcribed.append(TranscribedUtterance(sound, tuple((word,) for word in words)))
         edges.append([*where[:-1], where[-1] + 60])
     hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
-    errors = [
-        np.abs(align_units(hmm, compute_log_likelihoods(hmm, utterance.features), units) - where).max()
-        for utterance, units, where in zip(transcribed, said, edges, strict=True)
-    ]
-    assert max(errors) <= 3
+    for utterance, units, where in zip(transcribed, said, edges, strict=True):
+        assert np.abs(align(hmm, utterance.features, units) - where).max() <= 3
 
 
 def test_no_state_lasts_longer_than_it_may(trained):
@@ -141,17 +138,13 @@ def test_the_bigram_is_that_of_what_was_said_pauses_being_silence(trained):
     assert np.array_equal(hmm.bigram.log_probability, wanted.log_probability)
 
 
-def test_nothing_to_train_on_says_so():
-    with pytest.raises(CorpusError, match="none of 0"):
-        train_hmm([], INVENTORY, CONFIG, silent_monitor)
-    short = TranscribedUtterance(np.zeros((8, 4), np.float32), ((("a",),),))
-    with pytest.raises(CorpusError, match="none of 1"):
-        train_hmm([short], INVENTORY, CONFIG, silent_monitor)
-
-
 def test_an_utterance_too_short_for_its_words_is_left_out():
     transcribed, _, _ = recordings(2, 10, speaker(2))
     short = TranscribedUtterance(transcribed[0].features[:15], transcribed[0].words)
-    with_it = train_hmm([short, *transcribed], INVENTORY, CONFIG, silent_monitor)
-    without = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
+    for nothing in ([], [short]):
+        with pytest.raises(CorpusError, match=f"none of {len(nothing)}"):
+            train_hmm(nothing, INVENTORY, CONFIG, silent_monitor)
+    with_it, without = (
+        train_hmm(given, INVENTORY, CONFIG, silent_monitor) for given in ([short, *transcribed], transcribed)
+    )
     assert np.array_equal(with_it.mixtures.means, without.mixtures.means)

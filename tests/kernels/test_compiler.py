@@ -1,7 +1,3 @@
-"""Which form of a kernel runs; compiled ones are kept on disk, and a cache that is damaged is not noticed."""
-
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any, cast

@@ -1,10 +1,13 @@
+from collections import Counter
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors, log_forward_backward
-from oracles import chains, networks
+from lipmotion.kernels.paths import NetworkArrays, sample_paths
+from oracles import paths
 
 
 def padded(seed: int, sizes: list[tuple[int, int]], padding: float = 0.0):
@@ -42,7 +45,7 @@ def test_the_definition_agrees_with_the_enumeration_of_all_paths(seed, frames, s
     arcs = {(a, b): np.log(draw.uniform()) for a in range(3) for b in range(3) if draw.uniform() < 0.6}
     arrays = *np.array(list(arcs), np.intp).reshape(-1, 2).T, np.array(list(arcs.values()))
     log_posterior, counts, log_likelihood = log_forward_backward(ends[0], emission, *arrays, ends[1])
-    wanted, wanted_counts, wanted_log_likelihood = networks.posteriors(emission, np.arange(3), arcs, *ends)
+    wanted, wanted_counts, wanted_log_likelihood = paths.posteriors(emission, np.arange(3), arcs, *ends)
     assert np.exp(log_posterior) == pytest.approx(wanted, abs=1e-9)
     assert counts == pytest.approx(list(wanted_counts.values()), abs=1e-9)
     assert log_likelihood == pytest.approx(wanted_log_likelihood, abs=1e-9)
@@ -71,7 +74,7 @@ def test_agrees_with_the_enumeration_of_all_paths(seed, sizes, padding):
     batch, single = padded(seed, sizes, padding)
     posterior, stay, log_likelihood = chain_posteriors(*batch)
     for u, (frames, states) in enumerate(sizes):
-        wanted_posterior, wanted_stay, wanted_log_likelihood = chains.chain_posteriors(*single[u])
+        wanted_posterior, wanted_stay, wanted_log_likelihood = paths.chain_posteriors(*single[u])
         assert posterior[:frames, u, :states] == pytest.approx(wanted_posterior, abs=1e-10)
         assert not posterior[frames:, u].any()
         assert not posterior[:, u, states:].any()
@@ -90,35 +93,44 @@ def test_posteriors_of_every_frame_sum_to_one(seed, loudness):
     posterior, stay, _ = chain_posteriors(log_emission * loudness, *rest)
     for u, frames in enumerate((60, 31, 7)):
         assert posterior[:frames, u].sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-6)
-        assert stay[u].sum() == pytest.approx(
-            frames - (7, 5, 7)[u], abs=1e-6
-        )  # all other transitions are of states to themselves
+        moves = (7, 5, 7)[u]  # all other transitions are of states to themselves
+        assert stay[u].sum() == pytest.approx(frames - moves, abs=1e-6)
 
 
-def test_too_short_an_utterance_has_no_path_and_harms_no_other():
-    batch, _ = padded(3, [(6, 3), (2, 3)])
-    alone, _ = padded(3, [(6, 3)])
-    posterior, stay, log_likelihood = chain_posteriors(*batch)
-    assert log_likelihood[1] <= LOG_ZERO / 2
-    assert not posterior[:, 1].any()
-    assert not stay[1].any()
-    for together, apart in zip((posterior, stay, log_likelihood), chain_posteriors(*alone), strict=True):
-        whole = together[:, :1] if together.ndim == 3 else together[:1]
-        assert whole == pytest.approx(apart, abs=1e-12)
+EMISSION = np.array([0, 1, 0, 2])
+ARCS = {(0, 0): -0.5, (0, 1): -1.0, (1, 1): -0.7, (1, 2): -0.3, (2, 2): -1.2, (2, 3): -0.4, (3, 0): -0.6, (3, 3): -2.0}
+INITIAL = np.array([-0.2, -np.inf, -1.5, -np.inf])
+FINAL = np.array([-np.inf, -0.1, -0.9, -0.3])
 
 
-def test_as_many_frames_as_states_leave_one_path():
-    batch, _ = padded(5, [(4, 4)])
-    posterior, stay, _ = chain_posteriors(*batch)
-    assert posterior[:, 0] == pytest.approx(np.eye(4), abs=1e-12)
-    assert not stay.any()
+def arrays() -> NetworkArrays:
+    ordered = sorted((target, source, log) for (source, target), log in ARCS.items())
+    targets, sources, logs = map(np.array, zip(*ordered, strict=True))
+    return NetworkArrays(EMISSION, sources, logs, np.searchsorted(targets, np.arange(4)), INITIAL, FINAL)
 
 
-def test_order_of_utterances_changes_nothing():
-    batch, _ = padded(7, [(6, 3), (4, 2), (5, 1)])
-    log_emission, log_stay, log_move, frames, states = batch
-    back = [2, 0, 1]
-    shuffled = chain_posteriors(log_emission[:, back], log_stay[back], log_move[back], frames[back], states[back])
-    for mixed, straight in zip(shuffled, chain_posteriors(*batch), strict=True):
-        wanted = straight[:, back] if straight.ndim == 3 else straight[back]
-        assert np.array_equal(mixed, wanted)
+def test_paths_come_as_often_as_they_are_probable():
+    log_emission = np.random.default_rng(0).normal(0, 1.2, (5, 3))
+    expected, total = paths.path_posterior(log_emission, EMISSION, ARCS, INITIAL, FINAL)
+    count = 6_000
+    drawn, log_likelihood = sample_paths(log_emission, arrays(), np.random.default_rng(1).random((count, 5)))
+    assert log_likelihood == pytest.approx(total, abs=1e-9)
+    found = Counter(map(tuple, drawn.tolist()))
+    assert set(found) <= set(expected)
+    chi = sum((found[p] - count * q) ** 2 / (count * q) for p, q in expected.items() if count * q > 5)
+    degrees = sum(count * q > 5 for q in expected.values())
+    assert degrees > 5
+    assert chi < degrees + 4 * np.sqrt(2 * degrees)
+
+
+def test_what_is_far_from_probable_on_the_way_may_be_all_that_is_left_or_nothing():
+    log_emission = np.zeros((4, 3))
+    log_emission[0, 0] = log_emission[1, 1] = -5000.0
+    drawn, log_likelihood = sample_paths(log_emission, arrays(), np.full((3, 4), 0.999))
+    assert np.isfinite(log_likelihood)
+    assert (drawn >= 0).all()
+    log_emission[1] = -np.inf
+    with np.errstate(invalid="raise"):
+        drawn, log_likelihood = sample_paths(log_emission, arrays(), np.zeros((2, 4)))
+    assert log_likelihood == -np.inf
+    assert (drawn == -1).all()

@@ -87,20 +87,28 @@ def test_only_the_box_is_changed():
     assert not target[1][:, 36:].any()
 
 
+def packed_skin(skin: np.ndarray) -> np.ndarray:
+    into = np.zeros(skin.shape, np.uint32)
+    for plane, here in zip(skin, into, strict=True):
+        planes.pack(plane, 0, 0, *plane.shape, False, here)
+    return into
+
+
+def between(skin: np.ndarray, around: StillLayers, inside: tuple[slice, ...] = np.s_[:, :, :]) -> np.ndarray:
+    """Return what is seen of skin and its layers."""
+    below, shade, above = (layer[inside] for layer in around)
+    seen = skin[:3] + (1 - skin[3] / 255) * (below + skin[4] / 255 * shade)
+    return above[:3] + (1 - above[3]) * seen
+
+
 def test_skin_at_rest_lies_between_its_layers():
     rng = np.random.default_rng(6)
     around, still = layers(rng, 24, 40), np.zeros((4, 6))
     skin = rng.integers(0, 100, (5, 24, 40), np.uint8)
     target = np.zeros((3, 30, 50), np.uint8)
-    numbers = np.zeros(skin.shape, np.uint32)
-    for plane, into in zip(skin, numbers, strict=True):
-        planes.pack(plane, 0, 0, 24, 40, False, into)
-    planes.lay_skin(numbers, still, still, *around, 2, 4, target)
-    cover, shadow = skin[3] / 255, skin[4] / 255
-    expected = skin[:3] + (1 - cover) * (around.below + shadow * around.shade)
-    expected = around.above[:3] + (1 - around.above[3]) * expected
+    planes.lay_skin(packed_skin(skin), still, still, *around, 2, 4, target)
     inside = np.s_[:, :-1, :-1]
-    assert np.abs(target[:, 2:26, 4:44].astype(float) - expected)[inside].max() <= 0.51
+    assert np.abs(target[:, 2:26, 4:44].astype(float) - between(skin, around))[inside].max() <= 0.51
     assert not target[:, :2].any()
     assert not target[:, 26:].any()
 
@@ -131,20 +139,13 @@ def test_skin_that_moves_is_a_mean_of_its_pixels_between_its_layers() -> None:
     rng = np.random.default_rng(8)
     around, skin = layers(rng, 40, 70), rng.integers(0, 100, (5, 40, 70), np.uint8)
     skin[3, :20] = 255  # nothing but skin is seen there, where no hair is
-    into, target, x, y = np.zeros((5, 40, 70), np.uint32), np.zeros((3, 50, 80), np.uint8), 1.25, -2.5
-    for plane, here in zip(skin, into, strict=True):
-        planes.pack(plane, 0, 0, 40, 70, False, here)
-    grid = np.ones((6, 10))
-    planes.lay_skin(into, x * grid, y * grid, *around, 3, 5, target)
+    target, x, y, grid = np.zeros((3, 50, 80), np.uint8), 1.25, -2.5, np.ones((6, 10))
+    planes.lay_skin(packed_skin(skin), x * grid, y * grid, *around, 3, 5, target)
     rows, columns = np.arange(4, 36), np.arange(2, 66)
-    share = np.array([[0.5 * 0.75, 0.5 * 0.25]])[0]
     moved = sum(
         weight * skin[:, rows[:, None] - 3 + down, columns[None] + 1 + right].astype(float)
         for down in (0, 1)
-        for right, weight in enumerate(share)
+        for right, weight in enumerate((0.5 * 0.75, 0.5 * 0.25))
     )
-    cover, shadow = moved[3] / 255, moved[4] / 255
-    inside = np.s_[:, 4:36, 2:66]
-    wanted = moved[:3] + (1 - cover) * (around.below[inside] + shadow * around.shade[inside])
-    wanted = around.above[inside][:3] + (1 - around.above[3:][inside]) * wanted
+    wanted = between(moved, around, np.s_[:, 4:36, 2:66])
     assert np.abs(target[:, 3 + rows[:, None], 5 + columns[None]].astype(float) - wanted).max() <= 1

@@ -38,13 +38,10 @@ def test_every_bit_is_that_of_the_definition(seed):
     assert np.array_equal(first, second)
 
 
-def test_a_square_covers_its_pixels_and_no_others():
+def test_a_square_covers_its_pixels_and_no_others_and_half_a_pixel_is_half_the_light():
     picture = drawn(square(8, 10, 20, 15), np.ones((4, 3)), FACING)
     assert (picture[10:15, 8:20] == 255).all()
     assert picture.astype(int).sum() == 255 * 3 * 5 * 12
-
-
-def test_half_a_pixel_is_half_the_light():
     picture = drawn(square(8.5, 10, 20, 15), np.ones((4, 3)), FACING)
     assert (picture[10:15, 8] == 127).all()
 

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion_faces.kernels.textured import CLEAR, CUT, SOLID, TexturedTriangles, draw_textured
-from oracles import textured as oracle
+from oracles import raster as oracle
 
 TONE = np.arange(256).astype(np.uint8)
 HEIGHT, WIDTH = 40, 56
@@ -122,16 +122,10 @@ def test_a_blended_surface_is_mixed_with_what_is_behind_it():
     assert abs(int(part[20, 20]) - 64) <= 1
 
 
-def test_highlights_keep_the_colour_of_the_lamp():
-    texture = np.zeros((1, 1, 4))
-    texture[..., 3] = 1
-    what = surface(FACING, CORNERS[FACING], texture)
-    picture, _ = drawn(square(8, 10, 28, 30), WHITE, what, shine=np.full((4, 3), 0.5))
+def test_highlights_keep_the_colour_of_the_lamp_and_half_a_pixel_is_half_the_light():
+    black = surface(FACING, CORNERS[FACING], np.array([[[0.0, 0, 0, 1]]]))
+    picture, _ = drawn(square(8, 10, 28, 30), WHITE, black, shine=np.full((4, 3), 0.5))
     assert picture[20, 20].tolist() == pytest.approx([127, 127, 127], abs=1)
-
-
-def test_half_a_pixel_is_half_the_light():
-    what = surface(FACING, CORNERS[FACING], np.ones((1, 1, 4)))
-    picture, opacity = drawn(square(8.5, 10, 20, 15), WHITE, what)
+    picture, opacity = drawn(square(8.5, 10, 20, 15), WHITE, surface(FACING, CORNERS[FACING], np.ones((1, 1, 4))))
     assert (picture[10:15, 8] == 127).all()
     assert abs(int(opacity[12, 8]) - 127) <= 1

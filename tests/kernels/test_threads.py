@@ -17,19 +17,18 @@ def two_outside():
         yield
 
 
-def test_one_inside_and_as_before_afterwards():
+def test_one_inside_and_as_before_afterwards_also_after_an_error():
     with one_thread():
         assert threads() == {1}
         with one_thread():
             assert threads() == {1}
         assert threads() == {1}
     assert threads() == {2}
-
-
-def test_as_before_after_an_error():
     with pytest.raises(KeyError), one_thread():
         raise KeyError
     assert threads() == {2}
+    counted = one_thread()(threads)
+    assert [counted(), counted()] == [{1}, {1}]
 
 
 def test_blocks_that_overlap_in_threads_of_python_leave_nothing_behind():
@@ -50,12 +49,6 @@ def test_blocks_that_overlap_in_threads_of_python_leave_nothing_behind():
         for job in [pool.submit(first), pool.submit(second)]:
             job.result()
     assert threads() == {2}
-
-
-def test_a_decorated_function_may_be_called_again():
-    counted = one_thread()(threads)
-    assert counted() == {1}
-    assert counted() == {1}
 
 
 def test_kernels_are_named():

@@ -1,10 +1,12 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.paths import cheapest_arrivals, trace_back
-from oracles import trellis
+from lipmotion.kernels.paths import best_segments, cheapest_arrivals, trace_back
+from oracles import paths
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -18,26 +20,16 @@ def costs(states: int, frames: int, seed: int):
     return random.exponential(1, states), steps
 
 
-@settings(max_examples=150)
-@given(states=st.integers(1, 3), frames=st.integers(1, 6), seed=SEEDS)
-def test_no_path_is_cheaper(states: int, frames: int, seed: int) -> None:
-    start, steps = costs(states, frames, seed)
-    arrival, pointers = cheapest_arrivals(start, steps)
-    path, cost = trellis.cheapest_path(start, steps)
-    assert arrival.min() == pytest.approx(cost)
-    assert trace_back(pointers, int(arrival.argmin())).tolist() == path
-
-
 @settings(max_examples=60)
 @given(states=st.integers(1, 6), frames=st.integers(1, 300), seed=SEEDS)
 def test_every_last_state_is_reached_at_least_cost_by_the_way_traced(states: int, frames: int, seed: int) -> None:
     start, steps = costs(states, frames, seed)
     arrival, pointers = cheapest_arrivals(start, steps)
     assert pointers.shape == (frames, states)
-    assert arrival == pytest.approx(trellis.arrivals(start, steps))
+    assert arrival == pytest.approx(paths.arrivals(start, steps))
     for last in range(states):
         path = trace_back(pointers, last).tolist()
-        assert trellis.path_cost([pointers[0, path[0]], *path], start, steps) == pytest.approx(arrival[last])
+        assert paths.path_cost([pointers[0, path[0]], *path], start, steps) == pytest.approx(arrival[last])
 
 
 @settings(max_examples=40)
@@ -52,13 +44,52 @@ def test_stretches_are_the_whole(frames: int, cut: int, seed: int) -> None:
     assert np.concatenate([first, second]).tolist() == pointers.tolist()
 
 
-def test_ties_go_to_the_lower_state() -> None:
+def test_ties_go_to_the_lower_state_and_what_cannot_be_is_not_chosen() -> None:
     _, pointers = cheapest_arrivals(np.zeros(3), np.zeros((3, 3, 20)))
     assert not pointers.any()
-
-
-def test_what_cannot_be_is_not_chosen() -> None:
     steps = np.zeros((2, 2, 10))
     steps[:, 0, 5] = np.inf
     arrival, pointers = cheapest_arrivals(np.array([0.0, np.inf]), steps + np.array([0.0, 1.0])[:, None])
     assert trace_back(pointers, int(arrival.argmin())).tolist() == [0, 0, 0, 0, 0, 1, 0, 0, 0, 0]
+
+
+@settings(max_examples=50)
+@given(
+    frames=st.integers(1, 8),
+    labels=st.integers(1, 3),
+    hold=st.integers(1, 10),
+    change=st.sampled_from([0.0, 0.3, 2.0]),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_no_division_is_cheaper(frames: int, labels: int, hold: int, change: float, seed: int) -> None:
+    cost = np.random.default_rng(seed).normal(0, 1, (frames, labels))
+    found = best_segments(cost, hold, change)
+    assert paths.is_division(found, frames, hold)
+    _, least = paths.best_division(cost, hold, change)
+    assert paths.division_cost(found, cost, change) == pytest.approx(least, abs=1e-9)
+
+
+@settings(max_examples=15)
+@given(frames=st.integers(1, 300), hold=st.integers(1, 12), seed=st.integers(0, 2**32 - 1))
+def test_every_segment_is_held(frames: int, hold: int, seed: int) -> None:
+    found = best_segments(np.random.default_rng(seed).exponential(3, (frames, 9)), hold, 0.0)
+    assert paths.is_division(found, frames, hold)
+
+
+@settings(max_examples=25)
+@given(st.integers(1, 60), st.integers(1, 5), st.integers(0, 2**32 - 1))
+def test_ties_neither_split_nor_shorten(frames: int, hold: int, seed: int) -> None:
+    cost = np.random.default_rng(seed).integers(0, 2, (frames, 3)).astype(float)
+    found = best_segments(cost, hold, 0.0)
+    assert all(before[1] != after[1] for before, after in pairwise(found))
+    assert paths.is_division(found, frames, hold)
+
+
+def test_without_a_hold_it_is_the_cheapest_of_every_frame_and_a_dear_change_leaves_one_segment() -> None:
+    cost = np.random.default_rng(1).normal(0, 1, (200, 5))
+    labels = np.empty(200, int)
+    for first, label in best_segments(cost, 1, 0.0):
+        labels[first:] = label
+    assert (labels == cost.argmin(axis=1)).all()
+    assert best_segments(np.empty((0, 9)), 2, 0.5) == []
+    assert best_segments(cost, 2, 1e6) == [(0, int(cost.sum(axis=0).argmin()))]

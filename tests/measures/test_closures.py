@@ -48,11 +48,14 @@ def test_as_many_as_possible_are_matched_one_to_one_at_the_least_distance(genera
 
 
 def test_matching_by_hand():
+    for generated, original, pairs in (
+        ([8, 11], [10], [(11, 10)]),
+        ([7], [10], []),
+        ([9, 12], [10, 11], [(9, 10), (12, 11)]),
+        ([10, 12], [8, 10], [(10, 8), (12, 10)]),  # nearest first finds one
+    ):
+        assert match_closings(np.array(generated), np.array(original)) == pairs
     assert match_closings(np.array([10, 12]), np.array([11])) in ([(10, 11)], [(12, 11)])
-    assert match_closings(np.array([8, 11]), np.array([10])) == [(11, 10)]
-    assert match_closings(np.array([7]), np.array([10])) == []
-    assert match_closings(np.array([9, 12]), np.array([10, 11])) == [(9, 10), (12, 11)]
-    assert match_closings(np.array([10, 12]), np.array([8, 10])) == [(10, 8), (12, 10)]  # nearest first finds one
 
 
 @given(some=FRAMES, others=FRAMES)
@@ -61,21 +64,14 @@ def test_near_counts_whichever_is_near(some, others):
 
 
 def test_figures_by_hand():
-    original = [opening([5, 12, 20]), opening([3])]
-    generated = [opening([7, 20, 27]), opening([10])]
+    original, generated = [opening([5, 12, 20]), opening([3])], [opening([7, 20, 27]), opening([10])]
     figures = closure_figures(generated, original, 0.1, 25.0)
-    assert figures.score == pytest.approx(2 / 4)
-    assert figures.precision == pytest.approx(2 / 4)
-    assert figures.f1 == pytest.approx(2 * 2 / (4 + 4))
+    assert (figures.score, figures.precision, figures.f1) == pytest.approx((2 / 4, 2 / 4, 2 * 2 / (4 + 4)))
     assert figures.timing_ms == pytest.approx(1000 * 1 / 25)  # the median of 2 frames late and on time
     assert (figures.original, figures.generated) == (4, 4)
-
-
-def test_one_generated_closing_may_score_two_original_ones_but_is_matched_once():
-    """The score is Hofer's: a point for every original closing that has one near it."""
     figures = closure_figures([opening([11])], [opening([10, 12])], 0.1, 25.0)
-    assert (figures.score, figures.precision) == (1, 1)
-    assert figures.f1 == pytest.approx(2 / 3)
+    assert (figures.score, figures.precision) == (1, 1)  # Hofer's: a point for every original that has one near it
+    assert figures.f1 == pytest.approx(2 / 3)  # matched once
     assert abs(figures.timing_ms) == pytest.approx(40)
 
 
@@ -107,9 +103,7 @@ def test_intervals_are_taken_one_frame_longer_at_both_ends():
         for frame in range(30):
             figures = phone_closures([opening([frame])], [opening([frame])], [[interval_s]], 60.0, 0.1, 25.0)
             assert figures.intervals == (4 <= frame <= 8)
-            assert figures.false_per_minute == (not 4 <= frame <= 8) - (
-                frame == 0
-            )  # closed from the start is no closing
+            assert figures.false_per_minute == (not 4 <= frame <= 8 and frame > 0)  # closed from the start is none
 
 
 def test_phones_beyond_the_clip_and_clips_without_phones():

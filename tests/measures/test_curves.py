@@ -51,10 +51,9 @@ def test_correlation_is_that_of_numpy(seed):
 
 @given(value=st.floats(-1, 1), other=st.floats(-1, 1), frames=st.integers(1, 80))
 def test_a_constant_correlates_with_nothing(value, other, frames):
-    flat = np.full((frames, 1), value)
-    assert correlation(flat, np.full((frames, 1), other))[0] == 0
-    assert correlation(flat, np.linspace(0, 1, frames)[:, None])[0] == 0
-    assert correlation(np.linspace(0, 1, frames)[:, None], flat)[0] == 0
+    flat, line = np.full((frames, 1), value), np.linspace(0, 1, frames)[:, None]
+    for one, two in ((flat, np.full((frames, 1), other)), (flat, line), (line, flat)):
+        assert correlation(one, two)[0] == 0
 
 
 def test_pooled_means_are_those_of_all_frames_and_per_clip_of_each():
@@ -125,17 +124,11 @@ def test_lag_is_the_shift_and_late_is_positive(seed, late, rate_hz):
     assert lag_ms(generated, original, rate_hz) == pytest.approx(1000 * late / rate_hz, abs=0.1 * 1000 / rate_hz)
 
 
-def test_lag_between_frames():
+def test_lag_between_frames_of_the_first_channel():
     time_s = np.arange(200) / 25
-    original, generated = np.sin(4 * time_s)[:, None], np.sin(4 * (time_s - 0.013))[:, None]
+    original = np.stack([np.sin(4 * time_s), np.zeros(200)], axis=1)
+    generated = np.stack([np.sin(4 * (time_s - 0.013)), np.arange(200.0)], axis=1)
     assert lag_ms([generated], [original], 25.0) == pytest.approx(13, abs=1.5)
-
-
-def test_lag_looks_at_the_first_channel():
-    curve = smooth(1, 100)
-    original = np.stack([curve[30:-30], np.zeros(100)], axis=1)
-    generated = np.stack([curve[27:-33], np.arange(100.0)], axis=1)
-    assert lag_ms([generated], [original], 25.0) == pytest.approx(120, abs=4)
 
 
 def test_channels_that_move():

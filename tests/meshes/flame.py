@@ -1,7 +1,5 @@
 """Meshes with the vertices of FLAME, made up: only the vertices that are read have a place that means something."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from lipmotion.corpora.captured_faces import FLAME_MARKERS, FLAME_VERTICES

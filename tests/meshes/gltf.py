@@ -1,7 +1,5 @@
 """glTF files for tests, written by hand: a square of two triangles with two morph targets."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct
@@ -25,16 +23,29 @@ def document() -> tuple[dict, bytes]:
     accessors.append({"bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR"})
     primitive = {"attributes": {"POSITION": 0}, "indices": 3, "targets": [{"POSITION": 1}, {"POSITION": 2}]}
     content = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"name": "head", "mesh": 0}],
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"name": "head", "mesh": 0}],
         "meshes": [{"primitives": [primitive], "extras": {"targetNames": ["jawOpen", "mouthWide"]}}],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": offset}],
-    }
+        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": offset}],
+    }  # fmt: skip
     return content, b"".join(array.tobytes() for array in arrays)
+
+
+def with_array(content: dict, binary: bytes, array: np.ndarray, form: str, **more: object) -> tuple[bytes, int]:
+    """Add an array as a view and an accessor of a form; return the bytes, and the number of the accessor."""
+    kind = {"f4": 5126, "u1": 5121, "u2": 5123, "i2": 5122}[array.dtype.str[1:]]
+    width = 1 if form == "SCALAR" else int(form[-1])
+    content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
+    accessor = {"bufferView": len(content["bufferViews"]) - 1, "componentType": kind, "count": array.size // width}
+    content["accessors"].append(accessor | {"type": form} | more)
+    return binary + array.tobytes(), len(content["accessors"]) - 1
+
+
+def with_skin(content: dict, binary: bytes, joints: np.ndarray, weights: np.ndarray) -> bytes:
+    """Add the joints of each vertex [shape=(4, 4), uint8] and their weights; return the bytes."""
+    binary, first = with_array(content, binary, joints, "VEC4")
+    binary, second = with_array(content, binary, weights, "VEC4")
+    content["meshes"][0]["primitives"][0]["attributes"] |= {"JOINTS_0": first, "WEIGHTS_0": second}
+    return binary
 
 
 UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")
@@ -44,18 +55,14 @@ UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")
 def textured_document(picture: bytes, material=None, extension=None) -> tuple[dict, bytes]:
     """The square with a picture on it."""
     content, binary = document()
-    start = len(binary)
-    content["bufferViews"] += [
-        {"buffer": 0, "byteOffset": start, "byteLength": UV.nbytes},
-        {"buffer": 0, "byteOffset": start + UV.nbytes, "byteLength": len(picture)},
-    ]
-    content["accessors"].append({"bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC2"})
-    content["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 4
+    binary, number = with_array(content, binary, UV, "VEC2")
+    content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(picture)})
+    content["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = number
     content["meshes"][0]["primitives"][0]["material"] = 0
     place = {"index": 0} | ({"extensions": extension} if extension else {})
     content["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": place}} | (material or {})]
     content["textures"], content["images"] = [{"source": 0}], [{"bufferView": 5, "mimeType": "image/png"}]
-    return content, binary + UV.tobytes() + picture
+    return content, binary + picture
 
 
 def with_colours(content: dict, binary: bytes, colours: np.ndarray, *, normalised: bool = False) -> tuple[dict, bytes]:
@@ -77,16 +84,9 @@ def with_colours(content: dict, binary: bytes, colours: np.ndarray, *, normalise
 def animated_document(time_s: list[float], values, kind: str = "LINEAR", target=None) -> tuple[dict, bytes]:
     """The square with two animations: one of a rotation, and one of its targets, or of what ``target`` says."""
     content, binary = document()
-    keys, rows = np.array(time_s, "<f4"), np.array(values, "<f4")
-    width = rows.shape[-1] if target else 1
-    for array, form, count in (
-        (keys, "SCALAR", len(keys)),
-        (rows, f"VEC{width}" if width > 1 else "SCALAR", rows.size // width),
-    ):
-        content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
-        number = len(content["bufferViews"]) - 1
-        content["accessors"].append({"bufferView": number, "componentType": 5126, "count": count, "type": form})
-        binary += array.tobytes()
+    rows = np.array(values, "<f4")
+    binary, _ = with_array(content, binary, np.array(time_s, "<f4"), "SCALAR")
+    binary, _ = with_array(content, binary, rows, f"VEC{rows.shape[-1]}" if target else "SCALAR")
     sampler = {"input": 4, "output": 5, "interpolation": kind}
     channels = [{"sampler": 0, "target": target or {"node": 0, "path": "weights"}}]
     ignored = {"channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}], "samplers": [sampler]}

@@ -1,7 +1,5 @@
 """Files as the app Live Link Face writes them, for tests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

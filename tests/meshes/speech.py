@@ -1,7 +1,5 @@
 """Motion of a made-up sentence with known closures: silence, m, aa, p, uw, silence."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from lipmotion.articulation.lip_points import mouth_template

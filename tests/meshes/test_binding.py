@@ -1,8 +1,5 @@
-"""Control points move what is near them on the surface, and nothing else; bindings are stored and painted."""
-
-from __future__ import annotations
-
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,9 +14,12 @@ from lipmotion.meshes.files.binding_files import (
     write_points,
     write_weights,
 )
-from lipmotion.meshes.fitting.lip_placement import part_named_lips, place_lips_by_points
+from lipmotion.meshes.fitting import lip_placement
+from lipmotion.meshes.fitting.lip_placement import part_named_lips, place_lips_by_points, place_lips_by_shape
 from lipmotion.meshes.model.binding import MAX_WEIGHTS, bind, paint_weights, skin_vertices
-from meshes.heads import SEAM, SIZE, head, lip_points
+from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.meshes.model.surface import build_surface
+from meshes.heads import COLUMNS, HALF, SEAM, SIZE, head, lip_points, shaped
 from oracles.skinning import skinned_vertex_by_vertex
 
 
@@ -41,12 +41,6 @@ def _moved(binding, mesh, chosen, way):
     return (binding.moved(mesh, displacements) - mesh.vertices) / binding.placement.scale
 
 
-def test_weights_are_a_share_of_1(binding):
-    assert binding.weights.min() >= 0
-    assert binding.weights.sum(axis=1).max() <= 1 + 1e-9
-    assert binding.controls.shape[1] <= MAX_WEIGHTS
-
-
 def test_the_lower_lip_does_not_drag_the_upper(binding, mesh):
     template = mouth_template()
     moved = _moved(binding, mesh, template.lower | template.jaw, [0, -1, 0])
@@ -60,6 +54,9 @@ def test_the_lower_lip_does_not_drag_the_upper(binding, mesh):
 
 
 def test_the_face_beyond_the_mouth_stands_still(binding, mesh):
+    assert binding.weights.min() >= 0
+    assert binding.weights.sum(axis=1).max() <= 1 + 1e-9
+    assert binding.controls.shape[1] <= MAX_WEIGHTS
     template = mouth_template()
     moved = _moved(binding, mesh, np.ones(len(template.points), bool), [0.3, 0.2, 0.1])
     far = mesh.vertices[:, 1] / SIZE > SEAM + 0.55
@@ -86,41 +83,34 @@ def test_skinning_is_the_weighted_sum_of_the_transformed_vertices(binding, mesh)
     np.testing.assert_allclose(binding.transformed(mesh, matrices)[rows], slow, atol=1e-9)
 
 
-def test_a_stored_binding_is_the_same(binding, mesh, tmp_path):
-    save_binding(tmp_path / "head.binding", binding, mesh)
-    again = load_binding(tmp_path / "head.binding", mesh)
+def test_a_stored_binding_is_the_same_and_of_its_mesh_and_a_damaged_one_is_refused(binding, mesh, tmp_path):
+    path = tmp_path / "head.binding"
+    save_binding(path, binding, mesh)
+    again = load_binding(path, mesh)
     for name in ("rows", "controls", "weights"):
         np.testing.assert_array_equal(getattr(again, name), getattr(binding, name))
     assert again.placement.vertices.tolist() == binding.placement.vertices.tolist()
-
-
-def test_a_binding_of_another_mesh_is_refused(binding, mesh, tmp_path):
-    save_binding(tmp_path / "head.binding", binding, mesh)
     with pytest.raises(InputError, match="made for"):
-        load_binding(tmp_path / "head.binding", head(shapes=False, slit=False))
+        load_binding(path, head(shapes=False, slit=False))
 
+    def refused():
+        with pytest.raises(ModelFormatError, match="bind the character again"):
+            load_binding(path, mesh)
 
-@pytest.mark.parametrize("damage", ["no zip", "another format", "a weight too large"])
-def test_a_damaged_binding_is_refused(binding, mesh, tmp_path, damage):
-    path = tmp_path / "head.binding"
-    if damage == "a weight too large":
-        wrong = type(binding)(binding.placement, binding.rows, binding.controls, np.minimum(3 * binding.weights, 1))
-        save_binding(path, wrong, mesh)
-    elif damage == "no zip":
-        path.write_bytes(b"binding")
-    else:
-        with zipfile.ZipFile(path, "w") as file:
-            file.writestr("header.json", "{}")
-    with pytest.raises(ModelFormatError, match="bind the character again"):
-        load_binding(path, mesh)
+    save_binding(path, replace(binding, weights=np.minimum(3 * binding.weights, 1)), mesh)
+    refused()
+    path.write_bytes(b"binding")
+    refused()
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("header.json", "{}")
+    refused()
 
 
 def test_painted_weights_replace_those_of_a_vertex(binding, mesh, tmp_path):
     vertex = int(binding.rows[0])
-    (tmp_path / "paint.csv").write_text(
-        f"vertex,point,weight\n{vertex},152,0.25\n{vertex},17,0.5\n\n# more\n0,17,2e-1\n"
-    )
-    after = paint_weights(binding, mesh, read_weights(tmp_path / "paint.csv"))
+    paint = tmp_path / "paint.csv"
+    paint.write_text(f"vertex,point,weight\n{vertex},152,0.25\n{vertex},17,0.5\n\n# more\n0,17,2e-1\n")
+    after = paint_weights(binding, mesh, read_weights(paint))
     template = mouth_template()
     moved = _moved(after, mesh, [template.row(17)], [0, 1, 0])
     assert moved[vertex, 1] == pytest.approx(0.5)
@@ -130,13 +120,10 @@ def test_painted_weights_replace_those_of_a_vertex(binding, mesh, tmp_path):
     np.testing.assert_allclose(moved[untouched], before[untouched], atol=1e-9)
 
 
-def test_written_weights_paint_the_same_binding(binding, mesh, tmp_path):
+def test_written_weights_paint_the_same_binding_and_points_are_read(binding, mesh, tmp_path):
     write_weights(tmp_path / "weights.csv", binding)
     again = paint_weights(binding, mesh, read_weights(tmp_path / "weights.csv"))
     np.testing.assert_allclose(again.matrix.toarray(), binding.matrix.toarray(), atol=1e-5)
-
-
-def test_written_points_are_read(binding, tmp_path):
     write_points(tmp_path / "points.csv", binding.placement)
     named = read_points(tmp_path / "points.csv")
     assert [named[point] for point in binding.placement.points] == binding.placement.vertices.tolist()
@@ -159,3 +146,86 @@ def test_paint_is_checked(binding, mesh, tmp_path):
         (tmp_path / "paint.csv").write_text(text)
         with pytest.raises(InputError, match=message):
             paint_weights(binding, mesh, read_weights(tmp_path / "paint.csv"))
+
+
+GRID = 0.05 * SIZE
+"""The distance between vertices."""
+
+
+def _named(mesh):
+    named = lip_points(mesh)
+    return place_lips_by_points(mesh, part_named_lips(mesh, named), named)
+
+
+def _offsets(mesh, placement):
+    """How far each lip point is from where the template would have it."""
+    template = mouth_template()
+    centre = np.array([0, SEAM, 0]) * SIZE
+    lips = ~template.jaw & ~template.corner
+    wanted = centre[:2] + SIZE * HALF * 2 / template.width * (template.places - template.centre)[lips, :2]
+    return np.abs(mesh.vertices[placement.vertices[lips], :2] - wanted).max()
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_points_are_where_the_mouth_is_the_upper_ones_on_the_upper_lip(named):
+    mesh, template = head(), mouth_template()
+    placement = _named(mesh) if named else place_lips_by_shape(mesh, build_surface(mesh))
+    assert _offsets(mesh, placement) < 1.5 * GRID
+    assert placement.scale == pytest.approx(SIZE * 2 * HALF / template.width, rel=0.25)
+    drop = (shaped(mesh, {"jawOpen": 1.0}) - mesh.vertices)[placement.vertices, 1]
+    middle = np.abs(template.places[:, 0]) < 0.2
+    assert np.abs(drop[template.upper]).max() < 1e-9
+    assert drop[template.lower & middle].max() < -0.1 * SIZE
+
+
+def test_a_turned_head_is_found_by_its_eye_corners():
+    mesh = head()
+    turn = np.array([[0.0, 0, -1], [1, 0, 0], [0, -1, 0]]).T
+    named = lip_points(mesh)
+    for point, x in ((33, -0.5), (263, 0.5)):
+        named[point] = int(np.abs(mesh.vertices[:, :2] / SIZE - [x, 0.0]).sum(axis=1).argmin())
+    turned = Mesh(mesh.vertices @ turn.T, mesh.triangles)
+    placement = place_lips_by_points(turned, part_named_lips(turned, named), named)
+    upright = place_lips_by_points(mesh, part_named_lips(mesh, named), named)
+    assert placement.vertices.tolist() == upright.vertices.tolist()
+    np.testing.assert_allclose(placement.axes, turn @ upright.axes, atol=1e-9)
+    moved = placement.to_mesh(np.array([[0.0, -1, 0]]))
+    np.testing.assert_allclose(placement.to_motion(moved), [[0.0, -1, 0]], atol=1e-12)
+
+
+def test_mouths_that_do_not_open_are_refused():
+    mesh = head(shapes=False, slit=False)
+    named = lip_points(head(shapes=False))
+    named[14] = named[13] + len(COLUMNS)
+    with pytest.raises(InputError, match="hang together"):
+        place_lips_by_points(mesh, build_surface(mesh), named)
+    whole = Blendshape.between("jawOpen", mesh.vertices, mesh.vertices - [0, SIZE, 0])
+    with pytest.raises(InputError, match="parts no lips"):
+        place_lips_by_shape(Mesh(mesh.vertices, mesh.triangles, shapes=(whole,)), build_surface(mesh))
+    mesh = head()
+    closed = Mesh(mesh.vertices, mesh.triangles, shapes=tuple(s for s in mesh.shapes if s.name == "mouthPucker"))
+    with pytest.raises(InputError, match="the mesh has: mouthPucker"):
+        place_lips_by_shape(closed, build_surface(closed))
+
+
+def test_named_points_are_checked():
+    mesh = head(shapes=False)
+    for named, message in (
+        ({61: 0, 291: 1, 13: 2}, "14 are missing"),
+        ({61: 0, 291: 1, 13: 2, 14: 99999}, "vertex 99999, required 0 to"),
+        ({61: 0, 291: 1, 13: 2, 14: 2}, "are one vertex"),
+        ({61: 0, 291: 1, 13: 2, 14: 3, 5: 4}, "5 is no lip or jaw point"),
+    ):
+        with pytest.raises(InputError, match=message):
+            place_lips_by_points(mesh, build_surface(mesh), named)
+
+
+def test_of_a_dense_mesh_some_vertices_are_compared(monkeypatch):
+    mesh = head()
+    surface = build_surface(mesh)
+    whole = place_lips_by_shape(mesh, surface)
+    monkeypatch.setattr(lip_placement, "MAX_PAIRS", 1500)
+    thinned = place_lips_by_shape(mesh, surface)
+    assert (thinned.vertices != whole.vertices).any()
+    assert _offsets(mesh, thinned) < 2 * GRID
+    assert thinned.scale == pytest.approx(whole.scale, rel=0.2)

@@ -1,11 +1,15 @@
-"""Weights of blendshapes as motion of a mouth."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from lipmotion import Staging
 from lipmotion.articulation.contact import CLOSED_OPENING, opening_to_gap
+from lipmotion.articulation.expression import with_moods
+from lipmotion.articulation.liveliness import Liveliness
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.phone_targets import FADE_S, crossfade_phones
+from lipmotion.articulation.rest import rest_in_pauses
 from lipmotion.meshes.fitting.blendshape_motion import (
     arkit_mouth,
     arkit_weights,
@@ -14,25 +18,30 @@ from lipmotion.meshes.fitting.blendshape_motion import (
     with_mouth,
 )
 from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, eye_and_brow_weights
 from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
-from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
+from lipmotion.meshes.fitting.shape_weights import (
+    MAX_CLOSED_WEIGHT,
+    VISEME_OF_PHONE,
+    solve_shape_weights,
+    weigh_visemes,
+)
 from lipmotion.meshes.model.face_shapes import find_face_shapes
+from lipmotion.meshes.model.mesh import ANGLES
+from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.meshes.model.surface import build_surface
-from lipmotion.types import WEIGHT, Channel, Motion, Timeline
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types.delivery import parse_moods
+from lipmotion.types.motion import RADIAN
+from lipmotion.units import PHONES
+from lipmotion_faces.base import stage_liveliness
+from lipmotion_faces.head.pose import head_poses
 from meshes.heads import head
 from meshes.speech import motion, units
 
 
 def weights(**curves: list[float]) -> Motion:
     return Motion(np.array(list(curves.values())).T, 100.0, tuple(Channel(name, WEIGHT) for name in curves))
-
-
-def test_other_motion_stays_as_it_is() -> None:
-    said = motion()
-    assert with_mouth(said) is said
-    no_jaw = weights(mouthPucker=[0.0, 1.0])
-    assert with_mouth(no_jaw) is no_jaw
-    assert not is_of_blendshapes(no_jaw)
 
 
 def test_the_jaw_opens_and_mouth_close_closes() -> None:
@@ -62,21 +71,21 @@ def test_motion_that_became_weights_comes_back() -> None:
     assert np.corrcoef(back["width"], said["width"])[0, 1] > 0.9
 
 
-def test_the_blendshapes_of_facegood_are_converted() -> None:
-    found = arkit_weights(weights(mouth_stretch_c=[0.0, 0.6], mouth_pucker_l=[0.4, 0.0], mouth_pucker_r=[0.4, 0.0]))
-    assert found["jawOpen"].tolist() == [0.0, 0.6]
-    assert found["mouthPucker"].tolist() == pytest.approx([0.4, 0.0])
-    assert is_of_blendshapes(weights(mouth_stretch_c=[0.0, 0.6]))
-
-
-def test_weights_that_are_given_are_taken() -> None:
+def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> None:
     given = find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
     assert given is not None
     assert given.names == arkit_mouth().names
     assert given["jawOpen"].tolist() == [0.2, 1.0]
     assert given["mouthFunnel"].tolist() == [0.0, 0.0]
-    assert find_own_weights(motion(), arkit_mouth()) is None
-    assert find_own_weights(weights(mouthPucker=[0.1, 0.2]), arkit_mouth()) is None
+    for other in (motion(), weights(mouthPucker=[0.1, 0.2])):  # without a jaw
+        assert find_own_weights(other, arkit_mouth()) is None
+        assert with_mouth(other) is other
+        assert not is_of_blendshapes(other)
+    facegood = weights(mouth_stretch_c=[0.0, 0.6], mouth_pucker_l=[0.4, 0.0], mouth_pucker_r=[0.4, 0.0])
+    found = arkit_weights(facegood)
+    assert found["jawOpen"].tolist() == [0.0, 0.6]
+    assert found["mouthPucker"].tolist() == pytest.approx([0.4, 0.0])
+    assert is_of_blendshapes(facegood)
 
 
 def test_a_mesh_shows_the_weights_that_are_given() -> None:
@@ -86,8 +95,122 @@ def test_a_mesh_shows_the_weights_that_are_given() -> None:
     assert character.shapes is not None
     moved = with_mouth(weights(jawOpen=[0.0, 0.25, 0.5], mouthClose=[0.0] * 3))
     rest, half, whole = character.vertices(moved, Timeline(()), np.arange(3) / 100)
-    jaw = next(
-        shape for shape in mesh.shapes if shape.name == character.shapes.names[character.shapes.row("jawOpen") or 0]
-    )
+    (jaw,) = (shape for shape in mesh.shapes if shape.name == "jawOpen")
     assert (whole - rest)[jaw.rows] == pytest.approx(0.5 * jaw.displacements, abs=1e-9)
     assert (half - rest)[jaw.rows] == pytest.approx(0.25 * jaw.displacements, abs=1e-9)
+
+
+TIME_S = np.arange(60) / 30
+TALK = Motion(0.1 * np.sin(9 * TIME_S)[:, None] ** 2, 30.0, (Channel("opening"),))
+
+
+def staged(motion: Motion, seed: int = 0) -> Liveliness:
+    return stage_liveliness(TIME_S, with_mouth(motion), Timeline(()), Staging(seed=seed))
+
+
+def captured(curves: dict[str, object]) -> Motion:
+    """Return motion of blendshapes, with the angles of the head that are given."""
+    jaw = {"jawOpen": 0.3 * np.sin(9 * TIME_S) ** 2}
+    columns = {name: np.broadcast_to(np.asarray(curve, float), TIME_S.shape) for name, curve in (jaw | curves).items()}
+    channels = tuple(Channel(name, RADIAN if name in ANGLES else WEIGHT) for name in columns)
+    return Motion(np.stack(list(columns.values()), axis=1), 30.0, channels)
+
+
+@pytest.mark.parametrize("mood", ["", "afraid", "happy", "disgusted"])
+def test_a_face_moves_as_in_the_file_of_its_own_curves(mood: str) -> None:
+    played = staged(with_moods(TALK, parse_moods(mood)), seed=3)
+    weights = eye_and_brow_weights(played)
+    again = staged(captured(weights | dict(zip(ANGLES, played.turn.T, strict=True))), seed=4)
+    for name, curve in eye_and_brow_weights(again).items():
+        assert curve == pytest.approx(weights.get(name, 0), abs=1e-12), name
+    for name in ("lids", "gaze", "turn"):
+        assert getattr(again, name) == pytest.approx(getattr(played, name), abs=1e-12), name
+    for unit in (4, 5, 6, 9):
+        assert again.unit(unit) == pytest.approx(played.unit(unit), abs=1e-12), unit
+
+
+def test_curves_that_never_move_leave_the_face_to_itself() -> None:
+    nothing = {name: np.zeros(60) for names in MOVED_BY.values() for name in names}
+    alone, beside = (staged(captured(curves)) for curves in ({}, nothing))
+    for name in ("lids", "brows", "gaze", "turn"):
+        assert getattr(alone, name).any(), name
+        assert np.array_equal(getattr(alone, name), getattr(beside, name)), name
+    blinks = staged(captured({**nothing, "eyeBlinkLeft": 0.4}))
+    assert blinks.lids == pytest.approx(0.2)
+    assert np.array_equal(blinks.turn, alone.turn)
+
+
+def test_each_side_is_kept_and_a_mood_is_added() -> None:
+    tired = with_moods(captured({"browDownLeft": 0.8, "browInnerUp": 0.3}), parse_moods("tired"))
+    weights = eye_and_brow_weights(staged(tired))
+    assert weights["browDownLeft"] == pytest.approx(0.8)
+    assert weights["browInnerUp"] == pytest.approx(0.3 + 0.1)
+    assert not weights["browDownRight"].any()
+
+
+def test_eyes_hold_their_target_under_a_head_that_is_given() -> None:
+    ahead, aside = (staged(captured({"headYaw": yaw})) for yaw in (1e-9, 0.3))
+    assert aside.turn[:, 0] == pytest.approx(0.3)
+    assert (aside.gaze - ahead.gaze)[:, 0] == pytest.approx(-0.85 * 0.3, abs=1e-6)
+
+
+def test_the_3d_head_shows_what_was_captured() -> None:
+    curves = {f"{name}{side}": 0.9 for name in ("eyeBlink", "cheekSquint", "mouthSmile") for side in ("Left", "Right")}
+    pose = head_poses(with_mouth(captured({**curves, "headRoll": 0.2, "noseSneerLeft": 1.0})), Timeline(()), 30.0)[30]
+    assert (pose.shut, pose.mood.cheek, pose.mood.sneer, pose.turn[2]) == pytest.approx((0.9, 0.9, 0.5, 0.2))
+    assert pose.smile > 0.04
+
+
+def test_every_phone_has_a_viseme_and_silence_and_closures_have_theirs():
+    assert set(VISEME_OF_PHONE) == set(PHONES)
+    assert set(VISEME_OF_PHONE.values()) == set(VISEMES_15)
+    found = weigh_visemes(units(), spoken_mouth(motion(), units()))
+    assert found["viseme_sil"][[0, 20, 160, 200]] == pytest.approx([1, 1, 1, 1])
+    assert found["viseme_PP"][[55, 95]] == pytest.approx([1, 1])
+    assert found["viseme_aa"][75] == pytest.approx(1)
+    assert found["viseme_ou"][115] == pytest.approx(1)
+    nothing, closed = Timeline(()), Motion(np.zeros((5, 1)), 25.0, (Channel("opening"),))
+    assert weigh_visemes(nothing, spoken_mouth(closed, nothing))["viseme_sil"] == pytest.approx(np.ones(5))
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(st.tuples(st.sampled_from(PHONES), st.floats(0.0, 0.3), st.floats(0.0, 0.1)), max_size=12),
+    st.floats(10, 120),
+    st.sampled_from([0.0, 0.03, 0.1, 0.2]),
+)
+def test_weights_add_up_to_1_and_are_never_negative(phones, rate_hz, opening):
+    spans, end = [], 0.0
+    for phone, duration, gap in phones:
+        spans.append(Span(end + gap, end + gap + duration, Unit(phone)))
+        end += gap + duration
+    frames = int(rate_hz * (end + 0.5)) + 1
+    still = Motion(np.full((frames, 1), opening), rate_hz, (Channel("opening"),))
+    said = Timeline(tuple(spans))
+    motion = weigh_visemes(said, spoken_mouth(still, said))
+    np.testing.assert_allclose(motion.values.sum(axis=1), 1, atol=1e-9)
+    assert motion.values.min() >= 0
+    closed = motion["viseme_sil"] + motion["viseme_PP"]
+    contact = spoken_mouth(still, said).contact
+    assert closed[contact] == pytest.approx(1)
+    assert closed[~contact].max(initial=0) <= MAX_CLOSED_WEIGHT + 1e-9
+
+
+def test_phones_fade_around_their_border():
+    time_s = np.array([0.9 - FADE_S, 0.9 - 0.02, 0.9, 0.9 + 0.02, 0.9 + FADE_S])
+    weights = crossfade_phones(units(), time_s, lambda phone: phone)
+    assert weights["p"][2] == pytest.approx(0.5)
+    assert weights["aa"][2] == pytest.approx(0.5)
+    assert weights["aa"][0] == pytest.approx(1)
+    assert 0.5 < weights["aa"][1] < 1
+
+
+def test_visemes_rest_where_the_curves_do():
+    said = Timeline(tuple(Span(a, b, Unit(p)) for a, b, p in ((0, 0.5, "aa"), (0.5, 1.1, "sp"), (1.1, 1.6, "aa"))))
+    held = Motion(np.full((161, 1), 0.1), 100.0, (Channel("opening"),))
+    generation = Generation(held, np.zeros((161, 1)), said, StateTrace(("",), np.zeros(161, np.intp)))
+    for style, rests in (("rest", True), ("natural", False)):
+        moved = rest_in_pauses(generation, style).motion
+        found, arkit = weigh_visemes(said, spoken_mouth(moved, said)), solve_shape_weights(moved, said, arkit_mouth())
+        assert (found["viseme_sil"][80] > 0.99) == rests
+        assert (arkit["jawOpen"][80] < 0.01) == rests

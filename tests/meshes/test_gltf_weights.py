@@ -1,7 +1,3 @@
-"""Animations of glTF as motion: even and uneven keys, steps, splines, several meshes, expressions of VRM."""
-
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +14,9 @@ from meshes.heads import head, write_glb
 NAMES = ["jawOpen", "mouthWide"]
 
 
-def animated(
-    tmp_path: Path,
-    time_s: list[float],
-    values: Any,
-    kind: str = "LINEAR",
-    target: dict[str, Any] | None = None,
-    name: str = "a.glb",
-) -> Path:
-    """Write the square of two targets with one animation."""
-    content, binary = gltf.animated_document(time_s, values, kind, target)
-    (tmp_path / name).write_bytes(gltf.glb(content, binary))
+def animated(tmp_path: Path, time_s: list[float], values: Any, *how: Any, name: str = "a.glb") -> Path:
+    """Write the square of two targets with one animation, of some interpolation and target."""
+    (tmp_path / name).write_bytes(gltf.glb(*gltf.animated_document(time_s, values, *how)))
     return tmp_path / name
 
 
@@ -74,8 +62,8 @@ def test_uneven_keys_are_sampled(
 
 def test_expressions_of_a_vrm_animation(tmp_path: Path) -> None:
     rows = [[0, 0, 0], [0.75, 0, 0], [1, 0, 0]]
-    file = animated(tmp_path, [0, 1 / 30, 2 / 30], rows, target={"node": 1, "path": "translation"}, name="a.vrma")
-    motion, _ = read_motion(file)
+    target = {"node": 1, "path": "translation"}
+    motion, _ = read_motion(animated(tmp_path, [0, 1 / 30, 2 / 30], rows, "LINEAR", target, name="a.vrma"))
     assert (motion.rate_hz, motion.names) == (30, ("eyeBlinkLeft", "eyeBlinkRight"))
     assert motion["eyeBlinkRight"] == pytest.approx([0, 0.75, 1], abs=1e-6)
     assert {".glb", ".gltf", ".vrma"} <= {*readable_suffixes()}
@@ -113,14 +101,10 @@ def test_turns_of_neck_and_head_are_against_their_rest(tmp_path: Path) -> None:
     animation = content["animations"][1]
     for number, parent, at_rest, turn in zip((neck, head), (Rotation.identity(), world[0]), world, turns, strict=True):
         local = (parent.inv() * turn * at_rest).as_quat().astype("<f4")
-        content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": local.nbytes})
-        view = len(content["bufferViews"]) - 1
-        content["accessors"].append({"bufferView": view, "componentType": 5126, "count": 3, "type": "VEC4"})
-        binary += local.tobytes()
-        animation["samplers"].append({"input": 4, "output": len(content["accessors"]) - 1})
-        animation["channels"].append(
-            {"sampler": len(animation["samplers"]) - 1, "target": {"node": number, "path": "rotation"}}
-        )
+        binary, output = gltf.with_array(content, binary, local, "VEC4")
+        animation["samplers"].append({"input": 4, "output": output})
+        target = {"node": number, "path": "rotation"}
+        animation["channels"].append({"sampler": len(animation["samplers"]) - 1, "target": target})
     content["buffers"] = [{"byteLength": len(binary)}]
     (tmp_path / "a.vrma").write_bytes(gltf.glb(content, binary))
     motion, _ = read_motion(tmp_path / "a.vrma")
@@ -165,11 +149,9 @@ def test_the_animation_that_moves_the_mouth_is_read(tmp_path: Path, caplog: pyte
     rows = np.random.default_rng(5).random((5, 2))
     content, binary = gltf.animated_document([n / 30 for n in range(5)], rows)
     talk = content["animations"][1]
-    still = len(content["accessors"])
-    content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": 40})
-    content["accessors"].append({"bufferView": 6, "componentType": 5126, "count": 10, "type": "SCALAR"})
+    binary, still = gltf.with_array(content, binary, np.zeros(10, "<f4"), "SCALAR")
     idle = {"name": "idle", "channels": talk["channels"], "samplers": [{"input": 4, "output": still}]}
     content["animations"] = [idle, talk]
-    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary + bytes(40)))
+    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
     assert read_motion(tmp_path / "a.glb")[0].values == pytest.approx(rows, abs=1e-6)
     assert "2 animations move the face: idle, talk; read: talk" in caplog.text

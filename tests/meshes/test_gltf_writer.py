@@ -1,8 +1,7 @@
-"""What is written as glb is read again, with its blendshapes; the animation has the weights."""
-
-from __future__ import annotations
-
 import json
+import struct
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,15 +9,10 @@ import pytest
 from lipmotion.errors import ExportError
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
-from lipmotion.meshes.files.gltf_writer import find_named_sound, sound_extras
+from lipmotion.meshes.files.gltf_writer import find_named_sound, sound_extras, write_animated_gltf
 from lipmotion.types import WEIGHT, Channel, Motion
+from meshes import gltf
 from meshes.heads import head, shaped, write_glb
-
-
-@pytest.fixture
-def weights():
-    values = np.stack([np.linspace(0, 1, 7), np.linspace(0.5, 0, 7)], axis=1)
-    return Motion(values, 25.0, (Channel("mouthPucker", WEIGHT), Channel("jawOpen", WEIGHT)))
 
 
 def test_a_mesh_comes_back(tmp_path):
@@ -31,33 +25,16 @@ def test_a_mesh_comes_back(tmp_path):
         np.testing.assert_allclose(again, written, atol=1e-5)
 
 
-def test_the_animation_has_the_weights(tmp_path, weights):
-    mesh = head()
-    write_glb(tmp_path / "head.glb", mesh, weights)
-    document = read_gltf_document(tmp_path / "head.glb")
-    sampler = document.json["animations"][0]["samplers"][0]
-    arrays = GltfArrays(document)
-    np.testing.assert_allclose(arrays.floats(sampler["input"], 1)[:, 0], weights.time_s, atol=1e-6)
-    stored = arrays.floats(sampler["output"], 1).reshape(7, -1)
-    np.testing.assert_allclose(stored[:, mesh.shape_names.index("jawOpen")], weights["jawOpen"], atol=1e-6)
-    np.testing.assert_allclose(stored[:, mesh.shape_names.index("mouthFunnel")], 0, atol=1e-6)
-
-
-def test_a_channel_that_is_no_shape_is_refused(tmp_path):
+def test_colours_of_vertices_are_written_and_a_channel_that_is_no_shape_is_refused(tmp_path):
     other = Motion(np.zeros((3, 1)), 25.0, (Channel("opening"),))
     with pytest.raises(ExportError, match="no blendshape 'opening'"):
         write_glb(tmp_path / "head.glb", head(), other)
     assert not list(tmp_path.iterdir())
-
-
-def test_colours_of_vertices_come_back(tmp_path):
     mesh = head(shapes=False)
     colours = np.random.default_rng(0).random(mesh.vertices.shape)
-    painted = type(mesh)(mesh.vertices, mesh.triangles, mesh.parts, colours=colours)
-    write_glb(tmp_path / "head.glb", painted)
+    write_glb(tmp_path / "head.glb", replace(mesh, colours=colours))
     document = read_gltf_document(tmp_path / "head.glb")
-    primitive = document.json["meshes"][0]["primitives"][0]
-    assert "COLOR_0" in primitive["attributes"]
+    assert "COLOR_0" in document.json["meshes"][0]["primitives"][0]["attributes"]
 
 
 @pytest.mark.parametrize(
@@ -78,3 +55,81 @@ def test_paths_from_the_folder_of_the_file_count(tmp_path, extras, found):
     (tmp_path / "a.gltf").write_text(text, encoding="utf-8")
     named = find_named_sound(tmp_path / "a.gltf")
     assert (named and named[0]) == (found and tmp_path / found)
+
+
+def weights(*names: str) -> Motion:
+    values = np.random.default_rng(4).random((9, len(names)))
+    return Motion(values, 30.0, tuple(Channel(name, WEIGHT) for name in names))
+
+
+@pytest.fixture
+def original(tmp_path: Path) -> Path:
+    """A head of which things are known that this program does not know, and with an animation already."""
+    write_glb(tmp_path / "first.glb", head(), weights("mouthPucker"))
+    content = (tmp_path / "first.glb").read_bytes()
+    (size,) = struct.unpack_from("<I", content, 12)
+    document = json.loads(content[20 : 20 + size])
+    document["images"] = [{"name": "skin", "mimeType": "image/png", "bufferView": 0}]
+    document["asset"]["extras"] = {"by": "somebody – Größe"}
+    document["animations"][0]["name"] = "dance"
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    body = content[20 + size :]
+    header = struct.pack("<4sII", b"glTF", 2, 20 + len(text) + len(body))
+    path = tmp_path / "original.glb"
+    path.write_bytes(header + struct.pack("<II", len(text), 0x4E4F534A) + text + body)
+    return path
+
+
+def test_everything_stays_and_the_animation_comes_first(original: Path, tmp_path: Path) -> None:
+    assert write_animated_gltf(tmp_path / "a.glb", original, weights("jawOpen", "mouthFunnel"), "a.wav")
+    before, after = read_gltf_document(original), read_gltf_document(tmp_path / "a.glb")
+    for name in ("images", "meshes", "materials", "nodes"):
+        assert after.items(name) == before.items(name)
+    assert after.json["asset"] == before.json["asset"]
+    assert [each["name"] for each in after.json["animations"]] == ["speech", "dance"]
+    assert after.json["accessors"][: len(before.json["accessors"])] == before.json["accessors"]
+    assert after.buffers[0][: len(before.buffers[0])] == before.buffers[0]
+    assert after.json["scenes"][0]["extras"] == {"audio": {"uri": "a.wav", "start_s": 0.0}}
+    assert read_character(tmp_path / "a.glb").shape_names == head().shape_names
+
+
+def written_curves(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return the times of the first animation of a head, and its weights by name."""
+    document = read_gltf_document(path)
+    sampler, arrays = document.json["animations"][0]["samplers"][0], GltfArrays(document)
+    times_s = arrays.floats(sampler["input"], 1)[:, 0]
+    stored = arrays.floats(sampler["output"], 1).reshape(len(times_s), -1)
+    return times_s, dict(zip(head().shape_names, stored.T, strict=True))
+
+
+@pytest.mark.parametrize("added", [True, False])
+def test_the_animation_has_the_weights(original: Path, tmp_path: Path, added: bool) -> None:
+    moved = weights("jawOpen", "mouthFunnel")
+    if added:
+        assert write_animated_gltf(tmp_path / "a.glb", original, moved)
+    else:
+        write_glb(tmp_path / "a.glb", head(), moved)
+    times_s, stored = written_curves(tmp_path / "a.glb")
+    assert times_s == pytest.approx(moved.time_s, abs=1e-6)
+    for name, curve in stored.items():
+        assert curve == pytest.approx(moved[name] if name in moved.names else np.zeros(9), abs=1e-6)
+
+
+def test_held_weights_change_at_once(original: Path, tmp_path: Path) -> None:
+    moved = Motion(np.array([[0.0], [0.0], [1.0]]), 10.0, (Channel("jawOpen", WEIGHT),))
+    assert write_animated_gltf(tmp_path / "a.glb", original, moved, stepped=["jawOpen"])
+    times_s, stored = written_curves(tmp_path / "a.glb")
+    assert times_s == pytest.approx([0, 0.1, 0.199, 0.2])
+    assert stored["jawOpen"] == pytest.approx([0, 0, 0, 1])
+
+
+def test_what_is_no_morph_target_and_buffers_elsewhere_are_left_to_another_writer(
+    original: Path, tmp_path: Path
+) -> None:
+    content, binary = gltf.document()
+    content["buffers"][0]["uri"] = gltf.data_uri(binary)
+    (tmp_path / "elsewhere.gltf").write_text(json.dumps(content))
+    for path, moved in ((original, weights("jawOpen", "vowel_aa")), (tmp_path / "elsewhere.gltf", weights("target 0"))):
+        assert not write_animated_gltf(tmp_path / "a.glb", path, moved)
+        assert not (tmp_path / "a.glb").exists()

@@ -1,7 +1,3 @@
-"""Meshes check themselves; blendshapes add up."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -30,12 +26,9 @@ def _mesh(**changes) -> Mesh:
     return Mesh(**({"vertices": CORNERS, "triangles": SQUARE, "shapes": (up, out)} | changes))
 
 
-def test_displacements_of_some_vertices():
+def test_displacements_of_some_vertices_and_of_what_moves_alone():
     moved = _mesh().displacements(np.array([3, 0]))
     np.testing.assert_allclose(moved, [[[0, 2, 0], [0, 0, 0]], [[0, 0, 4], [0, 0, 0]]], atol=1e-12)
-
-
-def test_a_blendshape_keeps_only_what_moves():
     shape = CORNERS.copy()
     shape[1] += [0, 0, 1e-9]
     shape[2] += [0, 0, 0.5]
@@ -64,8 +57,7 @@ def test_what_does_not_fit_is_refused():
             _mesh(**changes)
 
 
-PLACES = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-FRONT = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+PLACES, FRONT = CORNERS, SQUARE
 BACK = np.array([[0, 3, 2], [2, 1, 0]], np.int32)
 
 
@@ -80,14 +72,15 @@ def test_a_part_with_both_sides_is_held_once():
 
 
 def test_other_meshes_stay_as_they_are():
-    for triangles in (FRONT, np.concatenate([FRONT, FRONT]), np.concatenate([FRONT, BACK[:1]])):
-        mesh = Mesh(PLACES, triangles)
+    parts = (MeshPart("front", 0, 2), MeshPart("back", 2, 4))
+    for triangles, of in (
+        (FRONT, None),
+        (np.concatenate([FRONT, FRONT]), None),
+        (np.concatenate([FRONT, BACK[:1]]), None),
+        (np.concatenate([FRONT, BACK]), parts),
+    ):
+        mesh = Mesh(PLACES, triangles, of or ())
         assert drop_back_sides(mesh) is mesh
-
-
-def test_both_sides_in_two_parts_stay():
-    mesh = Mesh(PLACES, np.concatenate([FRONT, BACK]), (MeshPart("front", 0, 2), MeshPart("back", 2, 4)))
-    assert drop_back_sides(mesh) is mesh
 
 
 def test_normals_of_both_sides_do_not_cancel_out():
@@ -99,14 +92,11 @@ def weights(name: str = "jawOpen") -> Motion:
     return Motion(np.linspace(0, 1, 4)[:, None], 25.0, (Channel(name, WEIGHT),))
 
 
-def test_weights_are_in_the_order_of_the_mesh() -> None:
+def test_weights_are_in_the_order_of_the_mesh_and_what_is_no_shape_is_refused() -> None:
     table = Scene(head(), weights()).table()
     column = head().shape_names.index("jawOpen")
     assert table[:, column] == pytest.approx(np.linspace(0, 1, 4))
     assert np.delete(table, column, axis=1) == pytest.approx(np.zeros((4, table.shape[1] - 1)))
-
-
-def test_a_channel_that_is_no_shape_is_refused() -> None:
     with pytest.raises(ExportError, match="no blendshape 'opening'"):
         Scene(head(), weights("opening"))
 
@@ -151,16 +141,12 @@ def test_curves_stay_within_the_tolerance(tolerance: float) -> None:
     assert np.abs(between((time_s, rows)) - ROWS).max() <= tolerance + 1e-12
 
 
-def test_coarser_keys_are_fewer() -> None:
+def test_coarser_keys_are_fewer_and_closed_lips_stay_closed() -> None:
     counts = [len(Thinning(tolerance).choose(TIME_S, ROWS)) for tolerance in (0.0, 0.003, 0.01, 0.05, 2.0)]
     assert counts == sorted(counts, reverse=True)
     assert (counts[0], counts[-1]) == (300, 2)
     assert len(EVERY_KEY.choose(TIME_S[:0], ROWS[:0])) == 0
-
-
-def test_closed_lips_stay_closed() -> None:
-    kept = Thinning(2.0, (0.703, 2.995)).choose(TIME_S, ROWS)
-    assert kept.tolist() == [0, 69, 70, 71, 298, 299]
+    assert Thinning(2.0, (0.703, 2.995)).choose(TIME_S, ROWS).tolist() == [0, 69, 70, 71, 298, 299]
 
 
 def test_a_held_pose_still_changes_at_once() -> None:
@@ -169,11 +155,6 @@ def test_a_held_pose_still_changes_at_once() -> None:
     rise = np.flatnonzero(np.diff(rows[:, 2]) > 0.3)
     assert len(rise) == 1
     assert time_s[rise[0] + 1] - time_s[rise[0]] == pytest.approx(0.001)
-
-
-def test_there_are_52_and_15():
-    assert len({*ARKIT_MOUTH, *ARKIT_OTHERS}) == 52
-    assert len(set(VISEMES_15)) == 15
 
 
 def test_names_as_files_spell_them():
@@ -186,23 +167,11 @@ def test_names_as_files_spell_them():
         "mouthSmile": None, "Fcl_MTH_A": None, "": None, "001": None,
     }  # fmt: skip
     assert {spelled: arkit_name(spelled) for spelled in arkit} == arkit
-    visemes = {
-        "viseme_PP": "PP",
-        "viseme_I": "ih",
-        "vrc.v_oh": "oh",
-        "Viseme_aa": "aa",
-        "viseme_ZZ": None,
-        "viseme_PP.001": "PP",
-        "aa": None,
-    }
+    assert len({*ARKIT_MOUTH, *ARKIT_OTHERS}) == 52
+    visemes = {"viseme_PP": "PP", "viseme_I": "ih", "vrc.v_oh": "oh", "Viseme_aa": "aa", "viseme_ZZ": None}
+    visemes |= {"viseme_PP.001": "PP", "aa": None}
+    assert len(set(VISEMES_15)) == 15
     assert {spelled: viseme_name(spelled) for spelled in visemes} == visemes
-    vowels = {
-        "Fcl_MTH_A": "aa",
-        "Fcl_MTH_O.003": "oh",
-        "aa": "aa",
-        "う": "ou",
-        "oh": "oh",
-        "Fcl_MTH_Angry": None,
-        "Alpha": None,
-    }
+    vowels = {"Fcl_MTH_A": "aa", "Fcl_MTH_O.003": "oh", "aa": "aa", "う": "ou", "oh": "oh"}
+    vowels |= {"Fcl_MTH_Angry": None, "Alpha": None}
     assert {spelled: vowel_name(spelled) for spelled in vowels} == vowels

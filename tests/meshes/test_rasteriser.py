@@ -34,19 +34,15 @@ def picture_of(mesh: Mesh, camera: Camera) -> np.ndarray:
     return Canvas(camera).picture(vertices, light, mesh.triangles)
 
 
-def test_the_centre_is_in_the_middle_of_the_picture():
-    column, row, _ = CAMERA.on_screen(np.array([[0.5, -0.25, 0.0]]))[0]
-    assert (column, row) == pytest.approx((60, 50))
-
-
 def test_the_height_of_the_picture_is_as_stated_and_nearer_things_are_larger():
+    centre = np.array([[0.5, -0.25, 0.0]])
+    assert CAMERA.on_screen(centre)[0][:2] == pytest.approx((60, 50))
     low, high, near = CAMERA.on_screen(np.array([[0.5, -1.25, 0.0], [0.5, 0.75, 0.0], [0.5, 0.75, 1.0]]))
     assert low[1] - high[1] == pytest.approx(100)
     assert near[1] < high[1]
     assert near[2] < high[2]
-
-
-def test_an_unusable_camera_is_refused():
+    light = gradient(Camera(100, 100))  # the background is brightest in the middle
+    assert light[42, 50].sum() > light[5, 5].sum()
     for size in ((63, 100), (120, 62), (120, 101)):
         with pytest.raises(InputError, match="even number of at least 64"):
             Camera(*size)
@@ -101,11 +97,6 @@ def test_marked_vertices_are_found_where_they_can_be_seen():
     assert seen[50, 60]
     assert not seen[50, 40]
     assert seen.sum() == pytest.approx(0.5 * np.pi * 25**2, rel=0.1)
-
-
-def test_the_background_is_brightest_in_the_middle():
-    light = gradient(Camera(100, 100))
-    assert light[42, 50].sum() > light[5, 5].sum()
 
 
 def test_a_floor_under_a_roof_gets_less_light_than_the_floor_beside_it():

@@ -1,7 +1,3 @@
-"""Weights follow the points, stay in range, and close the lips where they should."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -22,7 +18,7 @@ from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import Channel, Motion, Timeline
 from meshes.heads import head
-from meshes.speech import motion, units
+from meshes.speech import PHONES, motion, units
 
 
 def _head_shapes():
@@ -41,16 +37,21 @@ def weights(shapes):
     return solve_shape_weights(motion(points=shapes is not arkit_mouth()), units(), shapes)
 
 
-def test_weights_are_between_0_and_1_and_smooth(weights):
+def test_weights_are_between_0_and_1_and_smooth_and_pucker_in_oo(weights):
     assert weights.values.min() >= 0
     assert weights.values.max() <= 1
     assert np.abs(np.diff(weights.values, axis=0)).max() < 0.25
+    assert (weights["mouthClose"] - weights["jawOpen"]).max() < 1e-9
+    assert weights["mouthPucker"][115] > weights["mouthPucker"][75] + 0.04  # aa
+    of_reference = solve_shape_weights(motion(), units(), arkit_mouth())["mouthPucker"]
+    assert of_reference[115] > 0.38
+    assert of_reference[75] < 0.3
 
 
 def test_the_gap_is_that_of_the_motion(weights, shapes):
     gap = weights.values @ shapes.gap
     wanted = move_points(motion(), units()).mouth.gap
-    phone = np.array([name for name, start, end in _phones() for _ in range(round(100 * (end - start)))] + ["sil"])
+    phone = np.array([name for name, start, end in PHONES for _ in range(round(100 * (end - start)))] + ["sil"])
     free = ~np.isin(phone, ["p", "m"])
     assert np.abs(gap - wanted)[free].max() < 0.012
     assert np.corrcoef(gap, wanted)[0, 1] > 0.995
@@ -63,18 +64,10 @@ def test_lips_close_in_p_and_m_and_in_silence(weights, shapes):
     assert weights.values[5:40].max() < 0.03
 
 
-def test_the_jaw_is_never_less_open_than_the_lips_are_closed(weights):
-    assert (weights["mouthClose"] - weights["jawOpen"]).max() < 1e-9
-
-
 def test_the_jaw_stays_open_behind_closed_lips(shapes):
     weights = solve_shape_weights(motion(), units(), shapes)
     assert weights["jawOpen"][95] > 0.05
     assert weights["mouthClose"][95] > 0.05
-
-
-def test_oo_is_puckered_and_aa_is_not(weights):
-    assert weights["mouthPucker"][115] > weights["mouthPucker"][75] + 0.04
 
 
 def test_gestures_can_be_left_out(shapes):
@@ -129,12 +122,6 @@ def _of(displacements, gap):
     return Motion(values, 100.0, (Channel("opening"), Channel("lip_gap"), *channels))
 
 
-def _phones():
-    from meshes.speech import PHONES
-
-    return PHONES
-
-
 def test_each_frame_is_the_bounded_least_squares_solution():
     rng = np.random.default_rng(0)
     matrix, targets = rng.normal(size=(6, 20)), 2 * rng.normal(size=(5, 20))
@@ -150,39 +137,22 @@ def test_all_frames_together_are_the_exact_solution():
     frames, matrix = 7, rng.normal(size=(3, 8))
     targets = rng.normal(size=(frames, 8))
     found = fit_bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.7), np.array([[0.3, -0.3, 0.0]]))
-    second = np.zeros((frames - 2, frames))
-    for row in range(frames - 2):
-        second[row, row : row + 3] = 1, -2, 1
-    rows = np.concatenate(
-        [
-            np.kron(np.eye(frames), matrix.T),
-            np.sqrt(1e-2) * np.eye(3 * frames),
-            np.kron(np.eye(frames), [[0.3, -0.3, 0.0]]),
-            np.sqrt(0.7) * np.kron(second, np.eye(3)),
-        ]
-    )
+    fit, ridge = np.kron(np.eye(frames), matrix.T), np.sqrt(1e-2) * np.eye(3 * frames)
+    near, smooth = np.kron(np.eye(frames), [[0.3, -0.3, 0.0]]), np.kron(np.diff(np.eye(frames), 2, axis=0), np.eye(3))
+    rows = np.concatenate([fit, ridge, near, np.sqrt(0.7) * smooth])
     wanted = np.concatenate([targets.reshape(-1), np.zeros(len(rows) - targets.size)])
     exact = lsq_linear(rows, wanted, (0, 1), tol=1e-12).x.reshape(frames, 3)
     np.testing.assert_allclose(found, exact, atol=1e-4)
 
 
 def test_more_cost_is_smoother():
-    targets = np.random.default_rng(2).random((50, 4))
-    rough, smooth = (
-        np.abs(np.diff(fit_bounded_curves(np.eye(4), targets, CurveCosts(smooth=cost)), axis=0)).sum()
-        for cost in (0.0, 5.0)
-    )
+    targets, costs = np.random.default_rng(2).random((50, 4)), (CurveCosts(smooth=cost) for cost in (0.0, 5.0))
+    rough, smooth = (np.abs(np.diff(fit_bounded_curves(np.eye(4), targets, each), axis=0)).sum() for each in costs)
     assert smooth < rough / 2
-
-
-def test_what_does_not_fit_is_refused():
     with pytest.raises(InputError, match="do not fit"):
         fit_bounded_curves(np.zeros((2, 3)), np.zeros((5, 4)))
     with pytest.raises(InputError, match="not finite"):
         fit_bounded_curves(np.full((2, 3), np.nan), np.zeros((5, 3)))
-
-
-TIME_S = np.arange(201) / 100
 
 
 def test_the_weights_are_never_less_round_than_before():
@@ -193,12 +163,6 @@ def test_the_weights_are_never_less_round_than_before():
     assert result[:2, pucker] == pytest.approx([0.3, 0.3])
     assert 0.3 <= result[2, pucker] <= 0.5
     assert result[:, smile] == pytest.approx([0.3, 0.15, 0.0])
-
-
-def test_the_solved_weights_pucker_in_oo():
-    weights = solve_shape_weights(motion(), units(), arkit_mouth())
-    assert weights["mouthPucker"][115] > 0.38
-    assert weights["mouthPucker"][75] < 0.3
 
 
 def test_points_of_round_lips_come_together_and_forward():

@@ -1,8 +1,5 @@
-"""Acoustic networks: interpolation, training on acoustic conditions, serialisation."""
-
-from __future__ import annotations
-
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,16 +54,13 @@ def test_it_predicts_motion_of_held_out_speech(trained: AcousticNetwork) -> None
     assert abs(motion[:, 0].mean() - 0.3) < 0.06
 
 
-def test_frames_at_the_steps_have_the_values_of_the_steps() -> None:
+def test_steps_keep_their_values_and_straight_lines_stay_straight_inside() -> None:
     steps = np.random.default_rng(0).standard_normal((6, 2))
     curve = interpolate_steps(steps, 23)
     np.testing.assert_allclose(curve[::STEP], steps, atol=1e-12)
     np.testing.assert_allclose(interpolate_steps(steps, 23, first=2), np.concatenate([steps[[0, 0]], curve[:21]]))
-
-
-def test_a_straight_line_stays_straight_inside() -> None:
-    curve = interpolate_steps(np.arange(8.0)[:, None], 29)
-    np.testing.assert_allclose(curve[STEP : -2 * STEP, 0], np.arange(29)[STEP : -2 * STEP] / STEP, atol=1e-12)
+    line, inside = interpolate_steps(np.arange(8.0)[:, None], 29)[:, 0], slice(STEP, -2 * STEP)
+    np.testing.assert_allclose(line[inside], np.arange(29)[inside] / STEP, atol=1e-12)
 
 
 def test_it_is_the_same_after_serialisation_but_for_half_precision(trained: AcousticNetwork) -> None:
@@ -75,34 +69,22 @@ def test_it_is_the_same_after_serialisation_but_for_half_precision(trained: Acou
     np.testing.assert_allclose(again.predict(speech)[0], trained.predict(speech)[0], atol=3e-3)
 
 
-@pytest.mark.parametrize("name", ["network_first", "network_layers", "network_biases", "network_output"])
-def test_a_network_without_a_part_is_refused(trained: AcousticNetwork, name: str) -> None:
+def test_a_network_without_a_part_or_with_a_scale_of_nothing_is_refused(trained: AcousticNetwork) -> None:
     arrays = trained.arrays()
-    del arrays[name]
-    with pytest.raises(KeyError, match=name):
-        AcousticNetwork.from_arrays(arrays, 2)
-
-
-def test_a_scale_of_nothing_is_refused(trained: AcousticNetwork) -> None:
-    arrays = trained.arrays()
+    for name in ("network_first", "network_layers", "network_biases", "network_output"):
+        with pytest.raises(KeyError, match=name):
+            AcousticNetwork.from_arrays({other: array for other, array in arrays.items() if other != name}, 2)
     arrays["network_targets"][1, 0] = 0
     with pytest.raises(ValueError, match="scale"):
         AcousticNetwork.from_arrays(arrays, 2)
 
 
-def test_a_stopped_training_goes_on_from_its_checkpoint(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    checkpoint = Checkpoint(tmp_path_factory.mktemp("work"), "job")
+def test_a_stopped_training_goes_on_from_its_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(acoustic_network, "MIN_STEPS", 2)
     examples, values = zip(*(example_in_conditions(seed) for seed in range(2)), strict=True)
-    training = PredictorTraining(examples, values, 2, checkpoint=checkpoint)
+    training = PredictorTraining(examples, values, 2, checkpoint=Checkpoint(tmp_path, "job"))
     first = AcousticNetwork.fit(training).predictor.arrays()
-
-    def never(*_: object) -> None:
-        raise AssertionError("trained again")
-
-    monkeypatch.setattr(network_steps, "fit_network", never)
+    monkeypatch.setattr(network_steps, "fit_network", lambda *_: pytest.fail("trained again"))
     again = AcousticNetwork.fit(training).predictor.arrays()
     np.testing.assert_allclose(again["network_output"], first["network_output"])
 

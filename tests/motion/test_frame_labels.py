@@ -1,9 +1,12 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.motion.frame_labels import StateLayout, label_full_context, with_neighbours
-from lipmotion.types import Span, Timeline, Unit
+from lipmotion.motion.rest import find_digital_silence, is_away_from_speech, list_speech_intervals
+from lipmotion.testing.examples import timeline
+from lipmotion.types import ENERGY_FEATURE, Span, Timeline, Unit
 
 LAYOUT = StateLayout(5, 7, 0.1)
 REST = LAYOUT.rest
@@ -14,27 +17,26 @@ def spans(*labels: tuple[float, float, str]) -> Timeline[Unit]:
 
 
 def states_of(units: Timeline[Unit], phone: str, states: int = 5, edge_s: float = 0.08) -> list[int]:
-    return [
-        label.state for label in label_full_context(units, 200, StateLayout(states, 1, edge_s)) if label.unit == phone
-    ]
+    labels = label_full_context(units, 200, StateLayout(states, 1, edge_s))
+    return [label.state for label in labels if label.unit == phone]
 
 
 def test_beyond_the_ends_lies_silence():
-    units = spans((0, 0.1, "p"), (0.1, 0.2, "aa"))
-    assert [(left, span.label.phone, right) for left, span, right in with_neighbours(units)] == [
-        ("sil", "p", "aa"),
-        ("p", "aa", "sil"),
-    ]
+    found = list(with_neighbours(spans((0, 0.1, "p"), (0.1, 0.2, "aa"))))
+    assert [(left, span.label.phone, right) for left, span, right in found] == [("sil", "p", "aa"), ("p", "aa", "sil")]
 
 
-def test_a_short_phone_is_cut_into_equal_states():
-    assert states_of(spans((0.5, 0.6, "aa")), "aa") == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
-    assert states_of(spans((0.5, 0.53, "aa")), "aa", states=3) == [0, 1, 2]
-    assert states_of(spans((0.5, 0.53, "aa")), "aa", states=1) == [0, 0, 0]
-
-
-def test_only_the_middle_of_a_long_phone_gets_longer():
-    assert states_of(spans((0.5, 0.7, "aa")), "aa", edge_s=0.02) == [0, 0, 1, 1, *[2] * 12, 3, 3, 4, 4]
+@pytest.mark.parametrize(
+    ("end_s", "given", "wanted"),
+    [
+        (0.6, {}, [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]),
+        (0.53, {"states": 3}, [0, 1, 2]),
+        (0.53, {"states": 1}, [0, 0, 0]),
+        (0.7, {"edge_s": 0.02}, [0, 0, 1, 1, *[2] * 12, 3, 3, 4, 4]),
+    ],
+)
+def test_short_phones_are_cut_into_equal_states_and_only_the_middle_of_long_ones_is_longer(end_s, given, wanted):
+    assert states_of(spans((0.5, end_s, "aa")), "aa", **given) == wanted
 
 
 @given(
@@ -66,22 +68,42 @@ def test_silence_rests_away_from_speech_only():
     rests = np.array([state == REST for state in states])
     margin = round(LAYOUT.rest_s * 100)
     assert margin == 30
-    assert rests[: 60 - margin].all()
-    assert not rests[60 - margin : 70 + margin].any()
-    assert rests[70 + margin :].all()
+    assert np.flatnonzero(~rests).tolist() == [*range(60 - margin, 70 + margin)]
     assert (states[50].unit, states[50].right) == ("sil", "aa")
+    between_words = spans((0, 0.1, "aa"), (0.1, 0.6, "sil"), (0.6, 0.7, "aa"))
+    assert REST not in label_full_context(between_words, 70, LAYOUT)
 
 
-def test_short_silence_between_words_never_rests():
-    units = spans((0, 0.1, "aa"), (0.1, 0.6, "sil"), (0.6, 0.7, "aa"))
-    assert REST not in label_full_context(units, 70, LAYOUT)
-
-
-def test_frames_outside_all_units_rest():
+def test_frames_belong_to_the_unit_that_has_begun_and_rest_outside_of_all():
     states = label_full_context(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
     assert [frame for frame in range(60) if states[frame] != REST] == [*range(10, 20), *range(30, 40)]
-
-
-def test_frames_belong_to_the_unit_that_has_begun():
     states = label_full_context(spans((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, LAYOUT)
     assert [state.unit for state in states] == ["aa"] * 11 + ["t"] * 9
+
+
+@given(edges=st.lists(st.integers(0, 400), max_size=12, unique=True), margin=st.integers(0, 40))
+def test_it_is_farther_than_the_margin_from_every_interval(edges: list[int], margin: int) -> None:
+    edges = sorted(edges)[: len(edges) // 2 * 2]
+    speech = list(zip(edges[::2], edges[1::2], strict=True))
+    times = np.arange(400, dtype=float) + 0.5
+    wanted = np.ones(400, bool)
+    for start, end in speech:
+        wanted &= (times < start - margin) | (times > end + margin)
+    assert is_away_from_speech(times, speech, float(margin)).tolist() == wanted.tolist()
+
+
+def test_intervals_are_those_of_phones() -> None:
+    units = timeline(("t", "aa"))
+    assert list_speech_intervals(units) == [(0.6, 0.7), (0.7, 0.8)]
+    away = is_away_from_speech(np.array([0.0, 0.2, 0.45, 0.65, 1.0, 1.2]), list_speech_intervals(units), 0.3)
+    assert away.tolist() == [True, True, False, False, False, True]
+    assert is_away_from_speech(np.arange(3.0), [], 1.0).all()
+
+
+def test_the_mouth_rests_in_digital_silence_of_some_length() -> None:
+    features = np.full((200, ENERGY_FEATURE + 1), 3.0)
+    for first, stop in ((5, 10), (20, 24), (50, 62), (75, 90)):  # 50 ms, 40 ms, beside speech, in speech
+        features[first:stop, ENERGY_FEATURE] = -9.0
+    features[30:40, ENERGY_FEATURE] = -8.9  # a breath
+    silent = find_digital_silence(features, timeline(("t", "aa", "t")))
+    assert np.flatnonzero(silent).tolist() == [*range(5, 10), *range(50, 55)]

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
@@ -46,17 +44,10 @@ def test_each_dimension_has_its_own_filter_without_delay() -> None:
     assert half.taps[REACH, 1] > 1.2
 
 
-def test_its_strength_is_between_nothing_and_all_of_it() -> None:
+def test_its_strength_is_between_nothing_and_all_of_it_for_each_dimension() -> None:
     plain, whole = GENERATED[0], FILTER.apply(GENERATED[0])
-    assert FILTER.scale_to(0).apply(plain) == pytest.approx(plain)
-    assert FILTER.scale_to(0.5).apply(plain) == pytest.approx((plain + whole) / 2)
-    assert FILTER.scale_to(2).apply(plain) == pytest.approx(2 * whole - plain)
-
-
-def test_dimensions_may_have_strengths_of_their_own() -> None:
-    some = FILTER.scale_to(np.array([0.0, 2.0]))
-    assert some.apply(GENERATED[0])[:, 0] == pytest.approx(GENERATED[0][:, 0])
-    assert some.taps[:, 1] == pytest.approx(FILTER.scale_to(2).taps[:, 1])
+    for strength in (0, 0.5, 2, np.array([0.0, 2.0])):
+        assert FILTER.scale_to(strength).apply(plain) == pytest.approx(plain + strength * (whole - plain))
 
 
 def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wanted() -> None:
@@ -88,15 +79,15 @@ def test_a_mouth_at_rest_stays_there() -> None:
 
 
 def test_held_frames_are_what_they_were_and_their_neighbours_lead_to_them() -> None:
-    free, held = FILTER.apply(GENERATED[0]), FILTER.apply(GENERATED[0], [0, 200, 203, 599])
-    pinned = FILTER.apply(GENERATED[0], (), [(frame, 1) for frame in (0, 200, 203, 599)])
+    frames = [0, 200, 203, 599]
+    free, held = FILTER.apply(GENERATED[0]), FILTER.apply(GENERATED[0], frames)
+    pinned = FILTER.apply(GENERATED[0], (), [(frame, 1) for frame in frames])
     assert np.array_equal(pinned[:, 1], held[:, 1])
     assert np.array_equal(pinned[:, 0], free[:, 0])
-    assert np.array_equal(held[[0, 200, 203, 599]], GENERATED[0][[0, 200, 203, 599]])
-    far = np.abs(np.arange(600)[:, None] - [0, 200, 203, 599]).min(axis=1) >= HOLD_FRAMES
+    assert np.array_equal(held[frames], GENERATED[0][frames])
+    far = np.abs(np.arange(600)[:, None] - frames).min(axis=1) >= HOLD_FRAMES
     assert np.array_equal(held[far], free[far])
-    change = np.abs(held - GENERATED[0]) <= np.abs(free - GENERATED[0]) + 1e-12
-    assert change.all()
+    assert (np.abs(held - GENERATED[0]) <= np.abs(free - GENERATED[0]) + 1e-12).all()
 
 
 def test_noise_of_the_tracker_is_not_learned() -> None:
@@ -119,9 +110,10 @@ def test_it_is_stored() -> None:
     stored = filter_from_arrays(filter_to_arrays(FILTER), 2)
     assert stored is not None
     assert np.array_equal(stored.taps, FILTER.taps)
-    assert filter_from_arrays(filter_to_arrays(None), 2) is None
-    with pytest.raises(ModelFormatError), format_errors("the model"):
-        filter_from_arrays(filter_to_arrays(None), 2, needed=True)
-    for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], np.full_like(FILTER.taps, MODULATION["modulation"].maximum + 1)):
+    nothing = filter_to_arrays(None)
+    assert filter_from_arrays(nothing, 2) is None
+    too_large = np.full_like(FILTER.taps, MODULATION["modulation"].maximum + 1)
+    damaged = [ModulationFilter(taps) for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], too_large)]
+    for arrays, needed in ((nothing, True), *((filter_to_arrays(each), False) for each in damaged)):
         with pytest.raises(ModelFormatError), format_errors("the model"):
-            filter_from_arrays(filter_to_arrays(ModulationFilter(taps)), 2)
+            filter_from_arrays(arrays, 2, needed=needed)

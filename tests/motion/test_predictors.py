@@ -1,7 +1,5 @@
 """Predictors by name: that of docs/extend/predictor.md, in both engines that have predictors, and in their models."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterator
@@ -96,8 +94,7 @@ def test_the_trajectory_engine_relies_on_a_predictor_as_far_as_it_is_right(
 def test_a_model_whose_predictor_is_not_installed_says_so() -> None:
     arrays = {f"{PREFIX}coefficients": np.zeros((40, 2))}
     with pytest.raises(
-        ModelFormatError,
-        match=r"^no predictor 'frames'; there are: network, posteriors, prior, encoding; install",
+        ModelFormatError, match=r"^no predictor 'frames'; there are: network, posteriors, prior, encoding; install"
     ):
         predictor_from_arrays(arrays, 2)
     with pytest.raises(ValueError, match="prior and frames, required one of them"):

@@ -1,7 +1,3 @@
-"""Regression on what another model makes of the same speech."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,7 +10,9 @@ from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.speaker_maps import (
     FAR_FROM_SPEECH_S,
     NEAR_SPEECH_S,
+    RANGE_PRIOR_S,
     VISEME_NAMES,
+    SpeakerMap,
     SpeakerMaps,
     add_habits,
     map_to_mean_person,
@@ -21,39 +21,41 @@ from lipmotion.motion.speaker_maps import (
     speakers_to_arrays,
     weigh_visemes,
 )
+from lipmotion.motion.transfer_map import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map, select_channels
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
 
-GAIN, OFFSET = np.array([0.5, 1.4, 0.8]), np.array([0.03, -0.2, 0.1])
-"""How ben's opening, width and outer differ from anna's."""
+GAIN, OFFSET, PARTED = np.array([0.5, 1.4, 0.8]), np.array([0.03, -0.2, 0.1]), np.array([0.05, 0.0, 0.05])
+"""How ben's opening, width and outer differ from anna's, and by how much the lips part at rest."""
 POINTS = tuple(Channel(f"{axis}_{number}") for number in (13, 14) for axis in "xyz")
 
 
-def spoken(units: Timeline[Unit], motion: Motion, frames: int | None = None) -> Example:
-    count = len(motion.values) if frames is None else frames
-    speech = Speech(Features(np.zeros((count, 39), np.float32), count / 100), units)
-    return Example("one", speech, replace(motion, values=motion.values[:count]), np.ones(count, bool))
+def spoken(units: Timeline[Unit], motion: Motion) -> Example:
+    frames = len(motion.values)
+    speech = Speech(Features(np.zeros((frames, 39), np.float32), frames / 100), units)
+    return Example("one", speech, motion, np.ones(frames, bool))
 
 
 def anna(count: int = 6) -> list[Example]:
-    return [spoken(sentence.units, toy_motion(sentence.units, 100.0)) for sentence in toy_sentences(count)]
+    sentences = toy_sentences(max(count, 3))[:count]
+    return [spoken(sentence.units, toy_motion(sentence.units, 100.0)) for sentence in sentences]
 
 
 def changed(example: Example, values: np.ndarray) -> Example:
     return replace(example, motion=replace(example.motion, values=values))
 
 
-def ben(count: int = 6) -> list[Example]:
+def resting_open(examples: list[Example]) -> list[Example]:
     """The same words from a mouth of another size that rests open."""
-    return [
-        changed(
-            each,
-            OFFSET
-            + GAIN * each.motion.values
-            + np.array([0.05, 0, 0.05]) * measure_restfulness(each.speech.units, len(each.motion.values))[:, None],
-        )
-        for each in anna(count)
-    ]
+    return [changed(each, OFFSET + GAIN * each.motion.values + PARTED * restful(each)[:, None]) for each in examples]
+
+
+def ben(count: int = 6) -> list[Example]:
+    return resting_open(anna(count))
+
+
+def restful(example: Example) -> np.ndarray:
+    return measure_restfulness(example.speech.units, len(example.motion.values))
 
 
 def both(*groups: Sequence[Example]) -> tuple[list[list[Example]], SpeakerMaps]:
@@ -69,29 +71,24 @@ def poses(examples: Sequence[Example]) -> np.ndarray:
 
 
 def at_rest(examples: Sequence[Example]) -> np.ndarray:
-    frames = [measure_restfulness(each.speech.units, len(each.motion.values)) >= 1 for each in examples]
-    return np.median(poses(examples)[np.concatenate(frames)], axis=0)
+    return np.median(poses(examples)[np.concatenate([restful(each) >= 1 for each in examples])], axis=0)
+
+
+def least_openings(example: Example) -> list[float]:
+    """The least opening of each p, b and m."""
+    values = example.motion.values
+    return [values[frames, 0].min() for frames in find_closable_ranges(example.speech.units, len(values))]
 
 
 def closed(examples: Sequence[Example]) -> float:
-    return float(
-        np.median(
-            [
-                each.motion.values[frames, 0].min()
-                for each in examples
-                for frames in find_closable_ranges(each.speech.units, len(each.motion.values))
-            ]
-        )
-    )
+    return float(np.median([opening for each in examples for opening in least_openings(each)]))
 
 
 def test_people_become_alike() -> None:
     (first, second), _ = both(anna(), ben())
-    before = np.abs(poses(anna()) - poses(ben())).mean(axis=0)
-    after = np.abs(poses(first) - poses(second)).mean(axis=0)
+    before, after = (np.abs(poses(one) - poses(two)).mean(axis=0) for one, two in ((anna(), ben()), (first, second)))
     assert (after < 0.25 * before).all()
-    spread = poses(first).std(axis=0) / poses(second).std(axis=0)
-    np.testing.assert_allclose(spread, 1, atol=0.2)
+    np.testing.assert_allclose(poses(first).std(axis=0) / poses(second).std(axis=0), 1, atol=0.2)
 
 
 def test_closed_lips_and_rest_poses_are_the_same_for_all() -> None:
@@ -117,37 +114,29 @@ def test_a_map_and_its_inverse() -> None:
 
 def test_restfulness_grows_with_the_distance_from_speech() -> None:
     units = toy_sentences(3)[0].units
-    speech_s = list_speech_intervals(units)
-    times = np.arange(250) / 100
-    distance = [max(0.0, min(max(a - t, t - b) for a, b in speech_s)) for t in times]
+    speech_s, times = list_speech_intervals(units), np.arange(250) / 100
+    distance = np.array([max(0.0, min(max(a - t, t - b) for a, b in speech_s)) for t in times])
     found = measure_restfulness(units, 250)
-    near, far = np.array(distance) < NEAR_SPEECH_S, np.array(distance) > FAR_FROM_SPEECH_S
+    near, far = distance < NEAR_SPEECH_S, distance > FAR_FROM_SPEECH_S
     assert near.any()
     assert far.any()
     assert np.abs(found[near]).max() < 1e-12
     assert found[far].min() > 1 - 1e-12
-    between = ~near & ~far
-    order = np.argsort(np.array(distance)[between], kind="stable")
-    assert np.diff(found[between][order]).min() > -1e-9
+    assert np.diff(found[np.argsort(distance, kind="stable")]).min() > -1e-9
     assert (is_away_from_speech(times, speech_s, FAR_FROM_SPEECH_S) == far).all()
 
 
 def test_points_share_a_gain_for_each_axis() -> None:
-    rng = np.random.default_rng(1)
-    shape, size = rng.normal(size=6), np.array([1.5, 0.6, 1.0, 1.1, 0.7, 0.9])
+    shape, size = np.random.default_rng(1).normal(size=6), np.array([1.5, 0.6, 1.0, 1.1, 0.7, 0.9])
 
     def with_points(example: Example, person: bool) -> Example:
         movement = example.motion.values[:, [1, 0, 0, 1, 0, 0]] * np.array([1, 1, 0.3, -1, -1, 0.2])
-        points = shape + size * movement if person else movement
-        values = np.concatenate([example.motion.values, points], axis=1)
+        values = np.concatenate([example.motion.values, shape + size * movement if person else movement], axis=1)
         return replace(example, motion=Motion(values, 100.0, (*example.motion.channels, *POINTS)))
 
-    (first, second), maps = both(
-        [with_points(each, False) for each in anna()], [with_points(each, True) for each in anna()]
-    )
+    (first, second), maps = both(*([with_points(each, person) for each in anna()] for person in (False, True)))
     for axis in range(3):
-        columns = [3 + axis, 6 + axis]
-        assert np.ptp(maps.gain[:, columns], axis=1).max() < 1e-12
+        assert np.ptp(maps.gain[:, [3 + axis, 6 + axis]], axis=1).max() < 1e-12
     assert maps.of("ben").gain[4] < 0.9
     assert maps.of("ben").gain[3] > 1.1
     np.testing.assert_allclose(at_rest(first)[3:], at_rest(second)[3:], atol=1e-9)
@@ -163,11 +152,10 @@ def test_a_channel_that_somebody_does_not_move_is_not_stretched() -> None:
 def test_people_without_silence_or_without_speech() -> None:
     talk = []
     for each in ben():
-        start_s, end_s = list_speech_intervals(each.speech.units)[0][0], list_speech_intervals(each.speech.units)[-1][1]
-        first, stop = int(np.ceil(start_s * 100)), int(end_s * 100)
+        (start_s, _), *_, (_, end_s) = list_speech_intervals(each.speech.units)
         spans = [Span(s.start_s - start_s, s.end_s - start_s, s.label) for s in each.speech.units if s.label.word]
-        motion = replace(each.motion, values=each.motion.values[first:stop])
-        talk.append(spoken(Timeline(tuple(spans)), motion))
+        values = each.motion.values[int(np.ceil(start_s * 100)) : int(end_s * 100)]
+        talk.append(spoken(Timeline(tuple(spans)), replace(each.motion, values=values)))
     silent = Timeline((Span(0.0, 1.0, Unit("sil", "sil")),))
     mute = [spoken(silent, Motion(np.full((100, 3), 0.3), 100.0, anna()[0].motion.channels))]
     (_, second, third), maps = both(anna(), talk, mute)
@@ -188,21 +176,12 @@ def test_unseen_frames_change_nothing() -> None:
         assert np.array_equal(array, same)
 
 
-def test_speakers_without_a_name_are_one_person_more() -> None:
-    examples = [*anna(), *ben(), *anna(3)]
-    mapped, maps = map_to_mean_person(examples, ["anna"] * 6 + ["ben"] * 6 + [""] * 3)
-    assert maps.names == ("anna", "ben")
+def test_speakers_by_name_and_channels_in_another_order() -> None:
+    mapped, maps = map_to_mean_person([*anna(), *ben(), *anna(3)], ["anna"] * 6 + ["ben"] * 6 + [""] * 3)
     assert len(mapped) == 15
-
-
-def test_an_unknown_name_lists_the_others() -> None:
-    _, maps = both(anna(), ben())
+    assert maps.names == ("anna", "ben")  # those without a name are one person more
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
         maps.of("cleo")
-
-
-def test_channels_in_another_order() -> None:
-    _, maps = both(anna(), ben())
     person = maps.of("ben")
     turned = person.reorder(person.channels[::-1])
     np.testing.assert_allclose(turned.gain, person.gain[::-1])
@@ -215,11 +194,8 @@ def test_habits_are_what_is_left_in_each_viseme() -> None:
     mapped, maps = map_to_mean_person(examples, names)
     planted = np.zeros((len(VISEME_NAMES), 3))
     planted[VISEME_NAMES.index("lr1"), 1], planted[VISEME_NAMES.index("al"), 2] = 0.1, -0.2
-    generated = [
-        each.motion.values
-        - (weigh_visemes(each.speech.units, len(each.motion.values)) @ planted if name == "ben" else 0.0)
-        for each, name in zip(mapped, names, strict=True)
-    ]
+    generated = [each.motion.values for each in mapped[:6]]
+    generated += [x.motion.values - weigh_visemes(x.speech.units, len(x.motion.values)) @ planted for x in mapped[6:]]
     found = add_habits(maps, mapped, names, generated)
     np.testing.assert_allclose(found.of("anna").habits, 0, atol=1e-12)
     habits = found.of("ben").habits
@@ -230,8 +206,7 @@ def test_habits_are_what_is_left_in_each_viseme() -> None:
     visemes = weigh_visemes(one.speech.units, len(one.motion.values))
     shift = found.of("ben").shift(one.motion.values, visemes)
     assert np.abs(shift).max() > 0.03
-    restful = measure_restfulness(one.speech.units, len(shift)) >= 1
-    assert np.abs(shift[restful]).max() < 1e-12
+    assert np.abs(shift[restful(one) >= 1]).max() < 1e-12
     closed_lips = one.motion.values[:, 0] <= found.lips[0] + 1e-9  # rounding
     assert closed_lips.any()
     assert np.abs(shift[closed_lips]).max() < 1e-6
@@ -246,15 +221,13 @@ def test_weights_of_visemes_fade() -> None:
     assert np.abs(weigh_visemes(unknown, 100)).max() < 1e-12
 
 
-def test_maps_are_stored() -> None:
-    _, maps = both(anna(), ben())
-    again = speakers_from_arrays(speakers_to_arrays(maps))
+def test_maps_are_stored_and_damaged_ones_are_refused() -> None:
+    maps = both(anna(3), ben(3))[1]
+    arrays = speakers_to_arrays(maps)
+    again = speakers_from_arrays(arrays)
     assert (again.names, again.channels) == (maps.names, maps.channels)
-    for array, same in zip(speakers_to_arrays(maps).values(), speakers_to_arrays(again).values(), strict=True):
+    for array, same in zip(arrays.values(), speakers_to_arrays(again).values(), strict=True):
         assert np.array_equal(array, same)
-
-
-def test_damaged_maps_are_refused() -> None:
     for name, value in (
         ("gain", np.full((2, 3), 5.0)),
         ("gain", np.full((2, 3), np.nan)),
@@ -269,22 +242,15 @@ def test_damaged_maps_are_refused() -> None:
         ("channels", np.array([["a", "b"]] * 3)),
         ("more", np.ones(2)),
     ):
-        arrays = speakers_to_arrays(both(anna(3), ben(3))[1])
         with pytest.raises(ModelFormatError, match="table of speakers"):
             speakers_from_arrays(arrays | {name: value})
-
-
-def test_missing_arrays_are_refused() -> None:
     for name in ("channels", "names", "gain", "offset", "rest", "habits", "lips"):
-        arrays = speakers_to_arrays(both(anna(3), ben(3))[1])
-        del arrays[name]
         with pytest.raises(ModelFormatError, match=name):
-            speakers_from_arrays(arrays)
+            speakers_from_arrays({other: array for other, array in arrays.items() if other != name})
 
 
 def test_wrong_phones_of_one_clip_do_not_keep_the_lips_of_a_person_open() -> None:
-    clip = ben(3)[0]
-    labels = []
+    clip, labels = ben(3)[0], []
     for span in clip.speech.units:
         middle_s = 0.5 * (span.start_s + span.end_s)
         if span.label.phone == "aa":  # an m that was recognised where the mouth is open
@@ -292,9 +258,106 @@ def test_wrong_phones_of_one_clip_do_not_keep_the_lips_of_a_person_open() -> Non
         else:
             labels.append(replace(span, label=Unit("t" if span.label.phone in ("p", "b", "m") else span.label.phone)))
     recognised = replace(clip, speech=replace(clip.speech, units=Timeline(tuple(labels))))
-    opened = [clip.motion.values[f, 0].min() for f in find_closable_ranges(recognised.speech.units, 10_000)]
-    assert np.median(opened) > closed([clip]) + 0.02
+    assert closed([recognised]) > closed([clip]) + 0.02
     _, maps = both(anna(), [recognised])
     shut = np.full((1, 3), maps.lips[0])
-    person = maps.of("ben").to_person(shut, np.zeros(1))[0, 0]
-    assert person == pytest.approx(closed([clip]), abs=0.01)
+    assert maps.of("ben").to_person(shut, np.zeros(1))[0, 0] == pytest.approx(closed([clip]), abs=0.01)
+
+
+def random_map(seed: int, habits: float = 0.0) -> SpeakerMap:
+    rng = np.random.default_rng(seed)
+    channels = anna(1)[0].motion.channels
+    gain, offset, rest = rng.uniform(0.5, 2, 3), rng.normal(size=3), rng.normal(size=3)
+    return SpeakerMap(channels, gain, offset, rest, habits * rng.normal(size=(13, 3)), (0.0, 0.1))
+
+
+def test_motion_of_the_source_becomes_that_of_the_target() -> None:
+    examples = anna()
+    wanted = resting_open(examples)
+    person = fit_transfer_map(examples, wanted)
+    for mine, theirs in zip(examples, wanted, strict=True):
+        mapped = person.to_person(mine.motion.values, restful(mine))
+        before = np.abs(mine.motion.values - theirs.motion.values).mean(axis=0)
+        after = np.abs(mapped - theirs.motion.values).mean(axis=0)
+        assert (after < 0.25 * before).all()
+
+
+@pytest.mark.parametrize("count", [1, 6])
+def test_the_rest_pose_counts_by_the_seconds_of_silence(count: int) -> None:
+    """With S seconds the way from the map of speech to the target's rest pose counts S / (S + 0.5)."""
+    examples = anna(count)
+    wanted = resting_open(examples)
+    person = fit_transfer_map(examples, wanted)
+    silences = [restful(each) > 1 - 1e-9 for each in examples]
+    silence_s = sum(map(np.count_nonzero, silences)) / 100
+    for mine, theirs, silence in zip(examples, wanted, silences, strict=True):
+        from_speech = person.offset + person.gain * np.median(mine.motion.values[silence], axis=0)
+        way = np.median(theirs.motion.values[silence], axis=0) - from_speech
+        np.testing.assert_allclose(person.rest, silence_s / (silence_s + REST_PRIOR_S) * way, atol=5e-3)
+        assert np.abs(way).max() > 0.04
+
+
+def test_closed_lips_stay_closed() -> None:
+    examples = anna()
+    person = fit_transfer_map(examples, resting_open(examples))
+    for each in examples:
+        mapped = changed(each, person.to_person(each.motion.values, restful(each)))
+        np.testing.assert_allclose(least_openings(mapped), OFFSET[0], atol=0.01)
+
+
+def test_gains_grow_with_the_seconds_of_speech() -> None:
+    """With S seconds of speech the logarithm counts S / (S + 2)."""
+    examples = anna()
+    for count in (1, 6):
+        some = examples[:count]
+        person = fit_transfer_map(some, resting_open(some))
+        trust = count_speech_s(some) / (count_speech_s(some) + RANGE_PRIOR_S)
+        np.testing.assert_allclose(np.log(person.gain) / trust, np.log(GAIN), atol=0.05)
+
+
+def test_gains_have_limits() -> None:
+    examples = anna()
+    wild = [replace(each, motion=replace(each.motion, values=12 * each.motion.values)) for each in examples]
+    assert fit_transfer_map(examples, wild).gain.max() == pytest.approx(4.0)
+    assert fit_transfer_map(wild, examples).gain.min() == pytest.approx(0.25)
+
+
+def test_frames_that_were_not_measured_do_not_matter() -> None:
+    examples = anna()
+    wanted = resting_open(examples)
+    hidden = []
+    for each in wanted:
+        valid, values = each.valid.copy(), each.motion.values.copy()
+        valid[20:40], values[20:40] = False, 1e3
+        hidden.append(replace(each, valid=valid, motion=replace(each.motion, values=values)))
+    mine = [replace(each, valid=other.valid) for each, other in zip(examples, hidden, strict=True)]
+    left_out = fit_transfer_map(mine, hidden)
+    np.testing.assert_allclose(left_out.gain, fit_transfer_map(examples, wanted).gain, rtol=0.2)
+    assert np.abs(left_out.offset).max() < 1
+
+
+def test_two_maps_one_after_the_other() -> None:
+    rng = np.random.default_rng(3)
+    values, rest, weights = rng.normal(size=(40, 3)), rng.uniform(size=40), rng.uniform(size=(40, 13))
+    first, second = random_map(0, habits=0.1), random_map(1)
+    both = compose_maps(first, second)
+    shifted = values + first.shift(values, weights)
+    wanted = second.to_person(first.to_person(shifted, rest), rest)
+    np.testing.assert_allclose(both.to_person(values + both.shift(values, weights), rest), wanted, atol=1e-12)
+    assert compose_maps(None, second) is second
+
+
+def test_channels_in_the_order_of_a_model() -> None:
+    motion = Motion(np.arange(6.0).reshape(2, 3), 100.0, tuple(map(Channel, ("a", "b", "c"))))
+    assert select_channels(motion, (Channel("c"), Channel("a")), "x").values.tolist() == [[2.0, 0.0], [5.0, 3.0]]
+    with pytest.raises(InputError, match=r"x: .*no channel 'jaw' in the unit 'weight'.*1 of 2 are missing.*lipmotion"):
+        select_channels(motion, (Channel("a"), Channel("jaw", "weight")), "x")
+
+
+def test_seconds_of_measured_speech() -> None:
+    units = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 1.0, Unit("aa")), Span(1.0, 2.0, Unit("sil"))))
+    motion = Motion(np.zeros((200, 1)), 100.0, (Channel("opening"),))
+    valid = np.ones(200, bool)
+    valid[80:] = False
+    example = Example("x", Speech(Features(np.zeros((200, 39), np.float32), 2.0), units), motion, valid)
+    assert count_speech_s([example]) == pytest.approx(0.3, abs=0.011)

@@ -1,7 +1,3 @@
-"""Voices that training does not know, at any confidence: open vowels, the range of typical talkers, exact pins."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path

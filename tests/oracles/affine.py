@@ -1,30 +1,18 @@
 """Affine transforms of features, computed for one frame, Gaussian and row at a time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from lipmotion.stats.constrained_mllr import AffineStatistics
 from lipmotion.stats.mixture import Mixtures
-
-
-def log_gaussian(x: np.ndarray, mean: np.ndarray, variance: np.ndarray) -> float:
-    return float(-0.5 * (np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance).sum())
+from oracles.joint import gaussian, mixture
 
 
 def log_likelihood(mixtures: Mixtures, features: np.ndarray, densities: np.ndarray, transform: np.ndarray) -> float:
     """Return the log density of features before the transform, each frame under its own mixture after the transform."""
     total = len(features) * np.log(abs(np.linalg.det(transform[:, :-1])))
     for x, density in zip(features, densities, strict=True):
-        current = transform[:, :-1] @ x + transform[:, -1]
-        total += np.log(
-            sum(
-                np.exp(weight + log_gaussian(current, mean, variance))
-                for weight, mean, variance in zip(
-                    mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density], strict=True
-                )
-            )
-        )
+        of_density = mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density]
+        total += mixture(transform[:, :-1] @ x + transform[:, -1], *of_density)
     return float(total)
 
 
@@ -36,13 +24,8 @@ def statistics(
     quadratic, linear = np.zeros((size, size + 1, size + 1)), np.zeros((size, size + 1))
     for x, density in zip(features, densities, strict=True):
         current, extended = transform[:, :-1] @ x + transform[:, -1], np.append(x, 1)
-        shares = np.array(
-            [
-                np.exp(mixtures.log_weights[density, m])
-                * np.exp(log_gaussian(current, mixtures.means[density, m], mixtures.variances[density, m]))
-                for m in range(mixtures.size[1])
-            ]
-        )
+        of_density = mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density]
+        shares = np.exp([weight + gaussian(current, *of) for weight, *of in zip(*of_density, strict=True)])
         shares /= shares.sum()
         for m, share in enumerate(shares):
             for row in range(size):

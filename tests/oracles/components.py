@@ -1,7 +1,5 @@
 """Principal components by singular value decomposition of all values."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -4,10 +4,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-
-def log_gaussian(x, mean, variance):
-    """Return the log density of a diagonal Gaussian."""
-    return float(-0.5 * np.sum(np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance))
+from oracles.joint import gaussian
 
 
 def log_density(group, density, observations, frame):
@@ -21,7 +18,7 @@ def log_density(group, density, observations, frame):
                 continue
             mean = mixtures.means[density, component, columns].astype(float)
             variance = mixtures.variances[density, component, columns].astype(float)
-            total += weight * log_gaussian(observations.streams[stream][frame], mean, variance)
+            total += weight * gaussian(observations.streams[stream][frame], mean, variance)
         terms.append(total)
     return np.logaddexp.reduce(terms), np.array(terms)
 
@@ -33,15 +30,10 @@ def paths(chains, observations):
         zip(zip(found.arc_from.tolist(), found.arc_to.tolist(), strict=True), chains.transitions.arc_log, strict=True)
     )
     initial = found.initial
-    emission = np.array(
-        [
-            [
-                sum(log_density(group, group.tie[state], observations, frame)[0] for group in chains.groups)
-                for state in range(len(found.joint_states))
-            ]
-            for frame in range(observations.frames)
-        ]
-    )
+    emission = np.zeros((observations.frames, len(found.joint_states)))
+    for frame, state in np.ndindex(emission.shape):
+        for group in chains.groups:
+            emission[frame, state] += log_density(group, group.tie[state], observations, frame)[0]
 
     def onward(path, score):
         if len(path) == observations.frames:

@@ -1,7 +1,5 @@
 """The cheapest alignment of two sequences, by trying all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 

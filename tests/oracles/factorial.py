@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from oracles import networks
+from oracles import paths
 
 
 def steps(loop):
@@ -56,7 +56,7 @@ def posteriors(audio, visual, logs):
     arcs = joint_arcs(audio, visual)
     arc_logs = {arc: float(np.log(probability)) for arc, probability in arcs.items()}
     states = np.arange(log_density.shape[1])
-    posterior, followed, log_likelihood = networks.posteriors(log_density, states, arc_logs, initial, final)
+    posterior, followed, log_likelihood = paths.posteriors(log_density, states, arc_logs, initial, final)
     counts = [
         {name: np.zeros_like(getattr(loop, name)) for name in ("stay", "onward", "enter")} for loop in (audio, visual)
     ]

@@ -1,7 +1,5 @@
 """Poisson cloning, pixel by pixel as the equation is printed, by a sparse direct solver."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu

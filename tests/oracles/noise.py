@@ -1,7 +1,5 @@
 """Signal-to-noise ratio, sample by sample."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Painting of pictures, all pixels at once: the definition of ``lipmotion_faces.kernels.painting``, to the bit."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """A recurrent network, cell by cell (twin of ``stats.recurrence``)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork

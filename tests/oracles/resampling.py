@@ -1,7 +1,5 @@
 """Resampling and blending computed pixel by pixel, from the definitions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Light on vertices, for all of them at once."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

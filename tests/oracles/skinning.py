@@ -1,7 +1,5 @@
 """Linear blend skinning, one vertex and one control point at a time (Hofer 2008, Eq. 12)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

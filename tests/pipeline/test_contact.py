@@ -26,8 +26,7 @@ from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.stage import figure, head_mesh, lip_gap
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.portrait_rasteriser import face_poses
-from meshes.heads import head, lip_points, write_glb
-from meshes.obj_writing import write_obj
+from meshes.heads import head, lip_points, write_glb, write_obj
 from meshes.speech import motion, units
 
 Mask = NDArray[np.bool_]

@@ -5,8 +5,6 @@ sample; 160 of them centred on the frame, weighted by a Hann window; correlated 
 the power of the slope of the full signal, 10 ms either side, counts as silence.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

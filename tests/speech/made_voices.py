@@ -1,7 +1,5 @@
 """Voices that are made: pulses or noise through resonances, laughter, and phones in time for them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfilt

@@ -6,8 +6,6 @@ normalised over the recording; frame n centred at n · 10 ms, the signal reflect
 below the loudest of the recording.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

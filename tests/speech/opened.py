@@ -1,7 +1,5 @@
 """Which files of a folder a piece of code opens, as Linux tells it."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import struct

@@ -1,7 +1,5 @@
 """One scene as two machines record it: a camera in the room, and a recorder at the mouth that began at another time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from lipmotion.types import Audio

@@ -1,7 +1,6 @@
 """Recordings in any container, made on the spot."""
 
-from __future__ import annotations
-
+import wave
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -70,6 +69,25 @@ def write_sound(
                 container.mux(stream.encode(part))
         container.mux(stream.encode())
     return path
+
+
+def write_wave(path: Path, samples: NDArray[np.integer[Any]], rate_hz: int = 16_000) -> Path:
+    """Write whole numbers of 16 bits [shape=(N,) or (N, channels)] without a codec."""
+    with wave.open(str(path), "wb") as file:
+        file.setparams((samples.shape[1] if samples.ndim > 1 else 1, 2, rate_hz, 0, "NONE", ""))
+        file.writeframes(samples.astype("<i2").tobytes())
+    return path
+
+
+def late_by(samples: NDArray[np.float32], original: NDArray[np.float32]) -> tuple[int, float]:
+    """Return by how many samples the first is late, and how much they are alike then."""
+    count = 2 ** (len(samples) + len(original)).bit_length()
+    spectrum = np.fft.rfft(samples, count) * np.conj(np.fft.rfft(original, count))
+    shift = int(np.fft.irfft(spectrum).argmax())
+    shift -= count if shift > count // 2 else 0
+    one, two = samples[max(shift, 0) :], original[max(-shift, 0) :]
+    both = min(len(one), len(two))
+    return shift, float(np.corrcoef(one[:both], two[:both])[0, 1])
 
 
 def _add_cover(container: Any) -> None:

@@ -1,8 +1,5 @@
 """A synthesiser for machines without any: the project's own, saying words as the dictionary has them."""
 
-from __future__ import annotations
-
-import wave
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -15,6 +12,7 @@ from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, SynthesisedSente
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Span, Timeline
 from lipmotion.units import Lexicon, split_words
+from speech.sounds import write_wave
 
 RATE_HZ, EACH_S = 22_050, 0.09
 VOICES = (SyntheticVoice("one", "stand-in", "nobody"), SyntheticVoice("two", "stand-in", "nobody"))
@@ -28,9 +26,7 @@ def say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedS
         words = [phone for word in split_words(text) for phone in lexicon.pronunciations(word)[0]]
         labels = ["sil", *words, "sil"]
         audio, timeline = synthesise([(label, EACH_S) for label in labels], rate_hz=RATE_HZ, seed=len(voice))
-        with wave.open(str(path), "wb") as file:
-            file.setparams((1, 2, RATE_HZ, 0, "NONE", ""))
-            file.writeframes(np.round(np.clip(audio.samples, -1, 1) * 32_767).astype("<i2").tobytes())
+        write_wave(path, np.round(np.clip(audio.samples, -1, 1) * 32_767).astype(np.int16), RATE_HZ)
         spans = tuple(Span(span.start_s, span.end_s, span.label.phone) for span in timeline)
         yield SynthesisedSentence(read_audio(path), Timeline(spans), path)
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import tracemalloc
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -107,8 +105,8 @@ def test_features_are_normalised_over_the_passage_alone() -> None:
     ],
 )
 def test_silence_and_gain_change_no_features(before_s: float, after_s: float, units: float, decibels: float) -> None:
-    line = whole_frames(0)
     """But that two frames at either end are left out, whose windows reach into it, and those of a noise as loud."""
+    line = whole_frames(0)
     alone = of_samples(line)
     padded = of_samples(silence(before_s, units), line * 10 ** (decibels / 20), silence(after_s, units))
     (passage,), (found,) = alone.passages, padded.passages
@@ -166,12 +164,17 @@ def test_where_nothing_is_said_all_features_are_0() -> None:
             assert not values.any()
 
 
-def test_a_passage_is_not_divided_further(sentence: ToySentence) -> None:
+def test_a_passage_is_not_divided_further_and_what_keeps_its_features_stays_itself(sentence: ToySentence) -> None:
     audio = analysed(sentence.audio)
     (passage,) = audio.passages
     assert not audio.is_passage
     assert passage.audio.is_passage
     assert passage.audio.frames == len(passage.audio.mfcc().values)
+    assert analysed(audio) is audio
+    assert audio.samples is sentence.audio.samples
+    assert audio.duration_s == sentence.audio.duration_s
+    with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
+        analysed(Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
 
 
 def test_a_stretch_has_the_features_of_the_whole(sentence: ToySentence) -> None:
@@ -187,18 +190,6 @@ def test_features_that_are_known_are_not_computed(sentence: ToySentence, compute
     computed.clear()
     assert analysed(sentence.audio, features).mfcc() is features
     assert not computed
-
-
-def test_a_recording_that_keeps_its_features_stays_the_same_object(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
-    assert analysed(audio) is audio
-    assert audio.samples is sentence.audio.samples
-    assert audio.duration_s == sentence.audio.duration_s
-
-
-def test_what_has_no_features() -> None:
-    with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
-        analysed(Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
 
 
 def long_audio() -> Audio:

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -44,18 +42,24 @@ def test_words_have_the_times_of_their_line_or_their_own():
     assert found.groups.tolist() == [0, 0, 1, 2, 3, 4]
 
 
-def test_windows_are_the_times_and_the_tolerance():
-    found = anchors_of(transcript(line("a b", 2.0, 3.0), line("c", 5.0, 6.0)))
-    windows = windows_of(found, found.tolerance_s, 1000)
-    assert windows.first.tolist() == [150, 150, 450]
-    assert windows.end.tolist() == [351, 351, 651]
-
-
-def test_words_without_times_lie_between_those_that_have_some():
-    found = anchors_of(transcript(line("a"), line("b", 2.0, 3.0), line("c d"), line("e", 8.0, 9.0), line("f")))
-    windows = windows_of(found, found.tolerance_s, 1200)
-    assert windows.first.tolist() == [0, 150, 150, 150, 750, 750]
-    assert windows.end.tolist() == [351, 351, 951, 951, 951, 1200]
+@pytest.mark.parametrize(
+    ("lines", "first", "end"),
+    [
+        ([line("a b", 2.0, 3.0), line("c", 5.0, 6.0)], [150, 150, 450], [351, 351, 651]),
+        # words without times lie between those that have some
+        (
+            [line("a"), line("b", 2.0, 3.0), line("c d"), line("e", 8.0, 9.0), line("f")],
+            [0, 150, 150, 150, 750, 750],
+            [351, 351, 951, 951, 951, 3000],
+        ),
+        # no word may begin before those ahead of it
+        ([line("a", 5.0, 9.0), line("b", 6.0, 7.0), line("c", 5.5, 20.0)], [450, 550, 550], [751, 751, 2051]),
+    ],
+)
+def test_windows_are_the_times_and_the_tolerance(lines: list[TranscriptLine], first: list[int], end: list[int]):
+    found = anchors_of(transcript(*lines))
+    windows = windows_of(found, found.tolerance_s, 3000)
+    assert (windows.first.tolist(), windows.end.tolist()) == (first, end)
 
 
 times = st.one_of(st.none(), st.floats(-5, 40))
@@ -77,13 +81,6 @@ def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames)
         for first, end in zip(windows.first, windows.end, strict=True):
             at = max(at, first) + 3
             assert at <= min(end, frames - 3)
-
-
-def test_no_word_may_begin_before_those_ahead_of_it():
-    found = anchors_of(transcript(line("a", 5.0, 9.0), line("b", 6.0, 7.0), line("c", 5.5, 20.0)))
-    windows = windows_of(found, found.tolerance_s, 3000)
-    assert windows.first.tolist() == [450, 550, 550]
-    assert windows.end.tolist() == [751, 751, 2051]
 
 
 def test_windows_without_room_are_widened_where_it_lacks():

@@ -1,11 +1,6 @@
-"""Every container and codec that PyAV can write, at odd rates and channel counts, with holes and damage."""
-
-from __future__ import annotations
-
 import os
 import re
 import sys
-import wave
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import _TrackDecoder, read_audio
 from lipmotion.storage.media import open_media
 from speech.opened import opened_in
-from speech.sounds import babble, write_constant_flac, write_pictures, write_sound, write_stamped
+from speech.sounds import babble, late_by, write_constant_flac, write_pictures, write_sound, write_stamped, write_wave
 
 Samples = NDArray[np.float32]
 MS = 16
@@ -35,42 +30,16 @@ EXACT = [
 ]
 CODED = [
     # suffix, codec, samples that a whole last frame may add, samples of delay that the container does not record
-    ("mp3", "libmp3lame", 0, 0),
-    ("mkv", "libmp3lame", 0, 0),
-    ("ogg", "libopus", 0, 0),
-    ("opus", "libopus", 0, 0),
-    ("webm", "libopus", 0, 0),
-    ("mkv", "libopus", 0, 0),
-    ("ogg", "vorbis", 2048, 0),
-    ("webm", "vorbis", 2048, 0),
-    ("mp4", "aac", 1024, 0),
-    ("m4a", "aac", 1024, 0),
-    ("mov", "aac", 1024, 0),
-    ("mkv", "aac", 1024, 0),
-    ("mkv", "ac3", 1536, 0),
-    ("wav", "adpcm_ima_wav", 2048, 0),
-    ("aac", "aac", 2048, 1024),
-    ("ts", "aac", 2048, 1024),
-    ("flv", "aac", 2048, 1024),
-    ("avi", "libmp3lame", 2304, 1105),
-    ("mp2", "mp2", 1152, 480),
-    ("mpg", "mp2", 1152, 480),
-    ("ts", "mp2", 1152, 480),
-    ("mpg", "ac3", 1536, 256),
-    ("ac3", "ac3", 1536, 256),
+    *((suffix, "libmp3lame", 0, 0) for suffix in ("mp3", "mkv")),
+    *((suffix, "libopus", 0, 0) for suffix in ("ogg", "opus", "webm", "mkv")),
+    *((suffix, "vorbis", 2048, 0) for suffix in ("ogg", "webm")),
+    *((suffix, "aac", 1024, 0) for suffix in ("mp4", "m4a", "mov", "mkv")),
+    *[("mkv", "ac3", 1536, 0), ("wav", "adpcm_ima_wav", 2048, 0)],
+    *((suffix, "aac", 2048, 1024) for suffix in ("aac", "ts", "flv")),
+    *[("avi", "libmp3lame", 2304, 1105), ("mp2", "mp2", 1152, 480), ("mpg", "mp2", 1152, 480)],
+    *[("ts", "mp2", 1152, 480), ("mpg", "ac3", 1536, 256), ("ac3", "ac3", 1536, 256)],
 ]
 EXPERIMENTAL = {"vorbis": {"strict": "experimental"}}
-
-
-def late_by(samples: Samples, original: Samples) -> tuple[int, float]:
-    """Return by how many samples the first is late, and how much they are alike then."""
-    count = 2 ** (len(samples) + len(original)).bit_length()
-    spectrum = np.fft.rfft(samples, count) * np.conj(np.fft.rfft(original, count))
-    shift = int(np.fft.irfft(spectrum).argmax())
-    shift -= count if shift > count // 2 else 0
-    one, two = samples[max(shift, 0) :], original[max(-shift, 0) :]
-    both = min(len(one), len(two))
-    return shift, float(np.corrcoef(one[:both], two[:both])[0, 1])
 
 
 @pytest.fixture(scope="module")
@@ -119,12 +88,8 @@ def test_one_to_eight_channels(tmp_path: Path, original: Samples) -> None:
 
 
 def test_more_channels_than_have_a_name(tmp_path: Path, original: Samples) -> None:
-    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
-        file.setnchannels(12)
-        file.setsampwidth(2)
-        file.setframerate(16_000)
-        file.writeframes((np.tile(original[:, None], 12) * 32767).astype("<i2").tobytes())
-    assert late_by(read_audio(tmp_path / "a.wav").samples, original)[1] > 0.999
+    path = write_wave(tmp_path / "a.wav", np.round(np.tile(original[:, None], 12) * 32767).astype(np.int16))
+    assert late_by(read_audio(path).samples, original)[1] > 0.999
 
 
 def test_the_cover_of_an_album_changes_nothing(tmp_path: Path) -> None:
@@ -191,10 +156,7 @@ def test_nothing_but_the_file_itself_is_opened(tmp_path: Path) -> None:
     Image.new("RGB", (64, 48)).save(tmp_path / "page001.png")
     for name, text in FOREIGN.items():
         (tmp_path / name).write_text(text)
-        with (
-            opened_in(tmp_path) as opened,
-            pytest.raises(InputError, match=r"required a recording|not a readable"),
-        ):
+        with opened_in(tmp_path) as opened, pytest.raises(InputError, match=r"required a recording|not a readable"):
             read_audio(tmp_path / name)
         assert opened <= {name}
 
@@ -312,9 +274,7 @@ def peak(path: Path) -> tuple[str, int]:
 @pytest.mark.parametrize("name", STAMPS_S)
 def test_holes_are_bounded_all_together(tmp_path: Path, name: str) -> None:
     said, taken_mb = peak(write_stamped(tmp_path / "a.mkv", STAMPS_S[name]))
-    assert re.search(
-        r"a\.mkv: the time stamps of its sound leave holes of \d+ s beside \d+\.0 s of sound, at most", said
-    )
+    assert re.search(r"a\.mkv: the time stamps of its sound leave holes of \d+ s beside \d+\.0 s of sound", said)
     assert taken_mb < SPARED_MB
 
 
@@ -344,11 +304,8 @@ def test_sound_after_digital_silence_and_after_a_long_sound_is_in_its_place(tmp_
     assert np.array_equal(read_audio(path).samples, whole[0])
 
 
-def test_minutes_of_digital_silence_are_no_crime(tmp_path: Path) -> None:
+def test_minutes_of_digital_silence_are_no_crime_but_each_rate_is_checked(tmp_path: Path) -> None:
     assert read_audio(write_constant_flac(tmp_path / "a.flac", 60)).duration_s == pytest.approx(60, abs=8)
-
-
-def test_a_rate_that_changes_on_the_way_is_checked_as_the_first(tmp_path: Path) -> None:
     path = write_constant_flac(tmp_path / "a.flac", 60, rates_hz=(8000, 1))
     with pytest.raises(InputError, match=r"a\.flac: sampled at 1 Hz, required 4000 to 1000000; export the recording"):
         read_audio(path)

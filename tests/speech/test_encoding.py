@@ -1,7 +1,3 @@
-"""The speech encoder: windows, silence and gain do not change it; regressions on it."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

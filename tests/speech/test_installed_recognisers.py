@@ -1,7 +1,5 @@
 """Recognisers that users install, with stand-ins that have their interfaces (faster-whisper 1.2, vosk 0.3.45)."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterator
@@ -33,11 +31,8 @@ class WhisperModel:
 
     loaded: ClassVar[list[tuple[str, dict[str, object]]]] = []
     language = "en"
-    segments: ClassVar[list[SimpleNamespace]] = [
-        SimpleNamespace(
-            start=0.1, end=1.6, text="-", words=[SimpleNamespace(word=w, start=a, end=b) for w, a, b in WORDS]
-        )
-    ]
+    words: ClassVar = [SimpleNamespace(word=word, start=start_s, end=end_s) for word, start_s, end_s in WORDS]
+    segments: ClassVar = [SimpleNamespace(start=0.1, end=1.6, text="-", words=words)]
 
     def __init__(self, model_size_or_path: str, **options: object):
         self.loaded.append((model_size_or_path, options))
@@ -68,10 +63,8 @@ def whisper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> type[WhisperMode
 def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
     """Install a stand-in for vosk, whose model is in ``tmp_path``; return the sound that it is given."""
     given: list[bytes] = []
-    results = [
-        {"text": ""},
-        {"result": [{"conf": 1, "word": w.strip(" ,"), "start": a, "end": b} for w, a, b in WORDS], "text": ""},
-    ]
+    words = [{"conf": 1, "word": w.strip(" ,"), "start": a, "end": b} for w, a, b in WORDS]
+    results: list[dict[str, object]] = [{"text": ""}, {"result": words, "text": ""}]
 
     class Recogniser:
         def __init__(self, model: object, rate_hz: float):
@@ -119,17 +112,14 @@ def test_whisper(whisper: type[WhisperModel], tmp_path: Path) -> None:
     assert whisper.loaded == [(str(tmp_path), options)]
 
 
-def test_whisper_without_times_of_words(whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_whisper_without_times_of_words_and_in_another_language(
+    whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr(whisper, "segments", [SimpleNamespace(start=0.5, end=2.0, text=" [Music] Hi!", words=None)])
     found = recognise_words(AUDIO, "whisper")
     assert found is not None
     assert found.words == ("hi",)
     assert (found.lines[0].words[0].start_s, found.lines[0].end_s) == (None, 2.0)
-
-
-def test_another_language_is_not_taken_for_words(
-    whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
     monkeypatch.setattr(whisper, "language", "fr")
     assert recognise_words(AUDIO, "whisper") is None
     assert "recognises the language 'fr', not English; its words are not used" in caplog.text
@@ -142,27 +132,22 @@ def test_vosk(vosk: list[bytes]) -> None:
     assert (sound[0], sound[-1]) == (-32_768, 32_767)
 
 
-@pytest.mark.usefixtures("whisper")
+@pytest.mark.usefixtures("whisper", "vosk")
 def test_models_that_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(kind: str, message: str) -> None:
+        with pytest.raises(InputError, match=message):
+            recognise_words(AUDIO, kind)
+
     (tmp_path / "model.bin").write_bytes(b"bad")
-    with pytest.raises(InputError, match="faster-whisper cannot read this model: Unsupported model binary"):
-        recognise_words(AUDIO, "whisper")
+    refused("whisper", "faster-whisper cannot read this model: Unsupported model binary")
     (tmp_path / "tokenizer.json").unlink()  # it would be fetched
-    with pytest.raises(InputError, match=r"LIPMOTION_WHISPER_MODEL\): is no model of whisper, .* with tokenizer\.json"):
-        recognise_words(AUDIO, "whisper")
+    refused("whisper", r"LIPMOTION_WHISPER_MODEL\): is no model of whisper, .* with tokenizer\.json")
     monkeypatch.delenv("LIPMOTION_WHISPER_MODEL")
-    with pytest.raises(InputError, match="'whisper' needs a model: set LIPMOTION_WHISPER_MODEL to its folder"):
-        recognise_words(AUDIO, "whisper")
-
-
-@pytest.mark.usefixtures("vosk")
-def test_models_of_vosk_that_are_none(tmp_path: Path) -> None:
+    refused("whisper", "'whisper' needs a model: set LIPMOTION_WHISPER_MODEL to its folder")
     (tmp_path / "am" / "final.mdl").unlink()
-    with pytest.raises(InputError, match="vosk cannot read this model: Failed to create a model"):
-        recognise_words(AUDIO, "vosk")
+    refused("vosk", "vosk cannot read this model: Failed to create a model")
     (tmp_path / "am").rmdir()
-    with pytest.raises(InputError, match=r"is no model of vosk, required a folder with am or final\.mdl"):
-        recognise_words(AUDIO, "vosk")
+    refused("vosk", r"is no model of vosk, required a folder with am or final\.mdl")
 
 
 @pytest.mark.usefixtures("whisper", "vosk")

@@ -1,6 +1,8 @@
-from __future__ import annotations
-
+import runpy
 import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +12,15 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.speech.features import mfcc as module
+from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import ROUNDING_SHARE, mfcc, normalised, regression_delta
-from lipmotion.types import Audio
+from lipmotion.speech.sound.sound_offset import (
+    FRAME_OFFSETS,
+    STATIC_FEATURES,
+    measured_opening_speed,
+    predicted_opening_speed,
+)
+from lipmotion.types import Audio, Features
 from speech.mfcc_oracle import features as slow_features
 
 RATE_HZ = 16_000
@@ -26,15 +35,10 @@ def features(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     return mfcc(Audio(samples, RATE_HZ)).values
 
 
-def test_it_is_its_slow_twin() -> None:
-    for count in (400, 3333):
-        samples = noise(count, seed=count) * np.linspace(0.2, 1, count, dtype=np.float32)
+def test_it_is_its_slow_twin(toy_sentence) -> None:
+    drawn = [noise(count, seed=count) * np.linspace(0.2, 1, count, dtype=np.float32) for count in (400, 3333)]
+    for samples in (*drawn, toy_sentence.audio.samples[6400:11_200]):
         assert features(samples) == pytest.approx(slow_features(samples.astype(float)), abs=2e-3)
-
-
-def test_spoken_sound_is_its_slow_twin(toy_sentence) -> None:
-    samples = toy_sentence.audio.samples[6400:11_200]
-    assert features(samples) == pytest.approx(slow_features(samples.astype(float)), abs=2e-3)
 
 
 @settings(max_examples=20)
@@ -56,16 +60,13 @@ def test_frame_n_is_centred_at_n_times_10_ms() -> None:
         assert loud.tolist() == [n for n in (frame - 1, frame, frame + 1) if 0 <= n <= 100]
 
 
-def test_columns_are_normalised_over_the_recording() -> None:
-    values = features(noise(RATE_HZ))
+def test_columns_are_normalised_over_the_recording_whatever_its_loudness() -> None:
+    samples = noise(RATE_HZ)
+    values = features(samples)
     assert values.mean(axis=0) == pytest.approx(0, abs=1e-4)
     assert values.std(axis=0) == pytest.approx(1, abs=1e-4)
-
-
-def test_loudness_changes_nothing() -> None:
-    samples = noise(RATE_HZ)
     for gain in (1e-3, 30.0):
-        assert features((gain * samples).astype(np.float32)) == pytest.approx(features(samples), abs=2e-3)
+        assert features((gain * samples).astype(np.float32)) == pytest.approx(values, abs=2e-3)
 
 
 def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,23 +77,20 @@ def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.long
-def test_memory_beside_the_result_is_bounded() -> None:
-    samples = noise(20 * 60 * RATE_HZ)
+@pytest.mark.parametrize(("measure", "minutes", "most"), [(lambda a: mfcc(a).values, 20, 70e6), (log_f0, 8, 20e6)])
+def test_memory_beside_the_result_is_bounded(measure: Callable[[Audio], Any], minutes: int, most: float) -> None:
+    samples = noise(minutes * 60 * RATE_HZ)
+    measure(Audio(samples[:RATE_HZ], RATE_HZ))
     tracemalloc.start()
-    try:
-        result = features(samples)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert peak - result.nbytes < 70e6 < samples.nbytes
+    result = measure(Audio(samples, RATE_HZ))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak - result.nbytes < most < samples.nbytes
 
 
-def test_digital_silence_is_nothing_at_all() -> None:
+def test_digital_silence_is_nothing_at_all_and_finite_inside_a_recording() -> None:
     for count in (400, 16_000):
         assert not features(np.zeros(count, np.float32)).any()
-
-
-def test_silence_inside_a_recording_has_a_finite_logarithm() -> None:
     samples = noise(RATE_HZ)
     samples[4000:12_000] = 0
     values = features(samples)
@@ -113,7 +111,8 @@ def test_the_delta_of_a_ramp_is_its_slope(frames: int, slope: float, start: floa
     assert regression_delta(ramp)[2:-2] == pytest.approx(slope, abs=1e-4)
 
 
-def test_it_says_what_is_wrong() -> None:
+@pytest.mark.parametrize("measure", [mfcc, log_f0])
+def test_it_says_what_is_wrong(measure: Callable[[Audio], object]) -> None:
     peak = "finite samples, full scale 1, found a peak of"
     for audio, message in (
         (Audio(noise(16_000), 44_100), "need 16000 Hz, found 44100 Hz; resample first"),
@@ -123,4 +122,41 @@ def test_it_says_what_is_wrong() -> None:
         (Audio(1e30 * noise(800), RATE_HZ), r"found a peak of \d.*e\+29"),
     ):
         with pytest.raises(InputError, match=message):
-            mfcc(audio)
+            measure(audio)
+
+
+def drawn_features(seed: int, frames: int = 200) -> Features:
+    return Features(np.random.default_rng(seed).normal(size=(frames, 39)).astype(np.float32), frames / 100)
+
+
+def around(values: np.ndarray, frame: int) -> np.ndarray:
+    """Return what the map sees of a frame, slowly."""
+    rows = [values[min(max(frame + step, 0), len(values) - 1), :STATIC_FEATURES] for step in FRAME_OFFSETS]
+    return np.concatenate(rows)
+
+
+def test_the_fit_finds_the_map_behind_the_data() -> None:
+    weights = np.random.default_rng(9).normal(size=STATIC_FEATURES * len(FRAME_OFFSETS))
+    examples = []
+    for seed in range(6):
+        given = drawn_features(seed)
+        examples.append((given, np.array([around(given.values, n) @ weights for n in range(200)])))
+    script = Path(__file__).parents[2] / "scripts" / "lip_speed.py"
+    found = runpy.run_path(str(script))["fit_opening_speed"](examples)
+    assert np.corrcoef(found, weights)[0, 1] > 0.995
+
+
+def test_the_map_that_ships_is_linear_and_local() -> None:
+    given = drawn_features(1)
+    whole = predicted_opening_speed(given)
+    assert whole.shape == (200,)
+    twice = Features(2 * given.values, given.duration_s)
+    assert predicted_opening_speed(twice) == pytest.approx(2 * whole)
+    changed = given.values.copy()
+    changed[100, :STATIC_FEATURES] += 1
+    moved = np.flatnonzero(np.abs(predicted_opening_speed(Features(changed, 2.0)) - whole) > 1e-6)
+    assert moved.tolist() == [100 - step for step in reversed(FRAME_OFFSETS)]
+
+
+def test_speed_is_the_slope() -> None:
+    assert measured_opening_speed(0.03 * np.arange(20.0))[3:-3] == pytest.approx(0.03, abs=1e-6)

@@ -1,24 +1,29 @@
-"""Noise: its level is what was asked for, where something is said, whatever the pauses are."""
-
-from __future__ import annotations
-
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import resample_poly
 
 from lipmotion.errors import InputError
+from lipmotion.speech.features.mfcc import spectrum
+from lipmotion.speech.sound import resampling
 from lipmotion.speech.sound.acoustic_conditions import (
     NOISE_KINDS,
     add_noise,
     babble_noise,
+    condition_spectra,
+    in_condition,
     noisy_audio,
     spoken_samples,
     white_noise,
 )
+from lipmotion.speech.sound.overlap_add import REACH_S, overlapped
+from lipmotion.speech.sound.resampling import decimated
 from lipmotion.testing.formant_synthesiser import synthesise
-from lipmotion.types import Audio
+from lipmotion.testing.toy import toy_sentences
+from lipmotion.types import SPECTRUM_BANDS, Audio
 from oracles.noise import ratio_db
 
 RATE_HZ = 16_000
@@ -45,16 +50,13 @@ def test_the_ratio_is_as_asked() -> None:
             assert ratio_db(clean.samples, added(clean, dirty)) == pytest.approx(snr_db, abs=0.02)
 
 
-def test_the_level_of_the_noise_given_does_not_matter() -> None:
+def test_neither_the_level_of_the_noise_given_nor_pauses_matter() -> None:
     clean, hiss = talker(0), white_noise(len(talker(0).samples), 1)
     same, other = add_noise(clean, hiss, 10), add_noise(clean, np.float32(20) * hiss, 10)
     np.testing.assert_allclose(other.samples, same.samples, atol=1e-6)
-
-
-def test_pauses_do_not_change_the_level() -> None:
-    short, long = talker(0, pause_s=0.2), talker(0, pause_s=0.7)
-    levels = [added(clean, noisy_audio(clean, "white", 10)).std() for clean in (short, long)]
-    assert levels[1] == pytest.approx(levels[0], rel=0.06)
+    paused = (talker(0, pause_s=pause_s) for pause_s in (0.2, 0.7))
+    short, long = (added(clean, noisy_audio(clean, "white", 10)).std() for clean in paused)
+    assert long == pytest.approx(short, rel=0.06)
 
 
 def test_speech_is_found_between_the_pauses() -> None:
@@ -63,22 +65,15 @@ def test_speech_is_found_between_the_pauses() -> None:
     assert spoken[[0, -1]] == pytest.approx([0.5, 1.0], abs=0.06)
 
 
-def test_all_talkers_are_as_loud() -> None:
-    alone = [babble_noise([talker(1), Audio(talker(1).samples, RATE_HZ)], 16_000, seed=0)]
+def test_talkers_are_as_loud_begin_again_and_start_by_chance_of_the_seed() -> None:
+    one, two = talker(1), talker(2)
+    alone = [babble_noise([one, Audio(one.samples, RATE_HZ)], 16_000, seed=0)]
     alone += [babble_noise([talker(1, 0.02), talker(1, 3.0)], 16_000, seed=0)]
     np.testing.assert_allclose(alone[0], alone[1], atol=1e-4)
-
-
-def test_a_short_talker_begins_again() -> None:
-    one = talker(1)
     length = len(one.samples)
     twice = babble_noise([one, one], 3 * length, seed=2)
     np.testing.assert_allclose(twice[:length], twice[length : 2 * length], atol=1e-6)
-
-
-def test_talkers_start_by_chance_of_the_seed() -> None:
-    talkers = [talker(1), talker(2)]
-    first, again, other = (babble_noise(talkers, 20_000, seed) for seed in (1, 1, 2))
+    first, again, other = (babble_noise([one, two], 20_000, seed) for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
     assert not np.array_equal(white_noise(100, 1), white_noise(100, 2))
@@ -109,3 +104,105 @@ def test_it_says_what_is_wrong() -> None:
             add_noise(tone, noise, 0)
     with pytest.raises(InputError, match="0 samples"):
         white_noise(0)
+
+
+@pytest.fixture(scope="module")
+def voices() -> list[Audio]:
+    """Three sentences."""
+    return [sentence.audio for sentence in toy_sentences(3)]
+
+
+def test_the_same_seed_gives_the_same_spectra_and_another_does_not(voices: list[Audio]) -> None:
+    one, same, other = ([each.values for each in condition_spectra(voices[0], voices, 4, [seed])] for seed in (7, 7, 8))
+    for a, b in zip(one, same, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert any(a.shape != b.shape or not np.allclose(a, b) for a, b in zip(one, other, strict=True))
+
+
+def test_the_length_follows_the_tempo(voices: list[Audio]) -> None:
+    frames = len(spectrum(voices[0]))
+    for version in condition_spectra(voices[0], voices, 8, [1]):
+        assert len(version.values) == pytest.approx(frames / version.tempo, abs=2)
+
+
+def test_conditions_leave_speech_recognisable_and_finite(voices: list[Audio]) -> None:
+    found = [in_condition(voices[0], voices, np.random.default_rng(seed)) for seed in range(20)]
+    assert all(np.isfinite(audio.samples).all() and len(audio.samples) == len(voices[0].samples) for audio, _ in found)
+    distortions = np.array([distortion for _, distortion in found])
+    assert distortions.min() == 0
+    assert distortions.max() > 0.5
+    quiet = np.mean([np.abs(spectrum(audio) - spectrum(voices[0])).mean() for audio, d in found if d < 0.2])
+    covered = np.mean([np.abs(spectrum(audio) - spectrum(voices[0])).mean() for audio, d in found if d > 0.5])
+    assert covered > 1.5 * quiet
+
+
+def test_silence_stays_as_it_is(voices: list[Audio]) -> None:
+    silence = Audio(np.zeros(16_000, np.float32), 16_000)
+    for seed in range(5):
+        audio, distortion = in_condition(silence, voices, np.random.default_rng(seed))
+        assert not audio.samples.any()
+        assert distortion == 0
+
+
+def test_bands_are_normalised(voices: list[Audio]) -> None:
+    bands = spectrum(voices[0])
+    assert bands.shape[1] == SPECTRUM_BANDS
+    assert np.abs(bands.mean(axis=0)).max() < 1e-3
+    assert 0.5 < bands.std() < 1.5
+    louder = spectrum(Audio(voices[0].samples * 4, 16_000))
+    np.testing.assert_allclose(louder, bands, atol=2e-2)
+
+
+def tone(hertz: float, seconds: float, phase: float = 0.0) -> np.ndarray:
+    return np.sin(2 * np.pi * hertz * np.arange(int(seconds * RATE_HZ)) / RATE_HZ + phase).astype(np.float32)
+
+
+@pytest.mark.parametrize("edges_s", [(0.1, 0.3), (0.1, 0.3, 0.5, 0.8)])
+def test_successive_pieces_of_one_recording_join_without_a_trace(edges_s: tuple[float, ...]) -> None:
+    sound = np.random.default_rng(1).standard_normal(16_000).astype(np.float32)
+    pieces = list(pairwise(edges_s))
+    joined = overlapped([sound] * len(pieces), pieces, RATE_HZ)
+    np.testing.assert_allclose(joined.samples, sound[1600 : round(edges_s[-1] * RATE_HZ)], atol=1e-5)
+    assert joined.starts == [round((start_s - 0.1) * RATE_HZ) for start_s, _ in pieces]
+
+
+def test_a_tone_goes_on_in_phase() -> None:
+    for phase in (1.0, 4.5):
+        joined = overlapped([tone(140, 0.5), tone(140, 0.5, phase)], [(0.0, 0.25), (0.25, 0.5)], RATE_HZ)
+        spectrum = np.abs(np.fft.rfft(joined.samples[:7000] * np.hanning(7000)))
+        frequencies = np.fft.rfftfreq(7000, 1 / RATE_HZ)
+        assert spectrum[np.abs(frequencies - 140) > 30].max() < 0.02 * spectrum.max()
+        assert abs(len(joined.samples) - 8000) <= REACH_S * RATE_HZ + 1
+
+
+def test_a_shifted_piece_says_so() -> None:
+    marked = tone(100, 0.5, np.pi / 2)
+    joined = overlapped([tone(100, 0.5), marked], [(0.0, 0.2), (0.25, 0.5)], RATE_HZ)
+    begins = 0.25 + joined.shifts[1] / RATE_HZ
+    place = joined.starts[1] + round((0.4 - begins) * RATE_HZ)
+    np.testing.assert_allclose(joined.samples[place : place + 200], marked[6400:6600], atol=1e-5)
+    assert joined.shifts[1] != 0
+
+
+def test_a_short_first_piece_makes_no_click() -> None:
+    joined = overlapped([np.ones(8000, np.float32)] * 2, [(0.1, 0.101), (0.2, 0.4)], RATE_HZ)
+    np.testing.assert_allclose(joined.samples, 1, atol=1e-6)
+
+
+def test_fewer_samples_are_what_scipy_computes_and_a_sound_at_the_same_rate_stays():
+    for factor, length in ((2, 1), (3, 5), (6, 100), (3, 2401)):
+        sound = np.random.default_rng(length).normal(0, 0.1, length).astype(np.float32)
+        found, expected = decimated(sound, factor), resample_poly(sound, 1, factor)
+        assert found.dtype == np.float32
+        assert found.shape == expected.shape
+        assert found == pytest.approx(expected, abs=1e-6)
+        assert np.array_equal(decimated(sound, 1), sound)
+    assert not len(decimated(sound[:0], 3))
+
+
+@pytest.mark.parametrize("length", [599, 600, 1_000])
+def test_blocks_make_no_difference(length: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = np.random.default_rng(7).normal(0, 0.1, length).astype(np.float32)
+    whole = decimated(sound, 3)
+    monkeypatch.setattr(resampling, "KEPT_BLOCK", 50)
+    assert decimated(sound, 3) == pytest.approx(whole, abs=1e-7)

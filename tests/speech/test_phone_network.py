@@ -1,7 +1,3 @@
-"""Phone recognisers, the search for words in their posteriors, and what is made of both."""
-
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -199,15 +195,11 @@ def test_a_long_recording_is_cut(loud: str) -> None:
     assert max(each.stretch.end - each.stretch.first for each in found) <= 2000
 
 
-def test_a_recogniser_that_is_not_installed_is_refused(loud: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_recogniser_that_is_not_installed_or_is_none_is_refused(loud: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Loud, "installed", False)
     with pytest.raises(MissingDependencyError, match="pip install loud"):
         phone_recogniser(loud)
-
-
-def test_something_else_is_no_recogniser(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(type(posteriors.PHONE_RECOGNISERS), "load", lambda *_: dict)
-    phone_recogniser.cache_clear()
     with pytest.raises(InputError, match="required a PhoneRecogniser"):
         phone_recogniser("odd")
 

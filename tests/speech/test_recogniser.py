@@ -1,26 +1,26 @@
-from __future__ import annotations
-
 from collections.abc import Sequence
 from difflib import SequenceMatcher
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lipmotion import Model, load_model
-from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.model import UnitHmm
+from lipmotion.errors import AlignmentError, CorpusError, InputError
+from lipmotion.hmm.model import HmmConfig, UnitHmm
+from lipmotion.pipeline.training.train import train_phone_models
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.recognition import general as general_module
 from lipmotion.speech.recognition import recogniser as module
 from lipmotion.speech.recognition import word_search
-from lipmotion.speech.recognition.recogniser import (
-    Recogniser,
-)
+from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
+from lipmotion.types.progress import silent_monitor
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
 from lipmotion.units.phones import SHORT_PAUSE_S
 
@@ -90,7 +90,9 @@ def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after(
     assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
 
 
-def test_unknown_sentences_are_recognised(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+def test_unknown_sentences_are_recognised_and_digital_silence_is_silence(
+    hmm: UnitHmm, sentences: list[ToySentence]
+) -> None:
     for sentence in sentences[-3:]:
         found = recognise(hmm, sentence.audio)
         assert covers(found, sentence.audio.duration_s)
@@ -98,6 +100,9 @@ def test_unknown_sentences_are_recognised(hmm: UnitHmm, sentences: list[ToySente
         if sentence.split == "test":
             assert SequenceMatcher(None, phones(found), phones(sentence.units)).ratio() > 0.9
         assert all(span.label.word == "" for span in found)
+    silent = recognise(hmm, Audio(np.zeros(16_000, np.float32), 16_000))
+    assert phones(silent) == [SILENCE]
+    assert covers(silent, 1.0)
 
 
 def test_silence_at_both_ends_is_silence_however_short(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
@@ -138,17 +143,13 @@ def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: UnitHmm, se
     assert np.abs(errors_s).max() < 0.1
 
 
-def test_digital_silence_is_silence(hmm: UnitHmm) -> None:
-    found = recognise(hmm, Audio(np.zeros(16_000, np.float32), 16_000))
-    assert phones(found) == [SILENCE]
-    assert covers(found, 1.0)
-
-
-def test_too_many_words_for_the_sound(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
-    with pytest.raises(
-        AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+: the recording is too short"
-    ):
+def test_too_many_words_for_the_sound_and_an_unknown_kind_are_refused(
+    hmm: UnitHmm, sentences: list[ToySentence]
+) -> None:
+    with pytest.raises(AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+"):
         align(hmm, sentences[0].audio, ["baby"] * 50, Lexicon())
+    with pytest.raises(InputError, match="'best'; required one of: auto, words, fast, own, general"):
+        Recogniser(hmm, "best")
 
 
 @pytest.mark.recordings
@@ -176,11 +177,6 @@ def test_every_kind_gives_phones_from_start_to_end(hmm: UnitHmm, sentences: list
     aligned = align(hmm, sentence.audio, sentence.words, Lexicon(), kind)
     errors_s = [a.start_s - b.start_s for a, b in zip(aligned, sentence.units, strict=True)]
     assert np.median(np.abs(errors_s)) < 0.03
-
-
-def test_an_unknown_kind() -> None:
-    with pytest.raises(InputError, match="unknown recogniser 'best'; required one of: auto, words, fast, own, general"):
-        Recogniser(load_model().phones, "best")
 
 
 def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
@@ -223,3 +219,59 @@ def test_speakers_and_words_beyond_all_training(recordings: Path) -> None:
         share[kind] = right / count
     assert share["auto"] > 0.5
     assert share["auto"] > share["own"] + 0.15
+
+
+def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model) -> None:
+    own = toy_model.phones
+    combined = combine_phones(own)
+    table = combined.hmm.table
+    assert set(table.units) == {*PHONES, *NOISES}
+    assert table.free[0] == SILENCE
+    assert len(combined.columns) == len(table.names) == len(combined.hmm.mixtures.means)
+    for index, name in enumerate(own.table.names):
+        there = table.names.index(name)
+        assert np.array_equal(combined.hmm.mixtures.means[there], own.mixtures.means[index])
+    assert combined.hmm.stay("b", 0) == own.stay("b", 0)
+    assert np.exp(combined.hmm.bigram.log_probability).sum(axis=1) == pytest.approx(1, abs=1e-4)
+
+
+@pytest.mark.parametrize(("kept", "trust"), [(0, 0.4), (9, 0.0), (9, 0.4)])
+def test_evidence_is_the_sum_of_both(
+    toy_model: Model, trust: float, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(general_module, "KEPT_FRAMES", kept)
+    draw = np.random.default_rng(0)
+    own, general = draw.normal(size=(2, 9, 39)).astype(np.float32)
+    combined = combine_phones(toy_model.phones)
+    log_likelihoods = combined_log_likelihoods(combined, own, trust, general)
+    wanted = general_model().log_density(general)[:, combined.columns] + trust * combined.hmm.mixtures.log_likelihood(
+        own
+    )
+    assert log_likelihoods.frames == 9
+    assert log_likelihoods.log_density(0, 9, None) == pytest.approx(wanted, abs=2e-3)
+    some = np.array([5, 2, 40])
+    assert log_likelihoods.log_density(3, 7, some) == pytest.approx(wanted[3:7, some], abs=2e-3)
+
+
+SMALL = HmmConfig(mixtures=1, iterations=2)
+
+
+def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence]) -> None:
+    steps: list[tuple[str, float | None]] = []
+    spoken = [(sentence.audio, sentence.words) for sentence in sentences[:4]]
+    hmm = train_phone_models(spoken, Lexicon(), SMALL, lambda event: steps.append((event.stage, event.figure)))
+    assert {"flat start", "pronunciations"} <= {step for step, _ in steps}
+    for stage in ("flat start", "pronunciations"):
+        values = [value for step, value in steps if step == stage and value is not None]
+        assert all(before <= after + 1e-6 for before, after in pairwise(values))
+    said = {phone for sentence in sentences[:4] for word in sentence.words for phone in WORDS[word]}
+    assert set(hmm.table.units) == said | {SILENCE, PAUSE}
+
+
+def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) -> None:
+    good = [(sentence.audio, sentence.words) for sentence in sentences[:3]]
+    bad = (good[0][0], ("five",) * 100)
+    hmm = train_phone_models([*good, bad], Lexicon(), SMALL, silent_monitor)
+    assert np.array_equal(hmm.mixtures.means, train_phone_models(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
+    with pytest.raises(CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
+        train_phone_models([bad], Lexicon(), SMALL, silent_monitor)

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -27,28 +25,15 @@ ALIGNED = AlignedWords(
 )
 
 
-def test_a_stretch_is_replaced() -> None:
+def test_a_stretch_nothing_or_all_is_replaced() -> None:
     part = (Stretch(30, 60), [LabelledFrames(30, "b", 0), LabelledFrames(45, "iy", 0)])
-    assert spliced(BASE, [part], 100) == [
-        LabelledFrames(0, "sil"),
-        LabelledFrames(20, "aa"),
-        LabelledFrames(30, "b", 0),
-        LabelledFrames(45, "iy", 0),
-        LabelledFrames(60, "t"),
-        LabelledFrames(70, "sil"),
-    ]
-
-
-def test_nothing_or_all_is_replaced() -> None:
+    assert spliced(BASE, [part], 100) == [*BASE[:2], *part[1], LabelledFrames(60, "t"), BASE[3]]
     assert spliced(BASE, [], 100) == BASE
     whole = [LabelledFrames(0, "b", 0)]
     assert spliced(BASE, [(Stretch(0, 100), whole)], 100) == whole
-
-
-def test_slivers_are_dropped() -> None:
-    part = (Stretch(22, 69), [LabelledFrames(22, "b", 0)])
+    sliver = (Stretch(22, 69), [LabelledFrames(22, "b", 0)])
     assert SLIVER_FRAMES > 2
-    assert [label.phone for label in spliced(BASE, [part], 100)] == ["sil", "b", "sil"]
+    assert [label.phone for label in spliced(BASE, [sliver], 100)] == ["sil", "b", "sil"]
 
 
 def test_every_frame_has_one_label() -> None:
@@ -69,14 +54,11 @@ def test_every_frame_has_one_label() -> None:
         }
 
 
-def test_labels_of_words_that_are_all_believed_are_the_whole_stretch() -> None:
+def test_labels_are_those_of_the_words_that_are_believed() -> None:
     ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([True, True]), 5)
-    assert frames == Stretch(100, 180)
+    assert frames == Stretch(100, 180)  # all
     assert [label.word for label in labels] == [-1, 5, -1, 6, 6, 6, -1]
     assert [label.first for label in labels] == [100, 110, 120, 122, 130, 150, 160]
-
-
-def test_labels_of_one_word_that_is_believed() -> None:
     ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, True]), 0)
     assert frames == Stretch(122, 160)
     assert [label.phone for label in labels] == ["b", "ow", "t"]
@@ -93,18 +75,12 @@ def test_fits_are_means_over_the_frames_of_each_word() -> None:
 
 
 def test_what_was_recognised() -> None:
-    labels = [
-        LabelledFrames(0, "sil"),
-        LabelledFrames(10, "b", 0),
-        LabelledFrames(20, "iy", 0),
-        LabelledFrames(40, "z"),
-    ]
+    labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
     spans = ((0.0, 0.1, "sil", ""), (0.1, 0.2, "b", "bee"), (0.2, 0.4, "iy", "bee"), (0.4, 0.5, "z", ""))
     units = Timeline(tuple(Span(start, end, Unit(phone, word=word)) for start, end, phone, word in spans))
     found = recognition_of(units, labels, [RecognisedWord("bee", 0.8)], -7.0)
-    assert [(s.start_s, s.end_s, s.label.text) for s in found.words] == [
-        (pytest.approx(0.1), pytest.approx(0.4), "bee")
-    ]
+    (word,) = found.words
+    assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
     assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.1))
     assert found.confidence == pytest.approx(0.8)
     assert found.reliability == pytest.approx(1)

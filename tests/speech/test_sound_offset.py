@@ -1,7 +1,3 @@
-"""Two recordings of one scene are brought into step to a millisecond, or it is said that they cannot be."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

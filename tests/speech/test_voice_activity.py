@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import tracemalloc
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +11,7 @@ from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, average_power, find_sp
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW, log_energy
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db, levels_db_at, quietest_s, spoken_spans
 from lipmotion.speech.sound.voice_activity import (
     LONGEST_FRAMES,
     MARGIN_FRAMES,
@@ -43,28 +42,17 @@ def energy(frames: int, *sounds: tuple[int, int]) -> np.ndarray:
     return values
 
 
-def test_sound_has_its_stretch_with_a_margin() -> None:
+def test_sound_has_its_stretch_with_a_margin_that_ends_with_the_recording() -> None:
     (found,) = stretches_of_sound(energy(1000, (300, 500)))
-    assert found.first == pytest.approx(300 - MARGIN_FRAMES, abs=5)
-    assert found.end == pytest.approx(500 + MARGIN_FRAMES, abs=5)
+    assert found == pytest.approx((300 - MARGIN_FRAMES, 500 + MARGIN_FRAMES), abs=5)
+    assert stretches_of_sound(energy(400, (10, 200), (230, 390))) == [Stretch(0, 400)]
 
 
-def test_a_margin_ends_with_the_recording() -> None:
-    (found,) = stretches_of_sound(energy(400, (10, 200), (230, 390)))
-    assert found == Stretch(0, 400)
-
-
-def test_short_pauses_do_not_part_sound_and_long_ones_do() -> None:
+def test_short_pauses_do_not_part_sound_and_clicks_and_constant_energy_are_none() -> None:
     assert len(stretches_of_sound(energy(1000, (200, 300), (380, 500)))) == 1
     assert len(stretches_of_sound(energy(1000, (200, 300), (600, 700)))) == 2
-
-
-def test_clicks_are_no_sound() -> None:
     assert not stretches_of_sound(energy(1000, (300, 300 + LEAST_FRAMES // 3), (600, 602)))
-
-
-def test_constant_energy_holds_no_stretch() -> None:
-    assert stretches_of_sound(np.full(500, -11.5, np.float32)) == []
+    assert not stretches_of_sound(np.full(500, -11.5, np.float32))
 
 
 def test_a_long_stretch_is_cut_where_it_is_quietest() -> None:
@@ -122,8 +110,7 @@ def moved(found: list[Stretch], frames: int) -> list[Stretch]:
 
 
 @pytest.mark.parametrize(
-    ("before_s", "after_s", "units"),
-    [(0, 0, 0), (5, 0, 0), (0, 5, 0), (20, 20, 0), (60, 60, 0), (5, 5, 1), (5, 5, 4)],
+    ("before_s", "after_s", "units"), [(0, 0, 0), (5, 0, 0), (0, 5, 0), (20, 20, 0), (60, 60, 0), (5, 5, 1), (5, 5, 4)]
 )
 def test_a_passage_is_the_same_whatever_silence_is_around_it(before_s: float, after_s: float, units: float) -> None:
     """But for the frames whose windows reach into the silence."""
@@ -285,8 +272,8 @@ def assert_same_motion(line: Samples, samples: Samples, place: int, largest: flo
 @pytest.mark.long
 @pytest.mark.recordings
 @pytest.mark.parametrize("voice", [voice for voice in VOICES if not voice.endswith(".opus")])  # is doubtful
-def test_silence_and_gain_change_no_motion_of_a_real_voice(recordings: Path, voice: str) -> None:
-    line = in_frames(recordings / voice)
+def test_silence_gain_and_another_line_change_no_motion_of_a_real_voice(recordings: Path, voice: str) -> None:
+    line, other = in_frames(recordings / voice), in_frames(recordings / VOICES[2 if voice == VOICES[1] else 1])
     for seconds, units in ((0.5, 0), (5, 0), (20, 0), *([(5, 1)] if voice in IN_NOISE else [])):
         around = noise(seconds, units)
         samples = np.concatenate([around, line, around])
@@ -295,13 +282,6 @@ def test_silence_and_gain_change_no_motion_of_a_real_voice(recordings: Path, voi
             assert np.ptp(animate(Audio(samples, RATE_HZ)).motion["opening"][: round(100 * seconds) - 60]) < 0.02
     for decibels in (-40, -20):
         assert_same_motion(line, louder(line, decibels), 0)
-
-
-@pytest.mark.long
-@pytest.mark.recordings
-@pytest.mark.parametrize("voice", [voice for voice in VOICES if not voice.endswith(".opus")])  # is doubtful
-def test_another_line_changes_no_motion_of_a_real_voice(recordings: Path, voice: str) -> None:
-    line, other = in_frames(recordings / voice), in_frames(recordings / VOICES[2 if voice == VOICES[1] else 1])
     for gap_s, decibels in ((0.5, 0), (1, -30), (5, 30)):
         before, after = louder(other, -max(decibels, 0)), louder(line, min(decibels, 0))
         samples = np.concatenate([before, noise(gap_s, 0), after])
@@ -344,3 +324,57 @@ def test_hours_of_silence_are_searched_for_tones_block_by_block() -> None:
         assert tracemalloc.get_traced_memory()[1] < 6 * samples.nbytes
     finally:
         tracemalloc.stop()
+
+
+RATE = 16_000
+
+
+def loud_in(spans: list[tuple[float, float]], duration_s: float, *, gain: float = 0.1, noise: float = 1e-3) -> Audio:
+    """Return noise that is loud in some spans."""
+    draw = np.random.default_rng(0)
+    samples = noise * draw.normal(size=round(duration_s * RATE))
+    for start_s, end_s in spans:
+        part = slice(round(start_s * RATE), round(end_s * RATE))
+        samples[part] += gain * draw.normal(size=len(samples[part]))
+    return Audio(samples.astype(np.float32), RATE)
+
+
+SPANS = [(0.5, 1.5), (2.0, 3.2), (4.0, 4.6)]
+
+
+def test_levels_are_those_of_the_sound():
+    sine = np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE).astype(np.float32)
+    levels = levels_db(Audio(0.1 * sine, RATE))
+    assert levels.shape == (100,)
+    assert levels[10:-10] == pytest.approx(-23.0, abs=0.3)  # 20 dB below full scale, 3 for a sine
+    assert levels_db(Audio(np.zeros(RATE, np.float32), RATE)).tolist() == [-100.0] * 100
+
+
+def test_spans_between_pauses_are_not_divided_by_short_dips_and_clicks_are_none():
+    np.testing.assert_allclose(spoken_spans(levels_db(loud_in(SPANS, 5.0))), SPANS, atol=0.04)
+    found = spoken_spans(levels_db(loud_in([(0.5, 1.0), (1.12, 1.5), (2.5, 2.53)], 4.0)))
+    np.testing.assert_allclose(found, [(0.5, 1.5)], atol=0.04)
+
+
+def test_loudness_may_change_in_an_hour():
+    loud, soft = loud_in(SPANS * 1, 60.0, gain=0.2, noise=1e-2), loud_in(SPANS, 60.0, gain=0.004, noise=1e-4)
+    both = Audio(np.concatenate([loud.samples, soft.samples]), RATE)
+    found = spoken_spans(levels_db(both))
+    expected = [*SPANS, *((start_s + 60, end_s + 60) for start_s, end_s in SPANS)]
+    np.testing.assert_allclose([span for span in found if span[0] % 60 < 5], expected, atol=0.05)
+
+
+def test_the_quietest_place():
+    levels = levels_db(loud_in([(0.0, 1.0), (1.1, 2.0)], 2.0))
+    assert quietest_s(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
+    assert quietest_s(levels, 1.0, 1.0) == pytest.approx(1.0)
+
+
+def test_levels_at_any_time_also_of_less_than_a_step():
+    sound = loud_in(SPANS, 5.0)
+    levels, times_s = levels_db(sound), np.array([-1.0, 0.005, 1.005, 1.01, 99.0])
+    found = levels_db_at(sound, times_s)
+    assert found == pytest.approx([levels[0], levels[0], levels[100], levels[100:102].mean(), levels[-1]])
+    for samples in (0, 159):
+        found = levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
+        assert found == pytest.approx([QUIETEST_DB] * 3)

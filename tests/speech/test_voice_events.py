@@ -1,11 +1,8 @@
-"""Voice events in sounds that are made (``speech.made_voices``)."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from scipy.signal import find_peaks
 
-from lipmotion.speech.features.voice_events import voice_events, without_laughter
+from lipmotion.speech.features.voice_events import risen_peaks, voice_events, without_laughter
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from speech.made_voices import RATE_HZ, laugh, noise, pulses, recording, said, vowels
@@ -80,3 +77,12 @@ def test_one_phrase_is_shouted_if_it_is_higher_brighter_and_louder():
 def test_silence_and_hiss_say_nothing(level: float):
     samples = level * np.random.default_rng(0).standard_normal(32_000)
     assert not found(Audio(samples.astype(np.float32), RATE_HZ), said(2.0))
+
+
+@pytest.mark.parametrize("prominence", [0.1, 1.0, 3.0])
+@pytest.mark.parametrize("count", [3, 10, 500])
+def test_peaks_are_those_of_scipy(count: int, prominence: float) -> None:
+    for seed in range(5):
+        curve = np.cumsum(np.random.default_rng(seed).normal(size=count))
+        found = find_peaks(curve, prominence=prominence)[0]
+        assert risen_peaks(curve, prominence).tolist() == found.tolist()

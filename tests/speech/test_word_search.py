@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 
@@ -7,12 +5,14 @@ import numpy as np
 import pytest
 
 from lipmotion import load_model
+from lipmotion.errors import MissingDependencyError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition import recogniser, word_search
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.recognition.word_search import FoundWord, score_words
+from lipmotion.speech.recognition.word_search import FoundWord, is_filler, score_words, words_in
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent
 
@@ -96,14 +96,12 @@ def test_the_words_that_fit_are_believed_among_others(welcome: Audio, monkeypatc
     assert {"lips", "float", "by"} <= set(texts(found))
 
 
-def test_too_many_words_are_not_believed(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
-    recognise_as(monkeypatch, *["constitutional"] * 100)
-    assert recognition(welcome).units == of_welcome("fast").units
-
-
-def test_no_words_leave_the_phones_as_they_are(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
-    recognise_as(monkeypatch)
-    assert recognition(welcome).units == of_welcome("fast").units
+def test_too_many_words_are_not_believed_and_none_leave_the_phones_as_they_are(
+    welcome: Audio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for words in (["constitutional"] * 100, []):
+        recognise_as(monkeypatch, *words)
+        assert recognition(welcome).units == of_welcome("fast").units
     assert {span.label.phone for span in recognition(welcome, "words").units} == {"sil"}
 
 
@@ -151,3 +149,44 @@ def test_other_languages_have_no_confident_words(recordings: Path) -> None:
     ).confidence
     assert confidence is not None
     assert confidence < 0.35
+
+
+def test_words_of_a_sentence() -> None:
+    audio = read_audio(WELCOME)
+    words = words_in(stretch_samples(audio, Stretch(0, len(audio.samples) // 160)))
+    found = [word.text for word in words]
+    assert all(0 <= word.posterior <= 1 for word in words)
+    assert sum(word.posterior for word in words) > len(words) / 2
+    assert {"please", "speak", "lips", "five", "big", "blue", "boats"} <= set(found)
+    assert all(Lexicon().known(word) for word in found)
+    assert not any(is_filler(word) or "(" in word for word in found)
+
+
+def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers() -> None:
+    assert [words_in(samples) for samples in (b"", bytes(2), bytes(320))] == [()] * 3
+    audio = Audio(np.repeat(np.array([0.0, 0.5, -2.0], np.float32), 160), 16_000)
+    samples = np.frombuffer(stretch_samples(audio, Stretch(1, 3)), "<i2")
+    assert len(samples) == 320
+    assert samples[0] == pytest.approx(16_383, abs=1)
+    assert samples[-1] == -32_768
+    assert all(is_filler(entry) for entry in ("<s>", "</s>", "[NOISE]", "++UH++"))
+    assert not is_filler("'bout")
+
+
+def test_one_recording_does_not_change_the_next() -> None:
+    audio = read_audio(WELCOME)
+    samples = stretch_samples(audio, Stretch(0, 120))
+    noise = np.random.default_rng(0).normal(0, 9000, 8_000).astype("<i2").tobytes()
+    first = words_in(samples)
+    words_in(noise)
+    assert words_in(samples) == first
+
+
+def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(word_search, "find_english_data", lambda: tmp_path)
+    word_search._decoder.cache_clear()
+    try:
+        with pytest.raises(MissingDependencyError, match="pip install pocketsphinx"):
+            words_in(b"")
+    finally:
+        word_search._decoder.cache_clear()

@@ -1,7 +1,3 @@
-"""The convolutional network: gradients, reach, blocks, learning, determinism."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""The loop of expectation–maximisation, on a model that is one number."""
-
 from dataclasses import dataclass
 
 import numpy as np

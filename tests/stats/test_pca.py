@@ -93,17 +93,12 @@ def test_places_are_spread_evenly():
     assert (chosen[0], chosen[-1]) == (16, 32_983)
 
 
-def test_directions_of_rounding_are_no_components():
-    for count in (4, 60):
-        rng = np.random.default_rng(0)
-        plane = rng.normal(size=(count, 2)) @ rng.normal(size=(2, 7)) + 3
-        assert fit_pca(plane, 7).basis.shape == (2, 7)
-        assert fit_pca(plane * (1 + 1e-15 * rng.normal(size=plane.shape)), 7).basis.shape == (2, 7)
-
-
-def test_values_that_do_not_move_have_no_components():
-    for count in (4, 60):
-        still = np.full((count, 7), 0.1) * (1 + 1e-15 * np.random.default_rng(0).normal(size=(count, 7)))
-        found = fit_pca(still, 3)
-        assert found.basis.shape == (0, 7)
-        assert found.restore(found.project(still)) == pytest.approx(still)
+@pytest.mark.parametrize("count", [4, 60])
+def test_directions_of_rounding_are_no_components(count):
+    rng = np.random.default_rng(0)
+    rounding = 1 + 1e-15 * rng.normal(size=(count, 7))
+    plane = rng.normal(size=(count, 2)) @ rng.normal(size=(2, 7)) + 3
+    for values, dimensions in ((plane, 2), (plane * rounding, 2), (0.1 * rounding, 0)):
+        found = fit_pca(values, 7)
+        assert found.basis.shape == (dimensions, 7)
+        assert found.restore(found.project(values)) == pytest.approx(values)

@@ -1,7 +1,3 @@
-"""The recurrent network: gradients, ends of sequences, pieces, learning, determinism."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

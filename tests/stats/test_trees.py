@@ -28,10 +28,10 @@ def sample(mean_of, frames=20, seed=0):
     return [draw.normal(mean_of(context), 0.1, (frames, 2)) for context in CONTEXTS]
 
 
-def grown(values, factor=1.0, least=10.0, contexts=CONTEXTS):
-    return grow_tree(
-        contexts, statistics_of(values), QUESTIONS, gaussian_log_likelihood, parameters=4, factor=factor, least=least
-    )
+def grown(values, questions=QUESTIONS, contexts=CONTEXTS, sums=None, likelihood=gaussian_log_likelihood, **options):
+    statistics = (sums or statistics_of)(values)
+    options = {"parameters": 4, "factor": 1.0, "least": 10.0} | options
+    return grow_tree(contexts, statistics, questions, likelihood, **options)
 
 
 def test_the_likelihood_is_that_of_the_gaussian_fitted_to_the_frames():
@@ -41,11 +41,14 @@ def test_the_likelihood_is_that_of_the_gaussian_fitted_to_the_frames():
     assert gaussian_log_likelihood(statistics_of([x]))[0] == pytest.approx(expected, rel=1e-9)
 
 
-def test_the_question_that_matters_is_asked_first():
+def test_the_question_that_matters_is_asked_first_and_the_tree_can_be_read():
     tree = grown(sample(lambda context: 5.0 if context[0] in "ab" else 0.0))
     assert tree.questions[tree.asked[0]] == Question(0, "early", frozenset("ab"))
     assert len(tree.leaves) == 2
     assert tree.frames[0] == 20 * 64
+    leaves = ["  yes: leaf (640 frames)", "  no: leaf (640 frames)"]
+    assert tree.text().splitlines() == ["left is early? (1280 frames)", *leaves]
+    assert [tree.name(node) for node in range(3)] == ["any", "left is early", "left is not early"]
 
 
 def test_pure_noise_is_not_split():
@@ -68,33 +71,19 @@ def test_splits_are_those_of_a_search_by_hand():
         x = np.concatenate(chosen)
         return (-0.5 * (np.log(2 * np.pi * x.var(axis=0)) + 1)).sum() * len(x)
 
-    gains = []
-    for question in QUESTIONS:
-        yes = [x for x, c in zip(values, CONTEXTS, strict=True) if question.answer(c)]
-        no = [x for x, c in zip(values, CONTEXTS, strict=True) if not question.answer(c)]
-        gains.append(likelihood(yes) + likelihood(no))
-    assert tree.asked[0] == int(np.argmax(gains))
+    def gain(question):
+        answers = np.array([question.answer(context) for context in CONTEXTS])
+        return sum(likelihood([values[n] for n in np.flatnonzero(answers == answer)]) for answer in (True, False))
+
+    assert tree.asked[0] == int(np.argmax([gain(question) for question in QUESTIONS]))
 
 
 def test_a_context_never_seen_is_treated_like_those_that_answer_alike():
     seen = [context for context in CONTEXTS if context[0] != "b"]
     values = [x for x, c in zip(sample(lambda c: 5.0 * (c[0] in "ab")), CONTEXTS, strict=True) if c[0] != "b"]
-    questions = [q for q in QUESTIONS if q.name == "early"]  # the only ones about b
-    tree = grow_tree(
-        seen, statistics_of(values), questions, gaussian_log_likelihood, parameters=4, factor=1.0, least=10.0
-    )
-    assert tree.path(("b", "a", "a"))[-1] == tree.path(("a", "a", "a"))[-1]
-    assert tree.path(("b", "a", "a"))[-1] != tree.path(("c", "a", "a"))[-1]
-
-
-def test_the_tree_can_be_read():
-    tree = grown(sample(lambda context: 5.0 if context[0] in "ab" else 0.0))
-    assert tree.text().splitlines() == [
-        "left is early? (1280 frames)",
-        "  yes: leaf (640 frames)",
-        "  no: leaf (640 frames)",
-    ]
-    assert [tree.name(node) for node in range(3)] == ["any", "left is early", "left is not early"]
+    tree = grown(values, [q for q in QUESTIONS if q.name == "early"], seen)  # the only ones about b
+    unseen, alike, other = (tree.path((left, "a", "a"))[-1] for left in "bac")
+    assert unseen == alike != other
 
 
 def test_trees_come_back_from_arrays():
@@ -144,14 +133,11 @@ def test_frames_without_a_value_are_as_likely_as_they_are_frequent():
 
 
 def test_voicing_alone_is_worth_a_question():
-    draw = np.random.default_rng(0)
-    values = [
-        np.where(draw.random(30) < (0.9 if context[1] in "ab" else 0.1), draw.normal(0, 1, 30), np.nan)
-        for context in CONTEXTS
-    ]
-    tree = grow_tree(
-        CONTEXTS, spaces_of(values), QUESTIONS, multispace_log_likelihood, parameters=3, factor=1.0, least=10.0
-    )
+    draw, values = np.random.default_rng(0), []
+    for context in CONTEXTS:
+        voiced = draw.random(30) < (0.9 if context[1] in "ab" else 0.1)
+        values.append(np.where(voiced, draw.normal(0, 1, 30), np.nan))
+    tree = grown(values, sums=spaces_of, likelihood=multispace_log_likelihood, parameters=3)
     assert tree.questions[tree.asked[0]] == Question(1, "early", frozenset("ab"))
 
 
@@ -174,7 +160,5 @@ def test_of_questions_that_split_alike_the_first_is_asked_however_sums_are_round
         found = gaussian_log_likelihood(statistics)
         return found * (1 + 1e-14 * rounding.normal(size=found.shape))
 
-    tree = grow_tree(
-        CONTEXTS, statistics_of(values), [*alike, *others], likelihood, parameters=4, factor=1.0, least=10.0
-    )
+    tree = grown(values, [*alike, *others], likelihood=likelihood)
     assert tree.questions[tree.asked[0]].name == "0"

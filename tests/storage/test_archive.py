@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import io
 import logging
 import zipfile
@@ -13,34 +11,27 @@ from numpy.typing import NDArray
 from lipmotion.storage.archive import Checkpoint, array_in, check_archive
 
 
+def saved(array: NDArray[Any]) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
 def test_an_array_comes_back() -> None:
-    for array in (
-        np.arange(6.0).reshape(2, 3),
-        np.zeros((0, 3)),
-        np.array(["a", "näher 😀"]),
-        np.array("one"),
-        np.eye(3).T,
-    ):
-        stream = io.BytesIO()
-        np.save(stream, array)
-        found = array_in(stream.getvalue())
+    texts = np.array(["a", "näher 😀"]), np.array("one")
+    for array in (np.arange(6.0).reshape(2, 3), np.zeros((0, 3)), *texts, np.eye(3).T):
+        found = array_in(saved(array))
         assert found.dtype == array.dtype
         np.testing.assert_array_equal(found, array)
 
 
-def test_an_array_is_exactly_as_long_as_its_header_says() -> None:
-    stream = io.BytesIO()
-    np.save(stream, np.arange(6.0))
-    for content in (stream.getvalue()[:-1], stream.getvalue() + b"\0", b"", b"\x93NUMPY\x09\x00"):
+def test_an_array_is_exactly_as_long_as_its_header_says_and_of_letters_that_exist() -> None:
+    whole = saved(np.arange(6.0))
+    for content in (whole[:-1], whole + b"\0", b"", b"\x93NUMPY\x09\x00"):
         with pytest.raises(ValueError, match=r"required 48 bytes|not an array"):
             array_in(content)
-
-
-def test_letters_beyond_unicode_are_refused() -> None:
-    stream = io.BytesIO()
-    np.save(stream, np.array(["ab"]))
     with pytest.raises(ValueError, match="characters that do not exist"):
-        array_in(stream.getvalue()[:-4] + b"\0\0\x11\0")
+        array_in(saved(np.array(["ab"]))[:-4] + b"\0\0\x11\0")
 
 
 def test_a_zip_may_not_grow_without_end(tmp_path: Path) -> None:
@@ -74,7 +65,7 @@ def test_every_bit_comes_back(tmp_path: Path) -> None:
         assert found[name].tobytes() == array.tobytes()
 
 
-def test_the_last_state_counts(tmp_path: Path) -> None:
+def test_the_last_state_of_the_same_job_counts(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     checkpoint = Checkpoint(tmp_path, "a")
     for number in range(3):
         checkpoint.save("stage", {"n": np.array(number)})
@@ -83,11 +74,7 @@ def test_the_last_state_counts(tmp_path: Path) -> None:
     assert found["n"] == 2
     assert checkpoint.load("other") is None
     assert [path.name for path in tmp_path.iterdir()] == ["stage.checkpoint"]
-
-
-def test_another_job_is_not_gone_on_with(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
-    Checkpoint(tmp_path, "a").save("stage", ARRAYS)
     assert Checkpoint(tmp_path, "b").load("stage") is None
     assert "of another corpus, configuration or version; not used" in caplog.text
 

@@ -1,7 +1,3 @@
-"""Links in folders that strangers filled: nothing outside of such a folder is written, made or removed, by any verb."""
-
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import gzip
 import io
 import os
@@ -48,12 +46,16 @@ def test_nothing_is_written_into_a_folder_that_is_read(place: Path) -> None:
                 check_apart([], [folder], folders=[place / name], force=force)
 
 
-def test_what_a_folder_links_to_belongs_to_it(place: Path) -> None:
+def test_what_a_folder_links_to_belongs_to_it_and_a_link_into_it_leads_there(place: Path) -> None:
+    corpus = [Source(place / "folder", "corpus")]
     (place / "elsewhere.wav").write_text("sound")
-    check_apart([place / "elsewhere.wav"], [Source(place / "folder", "corpus")])
+    check_apart([place / "elsewhere.wav"], corpus)
     (place / "folder" / "b.wav").symlink_to(place / "elsewhere.wav")
     with pytest.raises(ExportError, match=r"elsewhere\.wav: belongs to the corpus"):
-        check_apart([place / "elsewhere.wav"], [Source(place / "folder", "corpus")])
+        check_apart([place / "elsewhere.wav"], corpus)
+    (place / "shortcut").symlink_to(place / "folder" / "deep")
+    with pytest.raises(ExportError, match=r"lies in the corpus .*folder"):
+        check_apart([place / "shortcut" / "new.json"], corpus)
 
 
 def test_a_folder_that_is_written_holds_nothing_that_is_read(place: Path) -> None:
@@ -66,12 +68,6 @@ def test_a_folder_that_is_written_holds_nothing_that_is_read(place: Path) -> Non
 def test_what_has_nothing_to_do_with_each_other(place: Path) -> None:
     sources = [Source(place / name, "text") for name in ("words.txt", "folder", "none", "x" * 5000, "a\0b")]
     check_apart([place / "new.json", place / "folder2", place / ("y" * 5000)], sources, folders=[place / "new"])
-
-
-def test_a_link_to_a_folder_inside_a_corpus_leads_into_the_corpus(place: Path) -> None:
-    (place / "shortcut").symlink_to(place / "folder" / "deep")
-    with pytest.raises(ExportError, match=r"lies in the corpus .*folder"):
-        check_apart([place / "shortcut" / "new.json"], [Source(place / "folder", "corpus")])
 
 
 def packed(*names: str, kind: str = "") -> bytes:

@@ -1,7 +1,3 @@
-"""Configurations check themselves, and are parsed from texts and mappings."""
-
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -64,12 +60,9 @@ def test_options_come_back() -> None:
 def test_texts_are_parsed_as_their_types() -> None:
     for settings, values in (
         (["count=4", "weight=2", "kind=hard"], {"count": 4, "weight": 2.0, "kind": "hard"}),
-        (["on=no"], {"on": False}),
-        (["on=TRUE"], {"on": True}),
-        (["free=a=b"], {"free": "a=b"}),
-        (["how_many=2"], {"count": 2}),
-        ([], {}),
-    ):
+        (["on=no"], {"on": False}), (["on=TRUE"], {"on": True}), (["free=a=b"], {"free": "a=b"}),
+        (["how_many=2"], {"count": 2}), ([], {}),
+    ):  # fmt: skip
         assert Example.values_of(settings) == values
 
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,11 +20,8 @@ def test_frames_have_times_and_channels_have_names() -> None:
     assert curves.names == ("opening", "jaw")
     assert curves["jaw"] == pytest.approx(-2 * np.arange(11))
     assert Channel("opening").unit == EYE_DISTANCE
-
-
-def test_an_unknown_channel_is_named_with_those_there_are() -> None:
     with pytest.raises(InputError, match="no motion channel 'width' among 2: opening, jaw"):
-        _ = motion()["width"]
+        _ = curves["width"]
 
 
 def test_it_says_what_does_not_fit() -> None:
@@ -75,9 +70,6 @@ def test_whole_multiples_keep_the_last_frame() -> None:
     for rows in range(1, 200):
         assert len(motion(rows, 100.0).resampled(50.0).values) == (rows - 1) // 2 + 1
         assert len(motion(rows, 25.0).resampled(100.0).values) == 4 * (rows - 1) + 1
-
-
-def test_an_impossible_rate_is_refused() -> None:
     for rate_hz in (0.0, -25.0, float("nan"), float("inf")):
         with pytest.raises(InputError, match=f"motion rate is {rate_hz} Hz"):
             motion().resampled(rate_hz)
@@ -85,13 +77,8 @@ def test_an_impossible_rate_is_refused() -> None:
 
 def test_a_name_is_no_formula_of_a_spreadsheet() -> None:
     for name in ("=1+1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =1", "＝1", "\u3000＠x", "-x" * 500):
-        with pytest.raises(
-            InputError, match=r"begins as a spreadsheet's formula, required another beginning"
-        ) as caught:
+        with pytest.raises(InputError, match="a spreadsheet's formula, required another beginning") as caught:
             Channel(name)
         assert len(str(caught.value)) < 250
-
-
-def test_other_names_are_names() -> None:
     for name in ("opening", "p12.x", "jaw-open", "Mouth Open (L)", "blendShape1.a=b", "öffnen", "", "_x", "|a|b"):
         assert Channel(name).name == name

@@ -1,7 +1,3 @@
-"""Documents are checked against tables of types and ranges; what stands in no table is not looked at."""
-
-from __future__ import annotations
-
 import pytest
 
 from lipmotion.errors import InputError

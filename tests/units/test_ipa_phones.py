@@ -1,7 +1,3 @@
-"""Phones of all languages become those of the nearest mouth shape."""
-
-from __future__ import annotations
-
 import unicodedata
 from itertools import groupby
 

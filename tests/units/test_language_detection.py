@@ -1,7 +1,3 @@
-"""Which language words are in; where that is not known, nothing is said."""
-
-from __future__ import annotations
-
 import pytest
 
 from lipmotion.units.language_detection import detect_language, is_english

@@ -14,12 +14,8 @@ def test_a_text_without_tags_is_returned_as_it_is():
 def test_tags_hold_until_the_next_and_end_tags_are_neutral():
     plain, tags = parse_tagged_text("One [Angry] two <smile>three</smile> four [sad: 0.25]")
     assert split_words(plain) == ("one", "two", "three", "four")
-    assert tags == (
-        MoodTag(0.25, "angry"),
-        MoodTag(0.5, "happy", 0.6),
-        MoodTag(0.75, NEUTRAL),
-        MoodTag(1.0, "sad", 0.25),
-    )
+    wanted = (0.25, "angry"), (0.5, "happy", 0.6), (0.75, NEUTRAL), (1.0, "sad", 0.25)
+    assert tags == tuple(MoodTag(*each) for each in wanted)
 
 
 def test_unknown_tags_are_named_and_not_spoken(caplog):
@@ -66,22 +62,19 @@ def test_markup_and_names_of_speakers_are_named_and_not_spoken(caplog, text, wor
     assert bool(caplog.records) == bool(named)
 
 
-def test_what_somebody_does_is_a_tag_between_asterisks():
-    assert [tag.mood for tag in parse_tagged_text("*laughs* {angry}no{/angry} *gasps*").tags] == [
-        "happy",
-        "angry",
-        NEUTRAL,
-        "surprised",
-    ]
-
-
 def test_known_tags_alone_can_be_taken_out():
     assert remove_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
 
 
-def test_manners_are_tags_too():
-    tags = parse_tagged_text("[whispers] one </whispers> two")[1]
-    assert [tag.mood for tag in tags] == ["whisper", "plain"]
+@pytest.mark.parametrize(
+    ("text", "moods"),
+    [
+        ("[whispers] one </whispers> two", ["whisper", "plain"]),
+        ("*laughs* {angry}no{/angry} *gasps*", ["happy", "angry", NEUTRAL, "surprised"]),
+    ],
+)
+def test_manners_and_what_somebody_does_between_asterisks_are_tags_too(text, moods):
+    assert [tag.mood for tag in parse_tagged_text(text).tags] == moods
 
 
 def test_every_synonym_means_a_mood():

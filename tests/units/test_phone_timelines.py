@@ -1,7 +1,3 @@
-"""Words in time, of phones in time."""
-
-from __future__ import annotations
-
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit
@@ -17,20 +13,12 @@ def said(*words: tuple[str, str]) -> list[tuple[float, float, str]]:
 
 def test_a_word_that_is_said_again_is_another_one() -> None:
     for word, phones, starts in (
-        ("big", "b ih g b ih g", [0, 3]),
-        ("Big", "b ih g b ih g b ih g", [0, 3, 6]),
-        ("the", "dh ax dh iy", [0, 2]),
-        ("tutu", "t uw t uw", [0]),
-        ("tutu", "t uw t uw t uw t uw", [0, 4]),
-        ("mama", "m aa m ax", [0]),
-        ("bigbig", "b ih g b ih g", [0]),
-        ("big", "b ih b ih", [0, 2]),
-        ("zero", "z iy r ow z iy r ow", [0, 4]),
+        ("big", "b ih g b ih g", [0, 3]), ("Big", "b ih g b ih g b ih g", [0, 3, 6]), ("the", "dh ax dh iy", [0, 2]),
+        ("tutu", "t uw t uw", [0]), ("tutu", "t uw t uw t uw t uw", [0, 4]), ("mama", "m aa m ax", [0]),
+        ("bigbig", "b ih g b ih g", [0]), ("big", "b ih b ih", [0, 2]), ("zero", "z iy r ow z iy r ow", [0, 4]),
         ("blorp", "b l ao r p b l ao r p b l ao r p", [0, 5, 10]),
-        ("hahaha", "hh aa hh aa hh aa hh aa hh aa hh aa", [0, 6]),
-        ("brrk", "r r r", [0]),
-        ("", "b ih g b ih g", [0]),
-    ):
+        ("hahaha", "hh aa hh aa hh aa hh aa hh aa hh aa", [0, 6]), ("brrk", "r r r", [0]), ("", "b ih g b ih g", [0]),
+    ):  # fmt: skip
         ends = [*starts[1:], len(phones.split())]
         assert said((word, phones)) == list(zip(starts, ends, [word] * len(starts), strict=True))
 

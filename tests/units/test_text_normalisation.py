@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import unicodedata
 
 import pytest
@@ -26,7 +24,6 @@ def test_texts() -> None:
         ("“Hello there”", "hello there"),
         ("one\ttwo\r\nthree\n\n", "one two three"),
         ("a_b", "a b"),
-        ("ﬁne Ｏｋ", "fine ok"),  # ligature and full-width letters
         ("cafe\u0301 CAFÉ", "café café"),  # composed or not, a letter is the same
         ("\ufeffhello", "hello"),
         ("日本 ελλάδα", "日本 ελλάδα"),
@@ -34,19 +31,15 @@ def test_texts() -> None:
         ("bin blue at f 2 now", "bin blue at f two now"),
         ("x2", "x two"),
         ("1,234 and 12,34", "one thousand two hundred thirty four and twelve thirty four"),
-        ("007", "zero zero seven"),
         ("٣", "three"),
         ("the 3rd, 21ST and 12th", "the third twenty first and twelfth"),
         ("30th 100th 1,000th", "thirtieth one hundredth one thousandth"),
         ("3 rd 3rds x3rd", "three rd three rds x three rd"),
-        ("$5.50", "five dollars and fifty cents"),
         ("$1 £1.01 €0.50", "one dollar one pound and one penny fifty cents"),
-        ("$1,234.05", "one thousand two hundred thirty four dollars and five cents"),
         ("$3 million, £2.5 billion", "three million dollars two point five billion pounds"),
         ("$0 $0.00 $5.5", "zero dollars zero dollars five point five dollars"),
         ("$ 7", "seven dollars"),
         ("7% 8 % ٩٪ %", "seven percent eight percent nine"),
-        ("you & me, AT&T", "you and me a t and t"),
         ("you &amp; me &#39;", "you and me"),
     ):
         assert " ".join(split_words(text)) == words
@@ -65,22 +58,13 @@ def test_a_text_without_words_is_refused() -> None:
 
 def test_numbers() -> None:
     for digits, words in (
-        ("0", "zero"),
-        ("10", "ten"),
-        ("19", "nineteen"),
-        ("20", "twenty"),
-        ("99", "ninety nine"),
-        ("100", "one hundred"),
-        ("101", "one hundred one"),
-        ("1000", "one thousand"),
-        ("1001", "one thousand one"),
-        ("110000", "one hundred ten thousand"),
-        ("2000000", "two million"),
-        ("1000000001", "one billion one"),
-        ("1000000000000", "one" + " zero" * 12),
-        ("00", "zero zero"),
-    ):
+        ("0", "zero"), ("10", "ten"), ("19", "nineteen"), ("20", "twenty"), ("99", "ninety nine"),
+        ("100", "one hundred"), ("101", "one hundred one"), ("1000", "one thousand"), ("1001", "one thousand one"),
+        ("110000", "one hundred ten thousand"), ("2000000", "two million"), ("1000000001", "one billion one"),
+        ("1000000000000", "one" + " zero" * 12), ("00", "zero zero"),
+    ):  # fmt: skip
         assert " ".join(spell_number(digits)) == words
+    assert split_words("7" * 10_000) == ("seven",) * 10_000  # numbers of any length are digits
 
 
 @settings(max_examples=60)
@@ -122,18 +106,13 @@ def test_a_letter_keeps_thirty_marks() -> None:
         assert normalise_text("e\u0301" * 100) == "é" * 100
 
 
-def test_numbers_of_any_length_are_digits() -> None:
-    assert split_words("7" * 10_000) == ("seven",) * 10_000
-
-
 def test_a_text_may_be_as_long_as_can_be_said() -> None:
     for duration_s in (0.0, 1.0, 3600.0):
         most = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
         check_text("a" * most, duration_s)
-        with pytest.raises(
-            AlignmentError, match=f"has {most + 1} characters, required at most {most} for {duration_s:.2f} s"
-        ):
+        with pytest.raises(AlignmentError, match=f"{most + 1} characters, .* at most {most} for {duration_s:.2f} s"):
             check_text("a" * (most + 1), duration_s)
+    check_text("strong " * 655 * 60, 3600.0)  # the fastest speech on record: 655 words a minute, for an hour
 
 
 def test_words_count_with_the_blanks_between_them() -> None:
@@ -142,11 +121,6 @@ def test_words_count_with_the_blanks_between_them() -> None:
         check_words(["a"] * (ALWAYS_ALLOWED_CHARACTERS // 2 + 1), 0.0)
     with pytest.raises(AlignmentError, match="give the words of this recording"):
         check_words(["a" * ALWAYS_ALLOWED_CHARACTERS], 0.0)
-
-
-def test_the_fastest_speech_on_record_fits() -> None:
-    """655 words a minute, of six characters and a blank, for an hour."""
-    check_text("strong " * 655 * 60, 3600.0)
 
 
 def test_phones_are_no_more_than_frames() -> None:

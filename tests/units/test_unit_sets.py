@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -117,13 +115,10 @@ def test_classes_of_any_table(units: list[str], quiet: tuple[str, str]) -> None:
 
 @named
 def test_a_table_says_the_same_as_the_set(name: str, tmp_path: Path) -> None:
-    path = written(tmp_path, "# mine\n\n" + table(dict(load_unit_set(name).unit_of_phone)).replace("\n", " # why\n"))
-    found = load_unit_set(path)
-    assert (found.name, dict(found.unit_of_phone), found.units) == (
-        "mine",
-        dict(load_unit_set(name).unit_of_phone),
-        load_unit_set(name).units,
-    )
+    wanted = load_unit_set(name)
+    text = "# mine\n\n" + table(dict(wanted.unit_of_phone)).replace("\n", " # why\n")
+    found = load_unit_set(written(tmp_path, text))
+    assert (found.name, found.unit_of_phone, found.units) == ("mine", wanted.unit_of_phone, wanted.units)
     assert found.count == len(found.units)
 
 
@@ -150,15 +145,15 @@ def test_a_wrong_table_is_refused(case: str, tmp_path: Path) -> None:
 
 
 def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"'evis'; there are: 2vis, sVis, pbVis, eVis, phone"):
-        load_unit_set("evis")
-    with pytest.raises(InputError, match="there are: 2vis"):
-        load_unit_set("x" * 300)
-    with pytest.raises(InputError, match=r"not a file|directory|folder"):
-        load_unit_set(tmp_path)
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="UTF-8"):
-        load_unit_set(tmp_path / "binary")
+    for asked, message in (
+        ("evis", r"'evis'; there are: 2vis, sVis, pbVis, eVis, phone"),
+        ("x" * 300, "there are: 2vis"),
+        (tmp_path, r"not a file|directory|folder"),
+        (tmp_path / "binary", "UTF-8"),
+    ):
+        with pytest.raises(InputError, match=message):
+            load_unit_set(asked)
 
 
 def test_a_unit_is_a_word() -> None:
@@ -202,11 +197,11 @@ def test_what_is_spoken_has_the_unit_of_its_phone_or_else_its_own() -> None:
 
 
 def test_a_unit_alone_tells_its_phone_only_where_it_has_one() -> None:
-    units = UNIT_SETS["eVis"]
-    assert [units.label(unit) for unit in ("aw", "bilabial", "silence")] == [
-        Unit("aw", "aw"),
-        Unit("", "bilabial"),
-        Unit("sil", "silence"),
-    ]
-    assert UNIT_SETS["2vis"].label("closed") == Unit("", "closed")
-    assert UNIT_SETS["phone"].label("sp") == Unit("sp", "sp")
+    for name, unit, label in (
+        ("eVis", "aw", Unit("aw", "aw")),
+        ("eVis", "bilabial", Unit("", "bilabial")),
+        ("eVis", "silence", Unit("sil", "silence")),
+        ("2vis", "closed", Unit("", "closed")),
+        ("phone", "sp", Unit("sp", "sp")),
+    ):
+        assert UNIT_SETS[name].label(unit) == label

@@ -1,7 +1,7 @@
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,37 +12,28 @@ WriteVideo = Callable[..., Path]
 
 @pytest.fixture
 def write_video(tmp_path: Path) -> WriteVideo:
-    """Writes a video whose frame n is a flat grey of value 10 · n."""
+    """Writes a video whose frame n is a flat grey of value 10 · n, or a picture again and again."""
 
     def write(
         name: str = "clip.mp4",
         ticks: Sequence[int] = range(10),
-        rate: int = 25,
         size: tuple[int, int] = (64, 48),
-        rotation: int = 0,
         picture: NDArray[np.uint8] | None = None,
-        pixel_shape: tuple[int, int] = (1, 1),
-        codec: str = "libx264",
+        **how: Any,
     ) -> Path:
-        from fractions import Fraction
+        from vision.variants import write_frames
 
-        import av
-
-        path = tmp_path / name
-        with av.open(str(path), "w") as container:
-            stream = container.add_stream(codec, rate=rate, options={"qp": "0"})
-            stream.width, stream.height = size
-            stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
-            stream.codec_context.time_base = Fraction(1, rate)
-            stream.codec_context.sample_aspect_ratio = Fraction(*pixel_shape)
-            if rotation:
-                stream.set_display_rotation(rotation)
-            for n, tick in enumerate(ticks):
-                image = np.full((size[1], size[0], 3), 10 * n % 256, np.uint8) if picture is None else picture
-                frame = av.VideoFrame.from_ndarray(image, format="rgb24")
-                frame.pts, frame.time_base = tick, Fraction(1, rate)
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode())
-        return path
+        greys = (np.full((size[1], size[0], 3), 10 * n % 256, np.uint8) for n in range(len(ticks)))
+        pictures = [*greys] if picture is None else [picture] * len(ticks)
+        return write_frames(tmp_path / name, pictures, ticks=ticks, options={"qp": "0"}, **how)
 
     return write
+
+
+@pytest.fixture
+def scripted(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Lets the faces of the next video be those that are given."""
+    pytest.importorskip("cv2")
+    from vision.scripted import script
+
+    return partial(script, monkeypatch)

@@ -1,8 +1,8 @@
 """A face mesh that answers as a test tells it to."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +22,14 @@ def face(opening: float) -> NDArray[np.float64]:
     return points
 
 
-class ScriptedMesh:
+class Opened(AbstractContextManager[Any]):
+    """Stands for what is opened and closed."""
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+class ScriptedMesh(Opened):
     """Stands for the face mesh: one answer a frame, None for no face."""
 
     last: NDArray[np.float64] | None = None
@@ -30,26 +37,14 @@ class ScriptedMesh:
     def __init__(self, answers: Iterator[NDArray[np.float64] | None], most: int) -> None:
         self.answers, self.most = answers, most
 
-    def __enter__(self) -> ScriptedMesh:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
     def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
         if self.most == 1:
             ScriptedMesh.last = next(self.answers)
         return [] if self.last is None else [self.last]
 
 
-class NoFinder:
+class NoFinder(Opened):
     """Stands for the detector, which finds no more than the mesh."""
-
-    def __enter__(self) -> NoFinder:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
 
     def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
         return []

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,12 +24,8 @@ class Detector:
         if not rows.size or np.ptp(columns) + 1 < max(image.shape) / 50:
             return SimpleNamespace(detections=None)
         height, width = image.shape[:2]
-        box = SimpleNamespace(
-            xmin=columns.min() / width,
-            ymin=rows.min() / height,
-            width=(np.ptp(columns) + 1) / width,
-            height=(np.ptp(rows) + 1) / height,
-        )
+        sides = {"width": (np.ptp(columns) + 1) / width, "height": (np.ptp(rows) + 1) / height}
+        box = SimpleNamespace(xmin=columns.min() / width, ymin=rows.min() / height, **sides)
         data = SimpleNamespace(relative_bounding_box=box)
         return SimpleNamespace(detections=[SimpleNamespace(location_data=data, score=[0.8])])
 
@@ -63,11 +57,9 @@ def test_what_is_smaller_is_found_in_a_part_once(finder):
     assert [(box.x, box.y, box.side) for box in finder.boxes(image)] == [pytest.approx((410, 310, 20))]
     assert finder._running.shapes[1:] == [(720, 720)] * 3
     assert finder.boxes(image, thorough=False) == []
-
-
-def test_a_small_picture_has_no_parts(finder):
+    finder._running.shapes.clear()
     finder.boxes(np.zeros((288, 360, 3), np.uint8))
-    assert finder._running.shapes == [(288, 360)]
+    assert finder._running.shapes == [(288, 360)]  # a small picture has no parts
 
 
 def test_a_large_picture_is_reduced_and_the_box_is_not(finder):

@@ -1,7 +1,3 @@
-"""The follower on scripted faces: the picture tells them apart, no tracker is needed."""
-
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -11,6 +7,7 @@ from numpy.typing import NDArray
 from lipmotion_faces.tracking import face_follower as follow
 from lipmotion_faces.tracking.face_follower import JUMP, LOST_FRAMES, MOST_THUMBNAILS, FaceFollower
 from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, FaceBox, LandmarkTracker
+from vision.scripted import Opened
 
 pytestmark = pytest.mark.video
 
@@ -43,7 +40,7 @@ SMALL_FACE_PX = 40
 """A face with a smaller distance between the eyes is found by the detector alone."""
 
 
-class Mesh:
+class Mesh(Opened):
     """Finds the faces of the frame that is being shown, at most so many, in their order; not those in capitals."""
 
     shown: Sequence[Face] = ()
@@ -51,24 +48,12 @@ class Mesh:
     def __init__(self, most: int = 1) -> None:
         self.most = most
 
-    def __enter__(self) -> Mesh:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
     def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
         return [points(face) for face in Mesh.shown if face[0].islower() and face[3] >= SMALL_FACE_PX][: self.most]
 
 
-class Finder:
+class Finder(Opened):
     """Stands for the detector: finds all faces of the frame that is being shown, those in capitals too."""
-
-    def __enter__(self) -> Finder:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
 
     def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
         return [FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
@@ -95,7 +80,7 @@ class SmallMesh:
     def __init__(self, box: FaceBox, _: LandmarkTracker) -> None:
         self.x = box.x
 
-    def __enter__(self) -> SmallMesh:
+    def __enter__(self) -> "SmallMesh":
         SmallMesh.open += 1
         return self
 
@@ -145,6 +130,7 @@ def test_a_moving_face_is_one_scene(show: Show) -> None:
     assert followed == [150.0 + n for n in range(30)]
     assert follower.person().all()
     assert follower.cuts() == []
+    assert len(show([([ANNA], 0)] * 110)[0].thumbnails()) == MOST_THUMBNAILS  # later looks are kept when they are new
 
 
 def test_the_one_shown_longest_is_the_person(show: Show) -> None:
@@ -185,6 +171,8 @@ def test_a_small_face_that_is_lost_is_searched_where_it_was(show: Show) -> None:
     assert followed == [220.0] * 8 + [None] * 3 + [230.0] * 8
     assert np.flatnonzero(~follower.person()).tolist() == [8, 9, 10]
     assert SmallMesh.open == 0
+    assert show([([hidden], 0)] * 6)[1] == [None] * 6  # of which the mesh is unsure is nobody's
+    assert SmallMesh.open == 0
 
 
 def test_who_leaves_and_returns_elsewhere_is_known_again(show: Show) -> None:
@@ -192,12 +180,6 @@ def test_who_leaves_and_returns_elsewhere_is_known_again(show: Show) -> None:
     follower, followed = show([([SMALL_ANNA], 0)] * 12 + gone + [([moved(SMALL_ANNA, -120)], 0)] * 6)
     assert followed == [220.0] * 12 + [None] * len(gone) + [100.0] * 6
     assert np.flatnonzero(follower.person()).tolist() == [*range(12), *range(len(followed) - 6, len(followed))]
-
-
-def test_a_face_of_which_the_mesh_is_unsure_is_nobodys(show: Show) -> None:
-    _, followed = show([([("A", *SMALL_ANNA[1:])], 0)] * 6)
-    assert followed == [None] * 6
-    assert SmallMesh.open == 0
 
 
 def test_of_several_small_ones_the_largest_then_the_known_one(show: Show) -> None:
@@ -213,12 +195,6 @@ def test_only_the_person_who_is_wanted_counts(show: Show) -> None:
     assert follower.person().tolist() == [False] * 20 + [True] * 5
     assert follower.share_of_person() == pytest.approx(0.2)
     assert not show([([BELLA], 1)] * 20, wanted)[0].person().any()
-
-
-def test_later_looks_are_kept_when_they_are_new(show: Show) -> None:
-    """Frames 0 to 95 give the first twenty thumbnails; nothing changes until somebody else's look comes slowly."""
-    same, _ = show([([ANNA], 0)] * 110)
-    assert len(same.thumbnails()) == MOST_THUMBNAILS
 
 
 def test_of_several_the_largest_then_the_middle_one(show: Show) -> None:

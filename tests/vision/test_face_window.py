@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import cast
 
@@ -33,6 +31,8 @@ def test_positions_in_the_window_are_those_in_the_picture():
         shown = window.cut(dot(720, 1280, 480, 310))
         assert shown.shape == (SIZE_PX, SIZE_PX, 3)
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [484, 314, 0], atol=0.6)
+    scaled = FaceWindow(10, 20, 2 * SIZE_PX).to_picture(np.array([[3.0, 4.0, 5.0]]))  # depth is scaled, too
+    np.testing.assert_allclose(scaled, [[16.0, 28.0, 10.0]])
 
 
 def test_beyond_the_edges_it_is_black():
@@ -42,11 +42,6 @@ def test_beyond_the_edges_it_is_black():
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [x, y, 0], atol=3)
         assert (shown == 0).mean() > 0.9
     assert not FaceWindow(2000, 0, 100).cut(np.full((72, 128, 3), 255, np.uint8)).any()
-
-
-def test_depth_is_scaled_too():
-    window = FaceWindow(10, 20, 2 * SIZE_PX)
-    np.testing.assert_allclose(window.to_picture(np.array([[3.0, 4.0, 5.0]])), [[16.0, 28.0, 10.0]])
 
 
 class BrightMesh:

@@ -1,7 +1,4 @@
-from __future__ import annotations
-
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +9,7 @@ from lipmotion.errors import InputError
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import CHANNELS, measure_motion, track
 from lipmotion_faces.tracking.trackers import JAW_POINTS, LIP_POINTS
-from vision.scripted import COLUMN, face, script
-
-
-@pytest.fixture
-def scripted(monkeypatch):
-    pytest.importorskip("cv2")
-
-    return partial(script, monkeypatch)
-
+from vision.scripted import COLUMN, face
 
 OPENINGS = 0.1 + 0.05 * np.sin(np.arange(20) / 3)
 
@@ -36,10 +25,8 @@ def test_channels_are_named_and_ordered():
 def test_distances_are_measured_in_the_image_plane():
     points = np.stack([face(0.2)])
     points[0, COLUMN[14], 2] += 100  # depth has no part in them
-    values = measure_motion(points)[0]
-    assert values[0] == pytest.approx(0.2)
-    expected = np.linalg.norm(points[0, COLUMN[61], :2] - points[0, COLUMN[291], :2]) / 60
-    assert values[1] == pytest.approx(expected)
+    width = np.linalg.norm(points[0, COLUMN[61], :2] - points[0, COLUMN[291], :2]) / 60
+    assert measure_motion(points)[0, :2] == pytest.approx([0.2, width])
 
 
 def test_every_frame_is_measured(write_video, scripted):
@@ -67,20 +54,15 @@ def test_a_part_of_a_video_begins_at_zero(write_video, scripted):
     result = track(write_video(ticks=range(20)), crops=False, span=VideoSpan(0.2, 0.6))
     np.testing.assert_allclose(result.motion["opening"], OPENINGS[5:15], atol=1e-9)
     assert result.seen.all()
-
-
-def test_a_part_without_pictures_is_refused(write_video, scripted):
     scripted([])
     with pytest.raises(InputError, match=r"no picture from 5\.00 to 6\.00 s"):
         track(write_video(ticks=range(20)), span=VideoSpan(5.0, 6.0))
 
 
 def test_a_small_face_is_noted(write_video, scripted):
-    small = [0.4 * face(opening) for opening in OPENINGS]
-    scripted(small)
-    assert track(write_video(ticks=range(20)), crops=False).notes == (
-        "the face is small: 24 px between the eyes, 35 give a good track; film closer",
-    )
+    scripted([0.4 * face(opening) for opening in OPENINGS])
+    notes = track(write_video(ticks=range(20)), crops=False).notes
+    assert notes == ("the face is small: 24 px between the eyes, 35 give a good track; film closer",)
 
 
 def test_dropped_frames_are_put_in_their_place(write_video, scripted):

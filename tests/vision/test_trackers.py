@@ -1,7 +1,3 @@
-"""Trackers by name: one of an installed package finds the face of a video; MediaPipe is not needed for it."""
-
-from __future__ import annotations
-
 import os
 import sys
 from importlib import metadata
@@ -18,27 +14,21 @@ from lipmotion_faces.tracking.mediapipe import FaceFinder, FaceMesh, MediaPipe, 
 from lipmotion_faces.tracking.packages import import_face_mesh, import_opencv
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, TRACKERS, LandmarkTracker, make_tracker
-from vision.scripted import NoFinder
+from vision.scripted import NoFinder, Opened
 
 
-class Brightest(LandmarkTracker):
+class Brightest(LandmarkTracker, Opened):
     """Finds a face around the brightest place of a picture."""
 
     def versions(self) -> dict[str, str]:
         return {"brightest": "2"}
 
-    def points(self, most: int = 1) -> Brightest:
+    def points(self, most: int = 1) -> "Brightest":
         assert most in (1, 4)
         return self
 
     def boxes(self) -> NoFinder:
         return NoFinder()
-
-    def __enter__(self) -> Brightest:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
 
     def faces(self, image: np.ndarray) -> list[np.ndarray]:
         y, x = (int(place) for place in np.unravel_index(int(image[..., 0].argmax()), image.shape[:2]))

@@ -1,7 +1,3 @@
-"""What happens to a track when the video is not as one would wish: against the track of the untouched clip."""
-
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

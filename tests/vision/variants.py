@@ -1,7 +1,5 @@
 """A real clip made into what people record: with other frame times, cuts, neighbours and damage."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -24,19 +22,26 @@ def write_frames(
     frames: Sequence[Image],
     *,
     ticks: Sequence[int] | None = None,
+    rate: int = 25,
     codec: str = "libx264",
     options: dict[str, str] | None = None,
+    rotation: int = 0,
+    pixel_shape: tuple[int, int] = (1, 1),
 ) -> Path:
-    """Write pictures, 25 a second; ``ticks`` are their times in 1/25 s, by default one after the other."""
+    """Write pictures; ``ticks`` are their times in 1/``rate`` s, by default one after the other."""
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=25, options={"crf": "8"} if options is None else options)
+        stream = container.add_stream(codec, rate=rate, options={"crf": "8"} if options is None else options)
         stream.height, stream.width = frames[0].shape[:2]
-        stream.pix_fmt, stream.codec_context.time_base = "yuv420p", Fraction(1, 25)
-        if codec != "libx264":
+        stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+        stream.codec_context.time_base = Fraction(1, rate)
+        stream.codec_context.sample_aspect_ratio = Fraction(*pixel_shape)
+        if codec == "mpeg2video":
             stream.bit_rate = 6_000_000
+        if rotation:
+            stream.set_display_rotation(rotation)
         for n, image in enumerate(frames):
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-            frame.pts, frame.time_base = n if ticks is None else ticks[n], Fraction(1, 25)
+            frame.pts, frame.time_base = n if ticks is None else ticks[n], Fraction(1, rate)
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return path

@@ -1,14 +1,185 @@
-"""The engine of coupled chains: how far it leans on the table of articulation."""
-
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
+import pytest
 
+from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from lipmotion.engines import engine_named
-from lipmotion.testing.examples import examples, speech, timeline
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
+from lipmotion.engines.coupled.explanation import (
+    chain_states,
+    explain_frames,
+    joint_state,
+    lead_posteriors,
+    leads,
+    unit_posteriors,
+)
+from lipmotion.motion import generation
+from lipmotion.testing.examples import CHANNELS, examples, speech, timeline
+from lipmotion.types import Explanation, NamedProbability
 from lipmotion.types.progress import silent_monitor
+from oracles import coupled as oracle
 
+KINDS = [
+    (COUPLED, (THREE, TWO), 1),
+    (COUPLED, (THREE, TWO), 0),
+    (FACTORIAL, (THREE, TWO), 1),
+    (MULTISTREAM, (THREE,), 1),
+    (HMM, (THREE,), 1),
+]
+every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
+
+
+def small(kind, sets, limit):
+    found, data = chains(structure(kind, sets, limit=limit)), observations()
+    return found, found.infer(data, found.full_lattice).posteriors, oracle.posteriors(found, data)[0]
+
+
+@every
+def test_the_asynchrony_is_that_of_all_paths(kind, sets, limit):
+    found, posteriors, joint = small(kind, sets, limit)
+    product = found.transitions.product
+    for chain, lead in enumerate(lead_posteriors(found, posteriors)):
+        ahead = leads(found, chain)
+        assert ahead == (tuple(range(-limit, limit + 1)) if chain else ())
+        for column, states in enumerate(ahead):
+            expected = joint[:, product.lead[chain] == states].sum(axis=1)
+            np.testing.assert_allclose(lead[:, column], expected, atol=2e-5)
+    for row in range(len(joint)):
+        for chain, states in enumerate(chain_states(found, posteriors, row)):
+            if chain:
+                assert states.expected_lead == pytest.approx(joint[row] @ product.lead[chain], abs=5e-5)
+
+
+@every
+def test_states_are_named_with_their_probabilities(kind, sets, limit):
+    found, posteriors, joint = small(kind, sets, limit)
+    product, of = found.transitions.product, found.structure
+    for row in range(len(joint)):
+        best = joint_state(found, posteriors, row)
+        assert best.name == product.name(int(joint[row].argmax()))
+        assert best.probability == pytest.approx(joint[row].max(), abs=2e-5)
+        for chain, explained in enumerate(chain_states(found, posteriors, row)):
+            names = [of.state_name(chain, state) for state in range(of.state_counts[chain])]
+            assert len(explained.states) <= 3
+            for one in explained.states:
+                state = names.index(one.name)
+                expected = joint[row, product.chain_states[chain] == state].sum()
+                assert one.probability == pytest.approx(expected, abs=2e-5)
+            shown = [one.probability for one in explained.states]
+            assert shown == sorted(shown, reverse=True)
+            assert shown[0] == pytest.approx(posteriors.chains[chain][row].max())
+
+
+def test_posteriors_of_units_are_sums_over_their_states():
+    found, posteriors, _ = small(*KINDS[0])
+    first, second = unit_posteriors(found, posteriors, slice(1, 4))
+    for number, one in enumerate((first, second)):
+        for unit, _ in enumerate(one.units):
+            own = posteriors.chains[number][1:4, 2 * unit : 2 * unit + 2].sum(axis=1)
+            np.testing.assert_allclose(one.probability[:, unit], own, rtol=1e-6)
+    np.testing.assert_array_equal(second.lead, lead_posteriors(found, posteriors)[1][1:4])
+
+
+def coupled_options(name):
+    kept = ("structure", "chains", "asynchrony")
+    return {key: value for key, value in SYSTEMS[name].items() if key in kept} | {"mixtures": 2}
+
+
+@cache
+def fitted(name):
+    engine = engine_named("coupled", coupled_options(name))
+    model = engine.fit(examples(4), silent_monitor).model
+    spoken = speech(timeline(SENTENCE))
+    inference = engine.inferred(model, spoken.features.values, engine.lattice(model, spoken, slice(None)))
+    return model, inference
+
+
+def explanation(name, row):
+    model, inference = fitted(name)
+    return explain_frames([Explanation(row / 100, row, None, "", {})], model, inference, [row])[0]
+
+
+@pytest.mark.parametrize("name", ["ph-vi-CHMM", pytest.param("ph-vi-FHMM", marks=pytest.mark.long)])
+@pytest.mark.parametrize("row", [0, 64, 91])
+def test_the_gaussian_is_the_most_responsible_one(name, row):
+    model, inference = fitted(name)
+    found = explanation(name, row)
+    for number, group in enumerate(model.chains.groups):
+        responsibilities = inference.emissions.responsibilities[number]
+        posterior = inference.posteriors.densities[number][row]
+        weight = posterior[None] if responsibilities is None else responsibilities[row] * posterior
+        for stream in group.streams:
+            explained = found.gaussians[stream]
+            assert explained.stream == model.chains.streams[stream]
+            assert explained.responsibility == pytest.approx(weight.max())
+            assert (explained.components, explained.density != "") == (len(weight), True)
+            component, position = np.argwhere(weight == weight.max())[0]
+            assert explained.component == component + 1
+            density = inference.lattice.densities[number][position]
+            columns = group.columns[group.streams.index(stream)]
+            mean, variance = (
+                x[density, component, columns].astype(float) for x in (group.mixtures.means, group.mixtures.variances)
+            )
+            if stream == 0:
+                error = (inference.observations.streams[0][row] - mean) ** 2 / variance
+                assert explained.distance == pytest.approx(np.sqrt(error.mean()))
+                assert explained.channels == {}
+                continue
+            visual = model.visual[stream - 1]
+            assert explained.distance is None
+            assert set(explained.channels) == {channel.name for channel in CHANNELS}
+            for column, direct in enumerate(model.space.direct_names):
+                value = explained.channels[direct]
+                assert value.value == pytest.approx(mean[column] * visual.deviation[column] + visual.mean[column])
+                assert value.deviation == pytest.approx(np.sqrt(variance[column]) * visual.deviation[column])
+
+
+def test_shares_of_regressions_are_posteriors_of_the_visual_chain():
+    model, inference = fitted("ph-vi-CHMM")
+    posterior = inference.posteriors.chains[1]
+    mean = model.regression[1][0].means(model.regression_inputs(inference), posterior)
+    for row in (64, 75, 91):
+        (found,) = explanation("ph-vi-CHMM", row).regressions
+        names = [model.chains.structure.state_name(1, state) for state in range(posterior.shape[1])]
+        for share in found.shares:
+            assert share.probability == pytest.approx(posterior[row, names.index(share.name)], abs=0.02)
+        opening = mean[row, 0] * model.visual[0].deviation[0] + model.visual[0].mean[0]
+        assert found.channels["opening"].value == pytest.approx(opening)
+
+
+def test_in_silence_away_from_speech_the_mean_is_the_rest_pose():
+    model, inference = fitted("ph-vi-CHMM")
+    assert model.is_away_from_speech(inference.posteriors.chains[0])[5]
+    (found,) = explanation("ph-vi-CHMM", 5).regressions
+    assert found.shares == (NamedProbability("rest", 1.0),)
+    assert found.channels["opening"].value == pytest.approx(model.rest_pose[0])
+
+
+def test_recordings_of_several_blocks_are_explained_as_one(monkeypatch):
+    monkeypatch.setattr(generation, "BLOCK_FRAMES", 60)
+    monkeypatch.setattr(generation, "MARGIN_FRAMES", 50)
+    engine, (model, _) = engine_named("coupled", coupled_options("ph-vi-CHMM")), fitted("ph-vi-CHMM")
+    spoken = speech(timeline(SENTENCE))
+    posteriors = engine.posteriors(model, spoken)
+    result = engine.generate(model, spoken)
+    frames = [3, 59, 60, 61, 119, 120, 150]
+    for row, found in zip(frames, engine.explain(model, spoken, frames), strict=True):
+        assert found.state == result.trace.states[result.trace.frames[row]] == found.joint.name
+        assert list(found.chains[1].lead.values()) == pytest.approx(posteriors[1].lead[row].tolist())
+        for chain, own in enumerate(found.chains):
+            unit = posteriors[chain].units.index(own.states[0].name.rpartition(".")[0])
+            assert posteriors[chain].probability[row, unit] >= own.states[0].probability - 1e-6
+
+
+def test_without_a_path_an_explanation_has_no_chains():
+    model, inference = fitted("ph-vi-CHMM")
+    impossible = type(inference.posteriors)(*[*vars(inference.posteriors).values()][:4], -np.inf)
+    nothing = Explanation(0.0, 0, None, "", {})
+    lost = type(inference)(inference.observations, inference.lattice, inference.emissions, impossible)
+    assert explain_frames([nothing], model, lost, [0]) == [nothing]
 
 
 def test_it_leans_on_recognised_phones_as_far_as_the_voice_is_unknown_or_words_confirm_them():

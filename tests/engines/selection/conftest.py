@@ -1,7 +1,5 @@
 """A small model of recorded units, trained once."""
 
-from __future__ import annotations
-
 import pytest
 
 from lipmotion.engines.selection.config import SelectionConfig

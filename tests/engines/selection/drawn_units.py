@@ -1,7 +1,5 @@
 """Recordings whose phones and motion are given."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

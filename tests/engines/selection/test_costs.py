@@ -1,7 +1,5 @@
 """The costs and overlaps of Minnis & Breen 2000, each on units that differ in one thing only."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -25,14 +23,11 @@ TABLE_1 = {
 """Table 1 by the phones before (rows: forward) and after (columns: backward) the shared one."""
 
 
-def test_another_phone_costs_less_the_further_away() -> None:
+def test_another_phone_costs_less_the_further_away_and_half_in_one_viseme() -> None:
     units = inventory("s iy aa m uw", "s aa aa m uw", "s iy aa f uw", "f iy aa m uw", "uw m aa iy s")
     costs = costs_of(units, context=0.3, farther=0.2)
     found = costs.target_costs(target_of(costs, "s iy aa m uw"), 2, np.arange(2, 25, 5))
     assert found / found[1] == pytest.approx([0, 1, 1, 0.2, 2.4])
-
-
-def test_another_phone_costs_half_in_one_viseme() -> None:
     costs = costs_of(inventory("s iy aa p uw", "s iy aa f uw", "m"), context=0.3)
     assert costs.target_costs(target_of(costs, "s iy aa m uw"), 2, array(2, 7)) == pytest.approx([0.15, 0.3])
 
@@ -48,15 +43,11 @@ def test_each_edge_of_a_word_that_differs_costs_once() -> None:
     assert costs.target_costs(wordless, 1, every) == pytest.approx(0)
 
 
-def test_stress_that_is_known_and_differs_costs() -> None:
-    units = with_stress(inventory("aa", "aa", "aa"), 1, 0, -1)
-    costs = costs_of(units, stress=0.06)
+def test_stress_that_is_known_and_differs_costs_and_the_ratio_of_durations_by_its_logarithm() -> None:
+    units = inventory("aa", "aa", "aa")
+    costs = costs_of(with_stress(units, 1, 0, -1), stress=0.06)
     for stress, wanted in ((1, [0, 0.06, 0]), (0, [0.06, 0, 0]), (-1, [0, 0, 0])):
         assert costs.target_costs(target_of(costs, "aa", [stress]), 0, array(0, 1, 2)) == pytest.approx(wanted)
-
-
-def test_the_ratio_of_durations_costs_by_its_logarithm() -> None:
-    units = inventory("aa", "aa", "aa")
     times_s = np.array([[0, PHONE_S], [0, 2 * PHONE_S], [0, PHONE_S / 4]])
     costs = costs_of(replace(units, windows=replace(units.windows, times_s=times_s)), duration=0.3)
     found = costs.target_costs(target_of(costs, "aa"), 0, array(0, 1, 2))
@@ -76,14 +67,9 @@ def test_motion_unlike_the_guide_costs_unless_the_sounds_are_alike() -> None:
 def test_abutting_costs_more_beside_a_protected_phone_and_inside_a_cluster_of_one_word() -> None:
     units = inventory("uw", "uw", "s l p aa")
     for text, wanted in (
-        ("s l", 0.15 + 0.1),
-        ("s | l", 0.15),
-        ("s aa", 0.15),
-        ("aa s", 0.15),
-        ("s p", 0.15 + 0.1 + 1),
-        ("p aa", 0.15 + 1),
-        ("aa p", 0.15 + 1),
-    ):
+        ("s l", 0.15 + 0.1), ("s | l", 0.15), ("s aa", 0.15), ("aa s", 0.15), ("s p", 0.15 + 0.1 + 1),
+        ("p aa", 0.15 + 1), ("aa p", 0.15 + 1),
+    ):  # fmt: skip
         costs = costs_of(units, hard=0.15, cluster=0.1, protected=1.0)
         assert costs.join_costs(target_of(costs, text), 1, array(0), array(1))[0, 0] == pytest.approx(wanted), text
     limited = costs_of(units, hard=9.0, most=2.0)

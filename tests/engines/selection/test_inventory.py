@@ -1,7 +1,3 @@
-"""Windows of phones, and the index that finds them."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -44,35 +40,21 @@ def test_a_window_has_the_phones_around_and_silence_beyond_a_recording() -> None
     assert windows.continues.tolist() == [True, True, False, False]
 
 
-def test_suppressed_phones_are_one_symbol_and_a_pause_is_silence() -> None:
-    assert phone_windows([spoken("t d k sp")]).symbols({"t", "d"}).tolist() == [
-        INVISIBLE_SYMBOL,
-        INVISIBLE_SYMBOL,
-        PHONE_NUMBER["k"],
-        SILENT,
-    ]
-
-
-def test_words_begin_and_end_where_the_word_changes() -> None:
+def test_words_begin_and_end_where_the_word_changes_and_suppressed_phones_are_one_symbol() -> None:
     one, two = spoken("b iy", "be"), spoken("g aa", "go")
     both = Timeline((*one.spans, *two.shifted(0.2).spans))
     assert phone_windows([both]).words.tolist() == [[True, False], [False, True], [True, False], [False, True]]
+    symbols = phone_windows([spoken("t d k sp")]).symbols({"t", "d"})
+    assert symbols.tolist() == [INVISIBLE_SYMBOL, INVISIBLE_SYMBOL, PHONE_NUMBER["k"], SILENT]
+    with pytest.raises(InputError, match="unknown phone 'xx' at 0"):
+        phone_windows([spoken("xx")])
 
 
 def test_gaps_are_silence() -> None:
     filled = covering(Timeline((Span(0.2, 0.3, Unit("b")), Span(0.5, 0.6, Unit("aa")))), 1.0)
-    assert [(span.start_s, span.end_s, span.label.phone) for span in filled] == [
-        (0.0, 0.2, "sil"),
-        (0.2, 0.3, "b"),
-        (0.3, 0.5, "sil"),
-        (0.5, 0.6, "aa"),
-        (0.6, 1.0, "sil"),
-    ]
-
-
-def test_an_unknown_phone_is_refused() -> None:
-    with pytest.raises(InputError, match="unknown phone 'xx' at 0"):
-        phone_windows([spoken("xx")])
+    edges_s, phones = [0.0, 0.2, 0.3, 0.5, 0.6, 1.0], "sil b sil aa sil".split()
+    found = [(span.start_s, span.end_s, span.label.phone) for span in filled]
+    assert found == list(zip(edges_s, edges_s[1:], phones, strict=False))
 
 
 @settings(max_examples=20)

@@ -4,8 +4,6 @@ Each case is an inventory with a wrong recording first and the right one behind 
 one is chosen; without the one cost that sees the difference, and with all others, the wrong one.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

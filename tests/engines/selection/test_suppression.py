@@ -1,7 +1,5 @@
 """Suppressed phones: "the following vowel gives the shape of the mouth" (Minnis & Breen 2000, §3)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Units other than phones: what trees ask, what is saved, and that lips meet all the same."""
-
 from functools import cache
 from pathlib import Path
 
@@ -90,16 +88,13 @@ def test_lips_meet_on_p_b_m_whatever_their_unit(name):
 
 
 def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
+    """Lips that meet between others do not rest, though their parts may have the number of silence's middle one."""
     layout = StateLayout(3, 7, 0.1, load_unit_set("2vis"))
     states = label_full_context(timeline(("p", "aa")), 141, layout)
     assert {state.unit for state in states} == {"open", "closed"}
     assert {layout.name(state) for state in states if state != layout.rest} == {"speech.0", "speech.1", "speech.2"}
     assert states[0] == states[-1] == layout.rest
     assert layout.rest not in states[60:80]
-
-
-def test_lips_that_meet_between_others_do_not_rest():
-    """All three are units of silence, too, and the part may have the number of silence's middle one."""
     layout = StateLayout(5, 5, 0.1, load_unit_set("2vis"))
     assert layout.rest not in label_full_context(timeline(("p", "b", "m")), 150, layout)[60:90]
 
@@ -120,6 +115,10 @@ def test_a_model_needs_its_table_no_more(tmp_path):
     assert np.isfinite(engine.generate(model, SPOKEN).motion.values).all()
     with pytest.raises(InputError, match="no unit set"):
         engine.fit(examples(1), silent_monitor)
+    with pytest.raises(InputError, match="units"):
+        engine_named("trajectory", {"units": ["eVis"]})
+    with pytest.raises(InputError, match="there are: 2vis"):
+        engine_named("trajectory", {"units": "evis"}).fit(examples(1), silent_monitor)
 
 
 def changed(pairs: np.ndarray, row: int, column: int, text: str) -> np.ndarray:
@@ -147,10 +146,3 @@ def test_a_damaged_table_is_refused(tmp_path):
     for damage in DAMAGES.values():
         with pytest.raises(ModelFormatError):
             engine.from_arrays(arrays | {"units": damage(arrays["units"])})
-
-
-def test_no_such_unit_set():
-    with pytest.raises(InputError, match="units"):
-        engine_named("trajectory", {"units": ["eVis"]})
-    with pytest.raises(InputError, match="there are: 2vis"):
-        engine_named("trajectory", {"units": "evis"}).fit(examples(1), silent_monitor)

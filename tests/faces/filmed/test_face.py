@@ -1,7 +1,3 @@
-"""Filmed faces as files: there and back, and nothing but a whole face is read."""
-
-from __future__ import annotations
-
 import io
 import json
 import re
@@ -36,10 +32,8 @@ CODED = ("appearance/mouths", "appearance/jaws", "background/data")
 @pytest.fixture(scope="module")
 def small(filmed_face: FilmedFace) -> FilmedFace:
     """A face with few candidates, which is written and read in no time."""
-    whole, few = filmed_face.appearance, slice(8)
-    candidates = {
-        name: getattr(whole, name)[few] for name in ("mouths", "mouth_codes", "mouth_distances", "jaws", "jaw_codes")
-    }
+    whole, names = filmed_face.appearance, ("mouths", "mouth_codes", "mouth_distances", "jaws", "jaw_codes")
+    candidates = {name: getattr(whole, name)[:8] for name in names}
     return replace(filmed_face, appearance=replace(whole, **candidates))
 
 
@@ -103,13 +97,16 @@ def test_the_same_face_is_the_same_file(small: FilmedFace, arrays: dict[str, np.
     assert load_face(tmp_path / "mute.face").takes == ()
 
 
-def test_the_summary_says_what_it_is(filmed_face: FilmedFace) -> None:
+def test_the_summary_says_what_it_is(filmed_face: FilmedFace, filmed_face_file: Path) -> None:
     summary = filmed_face.summary
     assert summary["name"] == "toy"
     assert summary["background"] == "2.0 s of 224 × 288 px at 25 frames a second"
     assert summary["needs"] == "3 channels of tracked points, or eigenlips"
     assert summary["jaw"].endswith("of the variance; 120 candidates")
     assert summary["licence"] == "synthesised by lipmotion"
+    header = read_face_header(filmed_face_file)  # without the pictures
+    assert header["takes"] == 2
+    assert [channel["name"] for channel in header["channels"]] == ["opening", "width", "outer"]
 
 
 def test_nothing_is_left_where_it_cannot_be_written(small: FilmedFace, tmp_path: Path) -> None:
@@ -125,28 +122,21 @@ def test_nothing_is_left_where_it_cannot_be_written(small: FilmedFace, tmp_path:
 
 @pytest.mark.long
 def test_every_array_is_needed(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
+    def without(name: str) -> str:
+        return refusal(tmp_path / "a.face", header, {key: arrays[key] for key in arrays if key != name})
+
     assert refusal(tmp_path / "a.face", header, arrays) == ""
-    read = [
-        name
-        for name in arrays
-        if "missing" not in refusal(tmp_path / "a.face", header, {key: arrays[key] for key in arrays if key != name})
-    ]
+    read = [name for name in arrays if "missing" not in without(name)]
     assert read == ["appearance/mouth_distances", "background/cuts"]  # which older faces have not
 
 
-def test_every_array_is_declared(arrays: dict[str, np.ndarray]) -> None:
-    named = {f"appearance/{name}" for name in APPEARANCE} | {
-        f"background/{name}" for name in (*BACKGROUND, *STORED_VIDEO)
-    }
+def test_every_array_is_declared(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
+    named = {f"appearance/{name}" for name in APPEARANCE}
+    named |= {f"background/{name}" for name in (*BACKGROUND, *STORED_VIDEO)}
     named |= {f"take{number}/{name}" for number in range(2) for name in TAKE}
     parts = tuple(f"appearance/{part}/" for part in PARTS)
     assert {name for name in arrays if not name.startswith(parts)} == named
     assert all(any(name.startswith(part) for name in arrays) for part in parts)
-
-
-def test_an_array_that_nothing_declares(
-    arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path
-) -> None:
     for more in "appearance/more appearance/noise/more background/more take0/more take2/sound jaw/mean".split():
         message = refusal(tmp_path / "a.face", header, arrays | {more: np.zeros(3)})
         assert "undeclared '" in message
@@ -173,13 +163,8 @@ def test_damaged_pictures_are_refused_or_shown(
     """A stream whose frames are not all there is refused before anything is shown of it."""
     for name in CODED:
         data = arrays[name]
-        for changed in (
-            data[: len(data) // 2],
-            data[:0],
-            np.random.default_rng(0).integers(0, 256, len(data), np.uint8),
-            np.concatenate([data, data]),
-            data.astype(np.float32),
-        ):
+        noise = np.random.default_rng(0).integers(0, 256, len(data), np.uint8)
+        for changed in (data[: len(data) // 2], data[:0], noise, np.concatenate([data, data]), data.astype(np.float32)):
             assert "damaged" in refusal(tmp_path / "a.face", header, arrays | {name: changed})
         refusal(tmp_path / "a.face", header, arrays | {name: data[1:]})  # the start code may lack its zero
 
@@ -217,11 +202,13 @@ def test_faces_of_before(arrays: dict[str, np.ndarray], header: dict[str, object
     assert len(face.appearance.predict_codes(load_face(path).takes[0].motion)) > 0
 
 
-def test_arrays_that_do_not_fit_together(
+def test_arrays_and_headers_that_do_not_fit_together(
     arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path
 ) -> None:
     for what, (changed, words) in CHANGES.items():
         assert re.search(words, refusal(tmp_path / "a.face", header, {**arrays, **changed})), what
+    for of_header, words in HEADERS:
+        assert words in refusal(tmp_path / "a.face", header | of_header, arrays)
 
 
 HEADERS: list[tuple[dict[str, object], str]] = [
@@ -241,11 +228,6 @@ HEADERS: list[tuple[dict[str, object], str]] = [
 ]
 
 
-def test_other_headers(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
-    for changed, words in HEADERS:
-        assert words in refusal(tmp_path / "a.face", header | changed, arrays)
-
-
 def files(face: Path) -> Iterator[tuple[str, bytes]]:
     """Files that are no faces."""
     content = face.read_bytes()
@@ -255,18 +237,14 @@ def files(face: Path) -> Iterator[tuple[str, bytes]]:
     yield "without its beginning", content[100:]
     for place in (len(content) // 3, len(content) // 2):
         yield f"changed at {place}", content[:place] + bytes([content[place] ^ 0x55]) + content[place + 1 :]
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w") as file:
-        file.writestr("header.json", json.dumps({"format": "lipmotion.face", "version": VERSION}))
-    yield "a header alone", made.getvalue()
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w") as file:
-        file.writestr("header.json", "[1, 2]")
-    yield "a list", made.getvalue()
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w") as file:
-        file.writestr("other.txt", "face")
-    yield "another zip", made.getvalue()
+    header = json.dumps({"format": "lipmotion.face", "version": VERSION})
+    for what, name, text in (
+        ("a header alone", "header.json", header), ("a list", "header.json", "[1, 2]"), ("a zip", "other.txt", "face")
+    ):  # fmt: skip
+        made = io.BytesIO()
+        with zipfile.ZipFile(made, "w") as file:
+            file.writestr(name, text)
+        yield what, made.getvalue()
 
 
 def test_what_is_no_face(filmed_face_file: Path, tmp_path: Path, toy_model_file: Path) -> None:
@@ -286,9 +264,3 @@ def test_what_is_no_face(filmed_face_file: Path, tmp_path: Path, toy_model_file:
         load_face(path)
     with pytest.raises(InputError, match="is a folder"):
         load_face(tmp_path)
-
-
-def test_a_header_is_read_without_the_pictures(filmed_face_file: Path) -> None:
-    header = read_face_header(filmed_face_file)
-    assert header["takes"] == 2
-    assert [channel["name"] for channel in header["channels"]] == ["opening", "width", "outer"]

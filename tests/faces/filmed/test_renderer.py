@@ -1,7 +1,3 @@
-"""Stitching: the footage comes back where nothing is to change, and what is to change is what was drawn."""
-
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -195,6 +191,9 @@ def test_too_few_frames_of_background(appearance: Appearance, backgrounds: list[
     frames = Stitcher(appearance).stitch(appearance.predict_codes(spoken), backgrounds[:-1])
     with pytest.raises(InputError, match=f"{FRAMES - 1} frames of background, required {FRAMES}; give longer footage"):
         list(frames)
+    nothing = FaceCodes(np.zeros((0, 90), np.float32), np.zeros((0, 36), np.float32), np.zeros(0, np.float32))
+    assert list(Stitcher(appearance).stitch(nothing, [])) == []
+    assert list(Stitcher(appearance).mouths(nothing)) == []
 
 
 def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
@@ -208,9 +207,3 @@ def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
     assert np.abs(made - appearance.mouths[chosen]).max() <= 1
     blurred = np.stack(list(Stitcher(appearance, StitchingOptions(mouth=None, noise=False)).mouths(codes)))
     assert np.array_equal(blurred, appearance.mouth.restore(codes.mouth))
-
-
-def test_no_frames(appearance: Appearance) -> None:
-    codes = FaceCodes(np.zeros((0, 90), np.float32), np.zeros((0, 36), np.float32), np.zeros(0, np.float32))
-    assert list(Stitcher(appearance).stitch(codes, [])) == []
-    assert list(Stitcher(appearance).mouths(codes)) == []

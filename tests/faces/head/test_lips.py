@@ -43,16 +43,10 @@ def contact(pose: CharacterPose) -> np.ndarray:
 
 
 def test_closed_lips_meet_at_every_column():
-    for pose in (
-        CharacterPose(),
-        CharacterPose(press=1),
-        CharacterPose(roundness=1, protrusion=0.08, width=0.7),
-        CharacterPose(width=1.2),
-        CharacterPose(width=1.1, spread=1),
-        CharacterPose(width=0.9, oval=1),
-        CharacterPose(roundness=0.6, press=0.7, protrusion=0.05),
-    ):
-        places = contact(pose)
+    rounded = {"roundness": 1, "protrusion": 0.08, "width": 0.7}, {"roundness": 0.6, "press": 0.7, "protrusion": 0.05}
+    wide = {"width": 1.2}, {"width": 1.1, "spread": 1}, {"width": 0.9, "oval": 1}
+    for gestures in ({}, {"press": 1}, *rounded, *wide):
+        places = contact(CharacterPose(**gestures))
         for upper, lower in PAIRS:
             assert places[upper] == pytest.approx(places[lower], abs=1e-12)
 
@@ -128,11 +122,9 @@ def test_the_lower_lip_of_f_lies_on_the_upper_teeth():
 
 
 def test_pressed_lips_are_thinner():
-    def height(pose: CharacterPose) -> float:
-        contour = section_points(pose, figure().skin.base_z)[0]
-        return float(contour[20, 1] - contour[60, 1])
-
-    assert height(CharacterPose(press=1)) == pytest.approx(0.65 * height(CharacterPose()), rel=0.05)
+    contours = (section_points(CharacterPose(press=press), figure().skin.base_z)[0] for press in (0, 1))
+    free, pressed = (contour[20, 1] - contour[60, 1] for contour in contours)
+    assert pressed == pytest.approx(0.65 * free, rel=0.05)
 
 
 def test_the_line_of_closed_lips_rises_to_the_corners_less_when_pressed_and_that_of_round_ones_is_level():

@@ -19,8 +19,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion_faces.mesh import MeshStage
 from lipmotion_faces.rendering.drawn_surface import drawn_surface
 from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
-from meshes.heads import head, lip_points, write_glb
-from meshes.obj_writing import write_obj
+from meshes.heads import head, lip_points, write_glb, write_obj
 from meshes.speech import motion, units
 
 HEADS = ("head.glb", "head.gltf", "head.obj", "head.vrm")

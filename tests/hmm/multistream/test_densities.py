@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 
 from hmm.multistream.synthetic import observed, random_joint
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.densities import (
     GaussianStatistics,
     StreamScale,
@@ -9,22 +11,28 @@ from lipmotion.hmm.multistream.densities import (
     fit_scale,
     make_standard_normals,
 )
-from lipmotion.hmm.multistream.streams import STREAMS, ObservedStream, StreamWeights
+from lipmotion.hmm.multistream.generate import select_densities, solve_trajectory
+from lipmotion.hmm.multistream.model import joint_from_arrays, joint_to_arrays
+from lipmotion.hmm.multistream.recognise import JointRecogniser
+from lipmotion.hmm.multistream.streams import (
+    STREAMS,
+    ObservedStream,
+    StreamObservations,
+    StreamWeights,
+    stream_observations,
+)
 from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
 
 
 def test_densities_are_those_of_the_formulas():
     for name, components in (*((name, 3) for name in STREAMS), ("f0", 1)):
-        hmm = random_joint(1, components=components)
-        model, data = hmm.models[name], observed(np.random.default_rng(2), 12)
-        leaves = np.array([2, 0, 2, 1])
-        found = model.tied.log_density(model.scale.standardise(data.streams[name]), leaves, model.scale.log_determinant)
-        stream = data.streams[name]
-        expected = [
-            [slow.stream_density(model, leaf, stream.values[t], stream.known[t]) for leaf in leaves] for t in range(12)
-        ]
-        assert found == pytest.approx(np.array(expected), abs=1e-3)
+        model = random_joint(1, components=components).models[name]
+        stream, leaves = observed(np.random.default_rng(2), 12).streams[name], np.array([2, 0, 2, 1])
+        found = model.tied.log_density(model.scale.standardise(stream), leaves, model.scale.log_determinant)
+        for values, known, densities in zip(stream.values, stream.known, found, strict=True):
+            expected = [slow.stream_density(model, leaf, values, known) for leaf in leaves]
+            assert densities == pytest.approx(np.array(expected), abs=1e-3)
 
 
 def test_voiced_and_unvoiced_together_are_everything():
@@ -94,3 +102,120 @@ def test_the_scale_is_that_of_known_frames():
     assert np.isfinite(
         StreamScale(scale.mean, scale.deviation).standardise(ObservedStream(values, np.ones(3, bool)))
     ).all()
+
+
+NAN = float("nan")
+
+
+def test_f0_has_a_slope_only_where_all_frames_of_the_window_are_voiced():
+    pitch = np.array([NAN, 4.0, 4.2, 4.6, NAN, NAN, 4.0, 4.1])
+    streams = stream_observations(np.zeros((8, 3)), pitch).streams
+    assert streams["f0"].known.tolist() == [False, True, True, True, False, False, True, True]
+    for name in ("f0_slope", "f0_curvature"):
+        assert np.flatnonzero(streams[name].known).tolist() == [2]
+    assert streams["f0_slope"].values[2, 0] == pytest.approx(0.3)
+    assert streams["f0_curvature"].values[2, 0] == pytest.approx(0.2)
+
+
+def test_motion_is_unknown_beside_frames_that_were_not_measured():
+    motion = np.arange(14.0).reshape(7, 2) ** 2
+    seen = np.ones(7, bool)
+    seen[3], motion[3] = False, NAN
+    stream = stream_observations(np.zeros((7, 3)), motion=motion, measured=seen).streams["motion"]
+    assert np.flatnonzero(stream.known).tolist() == [1, 5]
+    assert stream.values[1].reshape(3, 2)[2] == pytest.approx(motion[0] - 2 * motion[1] + motion[2])
+    assert (stream.values[~stream.known] == 0).all()
+
+
+def test_what_does_not_fit_is_refused():
+    for given in (
+        {"log_f0": np.zeros(4)},
+        {"log_f0": np.full(5, np.inf)},
+        {"motion": np.full((5, 2), NAN)},
+        {"motion": np.zeros((5, 2)), "measured": np.ones(4, bool)},
+    ):
+        with pytest.raises(InputError):
+            stream_observations(np.zeros((5, 3)), **given)
+    with pytest.raises(InputError, match="required speech"):
+        StreamObservations({"motion": ObservedStream(np.zeros((3, 3)), np.ones(3, bool))})
+    for weight in (-0.1, NAN, float("inf")):
+        with pytest.raises(InputError, match="f0_slope"):
+            StreamWeights(f0_slope=weight)
+
+
+def test_a_weight_of_nothing_switches_off():
+    assert list(StreamWeights(motion=0, f0=0).active) == ["speech", "f0_slope", "f0_curvature"]
+
+
+HMM = random_joint(1, ("a", "b", "c"))
+
+
+def test_a_model_comes_back_as_it_was():
+    arrays = joint_to_arrays(HMM, np.float32)
+    again = joint_from_arrays(arrays, HMM.config)
+    data = observed(np.random.default_rng(2), 30)
+    assert JointRecogniser(again).recognise(data) == JointRecogniser(HMM).recognise(data)
+    found, wanted = (solve_trajectory(select_densities(m, align(m, data, ("sil", "a", "sil")))) for m in (again, HMM))
+    assert np.array_equal(found.values, wanted.values)
+    for key, array in joint_to_arrays(again, np.float32).items():
+        assert array.dtype == arrays[key].dtype
+        assert np.array_equal(array, arrays[key]), key
+    assert again.text() == HMM.text()
+
+
+def changed(**changes):
+    arrays = joint_to_arrays(HMM)
+    for key, change in changes.items():
+        name = key.replace("__", "/")
+        if change is None:
+            del arrays[name]
+        else:
+            arrays[name] = change(arrays[name].copy())
+    return arrays
+
+
+def put(value, where=(0,)):
+    def change(array):
+        array[where] = value
+        return array
+
+    return change
+
+
+DAMAGED = [
+    *({name.replace("/", "__"): None} for name in sorted(joint_to_arrays(HMM))[::3]),
+    {"log_stay": lambda a: a[:-1]},
+    {"log_stay": put(0.0)},
+    {"log_stay": put(np.nan)},
+    {"durations": put(0.0)},
+    {"durations": lambda a: a[:, 0]},
+    {"bigram": lambda a: a[:-1]},
+    {"units": put("b")},
+    {"free": put("q")},
+    {"spoken": lambda a: a * 0},
+    {"spoken": lambda a: a[1:]},
+    {"streams": put("q")},
+    {"streams": put("motion")},
+    {"speech__means": lambda a: a[:-1]},
+    {"speech__means": put(np.inf)},
+    {"speech__variances": put(0.0)},
+    {"speech__variances": lambda a: a[:, :1]},
+    {"speech__log_weights": put(-np.inf)},
+    {"speech__log_weights": put(np.nan)},
+    {"speech__log_weights": put(5.0)},
+    {"speech__mean": put(np.nan)},
+    {"speech__deviation": put(0.0)},
+    {"speech__asked": put(10_000)},
+    {"speech__trees": put("7")},
+    {"f0__voiced": put(1.0)},
+    {"f0__voiced": lambda a: a[:-1]},
+    {"motion__sizes": put(0)},
+]
+
+
+def test_damaged_arrays_are_refused():
+    for changes in DAMAGED:
+        with pytest.raises(ModelFormatError, match="damaged"):
+            joint_from_arrays(changed(**changes), HMM.config)
+    with pytest.raises(ModelFormatError):
+        joint_from_arrays(joint_to_arrays(HMM), random_joint(1, states=2).config)

@@ -2,13 +2,22 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hmm.multistream.synthetic import CLASSES, NAMES, inventory, random_joint
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import GaussianStatistics
 from lipmotion.hmm.multistream.model import TreeCosts, choose_positions, context_questions, grow_forest, unit_forest
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS
-from lipmotion.hmm.multistream.unit_states import Inventory, expand_triphones
+from lipmotion.hmm.multistream.unit_states import (
+    Inventory,
+    RecognisedUnit,
+    expand_triphones,
+    frames_to_units,
+    units_to_frames,
+)
+from lipmotion.types import Span, Timeline, Unit
 
 KNOWN = inventory()
 SIDES = [name for name in NAMES if name != "sp"]
@@ -23,18 +32,16 @@ def test_every_unit_that_is_spoken_has_a_leaf_of_its_own():
     assert forest.leaf((("b", "a", "b"), 1)) == leaves["a"]
 
 
-def triphones(unit_names=NAMES):
-    return [((a, b, c), s) for a, b, c in product(SIDES, unit_names, SIDES) for s in range(KNOWN.count(b))]
+def triphones():
+    return [((a, b, c), s) for a, b, c in product(SIDES, NAMES, SIDES) for s in range(KNOWN.count(b))]
 
 
-def tied(stream, mean_of, seen, classes=CLASSES, has_spaces=False):
+def tied(stream, mean_of, seen):
     means = np.array([mean_of(*state) for state in seen])[:, None]
     sums = GaussianStatistics.zeros(len(seen), 1, 1)
     sums.add(np.arange(len(seen)), 20.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
-    return grow_forest(
-        stream, KNOWN, context_questions(KNOWN, classes), seen, sums,
-        has_spaces=has_spaces, costs=TreeCosts(1.0, 10.0, 0.02),
-    )  # fmt: skip
+    questions, costs = context_questions(KNOWN, CLASSES), TreeCosts(1.0, 10.0, 0.02)
+    return grow_forest(stream, KNOWN, questions, seen, sums, has_spaces=False, costs=costs)
 
 
 def test_units_and_contexts_that_were_never_seen_resolve_by_class():
@@ -55,17 +62,15 @@ def test_acoustic_streams_depend_on_one_neighbour_unless_both_are_asked_about(st
     forest, units = hmm.models[stream].forest, hmm.inventory.names
     sides = [name for name in units if name != "sp"]
 
-    def differs(unit, state, position):
-        found = set()
-        for other in sides:
-            context = ["sil", unit, "sil"]
-            context[position] = other
-            found.add(forest.leaf((tuple(context), state)))
-        return len(found) > 1
+    def depends(unit, state, position):
+        contexts = [(other, unit, "sil") if position == 0 else ("sil", unit, other) for other in sides]
+        return len({forest.leaf((context, state)) for context in contexts}) > 1
 
-    left = {state for unit, state in hmm.inventory.monophones if unit not in ("sil", "sp") and differs(unit, state, 0)}
-    right = {state for unit, state in hmm.inventory.monophones if unit not in ("sil", "sp") and differs(unit, state, 2)}
-    silent = any(differs("sil", state, position) for state in range(3) for position in (0, 2))
+    left, right = (
+        {s for unit, s in hmm.inventory.monophones if unit not in ("sil", "sp") and depends(unit, s, position)}
+        for position in (0, 2)
+    )
+    silent = any(depends("sil", state, position) for state in range(3) for position in (0, 2))
     one, everywhere = ({0}, {2}, False), ({0, 1, 2}, {0, 1, 2}, stream == "motion")
     assert (left, right, silent) == (one if stream in ACOUSTIC_STREAMS and not both else everywhere)
 
@@ -92,15 +97,9 @@ def test_silence_stands_for_pauses_beside_other_units():
 
 
 def test_an_inventory_that_is_none_and_an_unknown_unit_are_refused():
-    for given in (
-        (("a",), (), 3),
-        (("a",), ("b",), 3),
-        (("a", "a"), ("a",), 3),
-        (("a b",), ("a b",), 3),
-        (("a",), ("a",), 0),
-    ):
+    for names, free, states in (("a", "", 3), ("a", "b", 3), ("aa", "a", 3), (["a b"], ["a b"], 3), ("a", "a", 0)):
         with pytest.raises(InputError):
-            Inventory(*given)
+            Inventory(tuple(names), tuple(free), states)
     with pytest.raises(InputError, match="unknown unit 'q'"):
         expand_triphones(KNOWN, ("a", "q"))
 
@@ -108,3 +107,41 @@ def test_an_inventory_that_is_none_and_an_unknown_unit_are_refused():
 def test_classes_of_other_units_are_left_out():
     names = {question.name for question in context_questions(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
     assert names == {*CLASSES, *NAMES}
+
+
+def timeline(*spans):
+    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
+
+
+def test_every_frame_has_a_unit():
+    spoken = timeline((0.015, 0.05, "a"), (0.05, 0.054, "t"), (0.07, 0.1, "b"))
+    units, bounds = units_to_frames(spoken, 13, "sil")
+    assert units == ("sil", "a", "t", "sil", "b", "sil")
+    assert bounds.tolist() == [0, 2, 5, 6, 7, 10, 13]
+    assert units_to_frames(spoken, 4, "sil", lambda label: {"a": "open"}[label.phone])[0] == ("sil", "open")
+    assert units_to_frames(timeline(), 3, "sil")[0] == ("sil",)
+    with pytest.raises(InputError):
+        units_to_frames(spoken, 0, "sil")
+
+
+def test_a_unit_without_a_frame_is_left_out():
+    units, bounds = units_to_frames(timeline((0, 0.031, "a"), (0.031, 0.038, "t"), (0.038, 0.06, "b")), 6, "sil")
+    assert units == ("a", "b")
+    assert bounds.tolist() == [0, 4, 6]
+
+
+def test_a_unit_begins_half_a_frame_before_its_first_frame():
+    spoken = frames_to_units([RecognisedUnit("sil", 0), RecognisedUnit("a", 3), RecognisedUnit("sil", 9)], 0.125)
+    assert [span.start_s for span in spoken] == pytest.approx([0, 0.025, 0.085])
+    assert [span.end_s for span in spoken] == pytest.approx([0.025, 0.085, 0.125])
+
+
+@settings(max_examples=30)
+@given(lengths=st.lists(st.integers(1, 9), min_size=1, max_size=9))
+def test_there_and_back(lengths):
+    firsts = np.cumsum([0, *lengths]).tolist()
+    said = [RecognisedUnit("ab"[i % 2], first) for i, first in enumerate(firsts[:-1])]
+    spoken = frames_to_units(said, firsts[-1] / 100)
+    assert spoken[-1].end_s == firsts[-1] / 100
+    units, bounds = units_to_frames(spoken, firsts[-1], "sil")
+    assert [RecognisedUnit(unit, first) for unit, first in zip(units, bounds[:-1].tolist(), strict=True)] == said

@@ -49,14 +49,11 @@ def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
 
 
 def test_many_steps_over_one_gaussian_change_nothing():
-    densities = random_densities(1, 15, 1)
-    twins = FrameDensities(
-        np.full((15, 2), np.log(0.5)), densities.means.repeat(2, axis=1), densities.precisions.repeat(2, axis=1)
-    )
-    assert solve_trajectory(twins).values == pytest.approx(solve_trajectory(densities).values, abs=1e-9)
-    assert solve_trajectory(twins).log_likelihoods[-1] == pytest.approx(
-        solve_trajectory(densities).log_likelihoods[0], abs=1e-9
-    )
+    one = random_densities(1, 15, 1)
+    twins = FrameDensities(np.full((15, 2), np.log(0.5)), one.means.repeat(2, axis=1), one.precisions.repeat(2, axis=1))
+    found, wanted = solve_trajectory(twins), solve_trajectory(one)
+    assert found.values == pytest.approx(wanted.values, abs=1e-9)
+    assert found.log_likelihoods[-1] == pytest.approx(wanted.log_likelihoods[0], abs=1e-9)
 
 
 @settings(max_examples=30)
@@ -86,13 +83,9 @@ def slow_log_likelihood(densities, values):
 def test_mixtures_take_sides():
     means = np.zeros((30, 2, 3, 1))
     means[:, 0, 0], means[:, 1, 0] = 1.0, -1.0
-    precisions = np.full((30, 2, 3, 1), 50.0)
-    weights = np.log(np.tile([0.6, 0.4], (30, 1)))
-    found = solve_trajectory(FrameDensities(weights, means, precisions))
-    assert found.values == pytest.approx(np.ones((30, 1)), abs=0.05)
-    assert solve_trajectory(FrameDensities(weights, means, precisions), iterations=1).values == pytest.approx(
-        0.2, abs=0.05
-    )
+    densities = FrameDensities(np.log(np.tile([0.6, 0.4], (30, 1))), means, np.full((30, 2, 3, 1), 50.0))
+    assert solve_trajectory(densities).values == pytest.approx(np.ones((30, 1)), abs=0.05)
+    assert solve_trajectory(densities, iterations=1).values == pytest.approx(0.2, abs=0.05)
 
 
 def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion():
@@ -125,30 +118,22 @@ def test_all_paths_together_maximise_the_expected_density():
 
 
 def test_several_paths_count_as_often_as_they_are_given():
-    hmm = random_joint(3, components=1)
-    data = observed(np.random.default_rng(4), 20)
+    hmm, data = random_joint(3, components=1), observed(np.random.default_rng(4), 20)
     one, other = (align(hmm, data, units) for units in (("sil", "a", "b", "sil"), ("sil", "b", "sil")))
     leaves = [hmm.models[MOTION].forest.leaves(path.states.triphones) for path in (one, other)]
-    posterior = np.concatenate(
-        [0.75 * np.eye(len(leaves[0]))[one.frames], 0.25 * np.eye(len(leaves[1]))[other.frames]], axis=1
-    )
-    wanted = solve_trajectory(average_densities(hmm, np.concatenate(leaves), posterior)).values
-    assert solve_trajectory(average_path_densities(hmm, [one, other, one, one])).values == pytest.approx(
-        wanted, abs=1e-9
-    )
+    shares = [0.75 * np.eye(len(leaves[0]))[one.frames], 0.25 * np.eye(len(leaves[1]))[other.frames]]
+    wanted = solve_trajectory(average_densities(hmm, np.concatenate(leaves), np.concatenate(shares, axis=1)))
+    found = solve_trajectory(average_path_densities(hmm, [one, other, one, one]))
+    assert found.values == pytest.approx(wanted.values, abs=1e-9)
     with pytest.raises(InputError, match="of the same length"):
         average_path_densities(hmm, [])
 
 
 def test_what_was_learned_comes_back():
-    data = utterances(30)
-    hmm = train_joint(data, inventory(), CLASSES, config())
-    for utterance in utterances(4, seed=9):
-        motion = utterance.observed.streams[MOTION]
-        found = solve_trajectory(
-            select_densities(hmm, align(hmm, utterance.observed, utterance.units, utterance.bounds))
-        )
-        off = found.values - motion.values[:, :2]
+    hmm = train_joint(utterances(30), inventory(), CLASSES, config())
+    for each in utterances(4, seed=9):
+        motion, path = each.observed.streams[MOTION], align(hmm, each.observed, each.units, each.bounds)
+        off = solve_trajectory(select_densities(hmm, path)).values - motion.values[:, :2]
         assert np.sqrt((off[motion.known] ** 2).mean(axis=0)) == pytest.approx([0.06, 0.03], abs=0.05)
 
 

@@ -22,16 +22,15 @@ from lipmotion.hmm.multistream.multistream_training import (
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.types import Progress
-from oracles import chains
 from oracles import joint as slow
+from oracles import paths
 
 TRAIN, HELD_OUT = utterances(30), utterances(8, seed=1)
 
 
-def trained(data=TRAIN, validation=(), classes=CLASSES, known=None, **changes):
+def trained(data=TRAIN, validation=(), **changes):
     events: list[Progress] = []
-    hmm = train_joint(data, known or inventory(), classes, config(**changes), events.append, validation)
-    return hmm, events
+    return train_joint(data, inventory(), CLASSES, config(**changes), events.append, validation), events
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +46,16 @@ def stages(events):
     return found
 
 
+def only(observed, *names):
+    """Return some streams of what was observed."""
+    return StreamObservations({name: observed.streams[name] for name in names})
+
+
+DEAF = [replace(utterance, observed=only(utterance.observed, "speech")) for utterance in TRAIN[:3]]
+
+
 @pytest.mark.parametrize(
-    "weights",
-    [StreamWeights(), MOTION_ONLY, pytest.param(StreamWeights(0.3, 0.5, 0, 0.1, 2), marks=pytest.mark.long)],
+    "weights", [StreamWeights(), MOTION_ONLY, pytest.param(StreamWeights(0.3, 0.5, 0, 0.1, 2), marks=pytest.mark.long)]
 )
 def test_the_likelihood_never_falls_within_a_stage(weights):
     data = TRAIN[:10] if weights is MOTION_ONLY else [replace(utterance, bounds=None) for utterance in TRAIN[:10]]
@@ -63,19 +69,16 @@ def test_the_likelihood_never_falls_within_a_stage(weights):
 def test_posteriors_are_those_of_all_paths():
     for components in (1, 2):
         hmm = random_joint(1, states=2, components=components, training=StreamWeights(0.7, 1.2, 0.4, 1, 0.9))
-        draw = np.random.default_rng(0)
-        observed = StreamObservations({name: s for name, s in noise(draw, 7).streams.items() if name != "f0_slope"})
-        units = ("a", "sp", "b")
-        prepared = prepare_utterances(hmm, [(observed, units)])
+        observed = only(noise(np.random.default_rng(0), 7), *(name for name in STREAMS if name != "f0_slope"))
+        prepared = prepare_utterances(hmm, [(observed, ("a", "sp", "b"))])
         (found,) = iterate_posteriors(hmm, prepared)
-        triphones = [prepared.triphones[i] for i in prepared.items[0].triphones]
+        (item,) = prepared.items
         density = [
-            [slow.log_density(hmm, observed, state, t, hmm.config.training) for state in triphones] for t in range(7)
+            [slow.log_density(hmm, observed, prepared.triphones[i], t, hmm.config.training) for i in item.triphones]
+            for t in range(7)
         ]
-        rows = prepared.items[0].monophones
-        expected, stay, log_likelihood = chains.chain_posteriors(
-            np.array(density), hmm.log_stay[rows], hmm.log_move[rows]
-        )
+        transitions = hmm.log_stay[item.monophones], hmm.log_move[item.monophones]
+        expected, stay, log_likelihood = paths.chain_posteriors(np.array(density), *transitions)
         assert found.states == pytest.approx(expected, abs=1e-4)
         assert found.states.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-9)
         assert found.stay == pytest.approx(stay, abs=1e-4)
@@ -85,16 +88,10 @@ def test_posteriors_are_those_of_all_paths():
 def test_a_stream_without_weight_is_as_good_as_absent():
     off = StreamWeights(motion=0, f0=0)
     hmm, events = trained(TRAIN[:12], training=off)
-    without = [
-        replace(
-            u, observed=StreamObservations({n: s for n, s in u.observed.streams.items() if n not in ("motion", "f0")})
-        )
-        for u in TRAIN[:12]
-    ]
-    alone, same = trained(without, training=off)
-    assert [e.figure for e in events if e.stage in stages(same)] == pytest.approx(
-        [e.figure for e in same if e.stage in stages(same)], abs=1e-9
-    )
+    rest = [name for name in STREAMS if name not in ("motion", "f0")]
+    alone, same = trained([replace(u, observed=only(u.observed, *rest)) for u in TRAIN[:12]], training=off)
+    found, wanted = ([e.figure for e in each if e.stage in stages(same)] for each in (events, same))
+    assert found == pytest.approx(wanted, abs=1e-9)
     assert np.array_equal(hmm.models["speech"].tied.mixtures.means, alone.models["speech"].tied.mixtures.means)
     assert "motion" in hmm.models
     assert "motion" not in alone.models
@@ -112,23 +109,19 @@ def test_a_step_improves_on_what_was_found():
 
 
 def test_what_was_learned_is_recognised(usual):
-    hmm, _ = usual
-    recogniser = JointRecogniser(hmm)
+    recogniser = JointRecogniser(usual[0])
     right = [tuple(s.unit for s in recogniser.recognise(u.observed)) == u.units for u in HELD_OUT]
     assert np.mean(right) >= 0.75
 
 
 def test_a_stream_counts_as_much_as_its_weight(usual):
     """Voicing of another utterance: the less it weighs, the more units are those that speech says."""
-    hmm, _ = usual
     right = []
     for weight in (0.0, 1.0, 8.0):
-        recogniser = JointRecogniser(hmm, StreamWeights(1, weight, weight, weight, 0))
-        count = 0
+        recogniser, count = JointRecogniser(usual[0], StreamWeights(1, weight, weight, weight, 0)), 0
         for utterance, other in pairwise(HELD_OUT):
             frames = min(utterance.observed.frames, other.observed.frames)
-            mixed = {name: of.observed.streams[name] for name, of in
-                     [("speech", utterance), *((stream, other) for stream in F0_STREAMS)]}  # fmt: skip
+            mixed = only(other.observed, "speech", *F0_STREAMS).streams | only(utterance.observed, "speech").streams
             cut = {
                 name: ObservedStream(stream.values[:frames], stream.known[:frames]) for name, stream in mixed.items()
             }
@@ -165,9 +158,7 @@ def of_model(hmm, data):
 
 
 def test_streams_and_units_that_are_missing_here_and_there():
-    draw = np.random.default_rng(7)
-    deaf = replace(TRAIN[0], observed=StreamObservations({"speech": TRAIN[0].observed.streams["speech"]}))
-    pause = say(draw, ["a", "b"])
+    deaf, pause = DEAF[0], say(np.random.default_rng(7), ["a", "b"])
     hmm, _ = trained([deaf, pause, *TRAIN[1:8]])
     assert set(hmm.models) == set(STREAMS)
     assert hmm.spoken == ("sil", "a", "b", "c", "d")
@@ -177,10 +168,9 @@ def test_streams_and_units_that_are_missing_here_and_there():
 
 
 def test_nothing_that_is_switched_on_was_observed():
-    deaf = [replace(u, observed=StreamObservations({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
     with pytest.raises(InputError, match="switched on are motion"):
-        trained(deaf, training=MOTION_ONLY)
-    hmm, _ = trained([*TRAIN[:6], deaf[0]], training=MOTION_ONLY)  # utterances without motion change nothing
+        trained(DEAF, training=MOTION_ONLY)
+    hmm, _ = trained([*TRAIN[:6], DEAF[0]], training=MOTION_ONLY)  # utterances without motion change nothing
     assert np.isfinite(hmm.durations).all()
 
 

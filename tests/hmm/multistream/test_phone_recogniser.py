@@ -1,5 +1,3 @@
-"""The joint model as a recogniser of phones, for the speakers of its training."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -50,17 +48,16 @@ def test_phones_of_a_speaker_of_the_training_are_recognised(recogniser):
     assert found[-1].end_s == spoken.features.duration_s
 
 
-def test_another_speaker_is_left_to_the_shared_recogniser(recogniser):
+def test_another_speaker_silence_and_long_recordings_are_left_to_the_shared_recogniser(recogniser, monkeypatch):
     spoken = speech(timeline(SENTENCE))
-    strange = np.random.default_rng(0).normal(0, 3, spoken.features.values.shape).astype(np.float32)
-    assert recogniser.phones(replace(spoken, features=Features(strange, spoken.features.duration_s))) is None
-
-
-def test_digital_silence_and_long_recordings_are_left_to_the_shared_recogniser(recogniser, monkeypatch):
-    spoken = speech(timeline(SENTENCE))
-    quiet = Features(np.zeros_like(spoken.features.values), spoken.features.duration_s)
-    assert recogniser.phones(replace(spoken, features=quiet)) is None
-    assert recogniser.phones(replace(spoken, features=Features(spoken.features.values[:2], 0.01))) is None
+    values, duration_s = spoken.features.values, spoken.features.duration_s
+    strange = np.random.default_rng(0).normal(0, 3, values.shape).astype(np.float32)
+    for features in (
+        Features(strange, duration_s),
+        Features(np.zeros_like(values), duration_s),  # digital silence
+        Features(values[:2], 0.01),
+    ):
+        assert recogniser.phones(replace(spoken, features=features)) is None
     monkeypatch.setattr(module, "LONGEST_S", 1.0)
     assert recogniser.phones(spoken) is None
 
@@ -80,14 +77,11 @@ def test_a_recogniser_is_deserialised(recogniser):
 def test_a_trained_recogniser_is_kept_in_the_checkpoint(corpus, recogniser, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "LEAST_MINUTES", 0.1)
     checkpoint = Checkpoint(tmp_path, "one")
-    first = fitted(corpus, checkpoint)
+    first = module.recogniser_to_arrays(fitted(corpus, checkpoint))
     monkeypatch.setattr(module, "train_joint", lambda *_: pytest.fail("trained again"))
-    again = fitted(corpus, checkpoint)
-    for one, two in zip(
-        module.recogniser_to_arrays(first).values(), module.recogniser_to_arrays(again).values(), strict=True
-    ):
-        assert one.tobytes() == two.tobytes()
-    assert module.recogniser_to_arrays(first)["joint_typical"] == recogniser.training_score
+    again = module.recogniser_to_arrays(fitted(corpus, checkpoint))
+    assert [array.tobytes() for array in again.values()] == [array.tobytes() for array in first.values()]
+    assert first["joint_typical"] == recogniser.training_score
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import build_unit_loop, decode_units
 from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm
 from lipmotion.hmm.multistream.recognise import JointRecogniser, build_context_loop
-from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.streams import SPEECH, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import expand_triphones
 from lipmotion.hmm.network import compute_log_likelihoods
 from oracles import joint as slow
@@ -67,35 +67,39 @@ def test_nothing_else_is_more_probable(seed, states, frames, both):
     assert np.isfinite(best)
 
 
-def test_sequences_are_drawn_as_often_as_they_are_probable():
-    hmm = random_joint(3, states=2, bigram_weight=0.3, insertion=1.5)
-    data, frames, count = observed(np.random.default_rng(4), 7), 7, 4000
-    density = slow_densities(hmm, data, SOFT)
-    ways = list(slow.everything(hmm, density, frames, candidates(hmm, frames)))
-    shares = np.exp([score for score, _, _ in ways] - np.logaddexp.reduce([score for score, _, _ in ways]))
+@pytest.fixture(scope="module")
+def uncertain():
+    """A recogniser, seven frames, and the share of every sequence of units with its durations."""
+    hmm, data = random_joint(3, states=2, bigram_weight=0.3, insertion=1.5), observed(np.random.default_rng(4), 7)
+    ways = list(slow.everything(hmm, slow_densities(hmm, data, SOFT), 7, candidates(hmm, 7)))
+    scores = np.array([score for score, _, _ in ways])
+    shares = np.exp(scores - np.logaddexp.reduce(scores))
+    return JointRecogniser(hmm, SOFT), data, [(*way[1:], share) for way, share in zip(ways, shares, strict=True)]
+
+
+def test_sequences_are_drawn_as_often_as_they_are_probable(uncertain):
+    recogniser, data, ways = uncertain
     expected: dict[tuple, float] = {}
-    for share, (_, units, lengths) in zip(shares, ways, strict=True):
+    for units, lengths, share in ways:
         key = tuple(zip(units, np.cumsum([0, *lengths])[:-1:2].tolist(), strict=True))
         expected[key] = expected.get(key, 0) + share
-    drawn = sampled_units(JointRecogniser(hmm, SOFT), data, count, 5)
+    drawn = sampled_units(recogniser, data, 4000, 5)
     assert set(drawn) <= set(expected)
     likely = {key: share for key, share in expected.items() if share > 0.02}
     assert len(likely) > 2
     for key, share in likely.items():
-        assert drawn.count(key) / count == pytest.approx(share, abs=5 * np.sqrt(share / count))
+        assert drawn.count(key) / 4000 == pytest.approx(share, abs=5 * np.sqrt(share / 4000))
 
 
-def test_posteriors_are_the_shares_of_all_sequences():
-    hmm = random_joint(3, states=2, bigram_weight=0.3, insertion=1.5)
-    data, frames = observed(np.random.default_rng(4), 7), 7
-    ways = list(slow.everything(hmm, slow_densities(hmm, data, SOFT), frames, candidates(hmm, frames)))
-    shares = np.exp([score for score, _, _ in ways] - np.logaddexp.reduce([score for score, _, _ in ways]))
-    expected = np.zeros((frames, len(hmm.inventory.monophones)))
-    for share, (_, units, lengths) in zip(shares, ways, strict=True):
-        expected[np.arange(frames), np.repeat(expand_triphones(hmm.inventory, units).monophones, lengths)] += share
-    found = state_posteriors(JointRecogniser(hmm, SOFT), data)
+def test_posteriors_are_the_shares_of_all_sequences(uncertain):
+    recogniser, data, ways = uncertain
+    known = recogniser.hmm.inventory
+    expected = np.zeros((7, len(known.monophones)))
+    for units, lengths, share in ways:
+        expected[np.arange(7), np.repeat(expand_triphones(known, units).monophones, lengths)] += share
+    found = state_posteriors(recogniser, data)
     assert found == pytest.approx(expected, abs=1e-4)
-    assert found.sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-5)
+    assert found.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-5)
 
 
 def test_paths_that_are_drawn_go_through_the_states_of_their_units():
@@ -117,42 +121,36 @@ def test_speech_alone_is_the_plain_model():
     """The densities of all contexts, by name, in plain unit models."""
     hmm = random_joint(8, streams=(SPEECH,))
     known, model = hmm.inventory, hmm.models[SPEECH]
-    names, leaves = [], []
-    for unit, state in known.monophones:
-        names.append(f"{unit}.{state}")
-        leaves.append(model.forest.leaf((("sil", unit, "sil"), state)))
+    contexts = {f"{unit}.{state}": (("sil", unit, "sil"), state) for unit, state in known.monophones}
     for unit, state in known.monophones:
         side = known.side(unit, state)
-        for neighbour in ("sil", "a", "b") if side else ():
-            context = (neighbour, unit, "sil") if side < 0 else ("sil", unit, neighbour)
-            names.append(f"{unit}.{state}{'<' if side < 0 else '>'}{neighbour}")
-            leaves.append(model.forest.leaf((context, state)))
-    table = StateTable(known.names, tuple(map(known.count, known.names)), tuple(names), known.free)
+        for other in ("sil", "a", "b") if side else ():
+            context = (other, unit, "sil") if side < 0 else ("sil", unit, other)
+            contexts[f"{unit}.{state}{'<' if side < 0 else '>'}{other}"] = (context, state)
+    leaves = np.array([model.forest.leaf(each) for each in contexts.values()])
+    table = StateTable(known.names, tuple(map(known.count, known.names)), tuple(contexts), known.free)
     config = HmmConfig(bigram_weight=hmm.config.bigram_weight, insertion=hmm.config.insertion)
-    plain = UnitHmm(config, table, model.tied.mixtures.select(np.array(leaves)), hmm.log_stay, hmm.bigram)
+    plain = UnitHmm(config, table, model.tied.mixtures.select(leaves), hmm.log_stay, hmm.bigram)
     data = observed(np.random.default_rng(9), 60, (SPEECH,))
-    rows = model.scale.standardise(data.streams[SPEECH])
-    units, bounds = decode_units(
-        build_unit_loop(plain, ["sil", "a", "b"]), compute_log_likelihoods(plain, model.tied.values(rows))
-    )
+    values = model.tied.values(model.scale.standardise(data.streams[SPEECH]))
+    units, bounds = decode_units(build_unit_loop(plain, ["sil", "a", "b"]), compute_log_likelihoods(plain, values))
     said = JointRecogniser(hmm).recognise(data)
     assert tuple(s.unit for s in said) == units
     assert [s.first for s in said] == bounds[:-1].tolist()
 
 
 def test_what_cannot_be_recognised():
-    hmm = random_joint(12)
-    data = utterances(1)[0].observed
+    hmm, data = random_joint(12), utterances(1)[0].observed
     with pytest.raises(InputError, match="motion the weight 0"):
         JointRecogniser(hmm, StreamWeights())
     with pytest.raises(InputError, match="switched on are"):
         JointRecogniser(hmm, StreamWeights(0, 0, 0, 0, 0)).recognise(data)
     with pytest.raises(InputError, match="required one or more"):
         JointRecogniser(hmm).draw_paths(data, 0, 0)
-    with pytest.raises(AlignmentError):
-        JointRecogniser(hmm).recognise(observed(np.random.default_rng(0), 2))
-    with pytest.raises(AlignmentError):
-        JointRecogniser(hmm).draw_paths(observed(np.random.default_rng(0), 2), 1, 0)
-    wide = StreamObservations({SPEECH: type(data.streams[SPEECH])(np.zeros((9, 4)), np.ones(9, bool))})
+    short = observed(np.random.default_rng(0), 2)
+    for attempt in (JointRecogniser(hmm).recognise, lambda given: JointRecogniser(hmm).draw_paths(given, 1, 0)):
+        with pytest.raises(AlignmentError):
+            attempt(short)
+    wide = StreamObservations({SPEECH: ObservedStream(np.zeros((9, 4)), np.ones(9, bool))})
     with pytest.raises(InputError, match="has 4 dimensions"):
         JointRecogniser(hmm).recognise(wide)

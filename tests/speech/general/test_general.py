@@ -1,7 +1,3 @@
-"""The general models against what pocketsphinx itself says of its files and of sound."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pocketsphinx import Decoder
@@ -9,7 +5,6 @@ from pocketsphinx import Decoder
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech.recognition import general as acoustic
 from lipmotion.speech.recognition.general import (
-    GAUSSIANS,
     PHONES,
     STATES,
     STREAMS,
@@ -26,30 +21,6 @@ from lipmotion.units import PHONES as OURS
 
 def vowels() -> Audio:
     return synthesise([("sil", 0.3), ("iy", 0.4), ("s", 0.3), ("aa", 0.4), ("sil", 0.3)])[0]
-
-
-def test_densities_are_mixtures_of_gaussians() -> None:
-    """One frame, one state, by the definition."""
-    model, features = general_model(), general_features(vowels())
-    frames = np.array([35, 60, 90])
-    every = np.empty((3, len(PHONES) * STATES))
-    for row, frame in enumerate(frames):
-        for phone in range(len(PHONES)):
-            total = np.zeros(STATES)
-            for stream, part in enumerate(acoustic.STREAMS):
-                x = features[frame, part].astype(float)
-                block = slice(phone * GAUSSIANS, (phone + 1) * GAUSSIANS)
-                form, constant = model.forms[stream][:, block].astype(float), model.constants[stream][block]
-                precision = -2 * form[13:]
-                mean = form[:13] / precision
-                norm = 0.5 * (np.log(precision).sum(axis=0) - 13 * np.log(2 * np.pi))
-                assert constant == pytest.approx(norm - 0.5 * (mean * mean * precision).sum(axis=0), rel=1e-5, abs=1e-3)
-                log_gaussian = norm - 0.5 * (np.square(x[:, None] - mean) * precision).sum(axis=0)
-                total += np.log((np.exp(log_gaussian)[:, None] * model.weights[stream][phone]).sum(axis=0) + 1e-300)
-            every[row, phone * STATES : (phone + 1) * STATES] = total
-    found = model.log_density(features)[frames]
-    close = every - every.max(axis=1, keepdims=True) > -60  # far below the best one, float32 has other floors
-    assert found[close] == pytest.approx((every - every.max(axis=1, keepdims=True))[close], abs=2e-2)
 
 
 def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,5 @@
 """A machine with synthesisers that are none, and one without any."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from pathlib import Path

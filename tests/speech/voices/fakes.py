@@ -1,7 +1,5 @@
 """Programs that answer as the synthesisers do, and speak a tone; some texts make them misbehave."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

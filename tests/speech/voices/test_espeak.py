@@ -1,19 +1,20 @@
-"""espeak-ng: which library speaks, what it says in other languages, and the words that it tells."""
-
-from __future__ import annotations
-
 import json
+import re
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from children import Done, run_child
+from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech.voices import espeak
-from lipmotion.speech.voices.espeak import ESPEAK_NG
+from lipmotion.speech.voices.espeak import ESPEAK_NG, LanguageLexicon, corrected_phone_times
 from lipmotion.speech.voices.installed import speak_sentences, voice_named
-from lipmotion.types import Span, Timeline
-from lipmotion.units import is_silent
+from lipmotion.types import Audio, Span, Timeline
+from lipmotion.types.languages import ENGLISH, LANGUAGES
+from lipmotion.units import PHONES, is_silent
 
 from . import fakes
 
@@ -41,11 +42,7 @@ def test_the_package_comes_before_the_system(wheel: Path) -> None:
     assert espeak._library() == {"library": str(wheel / "libespeak-ng.so"), "data": str(wheel)}
     assert [voice.name for voice in ESPEAK_NG.voices()] == ["en-us+f2"]
     assert [voice.name for voice in ESPEAK_NG.others()] == ["de", "en", "en-gb", "en-us"]
-
-
-def test_a_package_without_its_data_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    spec = SimpleNamespace(submodule_search_locations=[str(tmp_path)])
-    monkeypatch.setattr(espeak, "find_spec", lambda _: spec)
+    shutil.rmtree(wheel / "espeak-ng-data")
     assert espeak.wheel_folder() is None
 
 
@@ -83,10 +80,7 @@ def written(*places: int, text: str) -> list[str]:
 
 def test_words_are_found_by_their_places() -> None:
     assert written(0, 0, 4, 8, 12, text="one two-six ten") == ["0.0 one", "0.2 two-six", "0.4 ten"]
-
-
-def test_a_word_that_is_said_with_the_one_before_belongs_to_it() -> None:
-    assert written(0, 0, 7, text="on the red ball") == ["0.0 on the", "0.2 red ball"]
+    assert written(0, 0, 7, text="on the red ball") == ["0.0 on the", "0.2 red ball"]  # said together
     assert written(3, 3, text="- one -") == ["0.0 - one -"]
 
 
@@ -126,3 +120,87 @@ class TestPackage:
     def test_letters_of_other_scripts_are_said_somehow(self) -> None:
         _, units = next(speak_sentences(["שלום 12345678901234567890"], voice_named("espeak-ng:en-us+f2")))
         assert len(units) > 40
+
+
+RATE_HZ = 16_000
+
+
+def sound(*silences: tuple[float, float], duration_s: float = 1.0) -> Audio:
+    """Return a tone with holes."""
+    samples = np.sin(np.arange(round(duration_s * RATE_HZ)) * 0.2 + 1).astype(np.float32)
+    samples[np.abs(samples) < 0.1] = 0.1
+    for start_s, end_s in silences:
+        samples[round(start_s * RATE_HZ) : round(end_s * RATE_HZ)] = 0
+    return Audio(samples, RATE_HZ)
+
+
+def starts(labels: list[tuple[str, float]], audio: Audio) -> list[float]:
+    return [round(span.start_s, 4) for span in corrected_phone_times(labels, audio)]
+
+
+def test_a_stop_begins_with_its_closure() -> None:
+    for stop in ("p", "t2", "k", "tS", "b", "d", "g", "dZ"):
+        assert starts([("a", 0.1), (stop, 0.4), ("i:", 0.5)], sound((0.35, 0.42))) == [0.1, 0.35, 0.5]
+    assert starts([("a", 0.1), ("p", 0.4)], sound((0.2, 0.4))) == [0.1, 0.34]  # a long silence is not all closure
+    for before, label in (("a", "s"), ("a", "m"), ("_:", "p"), ("_", "k")):  # other silences stay
+        assert starts([(before, 0.1), (label, 0.4)], sound((0.35, 0.4))) == [0.1, 0.4]
+    # it never reaches past the phone before, and without silence or at the start it stays
+    assert starts([("a", 0.1), ("s", 0.38), ("t", 0.4)], sound((0.35, 0.4))) == [0.1, 0.38, 0.38]
+    assert starts([("a", 0.1), ("b", 0.4)], sound()) == [0.1, 0.4]
+    assert starts([("a", 0.0), ("b", 0.0)], sound()) == [0.0, 0.0]
+    assert starts([("a", 0.1), ("p", 0.5)], Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)) == [0.1, 0.5]
+
+
+def test_an_l_that_is_late_gets_its_share_of_the_vowel() -> None:
+    assert starts([("OI", 0.1), ("l", 0.29), ("d", 0.3)], sound()) == [0.1, 0.21, 0.3]
+    assert starts([("OI", 0.1), ("l", 0.2), ("d", 0.3)], sound()) == [0.1, 0.2, 0.3]
+    assert starts([("t", 0.1), ("l", 0.29), ("d", 0.3)], sound()) == [0.1, 0.29, 0.3]
+
+
+def test_the_last_lasts_to_the_end() -> None:
+    phones = corrected_phone_times([("a", 0.1), ("s", 0.5)], sound())
+    assert [(span.label, span.end_s) for span in phones] == [("a", 0.5), ("s", 1.0)]
+
+
+WORDS = {
+    "es": {"lobo": "l ow v ow", "cigüeña": "th iy g uw eh n aa"},
+    "fr": {"rue": "hh uw", "l'œuf": "l ao f"},
+    "de": {"schöne": "sh ow n ax", "12": "t s v ao l f"},
+    "ja": {"ふゆ": "f uh y uh"},
+    "ko": {"밥을": "p aa p ix l"},
+    "zh": {"吗": "m aa", "个": "k ax"},
+    "ru": {"мир": "m iy r"},
+}
+
+
+@pytest.mark.usefixtures("bare")
+def test_without_rules_only_the_users_words_are_pronounced() -> None:
+    lexicon = LanguageLexicon({"perro": (("p", "eh", "r", "ow"),)}, "es")
+    assert lexicon.with_words(("perro", "perro")) is lexicon
+    with pytest.raises(MissingDependencyError, match=re.escape("no pronunciation of 'gato' in Spanish: install")):
+        lexicon.with_words(("perro", "gato"))
+
+
+@pytest.mark.usefixtures("bare")
+def test_letters_of_another_script_are_refused() -> None:
+    for language, word in (("ja", "東京"), ("es", "привет"), ("zh", "こ")):
+        with pytest.raises(InputError, match="no rules say how"):
+            LanguageLexicon({}, language).pronunciations(word)
+
+
+@pytest.mark.skipif(not INSTALLED, reason="the package espeakng-loader is not installed")
+class TestRules:
+    """The rules of espeak-ng, of the Python package."""
+
+    @pytest.mark.parametrize("language", ["es", *(pytest.param(each, marks=pytest.mark.long) for each in [*WORDS][1:])])
+    def test_rules_of_the_language(self, language: str) -> None:
+        words = WORDS[language]
+        lexicon = LanguageLexicon({}, language).with_words(tuple(words))
+        assert {word: " ".join(lexicon.pronunciations(word)[0]) for word in words} == words
+
+    @pytest.mark.long
+    def test_every_language_has_a_voice(self) -> None:
+        for language in LANGUAGES.keys() - {ENGLISH}:
+            phones = LanguageLexicon({}, language).pronunciations("2")[0]
+            assert phones
+            assert {*phones} <= {*PHONES}

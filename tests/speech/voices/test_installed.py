@@ -1,7 +1,7 @@
 """Which voices there are, and what they say: with fakes everywhere, with the synthesisers where they are."""
 
-from __future__ import annotations
-
+import os
+import time
 from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
@@ -14,7 +14,7 @@ from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
-from lipmotion.speech.voices import espeak_events
+from lipmotion.speech.voices import espeak_events, programs
 from lipmotion.speech.voices.installed import (
     SYNTHESISERS,
     all_voices,
@@ -25,6 +25,7 @@ from lipmotion.speech.voices.installed import (
     voice_named,
     voiced_sentences,
 )
+from lipmotion.speech.voices.programs import program_output
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 
@@ -41,15 +42,8 @@ HARD = ['"Hello" \\ (sil) %s', "Hello; `ls` $HOME", "Helló"]
 
 @pytest.mark.usefixtures("faked")
 def test_voices_are_listed() -> None:
-    assert installed_voices() == tuple(FAKED)
-
-
-@pytest.mark.usefixtures("bare")
-def test_without_synthesisers_there_are_none() -> None:
-    assert installed_voices() == ()
-    for voice in EACH:
-        with pytest.raises(MissingDependencyError, match=f"apt install {voice.synthesiser}"):
-            next(speak_sentences(["Hello"], voice))
+    assert installed_voices() == all_voices()[: len(FAKED)] == tuple(FAKED)
+    assert [voice.language for voice in all_voices()[len(FAKED) :]] == ["de", "en", "en-gb", "en-us"]
 
 
 @pytest.mark.usefixtures("faked")
@@ -60,13 +54,9 @@ def test_a_voice_says_phones_in_time() -> None:
         assert audio.duration_s == pytest.approx(1.0)
         found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
         assert found == [
-            ("sil", "", 0.0),
-            ("hh", "hello", 0.2),
-            ("ax", "hello", 0.3),
-            ("l", "hello", 0.4),
-            ("ow", "hello", 0.5),
+            ("sil", "", 0.0), ("hh", "hello", 0.2), ("ax", "hello", 0.3), ("l", "hello", 0.4), ("ow", "hello", 0.5),
             ("sil", "", 0.9),
-        ]
+        ]  # fmt: skip
 
 
 @pytest.mark.parametrize("voice", EACH)
@@ -129,6 +119,10 @@ def test_voices_by_name() -> None:
 
 @pytest.mark.usefixtures("bare")
 def test_without_synthesisers_it_says_what_to_install() -> None:
+    assert installed_voices() == ()
+    for voice in EACH:
+        with pytest.raises(MissingDependencyError, match=f"apt install {voice.synthesiser}"):
+            next(speak_sentences(["Hello"], voice))
     for find in (default_voice, lambda: voice_named("slt")):
         with pytest.raises(MissingDependencyError, match=r'pip install ".*\[text\]", or: apt install flite'):
             find()
@@ -154,12 +148,6 @@ def test_a_synthesiser_that_does_not_work_is_left_out(faked: Path, caplog: pytes
 
 
 @pytest.mark.usefixtures("faked")
-def test_all_voices_are_the_english_ones_and_the_languages() -> None:
-    assert all_voices()[: len(FAKED)] == tuple(FAKED)
-    assert [voice.language for voice in all_voices()[len(FAKED) :]] == ["de", "en", "en-gb", "en-us"]
-
-
-@pytest.mark.usefixtures("faked")
 def test_a_sound_is_there_until_the_next() -> None:
     with closing(voiced_sentences(["hello", "hello"], FAKED[0])) as said:
         first = next(said)
@@ -171,12 +159,8 @@ def test_a_sound_is_there_until_the_next() -> None:
 
 def test_flite_begins_again_at_each_utterance() -> None:
     phones = parse_phone_ends("pau:0.2 ay:0.5 \npau:0.1 y:0.3 \n")
-    assert [(span.label, span.start_s, span.end_s) for span in phones] == [
-        ("pau", 0, 0.2),
-        ("ay", 0.2, 0.5),
-        ("pau", 0.5, 0.6),
-        ("y", 0.6, 0.8),
-    ]
+    found = [(span.label, span.start_s, span.end_s) for span in phones]
+    assert found == [("pau", 0, 0.2), ("ay", 0.2, 0.5), ("pau", 0.5, 0.6), ("y", 0.6, 0.8)]
 
 
 def test_without_the_library_the_program_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -224,3 +208,69 @@ def test_the_times_of_real_voices_are_those_of_the_aligner(real: SyntheticVoice,
         late_s += [a.start_s - b.start_s for a, b in zip(said, aligned, strict=True)]
     assert np.median(np.abs(late_s)) < 0.02  # two frames; flite 0.013, festival with kal 0.015
     assert abs(np.median(late_s)) < 0.02
+
+
+needs_scripts = pytest.mark.skipif(os.name != "posix", reason="the programs are scripts")
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small bounds."""
+    bounds = {"LARGEST_OUTPUT_BYTES": 1000, "LARGEST_SOUND_BYTES": 1000, "STILL_S": 0.15, "POLL_S": 0.01}
+    for name, value in bounds.items():
+        monkeypatch.setattr(programs, name, value)
+
+
+@needs_scripts
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize(
+    ("script", "message"),
+    [
+        ("exec yes", "prints more than 1000 bytes"),
+        ("exec yes >&2", "prints more than 1000 bytes"),
+        ("echo; printf '%2000s' x", "prints more than 1000 bytes"),
+        ("exec yes > $0.d/endless", "writes more than 1000 bytes"),
+        ("truncate -s 20G $0.d/sparse", "writes more than 1000 bytes"),
+        ("sleep 30 & wait", "did not end within 0 s"),
+        ("kill -9 $$", "failed with -9"),
+        ("printf '\\377'", "cannot be run .*utf-8"),
+    ],
+)
+def test_a_program_is_stopped(script: str, message: str, tmp_path: Path) -> None:
+    program = _program(tmp_path, script)
+    with pytest.raises(InputError, match=message):
+        program_output([str(program)], "a-package", folder=tmp_path / "say.d")
+
+
+@needs_scripts
+def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
+    child = int(program_output([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
+    for _ in range(100):
+        if not _is_running(child):
+            return
+        time.sleep(0.01)
+    os.kill(child, 9)
+    pytest.fail("it is still running")
+
+
+@needs_scripts
+def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
+    assert program_output([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
+
+
+def _program(folder: Path, script: str) -> Path:
+    path = folder / "say"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    path.with_name("say.d").mkdir()
+    return path
+
+
+def _is_running(process: int) -> bool:
+    """Return whether a process is there and no zombie."""
+    try:
+        os.kill(process, 0)
+        status = Path(f"/proc/{process}/stat")
+        return not status.exists() or status.read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

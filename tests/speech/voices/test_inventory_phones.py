@@ -1,7 +1,3 @@
-"""A synthesiser's phones as the project's aligner would name them."""
-
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pytest
@@ -11,7 +7,7 @@ from hypothesis import strategies as st
 from lipmotion.errors import InputError
 from lipmotion.speech.voices import inventory_phones as module
 from lipmotion.speech.voices.inventory_phones import inventory_timeline, matches, with_words
-from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, ESPEAK_PHONES
+from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, ESPEAK_PHONES, complete_map
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from oracles.edits import least_cost
@@ -41,28 +37,17 @@ def test_matches_are_the_cheapest(found: list[str], wanted: list[str]) -> None:
 
 def test_unstressed_vowels_are_reduced_and_words_known() -> None:
     said = "b ah dh t er ih z ih t".split()  # dh: nobody's
-    assert with_words(said, ["butter", "is", "it"], LEXICON) == [
-        Unit("b", word="butter"),
-        Unit("ah", word="butter"),
-        Unit("dh", word="butter"),
-        Unit("t", word="butter"),
-        Unit("axr", word="butter"),
-        Unit("ix", word="is"),
-        Unit("z", word="is"),
-        Unit("ih", word="it"),
-        Unit("t", word="it"),
-    ]
+    wanted = {"butter": "b ah dh t axr", "is": "ix z", "it": "ih t"}
+    units = [Unit(phone, word=word) for word, phones in wanted.items() for phone in phones.split()]
+    assert with_words(said, [*wanted], LEXICON) == units
 
 
 def test_a_word_that_is_said_again_is_known_as_such() -> None:
-    said = with_words("ih t ih z ix t".split(), ["it", "is", "it"], LEXICON)
-    assert not any(unit.again for unit in said)
-    assert [unit.again for unit in with_words("ih t ax t".split(), ["it", "it"], LEXICON)] == [
-        False,
-        False,
-        True,
-        False,
-    ]
+    for phones, words, again in (
+        ("ih t ih z ix t", ["it", "is", "it"], [False] * 6),
+        ("ih t ax t", ["it", "it"], [False, False, True, False]),
+    ):
+        assert [unit.again for unit in with_words(phones.split(), words, LEXICON)] == again
 
 
 def test_pauses_are_named_by_place_and_length() -> None:
@@ -78,22 +63,15 @@ def test_pauses_are_named_by_place_and_length() -> None:
 def test_what_is_not_covered_is_silent_and_what_is_too_late_is_cut() -> None:
     said = timeline(("ih", 0.1, 0.2), ("t", 0.3, 0.6), ("t", 0.7, 0.8))
     units = inventory_timeline(said, ARPABET_PHONES, ["it"], LEXICON, 0.5)
-    assert [(span.label.phone, span.start_s, span.end_s) for span in units] == [
-        ("sil", 0.0, 0.1),
-        ("ih", 0.1, 0.2),
-        ("sp", 0.2, 0.3),
-        ("t", 0.3, 0.5),
-    ]
+    found = [(span.label.phone, span.start_s, span.end_s) for span in units]
+    assert found == [("sil", 0.0, 0.1), ("ih", 0.1, 0.2), ("sp", 0.2, 0.3), ("t", 0.3, 0.5)]
 
 
 def test_several_phones_share_a_label_and_parts_join() -> None:
     said = timeline(("A@", 0.0, 0.2), (";", 0.2, 0.3), ("t", 0.3, 0.3), ("z", 0.3, 0.4))
     units = inventory_timeline(said, ESPEAK_PHONES, ["is"], LEXICON, 0.4)
-    assert [(span.label.phone, span.start_s, span.end_s) for span in units] == [
-        ("aa", 0.0, 0.1),
-        ("r", 0.1, pytest.approx(0.3)),
-        ("z", 0.3, 0.4),
-    ]
+    found = [(span.label.phone, span.start_s, span.end_s) for span in units]
+    assert found == [("aa", 0.0, 0.1), ("r", 0.1, pytest.approx(0.3)), ("z", 0.3, 0.4)]
 
 
 def test_it_says_what_is_wrong() -> None:
@@ -107,3 +85,12 @@ def test_tables_lead_to_the_inventory() -> None:
         assert {phone for phones in table.values() for phone in phones} <= set(PHONES)
     spoken = {phone for phones in ESPEAK_PHONES.values() for phone in phones}
     assert set(PHONES) - spoken == {"sp"}
+
+
+def test_unknown_letters_are_reported_once() -> None:
+    found, unknown = complete_map(["ꙮ", "aꙮ", "_", ";", "_", "ꙮ"], {"_": ("sil",), ";": ()}, ipa=True)
+    assert found == {"ꙮ": ("ax",), "aꙮ": ("aa", "ax"), "_": ("sil",), ";": ()}
+    assert unknown == ("ꙮ",)
+    found, unknown = complete_map(["t", "e", "_!"], {"t": ("t",)}, ipa=False)  # mnemonics, read as IPA
+    assert found == {"t": ("t",), "e": ("eh",), "_!": ("sil",)}
+    assert unknown == ("e",)

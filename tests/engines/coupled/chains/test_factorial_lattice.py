@@ -1,5 +1,3 @@
-"""Factorial HMMs without a limit of asynchrony, whose product is not listed, against the listed product."""
-
 from dataclasses import replace
 from itertools import pairwise
 

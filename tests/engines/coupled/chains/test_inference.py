@@ -8,13 +8,9 @@ from lipmotion.engines.coupled.conversion.em_conversion import precision_statist
 from oracles import coupled as oracle
 
 KINDS = [
-    (COUPLED, (THREE, TWO), 1),
-    (COUPLED, (THREE, TWO), 0),
-    (FACTORIAL, (THREE, TWO), 1),
-    (FACTORIAL, (THREE, TWO), None),
-    (MULTISTREAM, (THREE,), 1),
-    (HMM, (THREE,), 1),
-]
+    (COUPLED, (THREE, TWO), 1), (COUPLED, (THREE, TWO), 0), (FACTORIAL, (THREE, TWO), 1),
+    (FACTORIAL, (THREE, TWO), None), (MULTISTREAM, (THREE,), 1), (HMM, (THREE,), 1),
+]  # fmt: skip
 every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 
 

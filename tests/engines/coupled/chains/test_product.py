@@ -3,8 +3,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, grammar, structure
-from lipmotion.engines.coupled.chains.product import JointState, initial_transitions, reachable
+from engines.coupled.tiny import THREE, TWO, chains, grammar, structure
+from lipmotion.engines.coupled.chains.product import JointState, Transitions, initial_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS, unit_sets
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.errors import InputError
@@ -114,29 +114,85 @@ def test_probabilities_out_of_every_state_sum_to_one(kind, limit):
     transitions = initial_transitions(even(structure(kind, limit=limit)))
     left = np.bincount(transitions.product.arc_from, np.exp(transitions.arc_log))
     np.testing.assert_allclose(left, 1, rtol=1e-12)
-
-
-def test_one_chain_is_the_hmm_of_its_units():
-    of = structure(HMM, (THREE,), states=3, limit=1)
-    reached = even(of)
-    assert len(reached.joint_states) == 9
-    assert len(reached.arc_from) == 9 + 6 + 9  # stay, move within, enter
+    one_chain = even(structure(HMM, (THREE,), states=3, limit=1))  # the HMM of its units
+    assert len(one_chain.joint_states) == 9
+    assert len(one_chain.arc_from) == 9 + 6 + 9  # stay, move within, enter
 
 
 def test_structures_that_do_not_fit_together():
-    for kind, chains, limit, message in (
+    for kind, sets, limit, message in (
         ("ring", (THREE,), 1, "ring"),
         (MULTISTREAM, (THREE, TWO), 1, "2 chains"),
         (COUPLED, (THREE,), 1, "1 chains"),
         (COUPLED, (THREE, TWO), 2, "required 0 to 1"),
     ):
         with pytest.raises(InputError, match=message):
-            structure(kind, chains, states=2, limit=limit)
+            structure(kind, sets, states=2, limit=limit)
     with pytest.raises(InputError, match="no chains"):
         unit_sets(" ")
-
-
-def test_too_many_joint_states_to_list():
-    of = structure(FACTORIAL, unit_sets("phone phone"), states=5, limit=None)
     with pytest.raises(InputError, match="limit the asynchrony"):
-        even(of)
+        even(structure(FACTORIAL, unit_sets("phone phone"), states=5, limit=None))
+
+
+def expected_log_likelihood(transitions: Transitions, counts) -> float:
+    """The part of the expected log likelihood that depends on the tables."""
+    return float(counts @ transitions.arc_log)
+
+
+def random_counts(transitions, seed=0):
+    return np.random.default_rng(seed).gamma(0.5, 20, len(transitions.product.arc_from))
+
+
+@pytest.mark.parametrize(
+    ("kind", "sets", "limit"),
+    [(COUPLED, (THREE, TWO), 1), (FACTORIAL, (THREE, TWO), 1), (COUPLED, (THREE, TWO), None), (HMM, (THREE,), 1)],
+)
+def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
+    transitions = chains(structure(kind, sets, limit=limit)).transitions
+    counts = random_counts(transitions)
+    best = transitions.reestimated(counts)
+    value = expected_log_likelihood(best, counts)
+    assert value > expected_log_likelihood(transitions, counts)
+    draw = np.random.default_rng(1)
+    for size in np.repeat((1e-3, 1e-2, 0.1), 8):
+        changes = (size * draw.normal(size=a.shape) * a * (1 - a) for a in best.advance)
+        moved = tuple(np.clip(a + step, 1e-5, 1 - 1e-5) for a, step in zip(best.advance, changes, strict=True))
+        other = expected_log_likelihood(Transitions(best.product, best.rows, moved), counts)
+        assert other <= value + 1e-6 * abs(value)
+
+
+def test_without_a_mask_it_is_the_closed_form():
+    transitions = chains(structure(HMM, (THREE,), limit=1)).transitions
+    counts = random_counts(transitions)
+    best = transitions.reestimated(counts)
+    left = np.bincount(transitions.product.arc_from, counts)
+    moved = np.bincount(transitions.product.arc_from, counts * transitions.product.moves[0])
+    np.testing.assert_allclose(best.advance[0][best.rows[0]], moved / left, atol=1e-6)
+
+
+def test_rows_without_data_stay():
+    transitions = chains().transitions
+    counts = random_counts(transitions)
+    without_data = transitions.product.arc_from == 3
+    counts[without_data] = 0
+    best = transitions.reestimated(counts)
+    for chain in range(2):
+        assert best.advance[chain][best.rows[chain][3]] == transitions.advance[chain][transitions.rows[chain][3]]
+
+
+def test_rare_joint_states_share_the_rows_of_their_own_state_and_lead():
+    transitions = chains().transitions
+    product, frames = transitions.product, np.zeros(len(transitions.product.joint_states))
+    frames[:4] = 1000
+    tied = transitions.tied(frames)
+    for chain in range(2):
+        rows = tied.rows[chain]
+        assert len(set(rows[:4])) == 4
+        alike = [
+            (product.chain_states[chain][s], *product.lead[:, s] - product.lead[chain, s]) for s in range(len(rows))
+        ]
+        for one in range(4, len(rows)):
+            for other in range(4, len(rows)):
+                assert bool(rows[one] == rows[other]) is (alike[one] == alike[other])
+    even_tables = Transitions(product, transitions.rows, tuple(np.full_like(a, 0.3) for a in transitions.advance))
+    np.testing.assert_allclose(even_tables.tied(0 * frames).arc_log, even_tables.arc_log)

@@ -3,6 +3,7 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
+from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     PRINTED,
@@ -13,6 +14,21 @@ from lipmotion.engines.coupled.conversion.em_conversion import (
     path_means,
     without_visual_streams,
 )
+from lipmotion.engines.coupled.conversion.mean_regression import (
+    CONSTANT,
+    OWN_RIDGE,
+    SHARED_RIDGE,
+    RegressionUtterance,
+    VisualRegression,
+    fit_regression_inputs,
+    fit_visual_regression,
+    posterior_axes,
+    regression_weights,
+)
+from lipmotion.engines.coupled.engine import CoupledEngine
+from lipmotion.engines.coupled.training.coupled_training import _state_regressions, fit_coupled
+from lipmotion.testing.examples import example, examples, speech, timeline
+from lipmotion.types.progress import silent_monitor
 from oracles import coupled as oracle
 
 KINDS = [
@@ -99,10 +115,8 @@ def test_the_printed_update_weighs_by_components_and_partners():
             for component, term in enumerate(terms):
                 weight = visual * np.exp(term - total) * np.exp(group.mixtures.log_weights[density, component])
                 inverse = 1 / group.mixtures.variances[density, component]
-                top, bottom = (
-                    top + weight * inverse * group.mixtures.means[density, component],
-                    bottom + weight * inverse,
-                )
+                top = top + weight * inverse * group.mixtures.means[density, component]
+                bottom = bottom + weight * inverse
         expected[frame] = top / bottom
     np.testing.assert_allclose(printed, expected, rtol=1e-3, atol=1e-4)
 
@@ -114,3 +128,99 @@ def test_with_one_component_and_one_partner_each_print_and_maximiser_agree():
         convert(model, data, model.full_lattice, ConversionSettings(SOFT, update, 5)) for update in (EXACT, PRINTED)
     )
     np.testing.assert_allclose(one.streams[1], other.streams[1], rtol=1e-4, atol=1e-5)
+
+
+def utterances(count=3, frames=60, states=4, seed=0) -> list[RegressionUtterance]:
+    draw = np.random.default_rng(seed)
+    result = []
+    for _ in range(count):
+        first = draw.dirichlet(np.full(states, 0.2), frames).astype(np.float32)
+        features = draw.normal(0, 1, (frames, 39)).astype(np.float32)
+        visual = draw.dirichlet(np.full(6, 0.2), frames).astype(np.float32)
+        observed = draw.random(frames) < 0.8
+        target = (features[:, :2] + visual[:, :2] * 3).astype(np.float32)
+        target = np.where(observed[:, None], target, 99).astype(np.float32)
+        result.append(RegressionUtterance(features, first, [visual], [target], observed))
+    return result
+
+
+def test_the_regressions_are_ridges_one_towards_the_other():
+    """By normal equations over explicitly weighted rows: all, then families, then regressions."""
+    data = utterances()
+    inputs = fit_regression_inputs(np.eye(4, dtype=np.float32), data)
+    regression_of_state, family = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 0, 1])
+    found = fit_visual_regression(inputs, data, 0, regression_of_state, family)
+    z = np.concatenate([inputs(one.features, one.reduced_posteriors)[one.observed] for one in data]).astype(float)
+    target = np.concatenate([one.targets[0][one.observed] for one in data]).astype(float)
+    weight = np.concatenate(
+        [regression_weights(one.chain_posteriors[0], regression_of_state, 3)[one.observed] for one in data]
+    ).astype(float)
+
+    def solved(rows, prior, strength):
+        system = z.T @ (rows[:, None] * z) + strength * np.eye(z.shape[1])
+        return np.linalg.solve(system, z.T @ (rows[:, None] * target) + strength * prior)
+
+    shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), SHARED_RIDGE * len(z))
+    for number in range(3):
+        above = solved(weight[:, family == family[number]].sum(axis=1), shared, OWN_RIDGE)
+        np.testing.assert_allclose(found.coefficients[number], solved(weight[:, number], above, OWN_RIDGE), atol=2e-3)
+
+
+def test_expected_means_and_precisions_are_sums_over_states():
+    draw = np.random.default_rng(0)
+    regression = VisualRegression(
+        np.array([0, 1, 1]),
+        draw.normal(0, 1, (2, 5, 3)).astype(np.float32),
+        draw.uniform(0.5, 2, (3, 3)).astype(np.float32),
+    )
+    posterior = np.array([[0.5, 0.2, 0.3], [0.0, 1.0, 0.0], [0.995, 0.005, 0.0]], np.float32)
+    inputs = draw.normal(0, 1, (3, 5)).astype(np.float32)
+    expected = [
+        0.5 * inputs[0] @ regression.coefficients[0] + 0.5 * inputs[0] @ regression.coefficients[1],
+        inputs[1] @ regression.coefficients[1],
+        inputs[2] @ regression.coefficients[0],  # half a percent is left out
+    ]
+    np.testing.assert_allclose(regression.means(inputs, posterior), expected, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(regression.precisions(posterior), posterior @ (1 / regression.variances), rtol=1e-6)
+
+
+def test_regression_inputs_end_with_a_constant_and_have_few_axes():
+    data = utterances(states=4)
+    axes = posterior_axes(one.reduced_posteriors for one in data)
+    assert axes.shape == (4, 4)
+    np.testing.assert_allclose(axes.T @ axes, np.eye(4), atol=1e-5)
+    inputs = fit_regression_inputs(axes, data)
+    z = inputs(data[0].features, data[0].reduced_posteriors)
+    assert len(z) == 60
+    assert (z[:, -1] == CONSTANT).all()
+    rows = np.concatenate([inputs(one.features, one.reduced_posteriors @ axes.T)[:, :-1] for one in data])
+    assert np.abs(rows.mean(axis=0)).max() < 1e-3
+
+
+def test_every_viseme_has_a_regression_for_each_position_of_a_state():
+    regression_of_state, family = _state_regressions(structure(states=2), 1)
+    assert regression_of_state.tolist() in ([2, 3, 0, 1], [0, 1, 2, 3])
+    assert family.tolist() == [0, 0, 1, 1]
+    assert len(TWO.units) == 2
+
+
+@pytest.mark.parametrize("regression", [True, pytest.param(False, marks=pytest.mark.long)])
+def test_the_regression_brings_motion_closer(regression):
+    config = CoupledConfig(acoustic_regression=regression, mixtures=1, closures=False, articulation=False)
+    model = fit_coupled(examples(6), config, silent_monitor).model
+    assert (model.regression is not None) is regression
+    held_out = example(("t", "aa", "p", "iy", "m", "uw", "s", "aa"), seed=77)
+    generated = CoupledEngine(config).generate(model, held_out.speech).motion
+    error = np.sqrt(np.mean((generated["opening"] - held_out.motion["opening"]) ** 2))
+    assert error < (0.02 if regression else 0.05)
+
+
+@pytest.mark.long
+def test_the_mouth_rests_in_long_silence():
+    config = CoupledConfig(mixtures=1)
+    engine = CoupledEngine(config)
+    model = fit_coupled(examples(), config, silent_monitor).model
+    generated = engine.generate(model, speech(timeline(("aa", "t", "aa")))).motion["opening"]
+    opening = model.rest_pose[model.space.direct_names.index("opening")]
+    assert np.abs(generated[:30] - opening).max() < 2e-3
+    assert generated[30:].max() > 0.15

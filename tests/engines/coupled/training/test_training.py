@@ -30,40 +30,30 @@ def sentences(count=6, frames_each=9, seed=0) -> list[AlignedUtterance]:
         draw = np.random.default_rng([seed, number])
         phones = [str(phone) for phone in draw.permutation(PHONES)]
         edges = np.arange(len(phones) + 1) * frames_each / 100
-        spans = tuple(
-            Span(a, b, Unit(p)) for a, b, p in zip(edges[:-1].tolist(), edges[1:].tolist(), phones, strict=True)
-        )
+        spans = tuple(Span(a, b, Unit(p)) for (a, b), p in zip(pairwise(edges.tolist()), phones, strict=True))
         index = np.repeat([THREE.units.index(THREE.unit(p)) for p in phones], frames_each)
         early = np.append(index[2:], index[-1:].repeat(2))
         speech = draw.normal(0, 0.4, (len(index), 2)) + np.stack([index == 0, index == 1], axis=1) * 2
         seen = draw.normal(0, 0.3, (len(index), 1)) + (early == THREE.units.index("closed"))[:, None] * 2
-        made.append(
-            AlignedUtterance(
-                AudioVisualObservations((speech.astype(np.float32), seen.astype(np.float32)), (None, None)),
-                Timeline(spans),
-            )
-        )
+        streams = AudioVisualObservations((speech.astype(np.float32), seen.astype(np.float32)), (None, None))
+        made.append(AlignedUtterance(streams, Timeline(spans)))
     return made
 
 
-def test_the_likelihood_rises_at_every_step():
-    for kind, sets, limit in (
-        (COUPLED, (THREE, TWO), 1),
-        (FACTORIAL, (THREE, TWO), 1),
-        (MULTISTREAM, (THREE,), 1),
-        (HMM, (THREE,), 1),
-    ):
-        steps = []
-        of = structure(kind, sets, states=3, limit=limit)
-        mixtures = (4,) if kind == HMM else (4, 2)
-        *_, grown = growing_chains(
-            of, ("speech", "seen"), sentences(), MixtureSchedule(mixtures, (1.0, 1.0), most_steps=8), steps.append
-        )
-        assert grown.converged is bool(steps[-1].log_likelihood - steps[-2].log_likelihood < CONVERGENCE_GAIN)
-        assert {step.mixtures[0] for step in steps} == {1, 2, 4}
-        for one, other in pairwise(steps):
-            if one.mixtures == other.mixtures:
-                assert other.log_likelihood >= one.log_likelihood - 1e-5
+@pytest.mark.parametrize(
+    ("kind", "sets"),
+    [(COUPLED, (THREE, TWO)), (FACTORIAL, (THREE, TWO)), (MULTISTREAM, (THREE,)), (HMM, (THREE,))],
+)
+def test_the_likelihood_rises_at_every_step(kind, sets):
+    steps = []
+    how = MixtureSchedule((4,) if kind == HMM else (4, 2), (1.0, 1.0), most_steps=8)
+    of = structure(kind, sets, states=3)
+    *_, grown = growing_chains(of, ("speech", "seen"), sentences(), how, steps.append)
+    assert grown.converged is bool(steps[-1].log_likelihood - steps[-2].log_likelihood < CONVERGENCE_GAIN)
+    assert {step.mixtures[0] for step in steps} == {1, 2, 4}
+    for one, other in pairwise(steps):
+        if one.mixtures == other.mixtures:
+            assert other.log_likelihood >= one.log_likelihood - 1e-5
 
 
 def test_statistics_of_utterances_are_those_of_all_paths():
@@ -122,12 +112,14 @@ def test_a_stream_that_was_not_observed_is_not_reestimated():
     assert not np.array_equal(better.groups[0].mixtures.means, model.groups[0].mixtures.means)
 
 
-def test_no_recording_has_a_path():
+def test_no_recording_has_a_path_and_options_that_cannot_be():
     model = chains()
-    data = observations(3)
     lattice = replace(model.full_lattice, allowed_units=np.zeros((3, 3), bool))
     with pytest.raises(InputError, match="labels"):
-        e_step(model, [LatticeUtterance(data, lattice)])
+        e_step(model, [LatticeUtterance(observations(3), lattice)])
+    for options in ({"mixtures": 3}, {"asynchrony": -2}, {"structure": "ring"}, {"audio_weight": -1.0}):
+        with pytest.raises(InputError):
+            CoupledConfig(**options)
 
 
 def test_allowed_units_are_those_of_labels_near_a_frame():
@@ -164,12 +156,6 @@ def test_frames_away_from_speech_are_silence():
     assert away[:4].all()
     assert not away[6:114].any()
     assert away[116:].all()
-
-
-def test_options_that_cannot_be():
-    for options in ({"mixtures": 3}, {"asynchrony": -2}, {"structure": "ring"}, {"audio_weight": -1.0}):
-        with pytest.raises(InputError):
-            CoupledConfig(**options)
 
 
 def with_pictures(number: int) -> Example:

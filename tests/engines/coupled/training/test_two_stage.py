@@ -1,5 +1,3 @@
-"""The second stage of training, on speech without motion."""
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -22,29 +20,21 @@ from lipmotion.stats.mixture import Mixtures
 from lipmotion.testing.examples import RATE_HZ, examples
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor
 from oracles.joint import mixture
-from oracles.networks import posteriors
+from oracles.paths import posteriors
 
 SMALL = {"articulation": False, "states": 1, "asynchrony": 0, "mixtures": 1, "speech_only_mixtures": 2, "components": 1}
 PLAIN = {"acoustic_regression": False, "variance_scaling": False}
-STRUCTURES = {
-    "hmm": "phone",
-    "multistream": "phone",
-    "factorial": "phone viseme",
-    "coupled": "phone viseme",
-}
+STRUCTURES = {"hmm": "phone", "multistream": "phone", "factorial": "phone viseme", "coupled": "phone viseme"}
 
 
 def aligned(sentences: Sequence[Example]) -> list[AlignedUtterance]:
-    """Speech with motion in two dimensions, and the phones in time."""
-    return [
-        AlignedUtterance(
-            AudioVisualObservations(
-                (e.speech.features.values, e.motion.values[:, :2].astype(np.float32)), (None, e.valid)
-            ),
-            e.speech.units,
-        )
-        for e in sentences
-    ]
+    """Speech with motion in two dimensions, and the phones in time; without motion, what nobody has seen is 0."""
+    found = []
+    for each in sentences:
+        seen = each.motion.values[:, :2] if each.motion.channels else np.zeros((len(each.valid), 2))
+        streams = each.speech.features.values, seen.astype(np.float32)
+        found.append(AlignedUtterance(AudioVisualObservations(streams, (None, each.valid)), each.speech.units))
+    return found
 
 
 @cache
@@ -63,24 +53,12 @@ def other_speaker(example: Example, seed: int = 5) -> Example:
     mixed = (0.3 * values + 0.8 * values @ turned).astype(np.float32)
     features = replace(example.speech.features, values=mixed)
     frames = len(values)
-    return Example(
-        "other speaker",
-        replace(example.speech, features=features),
-        Motion(np.zeros((frames, 0)), RATE_HZ, ()),
-        np.zeros(frames, bool),
-    )
+    nothing = Motion(np.zeros((frames, 0)), RATE_HZ, ())
+    return Example("other speaker", replace(example.speech, features=features), nothing, np.zeros(frames, bool))
 
 
 def speech_alone(sentences: Sequence[Example]) -> list[AlignedUtterance]:
-    return [
-        AlignedUtterance(
-            AudioVisualObservations(
-                (e.speech.features.values, np.zeros((len(e.valid), 2), np.float32)), (None, np.zeros_like(e.valid))
-            ),
-            e.speech.units,
-        )
-        for e in map(other_speaker, sentences)
-    ]
+    return aligned([other_speaker(each) for each in sentences])
 
 
 def three_frames() -> AlignedUtterance:
@@ -161,13 +139,8 @@ def test_a_step_is_that_of_the_split_model() -> None:
 @pytest.mark.parametrize("kind", ["hmm", "coupled"])
 def test_every_step_raises_the_likelihood(kind: str) -> None:
     steps: list[TrainingStep] = []
-    train_on_speech(
-        trained(kind),
-        aligned(examples(4)),
-        speech_alone(examples(4, seed=9)),
-        SpeechOnlySchedule(4, 6, 0.5),
-        steps.append,
-    )
+    own, others = aligned(examples(4)), speech_alone(examples(4, seed=9))
+    train_on_speech(trained(kind), own, others, SpeechOnlySchedule(4, 6, 0.5), steps.append)
     for _, run in groupby(steps, lambda step: step.mixtures):
         figures = [step.log_likelihood for step in run]
         assert len(figures) > 2

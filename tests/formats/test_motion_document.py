@@ -1,10 +1,12 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.formats import read_motion, write_motion
+from lipmotion.types.generation import ReducedVariance
 
 
 @pytest.fixture
@@ -64,3 +66,41 @@ def test_what_is_wrong_is_said(path, generation):
         path.write_text(json.dumps({key: document[key] for key in document if key != missing}), encoding="utf-8")
         with pytest.raises(InputError, match=f"{missing} is missing"):
             read_motion(path)
+
+
+@pytest.fixture
+def npz_path(tmp_path, generation):
+    npz_path = tmp_path / "a.npz"
+    write_motion(npz_path, generation, source={"file": "Größe.wav"}, model={})
+    return npz_path
+
+
+def test_arrays_are_not_rounded_and_plain(npz_path, generation):
+    motion, _ = read_motion(npz_path)
+    assert (motion.values == generation.motion.values).all()
+    assert motion.channels == generation.motion.channels
+    with np.load(npz_path, allow_pickle=False) as arrays:
+        assert set(arrays) == {"values", "standard_deviations", "document"}
+        document = json.loads(str(arrays["document"]))
+    assert "values" not in document
+    assert document["source"] == {"file": "Größe.wav"}
+
+
+def test_every_value_has_a_standard_deviation(tmp_path, generation):
+    spread = np.random.default_rng(3).uniform(0.01, 4, generation.motion.values.shape)
+    npz_path = tmp_path / "b.npz"
+    write_motion(npz_path, replace(generation, spread=spread), source={}, model={})
+    with np.load(npz_path, allow_pickle=False) as arrays:
+        np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(spread), rtol=1e-6)
+    reduced = ReducedVariance(spread[:, :1], np.array([[1.0, 4.0]]))
+    write_motion(npz_path, replace(generation, spread=reduced), source={}, model={})
+    with np.load(npz_path, allow_pickle=False) as arrays:
+        np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(spread[:, :1] * [1, 4]), rtol=1e-6)
+    assert (read_motion(npz_path)[0].values == generation.motion.values).all()
+
+
+def test_a_pickle_is_not_opened(tmp_path):
+    npz_path = tmp_path / "a.npz"
+    np.savez(npz_path, values=np.zeros((1, 1)), document=np.array({"format": "lipmotion.motion"}, dtype=object))
+    with pytest.raises(InputError, match="not a motion file"):
+        read_motion(npz_path)
