@@ -115,7 +115,7 @@ def main() -> None:
         if step % 100 == 0:
             print(step, round(error, 4), flush=True)
 
-    plan = TrainingPlan(options.steps, batch_size=16, rate=2e-3, dropout=0.1, seed=0)
+    plan = TrainingPlan(options.steps, batch_size=16, rate=2e-3, dropout=0.3, seed=0)
     network = SHAPE.initial(len(LAGS) * OUTPUTS, 0)
     network = fit_network(network, draw, len(sequences), weights, plan, report)
     network = network.with_parameters(

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named
     from lipmotion.formats.base import read_motion
+    from lipmotion.live.stream import LiveFrame, Stream
     from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.explain import explain, state_runs
@@ -58,6 +59,7 @@ __all__ = [
     "Generation",
     "Job",
     "Lexicon",
+    "LiveFrame",
     "Model",
     "Motion",
     "Outputs",
@@ -69,6 +71,7 @@ __all__ = [
     "Span",
     "SpokenText",
     "Staging",
+    "Stream",
     "Timeline",
     "Unit",
     "adapt",
@@ -98,6 +101,8 @@ _HOMES = {
     "Outputs": "lipmotion.pipeline.request",
     "Request": "lipmotion.pipeline.request",
     "Lexicon": "lipmotion.units",
+    "LiveFrame": "lipmotion.live.stream",
+    "Stream": "lipmotion.live.stream",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.train",
     "animate": "lipmotion.pipeline.generate.animate",

@@ -23,7 +23,7 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
 from lipmotion.types.values import parse_number, parse_whole
 
-_VERBS = "animate batch speak render edit explain cues words train adapt character addon info cite doctor"
+_VERBS = "animate batch live speak render edit explain cues words train adapt character addon info cite doctor"
 VERBS: Registry[Callable[[Any], None]] = Registry(
     "verb", "lipmotion.verbs", {name: f"lipmotion.cli.verbs.{name}:add" for name in [*_VERBS.split(), "completion"]}
 )

@@ -34,7 +34,7 @@ HEARD_S = (STEP_FRAMES - 1) / FRAME_RATE_HZ + WINDOW / 2 / SPEECH_RATE_HZ
 """So much after its time the sound of a step has come."""
 OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)
 """Values of an answer: articulators, and how probable each viseme is."""
-SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 128, (1, 2, 4, 8, 16, 1, 2, 4))
+SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 192, (1, 2, 4, 8, 16, 1, 2, 4))
 """It hears the last 1.5 s."""
 START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
 """Natural logarithm of the power of loud speech that is assumed before anything is heard, and the least: sound that is
@@ -99,13 +99,15 @@ class BandMeans:
     """
 
     def __init__(self, typical: Array) -> None:
-        self._means, self._frames = typical.astype(np.float32), KNOWN_FRAMES
+        self._means: Array = typical.astype(np.float32)
+        self._frames = KNOWN_FRAMES
 
     def push(self, row: Array) -> Array:
         """Return the features of a frame [shape=(41,)], from its levels, which also change the means."""
         if row[-1] > -SPEECH_RANGE:
             self._frames = min(self._frames + 1, REMEMBERED_FRAMES)
-            self._means = self._means + (row[:-1] - self._means) / np.float32(self._frames)
+            change: Array = (row[:-1] - self._means) / np.float32(self._frames)
+            self._means = self._means + change
         result: Array = np.append(row[:-1] - self._means, row[-1] + np.float32(SPEECH_RANGE)) / np.float32(SCALE)
         return result
 

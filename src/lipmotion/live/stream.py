@@ -41,13 +41,13 @@ SPOKEN, SILENT = 0.4, 0.6
 """Probability of silence under which the mouth speaks, and from which on it goes to rest."""
 REST_STEPS, START_STEPS = 5, 3
 """Steps in which it rests, 100 ms, and in which it begins to speak."""
-CLOSED = (0.3, 0.6)
+CLOSED = (0.07, 0.18)
 """Probabilities of p, b and m from which on the lips begin to close, and are closed."""
 CLOSING_STEPS = 2
 """Steps in which they close, or open, at most: 40 ms. What is seen late closes as fast."""
 TAPS, BLOCK = 16, 160
 """Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""
-CORRELATED_STEPS = 0.05
+CORRELATED_STEPS = 0.02
 """The network's errors are alike for about so many steps."""
 KEPT_STEPS = LAGS[-1] + 3
 LOWEST_RATE_HZ, HIGHEST_RATE_HZ = 4_000, 384_000
@@ -76,6 +76,11 @@ class LiveFrame:
         if name not in self.names:
             raise KeyError(name)
         return float(self.motion[self.names.index(name)])
+
+    @property
+    def number(self) -> int:
+        """The number of the frame, from 0."""
+        return round(self.time_s / STEP_S)
 
 
 class Stream:
@@ -137,7 +142,7 @@ class Stream:
         silence = np.zeros(BLOCK, np.float32)
         while self._next < wanted:
             frames += self._hear(silence)
-        kept = [frame for frame in frames if round(frame.time_s / STEP_S) < wanted]
+        kept = [frame for frame in frames if frame.number < wanted]
         self._next, self._first = wanted, wanted
         self._listen()
         return kept
@@ -201,8 +206,10 @@ class Stream:
         while len(self._rows) >= STEP_FRAMES:
             inputs, self._rows = np.concatenate(self._rows[:STEP_FRAMES]), self._rows[STEP_FRAMES:]
             self._answers.append(self._steps.push(inputs).reshape(len(LAGS), -1))
-            step, self._heard = self._heard - self._lag, self._heard + 1
-            if step >= 0:
+            if self._lag < self._heard == 0:  # what the first step says is about the frame after it
+                frames.append(self._frame(self._face.resting, self._first * STEP_S))
+            self._heard += 1
+            if self._heard > self._lag:
                 known_s = self._first * STEP_S + (self._heard - 1) * STEP_S + HEARD_S
                 frames.append(self._frame(self._speak(), known_s))
         return frames

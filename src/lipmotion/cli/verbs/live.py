@@ -1,0 +1,118 @@
+"""``lipmotion live``: lip motion of a microphone, a pipe or a file, frame by frame, to whatever shows it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from lipmotion.cli.terminal.printing import flush_output, print_line
+from lipmotion.errors import InputError, MissingDependencyError
+
+CHUNK_S = 0.02
+"""Sound is taken in pieces of so many seconds."""
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("live", help="move a mouth while somebody speaks: a microphone, a pipe, a file")
+    add = parser.add_argument
+    told = "a microphone by name or number (default: the usual one), a sound file, or - for raw sound of 16 bits"
+    add("-i", "--input", default="", metavar="DEVICE|FILE|-", help=told)
+    told = "what takes the frames, perhaps several (default: -, JSON lines); vmc:HOST:PORT, osc, livelink alike"
+    add("--to", action="append", metavar="-|FILE.csv|vmc|osc|livelink", help=told)
+    told = "how late a frame may be known, 0 to 640; more is better (default: 160)"
+    add("--look-ahead", type=float, default=160.0, metavar="MS", help=told)
+    add("--rate", type=int, default=16_000, metavar="HZ", help="of sound on standard input (default: 16000)")
+    add("--model", help="a trained model (default: the one that ships)")
+    add("--as-fast-as-possible", action="store_true", help="do not wait for a file's own time")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Push sound into a ``lipmotion.Stream`` and give its frames to all consumers."""
+    from contextlib import ExitStack
+
+    from lipmotion.live.consumers import open_consumer
+    from lipmotion.live.stream import Stream
+    from lipmotion.pipeline.model import load_model
+
+    with ExitStack() as stack:
+        rate_hz, sound = _open_sound(options)
+        stream = Stream(rate_hz, options.look_ahead, load_model(options.model))
+        consumers = [stack.enter_context(open_consumer(to, print_line)) for to in options.to or ["-"]]
+        pieces = iter(sound)
+        while True:
+            try:
+                frames, ended = stream.push(next(pieces)), False
+            except StopIteration:
+                frames, ended = stream.flush(), True
+            for frame in frames:
+                for take in consumers:
+                    take(frame)
+            flush_output()
+            if ended:
+                return
+
+
+def _open_sound(options: argparse.Namespace) -> tuple[int, Iterator[Any]]:
+    """Return the rate of the sound, and its pieces, as they come."""
+    from pathlib import Path
+
+    from lipmotion.speech.sound.audio_files import read_audio
+
+    if options.input == "-":
+        return options.rate, _read_pipe(options.rate)
+    if Path(options.input).is_file():
+        audio = read_audio(Path(options.input))
+        step = int(CHUNK_S * audio.rate_hz)
+        pieces = (audio.samples[first : first + step] for first in range(0, len(audio.samples), step))
+        return audio.rate_hz, pieces if options.as_fast_as_possible else _in_time(pieces)
+    return options.rate, _listen(options.input, options.rate)
+
+
+def _read_pipe(rate_hz: int) -> Iterator[bytes]:
+    """Yield what comes on standard input, as whole samples."""
+    rest = b""
+    while content := os.read(sys.stdin.fileno(), 2 * int(CHUNK_S * rate_hz)):
+        content = rest + content
+        even = len(content) // 2 * 2
+        rest = content[even:]
+        yield content[:even]
+
+
+def _in_time(pieces: Iterator[Any]) -> Iterator[Any]:
+    """Yield pieces of ``CHUNK_S`` when they would have been spoken."""
+    began_s = time.monotonic()
+    for number, piece in enumerate(pieces, 1):
+        time.sleep(max(began_s + number * CHUNK_S - time.monotonic(), 0.0))
+        yield piece
+
+
+def _listen(device: str, rate_hz: int) -> Iterator[Any]:
+    """Yield the sound of a microphone; where it is unplugged, wait until it is back.
+
+    Raises MissingDependencyError: sounddevice is not installed. InputError: there is no such microphone.
+    """
+    try:
+        import sounddevice
+    except (ImportError, OSError) as error:
+        raise MissingDependencyError(
+            f"a microphone needs sounddevice, and PortAudio ({error}); pip install sounddevice, or give a FILE or -"
+        ) from error
+    chosen: str | int | None = int(device) if device.isdecimal() else device or None
+    opened = False
+    while True:
+        try:
+            size = int(CHUNK_S * rate_hz)
+            with sounddevice.InputStream(rate_hz, size, chosen, channels=1, dtype="int16") as microphone:
+                opened = True
+                while True:
+                    yield microphone.read(size)[0]
+        except (sounddevice.PortAudioError, ValueError) as error:
+            if not opened:
+                raise InputError(f"no microphone {device or '(the usual one)'!s}: {error}") from error
+            time.sleep(1.0)  # it was unplugged

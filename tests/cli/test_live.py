@@ -1,0 +1,51 @@
+"""``lipmotion live``."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from children import LIPMOTION, child
+from cli.conftest import RunCommand
+from lipmotion.speech.sound.audio_files import read_audio
+
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
+
+
+def test_a_file_becomes_frames_on_the_command_line(run: RunCommand, tmp_path: Path) -> None:
+    ran = run(
+        "live", "-i", WELCOME, "--to", tmp_path / "a.csv", "--to", "-", "--look-ahead", 80, "--as-fast-as-possible"
+    )
+    assert ran.code == 0
+    rows = list(csv.DictReader((tmp_path / "a.csv").read_text("utf-8").splitlines()))
+    lines = [json.loads(line) for line in ran.out]
+    assert len(rows) == len(lines) == pytest.approx(5.66 * 50, abs=2)
+    for number, (row, line) in enumerate(zip(rows, lines, strict=True)):
+        assert float(row["time_s"]) == pytest.approx(number * 0.02)
+        assert float(row["known_s"]) - float(row["time_s"]) < 0.08
+        assert float(row["opening"]) == pytest.approx(line["opening"], abs=1e-4)
+    assert max(float(row["jawOpen"]) for row in rows) > 0.05
+
+
+def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
+    (tmp_path / "a.raw").write_bytes((read_audio(WELCOME).samples[:32_000] * 32767).astype("<i2").tobytes())
+    command = [*LIPMOTION, "live", "-i", "-", "--to", tmp_path / "a.csv"]
+    with (tmp_path / "a.raw").open("rb") as sound, child(command, stdin=sound) as process:
+        assert process.communicate()[0] == ""
+        assert process.returncode == 0
+    assert len((tmp_path / "a.csv").read_text("utf-8").splitlines()) == 101
+
+
+def test_what_is_wrong_is_said(run: RunCommand) -> None:
+    for arguments, message in (
+        (("-i", WELCOME, "--to", "nowhere"), "--to nowhere"),
+        (("-i", WELCOME, "--look-ahead", "-5"), "-5"),
+        (("-i", "no such microphone"), "sounddevice|microphone"),
+    ):
+        ran = run("live", *arguments)
+        assert ran.code in (3, 8)
+        assert re.search(message, "\n".join(ran.err))

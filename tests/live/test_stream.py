@@ -1,0 +1,177 @@
+"""Live motion: pieces do not matter, frames are neither lost nor doubled, closures, rest, interruption."""
+
+from __future__ import annotations
+
+import asyncio
+import copy
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion import LiveFrame, Request, Stream, animate
+from lipmotion.errors import InputError
+from lipmotion.live.network import CausalSteps, SoundFeatures, live_network, silent_step
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio
+
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
+STEP_S = 0.02
+
+
+@pytest.fixture(scope="module")
+def sound() -> np.ndarray:
+    return read_audio(WELCOME).samples
+
+
+def all_of(stream: Stream, samples: np.ndarray, sizes: list[int]) -> list[LiveFrame]:
+    frames, place, number = [], 0, 0
+    while place < len(samples):
+        size = sizes[number % len(sizes)]
+        frames += stream.push(samples[place : place + size])
+        place, number = place + size, number + 1
+    return frames + stream.flush()
+
+
+def values_of(frames: list[LiveFrame]) -> np.ndarray:
+    return np.array([[frame.time_s, frame.known_s, *frame.motion, *frame.weights.values()] for frame in frames])
+
+
+@pytest.mark.parametrize(("rate_hz", "look_ahead_ms"), [(16_000, 160), (24_000, 0), (44_100, 320), (8_000, 80)])
+def test_pieces_do_not_matter(sound: np.ndarray, rate_hz: int, look_ahead_ms: float) -> None:
+    positions = np.arange(0, len(sound) - 1, 16_000 / rate_hz)
+    there = np.interp(positions, np.arange(len(sound)), sound).astype(np.float32)[: 3 * rate_hz]
+    whole, *others = (
+        values_of(all_of(Stream(rate_hz, look_ahead_ms), there, sizes))
+        for sizes in ([len(there)], [rate_hz // 1000], [1, 977, 20_011, 3], [rate_hz // 25])
+    )
+    assert len(whole) == 150
+    assert whole[:, 0] == pytest.approx(np.arange(150) * STEP_S)
+    assert (whole[:, 1] - whole[:, 0]).max() < max(look_ahead_ms / 1000, 0.0026) + 1e-9
+    for other in others:
+        assert other.tobytes() == whole.tobytes()
+
+
+def test_integers_and_channels_are_the_same_sound(sound: np.ndarray) -> None:
+    rounded = np.round(sound[:16_000] * 32767).astype(np.int16)
+    alone = values_of(all_of(Stream(), rounded, [16_000]))
+    stereo = values_of(all_of(Stream(), np.stack([rounded, rounded], axis=1), [16_000]))
+    stream = Stream()
+    as_bytes = values_of(stream.push(rounded.tobytes()) + stream.flush())
+    assert np.array_equal(alone, stereo)
+    assert np.array_equal(alone, as_bytes)
+
+
+def test_without_a_limit_it_is_what_animate_makes(sound: np.ndarray) -> None:
+    stream = Stream(look_ahead_ms=None)
+    assert stream.push(sound[:48_000]) == []
+    frames = stream.flush()
+    expected = animate(Request(Audio(sound[:48_000], 16_000))).motion.resampled(50.0)
+    made = np.array([frame["opening"] for frame in frames])
+    assert made == pytest.approx(expected["opening"][: len(made)], abs=1e-9)
+    assert {frame.known_s for frame in frames} == {3.0}
+
+
+@pytest.mark.parametrize("look_ahead_ms", [0, 80, 320])
+def test_it_follows_the_whole_recording(sound: np.ndarray, look_ahead_ms: float) -> None:
+    whole = animate(Request(Audio(sound, 16_000))).motion
+    frames = all_of(Stream(look_ahead_ms=look_ahead_ms), sound, [640])
+    time_s = np.array([frame.time_s for frame in frames])
+    opening = np.array([frame["opening"] for frame in frames])
+    assert np.corrcoef(opening, np.interp(time_s, whole.time_s, whole["opening"]))[0, 1] > 0.6
+
+
+def test_it_rests_in_silence_and_within_100_ms_after_it(sound: np.ndarray) -> None:
+    line = np.concatenate([np.zeros(16_000), sound[:40_000], np.zeros(16_000)]).astype(np.float32)
+    frames = all_of(Stream(), line, [640])
+    opening = np.array([frame["opening"] for frame in frames])
+    assert opening[:45].max() < 0.01
+    assert opening[-35:].max() < 0.01
+    assert opening.max() > 0.08
+    still = values_of(all_of(Stream(), np.zeros(32_000, np.float32), [640]))[:, 2:]
+    assert np.ptp(still, axis=0).max() < 1e-9
+
+
+def test_a_gain_changes_little(sound: np.ndarray) -> None:
+    loud, soft = (
+        np.array([frame["opening"] for frame in all_of(Stream(), sound * np.float32(gain), [640])])
+        for gain in (1.0, 0.1)
+    )
+    assert np.corrcoef(loud, soft)[0, 1] > 0.9
+
+
+def test_an_interruption_rests_and_time_goes_on(sound: np.ndarray) -> None:
+    rng, stream, frames = np.random.default_rng(5), Stream(look_ahead_ms=80), []
+    for _ in range(40):
+        start = int(rng.integers(len(sound) - 16_000))
+        frames += stream.push(sound[start : start + int(rng.integers(1, 12_000))])
+        if rng.random() < 0.4:
+            rested = stream.interrupt()
+            assert len(rested) == 5
+            assert rested[-1]["opening"] < 0.005
+            frames += rested
+    frames += stream.flush()
+    assert [frame.number for frame in frames] == list(range(len(frames)))
+    opening = np.array([frame["opening"] for frame in frames])
+    assert np.isfinite(values_of(frames)).all()
+    assert np.abs(np.diff(opening)).max() < 0.12
+
+
+def test_an_interruption_takes_back_what_is_not_heard_yet(sound: np.ndarray) -> None:
+    stream = Stream()
+    pushed = stream.push(sound[:48_000])
+    frames = stream.interrupt(1.0)
+    assert frames[0].time_s == pytest.approx(1.02)
+    assert frames[0]["opening"] < pushed[50]["opening"] + 1e-9
+    assert stream.push(sound[:16_000])[0].time_s == pytest.approx(frames[-1].time_s + STEP_S)
+
+
+def test_a_copy_goes_on_by_itself(sound: np.ndarray) -> None:
+    stream = Stream()
+    stream.push(sound[:20_000])
+    other = copy.deepcopy(stream)
+    first = values_of(stream.push(sound[20_000:40_000]))
+    stream.push(sound)
+    assert np.array_equal(values_of(other.push(sound[20_000:40_000])), first)
+
+
+def test_sound_that_comes_while_others_work(sound: np.ndarray) -> None:
+    async def pieces() -> AsyncIterator[np.ndarray]:
+        for first in range(0, 32_000, 640):
+            await asyncio.sleep(0)
+            yield sound[first : first + 640]
+
+    async def collect() -> list[LiveFrame]:
+        return [frame async for frame in Stream().frames(pieces())]
+
+    assert np.array_equal(values_of(asyncio.run(collect())), values_of(all_of(Stream(), sound[:32_000], [640])))
+
+
+def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarray) -> None:
+    stream = Stream()
+    for wrong, message in (
+        (np.array([0.1, np.nan]), "not finite"),
+        (np.zeros((2, 2, 2)), r"shape \(2, 2, 2\)"),
+        (np.zeros(3, np.int32), "int32"),
+        (b"123", "3 bytes"),
+    ):
+        with pytest.raises(InputError, match=message):
+            stream.push(wrong)
+    assert np.array_equal(
+        values_of(all_of(stream, sound[:8000], [80])), values_of(all_of(Stream(), sound[:8000], [80]))
+    )
+    for arguments, message in (((0,), "0 Hz"), ((16_000, 700), "700 ms"), ((16_000, -1), "-1 ms")):
+        with pytest.raises(InputError, match=message):
+            Stream(*arguments)
+
+
+def test_steps_are_those_of_the_whole_network(sound: np.ndarray) -> None:
+    live = live_network()
+    typical = live.typical.astype(np.float32)
+    rows = np.stack(SoundFeatures(typical).push(sound[:32_000]))
+    steps = rows[: len(rows) // 2 * 2].reshape(len(rows) // 2, -1)
+    hears = CausalSteps(live.network, silent_step(typical))
+    one_by_one = np.stack([hears.push(step) for step in steps])
+    heard = np.concatenate([np.tile(silent_step(typical), (live.network.reach, 1)), steps])
+    assert one_by_one == pytest.approx(live.network(heard)[: len(steps)], abs=1e-4)
