@@ -20,6 +20,7 @@ REGION = re.compile(r"(<!--made:([\w-]+)-->\n).*?(<!--end-->)", re.DOTALL)
 SEE = {
     "animate": "faces controls formats transcripts meshes filmed-face",
     "batch": "batch",
+    "live": "live",
     "speak": "speak",
     "render": "controls",
     "edit": "edit",

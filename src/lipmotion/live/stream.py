@@ -61,6 +61,11 @@ class LiveFrame:
     known_s : when it was known, in the sound's own time
     motion  : values of all channels of the model [shape=(P,)], by ``names``
     weights : ARKit's weights of the mouth, and visemes of Oculus, by name
+
+    >>> import numpy as np, lipmotion
+    >>> frame = lipmotion.Stream(look_ahead_ms=80).push(np.zeros(16_000, np.float32))[-1]
+    >>> frame.number, round(frame.time_s, 2), round(frame["viseme_sil"])
+    (46, 0.92, 1)
     """
 
     time_s: float
