@@ -106,10 +106,9 @@ class BandMeans:
         """Return the features of a frame [shape=(41,)], from its levels, which also change the means."""
         if row[-1] > -SPEECH_RANGE:
             self._frames = min(self._frames + 1, REMEMBERED_FRAMES)
-            change: Array = (row[:-1] - self._means) / np.float32(self._frames)
+            change: Array = ((row[:-1] - self._means) / np.float32(self._frames)).astype(np.float32)
             self._means = self._means + change
-        result: Array = np.append(row[:-1] - self._means, row[-1] + np.float32(SPEECH_RANGE)) / np.float32(SCALE)
-        return result
+        return (np.append(row[:-1] - self._means, row[-1] + SPEECH_RANGE) / SCALE).astype(np.float32)
 
 
 def silent_step(typical: Array) -> Array:
