@@ -118,6 +118,16 @@ def test_an_interruption_rests_and_time_goes_on(sound: np.ndarray) -> None:
     assert np.abs(np.diff(opening)).max() < 0.12
 
 
+def test_the_mouth_goes_on_from_where_it_was(sound: np.ndarray) -> None:
+    """A line that ends in the middle of a word, and the next one."""
+    stream = Stream()
+    frames = stream.push(sound[:30_400]) + stream.flush() + stream.push(sound[20_000:60_000]) + stream.flush()
+    opening = np.array([frame["opening"] for frame in frames])
+    assert [frame.number for frame in frames] == list(range(len(frames)))
+    assert np.abs(np.diff(opening)).max() < 0.08
+    assert max(frame.known_s for frame in frames[:95]) <= 1.9 + 1e-9
+
+
 def test_an_interruption_takes_back_what_is_not_heard_yet(sound: np.ndarray) -> None:
     stream = Stream()
     pushed = stream.push(sound[:48_000])
@@ -168,7 +178,7 @@ def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarra
 
 def test_steps_are_those_of_the_whole_network(sound: np.ndarray) -> None:
     live = live_network()
-    typical = live.typical.astype(np.float32)
+    typical = live.typical
     rows = np.stack(SoundFeatures(typical).push(sound[:32_000]))
     steps = rows[: len(rows) // 2 * 2].reshape(len(rows) // 2, -1)
     hears = CausalSteps(live.network, silent_step(typical))

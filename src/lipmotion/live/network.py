@@ -61,11 +61,15 @@ class SoundFeatures:
     """
 
     def __init__(self, typical: Array, warp: float = 1.0) -> None:
-        self._pending = np.zeros(WINDOW // 2 + 1, np.float32)
         self._filters = mel_filters(warp, *BANDS)
         self._window = np.hamming(WINDOW).astype(np.float32)
-        self._level, self._power = START_LEVEL, 0.0
-        self._bands = BandMeans(typical)
+        self._level, self._bands = START_LEVEL, BandMeans(typical)
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin to hear other sound of the same voice and microphone."""
+        self._pending = np.zeros(WINDOW // 2 + 1, np.float32)
+        self._power = 0.0
 
     def push(self, samples: Array) -> list[Array]:
         """Return the features of every frame that is complete [each shape=(41,)]."""
@@ -167,7 +171,7 @@ class LiveNetwork(NamedTuple):
     variances: NDArray[np.float64]
     acceleration: NDArray[np.float64]
     gains: NDArray[np.float64]
-    typical: NDArray[np.float64]
+    typical: Array
     curves: NDArray[np.float64]
 
 
@@ -178,4 +182,5 @@ def live_network() -> LiveNetwork:
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
         arrays = dict(stored)
     network = SHAPE.from_arrays({name: arrays[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)
-    return LiveNetwork(network, *(arrays[name].astype(float) for name in LiveNetwork._fields[1:]))
+    values = {name: arrays[name].astype(float) for name in LiveNetwork._fields[1:]}
+    return LiveNetwork(network, **{**values, "typical": arrays["typical"].astype(np.float32)})

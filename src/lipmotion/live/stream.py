@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections import deque
 from collections.abc import AsyncIterable, AsyncIterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import gcd
 from typing import Any
@@ -43,13 +43,13 @@ REST_STEPS, START_STEPS = 5, 3
 """Steps in which it rests, 100 ms, and in which it begins to speak."""
 CLOSED = (0.07, 0.18)
 """Probabilities of p, b and m from which on the lips begin to close, and are closed."""
-CLOSING_STEPS = 2
-"""Steps in which they close, or open, at most: 40 ms. What is seen late closes as fast."""
+CLOSING_STEPS, OPENING_STEPS = 2, 4
+"""Steps in which they close, also where it is seen late, and in which they open again: 40 and 80 ms."""
 TAPS, BLOCK = 16, 160
 """Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""
 CORRELATED_STEPS = 0.02
 """The network's errors are alike for about so many steps."""
-KEPT_STEPS = LAGS[-1] + 3
+KEPT_STEPS, SHOWN_FRAMES = LAGS[-1] + 3, 500
 LOWEST_RATE_HZ, HIGHEST_RATE_HZ = 4_000, 384_000
 
 
@@ -121,6 +121,8 @@ class Stream:
         self._smoother = _Smoother(live_network(), self._lag)
         self._first = 0  # the frame at which the sound that is heard now begins
         self._next = 0
+        self._shown: deque[tuple[Array, Array]] = deque([self._face.resting], maxlen=SHOWN_FRAMES)
+        self._features = SoundFeatures(live_network().typical)
         self._listen()
 
     def push(self, samples: Any) -> list[LiveFrame]:
@@ -140,17 +142,15 @@ class Stream:
         """Return the frames of all sound that was pushed; the next sound follows it."""
         if self._sound is not None:
             return self._animate_all()
-        heard, frames = self._resampler.finish(), []
-        total = self._resampler.seconds
-        wanted = self._first + int(np.ceil(total / STEP_S - 1e-9))
-        frames = self._hear(heard)
-        silence = np.zeros(BLOCK, np.float32)
+        seconds, frames = self._resampler.seconds, self._hear(self._resampler.finish())
+        wanted, end_s = self._first + int(np.ceil(seconds / STEP_S - 1e-9)), self._first * STEP_S + seconds
         while self._next < wanted:
-            frames += self._hear(silence)
-        kept = [frame for frame in frames if frame.number < wanted]
+            frames += self._hear(np.zeros(BLOCK, np.float32))
+        for _ in range(self._next - wanted):
+            self._shown.pop()
         self._next, self._first = wanted, wanted
         self._listen()
-        return kept
+        return [replace(frame, known_s=min(frame.known_s, end_s)) for frame in frames if frame.number < wanted]
 
     def interrupt(self, time_s: float | None = None) -> list[LiveFrame]:
         """Return the frames in which the mouth comes to rest, 100 ms; sound that is not heard yet is forgotten.
@@ -160,16 +160,13 @@ class Stream:
         Sound that is pushed now follows these frames.
         """
         last = self._next if time_s is None else min(max(int(time_s / STEP_S) + 1, 0), self._next)
-        back = min(self._next - last, len(self._shown) - 1)
-        self._next -= max(back, 0)
-        for _ in range(max(back, 0)):
+        for _ in range(min(self._next - last, len(self._shown) - 1)):
             self._shown.pop()
-        pose, weights = self._shown[-1] if self._shown else self._face.resting
-        frames = []
+            self._next -= 1
+        shown, frames = self._shown[-1], []
         for number in range(1, REST_STEPS + 1):
             share = (1 - np.cos(np.pi * number / REST_STEPS)) / 2
-            shown = self._face.between(pose, weights, float(share))
-            frames.append(self._frame(shown, self._next * STEP_S))
+            frames.append(self._frame(_between(shown, self._face.resting, share), self._next * STEP_S))
         self._first = self._next
         if self._sound is not None:
             self._sound = []
@@ -192,18 +189,16 @@ class Stream:
         return result
 
     def _listen(self) -> None:
-        """Begin to hear, as after silence."""
+        """Begin to hear, as after silence; how loud and how coloured the sound is stays known."""
         self._resampler = _Resampler(self.sample_rate)
-        network = live_network()
-        self._features = SoundFeatures(network.typical.astype(np.float32))
-        self._steps = CausalSteps(network.network, silent_step(network.typical.astype(np.float32)))
+        self._features.restart()
+        self._steps = CausalSteps(live_network().network, silent_step(live_network().typical))
         self._rows: list[NDArray[np.float32]] = []
         self._answers = deque([self._smoother.silent] * KEPT_STEPS, KEPT_STEPS)
         self._heard = 0  # steps
         self._before = [self._smoother.rest] * 2
         self._closing, self._resting = 0.0, 1.0
-        if not hasattr(self, "_shown"):
-            self._shown: deque[tuple[Array, Array]] = deque(maxlen=500)
+        self._last, self._leaving = self._shown[-1], 1.0  # the pose from which the mouth goes on
 
     def _hear(self, samples: NDArray[np.float32]) -> list[LiveFrame]:
         frames = []
@@ -211,7 +206,7 @@ class Stream:
         while len(self._rows) >= STEP_FRAMES:
             inputs, self._rows = np.concatenate(self._rows[:STEP_FRAMES]), self._rows[STEP_FRAMES:]
             self._answers.append(self._steps.push(inputs).reshape(len(LAGS), -1))
-            if self._lag < self._heard == 0:  # what the first step says is about the frame after it
+            if self._lag == -1 and not self._heard:  # what the first step says is about the frame after it
                 frames.append(self._frame(self._face.resting, self._first * STEP_S))
             self._heard += 1
             if self._heard > self._lag:
@@ -227,9 +222,11 @@ class Stream:
         change = 1 / REST_STEPS if silent > SILENT else -1 / START_STEPS if silent < SPOKEN else 0.0
         self._resting = float(np.clip(self._resting + change, 0, 1))
         wanted = float(np.interp(said[VISEMES_15.index("PP")], CLOSED, (0, 1)))
-        self._closing += float(np.clip(wanted - self._closing, -1 / CLOSING_STEPS, 1 / CLOSING_STEPS))
-        pose, weights = self._face.pose(smooth, np.clip(said, 0, 1), self._closing)
-        return self._face.between(pose, weights, (1 - np.cos(np.pi * self._resting)) / 2)
+        self._closing += float(np.clip(wanted - self._closing, -1 / OPENING_STEPS, 1 / CLOSING_STEPS))
+        spoken = self._face.pose(smooth, np.clip(said, 0, 1), self._closing)
+        shown = _between(spoken, self._face.resting, (1 - np.cos(np.pi * self._resting)) / 2)
+        self._leaving = max(self._leaving - 1 / REST_STEPS, 0.0)
+        return _between(shown, self._last, self._leaving)
 
     def _frame(self, shown: tuple[Array, Array], known_s: float) -> LiveFrame:
         self._shown.append(shown)
@@ -281,7 +278,7 @@ class _Smoother:
             first = np.linalg.solve(normal, np.eye(count)[0])
             self._of_answers[:, column] = first * trust[:, column]
             self._of_before[:, column] = -first @ (unknown.T @ known) / variance
-        step = silent_step(network.typical.astype(np.float32))
+        step = silent_step(network.typical)
         hears = CausalSteps(network.network, step)
         for _ in range(network.network.reach):
             answers = hears.push(step)
@@ -338,9 +335,11 @@ class _Face:
         arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
         return motion.values[0], np.concatenate([arkit, said / max(float(said.sum()), 1.0)])
 
-    def between(self, pose: Array, weights: Array, rest: float) -> tuple[Array, Array]:
-        """Return a pose and weights that are so far at rest, 0 to 1."""
-        return tuple(each + rest * (goal - each) for each, goal in zip((pose, weights), self.resting, strict=True))  # type: ignore[return-value]
+
+def _between(shown: tuple[Array, Array], goal: tuple[Array, Array], share: float) -> tuple[Array, Array]:
+    """Return a pose and weights that are a share of the way to others, 0 to 1."""
+    (pose, weights), (last, others) = shown, goal
+    return pose + share * (last - pose), weights + share * (others - weights)
 
 
 class _Resampler:
