@@ -184,3 +184,12 @@ def live_network() -> LiveNetwork:
     network = SHAPE.from_arrays({name: arrays[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)
     values = {name: arrays[name].astype(float) for name in LiveNetwork._fields[1:]}
     return LiveNetwork(network, **{**values, "typical": arrays["typical"].astype(np.float32)})
+
+
+@cache
+def answer_silence() -> Array:
+    """Return the answers of the network of the package after nothing but silence [shape=(5 · 23,)]."""
+    live = live_network()
+    step = silent_step(live.typical)
+    hears = CausalSteps(live.network, step)
+    return [hears.push(step) for _ in range(live.network.reach)][-1]

@@ -22,6 +22,7 @@ from lipmotion.live.network import (
     CausalSteps,
     LiveNetwork,
     SoundFeatures,
+    answer_silence,
     live_network,
     silent_step,
 )
@@ -278,11 +279,7 @@ class _Smoother:
             first = np.linalg.solve(normal, np.eye(count)[0])
             self._of_answers[:, column] = first * trust[:, column]
             self._of_before[:, column] = -first @ (unknown.T @ known) / variance
-        step = silent_step(network.typical)
-        hears = CausalSteps(network.network, step)
-        for _ in range(network.network.reach):
-            answers = hears.push(step)
-        self.silent = answers.reshape(len(LAGS), -1)
+        self.silent = answer_silence().reshape(len(LAGS), -1)
         self.rest = self.silent[-1, : len(ARTICULATORS)].astype(float)
 
     def solve(self, answers: deque[NDArray[np.float32]], before: list[Array]) -> tuple[Array, Array]:
@@ -316,9 +313,9 @@ class _Face:
     @cached_property
     def resting(self) -> tuple[Array, Array]:
         """Pose and weights of the mouth at rest."""
-        smoother = _Smoother(live_network(), 0)
+        articulators = answer_silence().reshape(len(LAGS), -1)[-1, : len(ARTICULATORS)].astype(float)
         said = np.eye(len(VISEMES_15))[VISEMES_15.index("sil")]
-        return self.pose(smoother.rest, said, 1.0)
+        return self.pose(articulators, said, 1.0)
 
     def pose(self, articulators: Array, said: Array, closing: float) -> tuple[Array, Array]:
         """Return the values of all channels, and the weights, with the lips closed so far, 0 to 1."""

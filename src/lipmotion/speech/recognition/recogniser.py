@@ -23,7 +23,12 @@ from lipmotion.hmm.network import (
 )
 from lipmotion.kernels.paths import Windows
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, speaker_similarity
+from lipmotion.speech.features.speaker_similarity import (
+    OWN_SCORE,
+    STRANGER_SCORE,
+    SpeakerSimilarity,
+    speaker_similarity,
+)
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
 from lipmotion.speech.recognition.general import CombinedPhones, combine_phones, combined_log_likelihoods
@@ -59,14 +64,13 @@ RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 words are recognised by pocketsphinx and aligned. ``auto``: by a phone recogniser, where one is installed and sure; else
 as ``fast``, and words where they fit."""
 USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
-OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
-"""A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
-is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
-alone decide. The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
-NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
-"""Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
-general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
-other voices in other rooms -7 to -15."""
+SMALL_PERPLEXITY = 9.0
+"""A voice with a speaker similarity over ``OWN_SCORE`` is that of the own models; if the perplexity of their bigram is
+less than this, their corpus has few words, which no language model of English expects. Then the phones alone decide.
+The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
+FULL_WEIGHT_SCORE = -5.0
+"""Own models have the weight of the general ones from this speaker similarity score on, and none down from
+``STRANGER_SCORE``."""
 FEW_GAUSSIANS = 2
 """Own models of so few Gaussians a state were trained on less than two minutes: forced alignment uses the general ones
 alone then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
@@ -130,7 +134,7 @@ class Recogniser:
         known = (
             self.kind == "auto"
             and similarity is not None
-            and similarity.score > OWN_VOICE_SCORE
+            and similarity.score > OWN_SCORE
             and self.own.bigram.perplexity < SMALL_PERPLEXITY
         )
         network = None if known else network_of(self.kind)
@@ -336,7 +340,7 @@ def cached_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation |
 
 def own_model_weight(score: float) -> float:
     """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
-    return min(max((score - NO_WEIGHT_SCORE) / (FULL_WEIGHT_SCORE - NO_WEIGHT_SCORE), 0.0), 1.0)
+    return min(max((score - STRANGER_SCORE) / (FULL_WEIGHT_SCORE - STRANGER_SCORE), 0.0), 1.0)
 
 
 def _first_frame(start_s: float) -> int:
