@@ -70,7 +70,7 @@ def test_words_of_other_tools_are_answered_with_a_verb(run):
         (["animat", "a.wav"], "no verb 'animat'; did you mean: lipmotion animate"),
         (["-o", "b.tsv", "a.wav"], "no verb 'b.tsv'; did you mean: lipmotion animate SPEECH -o OUT"),
         (["version"], "no verb 'version'; did you mean: lipmotion --version"),
-        (["bogus"], "no verb 'bogus'; the verbs are: animate, batch, speak"),
+        (["bogus"], "no verb 'bogus'; the verbs are: animate, batch, live, speak"),
     ):
         done = run(*words)
         assert done.code == 2
