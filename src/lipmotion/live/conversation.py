@@ -176,7 +176,7 @@ def list_messages(frames: list[LiveFrame], now: bool, **more: Any) -> Iterator[d
     for first in range(0, len(frames), FRAMES_IN_MESSAGE):
         shown = [
             {
-                "time_s": round(frame.time_s, 3),
+                "time_s": round(frame.time_s, 4),
                 "weights": {name: round(value, 3) for name, value in frame.weights.items() if value >= LEAST_WEIGHT},
             }
             for frame in frames[first : first + FRAMES_IN_MESSAGE]

@@ -72,8 +72,10 @@ class LipSync(FrameProcessor):
         """Pass a frame on, sound with its motion."""
         await super().process_frame(frame, direction)
         if isinstance(frame, InterruptionFrame):
+            await self.pause_processing_frames()  # what comes next follows the frames of rest
             await self.push_frame(frame, direction)
             await self._interrupt()
+            await self.resume_processing_frames()
         elif isinstance(frame, SystemFrame) or direction == FrameDirection.UPSTREAM:
             await self.push_frame(frame, direction)
         elif isinstance(frame, TTSAudioRawFrame):
