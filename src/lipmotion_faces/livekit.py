@@ -63,7 +63,9 @@ class AvatarVideo(VideoGenerator):
         still = Staging(size=size, blinks=False, gaze=False, brows=False, head=False)
         drawn = stage_face(make_face(face) if isinstance(face, str) else face, still)
         if not isinstance(drawn, DrawsSingly):
-            raise InputError(f"the face {type(drawn).__name__!r} does not draw single pictures; choose portrait or head")
+            raise InputError(
+                f"the face {type(drawn).__name__!r} does not draw single pictures; choose portrait or head"
+            )
         self._face: DrawsSingly = drawn
         self._channels = (*model.learned.space.channels, Channel("eyeBlinkLeft", ""), Channel("eyeBlinkRight", ""))
         self._rest = self._shown = self._conversation.rest(0.0, None)[0]

@@ -85,9 +85,7 @@ class Conversation:
 
         shown : the frame from which it goes to rest; None: it rests already
         """
-        goal = [
-            replace(self._goal, time_s=time_s + number * STEP_S, known_s=time_s) for number in range(REST_STEPS)
-        ]
+        goal = [replace(self._goal, time_s=time_s + number * STEP_S, known_s=time_s) for number in range(REST_STEPS)]
         return blend(goal, shown or self._goal)
 
     def _flush(self) -> list[LiveFrame]:

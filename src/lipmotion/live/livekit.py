@@ -1,4 +1,4 @@
-"""Lip motion in a LiveKit agent: ``LipSync``, around the session's audio output. (A face as video: ``lipmotion_faces``.)"""
+"""Lip motion in a LiveKit agent: ``LipSync``, around the audio output of a session."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ DISCARDED_S = 0.2
 
 
 class LipSync(AudioOutput):
-    """Sends lip motion in time with the sound of a session: ``session.output.audio = LipSync(session.output.audio, …)``.
+    """Sends lip motion in time with sound: ``session.output.audio = LipSync(session.output.audio, room=ctx.room)``.
 
     next_in_chain        : takes the sound, unchanged
     room                 : to whose participants motion goes, as data packets of topic ``lipmotion``
@@ -51,7 +51,8 @@ class LipSync(AudioOutput):
     Sound waits until its motion is known: at most the look-ahead, when an utterance begins. Motion goes 0.1 s before
     its sound is heard. A packet is an object of JSON::
 
-        {"type": "lipmotion", "now": true, "frames": [{"time_s": 0.0, "weights": {"jawOpen": 0.12, "viseme_aa": 0.4}}, …]}
+        {"type": "lipmotion", "now": true,
+         "frames": [{"time_s": 0.0, "weights": {"jawOpen": 0.12, "viseme_aa": 0.4}}, …]}
 
     Times are seconds of all sound of this output. The frames take the place of all frames from the time of the first
     one on. ``now``: show the first one when the packet comes, the others by their distance from it; so it is where
@@ -108,9 +109,7 @@ class LipSync(AudioOutput):
             return
         at_rest = self._playout.is_silent(self._clock_s())
         sound = bytes(frame.data)
-        self._add(
-            await self._conversation.push(sound, frame.sample_rate, frame.num_channels, at_rest=at_rest)
-        )
+        self._add(await self._conversation.push(sound, frame.sample_rate, frame.num_channels, at_rest=at_rest))
         if not self._void:
             self._held.append((self._conversation.sound_s, frame))
             await self._pass_on()
