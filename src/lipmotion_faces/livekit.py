@@ -129,7 +129,7 @@ class AvatarVideo(VideoGenerator):
         for pose in rest[::2]:
             self._waiting.put_nowait((self._number, pose, None))
 
-    async def __aiter__(self) -> AsyncIterator[rtc.VideoFrame | rtc.AudioFrame | AudioSegmentEnd]:  # type: ignore[override]
+    async def __aiter__(self) -> AsyncIterator[rtc.VideoFrame | rtc.AudioFrame | AudioSegmentEnd]:
         """Yield a picture, and the sound that is heard with it, if any."""
         while True:
             sound: rtc.AudioFrame | AudioSegmentEnd | None = None

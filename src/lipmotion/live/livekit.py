@@ -222,7 +222,7 @@ class LipSync(AudioOutput):
         while self._known and self._started and self._paused_s is None:
             heard_s = self._playout.heard_s(self._clock_s())
             early_s = self._known[0].time_s - LEAD_S - heard_s
-            if early_s > 0:
+            if early_s > 0.001:
                 await asyncio.sleep(early_s)
                 continue
             due = [frame for frame in self._known if frame.time_s < heard_s + 2 * LEAD_S][:FRAMES_IN_MESSAGE]
