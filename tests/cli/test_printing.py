@@ -20,10 +20,9 @@ import pytest
 from cli.conftest import is_one_error
 from lipmotion import Corpus
 from lipmotion.cli.main import main
-from lipmotion.cli.terminal.events import Events
+from lipmotion.cli.terminal.events import Events, Stopper
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
 from lipmotion.cli.terminal.progress import outcome, report_progress
-from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.cli.verbs import info
 from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import figures_table

@@ -14,7 +14,7 @@ import lipmotion
 from children import LIPMOTION, PIPE, child, environment, run_child
 from children import Done as Completed
 from cli import signalled
-from lipmotion.cli.terminal.stop import Stopped, Stopper
+from lipmotion.cli.terminal.events import Stopped, Stopper
 from lipmotion.cli.verbs import info
 
 LINE = "lipmotion: stopped; run the same command again to go on"
@@ -131,9 +131,9 @@ def test_a_second_signal_later_ends_the_program():
     """A second signal ends the program at once, even where the first one was swallowed."""
     program = (
         "import time\n"
-        "from lipmotion.cli.terminal import stop\n"
-        "stop.SAME_SIGNAL_S = 0.0\n"
-        "stop.Stopper().listen()\n"
+        "from lipmotion.cli.terminal import events\n"
+        "events.SAME_SIGNAL_S = 0.0\n"
+        "events.Stopper().listen()\n"
         "while True:\n"
         "    try:\n"
         "        print('ready', flush=True)\n"
@@ -254,6 +254,5 @@ def test_little_is_loaded_before_signals_are_listened_to():
     loaded = set(done.stdout.split())
     assert {name for name in loaded if name.startswith("lipmotion")} == {
         "lipmotion", "lipmotion.cli", "lipmotion.cli.terminal", "lipmotion.cli.terminal.events", "lipmotion.cli.main",
-        "lipmotion.cli.terminal.stop",
     }  # fmt: skip
     assert not loaded & {"typing", "re", "json", "argparse", "logging", "numpy", "pathlib"}

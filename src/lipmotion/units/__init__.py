@@ -16,6 +16,9 @@ from lipmotion.units.phones import (
     SILENCE,
     SIMILAR_PHONES,
     UNKNOWN_PHONES,
+    VISEME_OF,
+    VISEMES,
+    VOWELS,
     describe_unknown_phone,
     find_similar_lips,
     find_similar_phone,
@@ -25,7 +28,6 @@ from lipmotion.units.phones import (
 )
 from lipmotion.units.text_normalisation import check_phones, check_text, check_words, find_words, split_words
 from lipmotion.units.unit_sets import UNIT_SETS, UnitSet, load_unit_set
-from lipmotion.units.visemes import VISEME_OF, VISEMES, VOWELS
 
 __all__ = [
     "LIP_CLOSING",

@@ -8,7 +8,6 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.inventory import (
     RecordedUnits,
     UnitIndex,
@@ -17,6 +16,7 @@ from lipmotion.engines.selection.inventory import (
     standing_in,
     unit_index,
 )
+from lipmotion.engines.selection.model import SelectionConfig
 from lipmotion.engines.selection.windows import (
     INVISIBLE,
     INVISIBLE_SYMBOL,
