@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.selection.concatenation import pieces_of
-from lipmotion.engines.selection.costs import ABUTTING_JOIN
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, MINNIS_2000, SelectionConfig
 from lipmotion.engines.selection.engine import SelectionEngine
-from lipmotion.engines.selection.model import MINNIS_2000, SelectionConfig, SelectionModel
+from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.kernels.compiler import one_thread

@@ -23,7 +23,7 @@ from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, Stopper
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
 from lipmotion.cli.terminal.progress import outcome, report_progress
-from lipmotion.cli.verbs import info
+from lipmotion.cli.verbs import about
 from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text
@@ -154,7 +154,7 @@ def test_warnings(run, monkeypatch):
             warnings.simplefilter("always")
             warnings.warn(EVIL, stacklevel=1)
 
-    monkeypatch.setattr(info, "run", warn)
+    monkeypatch.setattr(about, "run_info", warn)
     head = "lipmotion: warning: "
     with logged():
         done = run("info")

@@ -145,7 +145,7 @@ class SpeechKnowledge:
     >>> SpeechKnowledge(voice=1.0, phones=1.0).confidence(curve, variance).round(2)
     array([0.86, 0.86, 0.86, 0.86])
     >>> SpeechKnowledge(voice=0.0, phones=0.9).confidence(curve, variance).round(2)
-    array([0.32, 0.61, 0.32, 0.61])
+    array([0.32, 0.62, 0.32, 0.62])
     """
 
     voice: float

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from lipmotion.errors import shorten
 from lipmotion.types import Timeline, Unit
+from lipmotion.units.spelling import parse_table
 
 VISEMES: dict[str, tuple[str, ...]] = {
     "sip": ("sil", "sp"),  # silence (the print's /sip/ is /sil/; sp joins it)
@@ -110,55 +111,16 @@ LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")
 """The phones in which the lips meet."""
 
 SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
-    # A phone that is not in a corpus borrows the model of the first of these that is.
-    "aa": ("ao", "ah"),
-    "ae": ("eh", "aa"),
-    "ah": ("ax", "aa"),
-    "ao": ("aa", "ow"),
-    "aw": ("aa", "ow"),
-    "ax": ("ah", "ix", "ih"),
-    "axr": ("er", "r", "ax"),
-    "ay": ("aa", "ey"),
-    "b": ("p", "m", "d"),
-    "ch": ("jh", "sh", "t"),
-    "d": ("t", "dh", "n"),
-    "dh": ("th", "v", "d"),
-    "eh": ("ae", "ih"),
-    "el": ("l", "ow"),
-    "em": ("m", "ax"),
-    "en": ("n", "ax"),
-    "er": ("axr", "r", "ax"),
-    "ey": ("eh", "iy"),
-    "f": ("v", "th", "s"),
-    "g": ("k", "d"),
-    "hh": ("th", "f", "k"),
-    "ih": ("ix", "iy", "eh"),
-    "ix": ("ih", "ax"),
-    "iy": ("ih", "ey"),
-    "jh": ("ch", "zh", "d"),
-    "k": ("g", "t"),
-    "l": ("el", "ow", "w"),
-    "m": ("n", "em"),
-    "n": ("m", "en"),
-    "ng": ("n", "m"),
-    "ow": ("ao", "uh", "uw"),
-    "oy": ("ao", "ow"),
-    "p": ("b", "t"),
-    "r": ("axr", "er", "w"),
-    "s": ("z", "sh", "f"),
-    "sh": ("ch", "s"),
-    "t": ("d", "k"),
-    "th": ("f", "dh", "s"),
-    "uh": ("uw", "ax", "ow"),
-    "uw": ("uh", "ow"),
-    "v": ("f", "dh", "b"),
-    "w": ("uw", "l", "r"),
-    "y": ("iy", "ih"),
-    "z": ("s", "zh"),
-    "zh": ("jh", "sh", "z"),
-    "sil": ("sp",),
-    "sp": ("sil",),
+    phone: tuple(others.split())
+    for phone, others in parse_table(
+        "aa=ao_ah ae=eh_aa ah=ax_aa ao=aa_ow aw=aa_ow ax=ah_ix_ih axr=er_r_ax ay=aa_ey b=p_m_d ch=jh_sh_t d=t_dh_n "
+        "dh=th_v_d eh=ae_ih el=l_ow em=m_ax en=n_ax er=axr_r_ax ey=eh_iy f=v_th_s g=k_d hh=th_f_k ih=ix_iy_eh "
+        "ix=ih_ax iy=ih_ey jh=ch_zh_d k=g_t l=el_ow_w m=n_em n=m_en ng=n_m ow=ao_uh_uw oy=ao_ow p=b_t r=axr_er_w "
+        "s=z_sh_f sh=ch_s t=d_k th=f_dh_s uh=uw_ax_ow uw=uh_ow v=f_dh_b w=uw_l_r y=iy_ih z=s_zh zh=jh_sh_z sil=sp "
+        "sp=sil"
+    ).items()
 }
+"""A phone that is not in a corpus borrows the model of the first of these that is."""
 
 
 def count_phone_edits(wanted: Sequence[str], found: Sequence[str]) -> int:

@@ -2,8 +2,9 @@
 
 import pytest
 
+from lipmotion.engines.selection.costs import SelectionConfig
 from lipmotion.engines.selection.engine import SelectionEngine
-from lipmotion.engines.selection.model import SelectionConfig, SelectionModel
+from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.testing.examples import examples
 from lipmotion.types import silent_monitor
 

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.costs import Costs, Target
+from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.model import SelectionConfig
 from lipmotion.engines.selection.windows import phone_windows
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon
