@@ -20,7 +20,6 @@ from lipmotion.types.progress import with_reports
 from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawsPlanes, Face, Staging
 from lipmotion_faces.film.filmed_video import RENDERING
 from lipmotion_faces.registry import stage_face
-from lipmotion_faces.video.mp4 import write_mp4, write_pictures, write_with_alpha
 
 OPAQUE_SUFFIX = ".mp4"
 VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
@@ -136,6 +135,8 @@ def frame_count(generation: Generation, fps: float) -> int:
 
 def write_frames(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float, sound: Audio) -> None:
     """Write pictures with their sound in the format of the suffix. Raises ExportError: the file cannot be written."""
+    from lipmotion_faces.video.mp4 import write_mp4, write_pictures, write_with_alpha
+
     if is_picture_sequence(path):
         write_pictures(path, frames)
     elif path.suffix.lower() == OPAQUE_SUFFIX:
