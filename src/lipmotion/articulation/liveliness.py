@@ -42,8 +42,9 @@ BROW_LEAD_S = 0.2
 """Brows rise so long before an accent, as those of tracked talkers do (docs/expression.md)."""
 GAZE_COUNTER_SHARE = 0.85
 """The eyes turn against the head by this part of its way, and so hold their target."""
-SWAY = (0.034, 0.016, 0.018)
-"""Deviations of the slow turning of the head in speech: to the side, up and down, to a shoulder, in radians."""
+SWAY, SWAY_HZ = (0.034, 0.016, 0.018), (0.08, 0.45)
+"""Deviations of the slow turning of the head in speech, to the side, up and down, to a shoulder, in radians; and the
+slowest and fastest parts of it."""
 NOD_RAD, PHRASE_FALL_RAD = 0.045, 0.03
 """How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
 STILL_SHARE = 0.35
@@ -269,7 +270,7 @@ def _turn_head(
     time_s: Curve, accent: Curve, talking: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
 ) -> Curve:
     lively = STILL_SHARE + (1 - STILL_SHARE) * talking
-    yaw, pitch, roll = (size * sway(time_s, rng, 0.08, 0.45) for size in SWAY)
+    yaw, pitch, roll = (size * sway(time_s, rng, *SWAY_HZ) for size in SWAY)
     nod = _at(_smooth(accent, 0.11), time_s + 0.04)
     tilt = np.zeros(len(time_s))
     for begin, end in spoken:  # every phrase has its own pose, and ends a little lower

@@ -13,9 +13,8 @@ from lipmotion.live.network import LAGS, STEP_S, answer_silence, live_network
 from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
-from lipmotion.motion.closure import OPENING, clip_at_zero
+from lipmotion.motion.closure import OPENING, is_never_negative
 from lipmotion.pipeline.model import Model
-from lipmotion.types import Motion
 
 Array = NDArray[np.float64]
 WEIGHT_NAMES = (*ARKIT_MOUTH, *VISEME_CHANNELS)
@@ -66,6 +65,10 @@ class Face:
             raise InputError("the model has no table of articulation, which live motion needs; train it again")
         self.model, self._space, self._prior, self._closure = model, learned.space, learned.prior, learned.closure
         self.names = tuple(channel.name for channel in self._space.channels)
+        self._bounded = np.array([is_never_negative(channel) for channel in self._space.channels])
+        poses = np.concatenate([np.zeros((1, self._space.dimensions)), np.eye(self._space.dimensions)])
+        rows, _ = self._space.restore(poses, np.zeros_like(poses))
+        self._base, self._basis = rows[0], rows[1:] - rows[0]
         row = ARTICULATORS.index(OPENING)
         column = self._closure.column
         self._closed = (self._closure.closed - self._prior.centre[column]) / self._prior.matrix[row, column]
@@ -87,11 +90,10 @@ class Face:
             moved[self._opening] * self._prior.matrix[self._opening, self._closure.column]
         )
         reduced += (opening - reduced[self._closure.column]) * self._closure.follow
-        values, _ = self._space.restore(reduced[None], np.zeros((1, len(reduced))))
-        motion = Motion(values, 1 / STEP_S, self._space.channels)
-        clip_at_zero(motion)
+        values = self._base + reduced @ self._basis
+        values[self._bounded] = np.maximum(values[self._bounded], 0)
         arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
-        return motion.values[0], np.concatenate([arkit, said / max(float(said.sum()), 1.0)])
+        return values, np.concatenate([arkit, said / max(float(said.sum()), 1.0)])
 
 
 def between(shown: tuple[Array, Array], goal: tuple[Array, Array], share: float) -> tuple[Array, Array]:

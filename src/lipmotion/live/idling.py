@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.liveliness import (
+    BLINK_S,
     BROW_RAISE,
     GAZE_COUNTER_SHARE,
     MEAN_BLINK_S,
@@ -21,6 +22,7 @@ from lipmotion.articulation.liveliness import (
     SACCADE_S,
     STILL_SHARE,
     SWAY,
+    SWAY_HZ,
     Liveliness,
     draw_fixation,
     lid_closure,
@@ -37,6 +39,8 @@ ACCENT_S, TALKING_S, TURNING_S = 0.1, 0.5, 0.35
 """Time constants of brows and nods, of the liveliness of the head, and of its turning to somebody."""
 LARGEST_TURN_RAD, HEAD_SHARE = 1.0, 0.7
 """The furthest that somebody may be to the side; and how much of the way the head turns, the eyes the rest."""
+SWAY_STEPS = 250
+"""The sway of so many steps is computed at once."""
 PHRASE_END_SHARE = 0.5
 """Share of the ends of phrases at which a blink comes."""
 
@@ -51,6 +55,7 @@ class Idling:
         self._until_s = float(self._rng.uniform(0.4, 1.2))
         self._accent, self._talking, self._spoke = 0.0, 0.0, False
         self._turn = np.zeros(2)
+        self._swayed = -1, np.zeros((0, 3))
         self.target = np.zeros(2)
         """Where somebody is to whom the face turns, to its left and upwards, radians."""
 
@@ -70,19 +75,30 @@ class Idling:
             target, stay_s = draw_fixation(self._rng, self._fixations[-1][1], ended)
             self._fixations.append((time_s, target))
             self._until_s = time_s + stay_s
-        now = np.array([time_s])
-        rng = np.random.default_rng([self._seed, 1])
-        lively = STILL_SHARE + (1 - STILL_SHARE) * self._talking
-        turn = np.concatenate([lively * size * sway(now, rng, 0.08, 0.45) for size in SWAY])
+        turn = (STILL_SHARE + (1 - STILL_SHARE) * self._talking) * self._sway_at(time_s)
         turn[1] -= NOD_RAD * self._accent
         (_, before), (began_s, aimed) = self._fixations
         aim = np.array(before) + smooth_step((time_s - began_s) / SACCADE_S) * np.subtract(aimed, before)
         gaze = aim - GAZE_COUNTER_SHARE * turn[:2] + self.target - self._turn
         turn[:2] += self._turn
-        lids, brows = lid_closure(now, [*self._blinks]), np.array([BROW_RAISE * self._accent])
+        lids = lid_closure(np.array([time_s]), [begin for begin in self._blinks if begin <= time_s < begin + BLINK_S])
+        brows = np.array([BROW_RAISE * self._accent])
         weights = eye_and_brow_weights(Liveliness(lids, brows, gaze[None], turn[None]))
         angles = dict(zip(ANGLES, turn.tolist(), strict=True))
         return {name: float(curve[0]) for name, curve in weights.items()} | angles
+
+    def _sway_at(self, time_s: float) -> Array:
+        """Return the slow turning of the head [shape=(3,)], which is computed for some seconds at a time."""
+        number, place = divmod(round(time_s / STEP_S), SWAY_STEPS)
+        if number != self._swayed[0]:
+            rng, ahead_s = (
+                np.random.default_rng([self._seed, 1]),
+                (number * SWAY_STEPS + np.arange(SWAY_STEPS)) * STEP_S,
+            )
+            rows = np.stack([size * sway(ahead_s, rng, *SWAY_HZ) for size in SWAY], axis=1)
+            self._swayed = number, rows
+        turn: Array = self._swayed[1][place]
+        return turn
 
     def _draw_blink(self, time_s: float, ended: bool) -> None:
         """Decide when the lids fall next: at random, and rather where a phrase ends."""
