@@ -6,8 +6,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.motion.encoding_regression import EncodingRegression
 from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.motion.prior_regression import EncodingRegression
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.encoding import (
     COMPONENTS,
