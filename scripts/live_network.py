@@ -94,10 +94,9 @@ def main() -> None:
     parser.add_argument("text", type=Path)
     parser.add_argument("voices", type=Path, nargs="+")
     parser.add_argument("--split", default="train")
-    parser.add_argument("--prompts", type=Path, help="folder of recorded sentences, G.722 (asterisk-core-sounds-en)")
-    parser.add_argument("--minutes", type=float, default=20.0, help="of synthetic speech")
+    parser.add_argument("--minutes", type=float, default=12.0, help="of synthetic speech")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--steps", type=int, default=2400, help="of the optimiser")
+    parser.add_argument("--steps", type=int, default=4000, help="of the optimiser")
     parser.add_argument("--keep", type=Path, help="a file that keeps what was prepared")
     parser.add_argument("--output", type=Path, default=OUTPUT)
     options = parser.parse_args()
@@ -226,8 +225,7 @@ def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
     for name in corpus.names(options.split)[::2]:
         utterance = corpus.utterance(name)
         jobs.append((utterance.audio, utterance.track, " ".join(utterance.words or ())))
-    prompts = [read_audio(path) for path in sorted(options.prompts.glob("*.g722"))[::2]] if options.prompts else []
-    spoken = [audio for audio in (*sounds, *prompts) if audio.duration_s > LEAST_S]
+    spoken = [audio for audio in sounds if audio.duration_s > LEAST_S]
     spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in spoken]
     jobs += [(audio, None, None) for audio in (*spoken, *synthesise(options.text, options.minutes))]
     with ProcessPoolExecutor(options.workers) as pool:

@@ -6,9 +6,9 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from lipmotion.engines.coupled.model import CoupledConfig
 
 from docs.test_links import DOCS
+from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.joint.engine import JointEngineConfig
 from lipmotion.engines.selection.costs import SelectionConfig
 
