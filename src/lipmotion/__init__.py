@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named
     from lipmotion.formats.base import read_motion
-    from lipmotion.live.stream import LiveFrame, Stream
+    from lipmotion.live.face import LiveFrame
+    from lipmotion.live.stream import Stream
     from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.explain import explain, state_runs
@@ -61,7 +62,8 @@ _HOMES = {
         "corpora.store": "Corpus Selection",
         "engines": "engine_named",
         "formats.base": "read_motion",
-        "live.stream": "LiveFrame Stream",
+        "live.face": "LiveFrame",
+        "live.stream": "Stream",
         "pipeline.edits": "Edits",
         "pipeline.generate.animate": "animate",
         "pipeline.generate.explain": "explain state_runs",
