@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named
     from lipmotion.formats.base import read_motion
-    from lipmotion.live.stream import LiveFrame, Stream
+    from lipmotion.live.face import LiveFrame
+    from lipmotion.live.stream import Stream
     from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.explain import explain, state_runs
@@ -48,80 +49,37 @@ if TYPE_CHECKING:
     from lipmotion.units import Lexicon
 
 __all__ = [
-    "Audio",
-    "Constraints",
-    "Corpus",
-    "CueSheet",
-    "Delivery",
-    "Edits",
-    "Explanation",
-    "Gain",
-    "Generation",
-    "Job",
-    "Lexicon",
-    "LiveFrame",
-    "Model",
-    "Motion",
-    "Outputs",
-    "Pin",
-    "Request",
-    "Run",
-    "Selection",
-    "Session",
-    "Span",
-    "SpokenText",
-    "Staging",
-    "Stream",
-    "Timeline",
-    "Unit",
-    "adapt",
-    "animate",
-    "cues",
-    "engine_named",
-    "explain",
-    "load_model",
-    "read_motion",
-    "save_model",
-    "speak",
-    "state_runs",
-    "train",
-    "with_person",
-    "write",
-    "write_cues",
-]
+    "Audio", "Constraints", "Corpus", "CueSheet", "Delivery", "Edits", "Explanation", "Gain", "Generation", "Job",
+    "Lexicon", "LiveFrame", "Model", "Motion", "Outputs", "Pin", "Request", "Run", "Selection", "Session", "Span",
+    "SpokenText", "Staging", "Stream", "Timeline", "Unit", "adapt", "animate", "cues", "engine_named", "explain",
+    "load_model", "read_motion", "save_model", "speak", "state_runs", "train", "with_person", "write", "write_cues",
+]  # fmt: skip
 
 _HOMES = {
-    "Edits": "lipmotion.pipeline.edits",
-    "Run": "lipmotion.pipeline.training.train",
-    "Session": "lipmotion.pipeline.session",
-    "Selection": "lipmotion.corpora.store",
-    "Corpus": "lipmotion.corpora.store",
-    "CueSheet": "lipmotion.articulation.cue_sheets",
-    "Job": "lipmotion.pipeline.job",
-    "Outputs": "lipmotion.pipeline.request",
-    "Request": "lipmotion.pipeline.request",
-    "Lexicon": "lipmotion.units",
-    "LiveFrame": "lipmotion.live.stream",
-    "Stream": "lipmotion.live.stream",
-    "Model": "lipmotion.pipeline.model",
-    "adapt": "lipmotion.pipeline.training.train",
-    "animate": "lipmotion.pipeline.generate.animate",
-    "cues": "lipmotion.pipeline.outputs.cues",
-    "engine_named": "lipmotion.engines",
-    "explain": "lipmotion.pipeline.generate.explain",
-    "load_model": "lipmotion.pipeline.model",
-    "read_motion": "lipmotion.formats.base",
-    "save_model": "lipmotion.pipeline.model",
-    "SpokenText": "lipmotion.types",
-    "speak": "lipmotion.pipeline.generate.speak",
-    "state_runs": "lipmotion.pipeline.generate.explain",
-    "train": "lipmotion.pipeline.training.train",
-    "with_person": "lipmotion.pipeline.model",
-    "write": "lipmotion.pipeline.outputs.output",
-    "write_cues": "lipmotion.pipeline.outputs.cues",
+    name: f"lipmotion.{home}"
+    for home, names in {
+        "articulation.cue_sheets": "CueSheet",
+        "corpora.store": "Corpus Selection",
+        "engines": "engine_named",
+        "formats.base": "read_motion",
+        "live.face": "LiveFrame",
+        "live.stream": "Stream",
+        "pipeline.edits": "Edits",
+        "pipeline.generate.animate": "animate",
+        "pipeline.generate.explain": "explain state_runs",
+        "pipeline.generate.speak": "speak",
+        "pipeline.job": "Job",
+        "pipeline.model": "Model load_model save_model with_person",
+        "pipeline.outputs.cues": "cues write_cues",
+        "pipeline.outputs.output": "write",
+        "pipeline.request": "Outputs Request",
+        "pipeline.session": "Session",
+        "pipeline.training.train": "Run adapt train",
+        "units": "Lexicon",
+    }.items()
+    for name in names.split()
 }
-
-
+"""Where names are, but those of ``lipmotion.types``."""
 _ADDED = (
     *("FilmedFace", "SessionPictures", "analyse_study", "build_face", "compare", "evaluate", "load_face"),
     *("map_onto", "prepare", "save_face"),
