@@ -1,10 +1,12 @@
 """Makes the network of live speech, ``models/live.npz``: taught by what ``animate`` makes of whole recordings.
 
-    python scripts/live_network.py CORPUS VOICES TEXT
+    python scripts/live_network.py CORPUS TEXT VOICES...
 
-CORPUS is a prepared corpus (GRID speaker s1), whose motion is measured; VOICES a folder of recordings (``speech-open``)
-and TEXT a folder of English pages, which flite, festival and espeak-ng speak: for these, ``animate`` with the shipped
-model is the teacher. Every recording is heard as it is, by other voices, and in the conditions of training.
+CORPUS is a prepared corpus (GRID speaker s1), whose motion is measured; VOICES are folders of recordings
+(``speech-open``; LibriSpeech, one sentence of each of 251 readers and ten of each of ten others, as Resemblyzer has
+them in ``audio_data``) and TEXT a folder of English pages, which flite, festival and espeak-ng speak: for these,
+``animate`` with the shipped model is the teacher. Every recording is heard as it is, by other vocal tracts, and in the
+conditions of training.
 """
 
 from __future__ import annotations
@@ -43,6 +45,8 @@ from lipmotion.motion.articulation import ARTICULATORS, measure_articulators
 from lipmotion.motion.space import resample_track
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import make_curves
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.acoustic_conditions import in_condition
 from lipmotion.speech.sound.audio_files import read_audio
@@ -62,6 +66,9 @@ VOICES = [
     ),
 ]
 SOUNDS = (".flac", ".wav", ".opus", ".mp3")
+HINTS, HINT_LAG, HINT_SHARE = COMPONENTS, 6, 0.5
+"""In training it also says what the speech encoder makes of the sound, so many steps ago, with this share of the error:
+who learns what the encoder knows learns the motion of unseen voices from fewer of them."""
 SILENCE_S, LEAST_S, LONGEST_S = 0.8, 1.2, 20.0
 """Silence after every recording, in which the mouth comes to rest; and how much of a long one is used."""
 GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 4
@@ -69,21 +76,21 @@ GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 4
 VISEME_SCALE = 3.0
 """What is said is learned with deviations about as large as those of the motion."""
 MICROPHONE_DB, MICROPHONE_KNOTS = 4.0, 6
-LARGEST_GAIN, CURVE_CLIPS = 1.6, 40
+LARGEST_GAIN, CURVE_CLIPS, BABBLE = 1.6, 40, 40
 PIECE_STEPS, HELD_OUT = 250, 20
 """Steps of a piece for training; and one in so many recordings measures the errors instead."""
 WEIGHTS_OF = dict.fromkeys(ARTICULATORS, 1.0) | {"opening": 4.0, "width": 3.0, "outer": 2.0}
 Array = NDArray[np.float32]
 Lesson = tuple[Array, list[Array]]
-"""Targets of every step [shape=(N, 23)], and the features of the sound in several versions [each shape=(N, 82)]."""
+"""Targets of every step, and its encoding [shape=(N, 23 + 64)], and the features of the sound in several versions [each shape=(N, 82)]."""
 
 
 def main() -> None:
     """Make the file."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("corpus", type=Path)
-    parser.add_argument("voices", type=Path)
     parser.add_argument("text", type=Path)
+    parser.add_argument("voices", type=Path, nargs="+")
     parser.add_argument("--split", default="train")
     parser.add_argument("--prompts", type=Path, help="folder of recorded sentences, G.722 (asterisk-core-sounds-en)")
     parser.add_argument("--minutes", type=float, default=20.0, help="of synthetic speech")
@@ -106,6 +113,7 @@ def main() -> None:
         if number % HELD_OUT
     ]
     weights = np.tile([*(WEIGHTS_OF[name] for name in ARTICULATORS), *np.ones(len(VISEMES_15))], len(LAGS))
+    weights = np.append(weights, np.full(HINTS, HINT_SHARE * weights.sum() / HINTS))
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
         whole = sequences[number][int(rng.integers(len(sequences[number])))]
@@ -116,17 +124,18 @@ def main() -> None:
             print(step, round(error, 4), flush=True)
 
     plan = TrainingPlan(options.steps, batch_size=16, rate=2e-3, dropout=0.3, seed=0)
-    network = SHAPE.initial(len(LAGS) * OUTPUTS, 0)
+    network = SHAPE.initial(len(LAGS) * OUTPUTS + HINTS, 0)
     network = fit_network(network, draw, len(sequences), weights, plan, report)
     network = network.with_parameters(
-        [*network.parameters[:-2], *(array / output_scale() for array in network.parameters[-2:])]
+        [*network.parameters[:-2], *(array[..., :-HINTS] / output_scale() for array in network.parameters[-2:])]
     )
     arrays = {name: array.astype(np.float16) for name, array in SHAPE.arrays(network).items()}
     rounded = SHAPE.from_arrays(arrays, len(LAGS) * OUTPUTS)
     count, predicted, wanted = len(ARTICULATORS), [], []
     for number, (targets, versions) in enumerate(lessons[::HELD_OUT]):
         sequence = shift(hear(versions[number % VERSIONS], typical, ()), targets, typical)
-        for rows, kept in ((rounded(sequence.inputs), predicted), (sequence.targets / output_scale(), wanted)):
+        known = sequence.targets[:, :-HINTS] / output_scale()
+        for rows, kept in ((rounded(sequence.inputs), predicted), (known, wanted)):
             kept.append(rows[: len(targets)].reshape(-1, len(LAGS), OUTPUTS)[:, :, :count])
     people = np.concatenate([np.diff(targets[:, :count], 2, axis=0) for targets, _ in lessons])
     guesses, truth = np.concatenate(predicted), np.concatenate(wanted)
@@ -188,8 +197,9 @@ def shift(inputs: Array, targets: Array, typical: Array) -> TrainingSequence:
     reach, steps = sum(SHAPE.dilations), len(inputs)
     heard = np.concatenate([np.tile(silent_step(typical), (reach, 1)), inputs])
     wanted = np.clip(np.arange(len(heard))[:, None] - np.array(LAGS), 0, steps - 1)
-    rows = targets[wanted].reshape(len(heard), -1) * output_scale()
-    return TrainingSequence(heard, rows, np.arange(len(heard)) < steps)
+    rows = targets[wanted, :OUTPUTS].reshape(len(heard), -1) * output_scale()
+    hints = targets[np.clip(np.arange(len(heard)) - HINT_LAG, 0, steps - 1), OUTPUTS:]
+    return TrainingSequence(heard, np.concatenate([rows, hints], axis=1), np.arange(len(heard)) < steps)
 
 
 def cut(whole: TrainingSequence, start: int) -> TrainingSequence:
@@ -203,7 +213,8 @@ def cut(whole: TrainingSequence, start: int) -> TrainingSequence:
 def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
     """Yield the lessons of all recordings."""
     corpus = Corpus.open(options.corpus)
-    sounds = [read_audio(path) for path in sorted(options.voices.iterdir()) if path.suffix in SOUNDS]
+    folders = [sorted(folder.rglob("*")) for folder in options.voices]
+    sounds = [read_audio(path) for folder in folders for path in folder if path.suffix in SOUNDS]
     jobs: list[tuple[Audio, Track | None, str | None]] = []
     for name in corpus.names(options.split)[::2]:
         utterance = corpus.utterance(name)
@@ -213,7 +224,7 @@ def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
     spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in spoken]
     jobs += [(audio, None, None) for audio in (*spoken, *synthesise(options.text, options.minutes))]
     with ProcessPoolExecutor(options.workers) as pool:
-        yield from pool.map(partial(teach, babble=sounds), jobs, range(len(jobs)), chunksize=8)
+        yield from pool.map(partial(teach, babble=sounds[:BABBLE]), jobs, range(len(jobs)), chunksize=8)
 
 
 def teach(job: tuple[Audio, Track | None, str | None], number: int, babble: list[Audio]) -> Lesson:
@@ -223,7 +234,7 @@ def teach(job: tuple[Audio, Track | None, str | None], number: int, babble: list
     """
     audio, tracked, words = job
     model = load_model()
-    result = animate(Request(audio, transcript=words), model=model)
+    result = animate(Request(audio, transcript=words, pauses="natural"), model=model)
     motion = result.motion
     if tracked is not None:
         measured, _ = resample_track(tracked, len(motion.values))
@@ -264,7 +275,10 @@ def make_lesson(
     inside = np.stack([np.interp(time_s, motion.time_s, column) for column in articulators.T], axis=1)
     visemes = np.stack([viseme_curves(units, time_s)[name] for name in VISEMES_15], axis=1)
     visemes[time_s > audio.duration_s] = np.eye(len(VISEMES_15))[0]
-    targets = np.concatenate([inside, visemes], axis=1).astype(np.float32)
+    encoding = np.zeros((steps, HINTS), np.float32)
+    known = analysed(audio).encoding[::STEP_FRAMES][:steps]
+    encoding[: len(known)] = known
+    targets = np.concatenate([inside, visemes, encoding], axis=1).astype(np.float32)
     versions = []
     for number in range(VERSIONS):
         rng = np.random.default_rng([seed, number])

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named
     from lipmotion.formats.base import read_motion
-    from lipmotion.live.stream import LiveFrame, Stream
+    from lipmotion.live.face import LiveFrame
+    from lipmotion.live.stream import Stream
     from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.explain import explain, state_runs
@@ -101,7 +102,7 @@ _HOMES = {
     "Outputs": "lipmotion.pipeline.request",
     "Request": "lipmotion.pipeline.request",
     "Lexicon": "lipmotion.units",
-    "LiveFrame": "lipmotion.live.stream",
+    "LiveFrame": "lipmotion.live.face",
     "Stream": "lipmotion.live.stream",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.train",

@@ -11,7 +11,7 @@ import pytest
 from lipmotion import LiveFrame
 from lipmotion.errors import InputError
 from lipmotion.live.consumers import live_link_packet, open_consumer, osc_packet, vmc_packet
-from lipmotion.live.stream import WEIGHT_NAMES
+from lipmotion.live.face import WEIGHT_NAMES
 from lipmotion.meshes.model.shape_names import ARKIT_52
 
 

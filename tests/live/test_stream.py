@@ -89,7 +89,7 @@ def test_it_rests_in_silence_and_within_100_ms_after_it(sound: np.ndarray) -> No
     assert opening[:45].max() < 0.01
     assert opening[-35:].max() < 0.01
     assert opening.max() > 0.08
-    still = values_of(all_of(Stream(), np.zeros(32_000, np.float32), [640]))[:, 2:]
+    still = values_of(all_of(Stream(seed=None), np.zeros(32_000, np.float32), [640]))[:, 2:]
     assert np.ptp(still, axis=0).max() < 1e-9
 
 
@@ -174,6 +174,84 @@ def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarra
     for arguments, message in (((0,), "0 Hz"), ((16_000, 700), "700 ms"), ((16_000, -1), "-1 ms")):
         with pytest.raises(InputError, match=message):
             Stream(*arguments)
+
+
+def test_natural_pauses_stay_as_people_s_do(sound: np.ndarray) -> None:
+    line = np.concatenate([sound[:40_000], np.zeros(16_000)]).astype(np.float32)
+    rested, natural = (
+        np.array([frame["opening"] for frame in all_of(Stream(pauses=pauses), line, [640])])
+        for pauses in ("rest", "natural")
+    )
+    assert np.abs(rested - natural)[-20:].max() < 0.02
+    assert np.abs(rested - natural).max() > 0.01
+    with pytest.raises(InputError, match="'none'"):
+        Stream(pauses="none")
+
+
+WORDS = [("map", 0.5, 0.9), ("[music]", 0.9, 1.0), ("boom", 1.7, 2.1)]
+PHONES = [("m", 0.5, 0.61), ("ae", 0.61, 0.79), ("p", 0.79, 0.9), ("", 0.9, 1.7), ("b", 1.7, 1.81), ("uw", 1.81, 2.0)]
+
+
+@pytest.mark.parametrize(("timings", "phones"), [(WORDS, False), (PHONES, True)])
+def test_what_is_told_is_said(sound: np.ndarray, timings: list[tuple[str, float, float]], phones: bool) -> None:
+    def tell(stream: Stream) -> None:
+        (stream.add_phones if phones else stream.add_words)(timings)
+
+    stream, other = Stream(look_ahead_ms=80), Stream(look_ahead_ms=80)
+    tell(stream)
+    tell(other)
+    frames = all_of(stream, sound[:40_000], [640])
+    assert np.array_equal(values_of(frames), values_of(all_of(other, sound[:40_000], [977])))
+    for moment_s in (0.56, 0.84, 1.75):  # m, p, b
+        frame = frames[round(moment_s / STEP_S)]
+        assert frame["viseme_PP"] > 0.9
+        assert frame["opening"] < 0.005
+    assert frames[35]["viseme_aa"] + frames[35]["viseme_E"] > 0.9  # ae
+    assert frames[65]["viseme_sil"] > 0.9
+    assert frames[65]["opening"] < 0.01
+    late = Stream(look_ahead_ms=80)
+    before = late.push(sound[:16_000])
+    tell(late)  # its first words are said already
+    after = late.push(sound[16_000:40_000])
+    assert [frame.number for frame in before + after] == list(range(len(before + after)))
+    assert after[88 - len(before)]["viseme_PP"] > 0.9
+
+
+def test_what_is_told_wrongly_is_refused_and_forgotten_at_an_interruption(sound: np.ndarray) -> None:
+    stream = Stream()
+    stream.add_words([("map", 0.5, 0.9)])
+    for wrong in ([("a", 0.8, 1.0)], [("a", 1.5, 1.2)], [("a", 1000, 1400)], [("a", 1.0, np.nan)]):
+        with pytest.raises(InputError, match="required seconds"):
+            stream.add_words(wrong)
+    with pytest.raises(InputError, match="unknown phone"):
+        stream.add_phones([("qq", 1.0, 1.2)])
+    stream.add_words([("boom", 0.9, 1.3)])
+    stream.push(sound[:8_000])
+    ends_s = stream.interrupt()[-1].time_s
+    frames = stream.push(np.zeros(16_000, np.float32))
+    assert frames[0].time_s == pytest.approx(ends_s + STEP_S)
+    assert max(frame["viseme_PP"] for frame in frames) < 0.2
+
+
+def test_eyes_and_head_move_by_themselves() -> None:
+    minute = np.zeros(16_000 * 60, np.float32)
+    frames, same, mouth_alone = (Stream(seed=seed).push(minute) for seed in (3, 3, None))
+    assert np.array_equal(values_of(frames), values_of(same))
+    lids = np.array([frame["eyeBlinkLeft"] for frame in frames])
+    blinks = int(((lids[1:] > 0.5) & (lids[:-1] <= 0.5)).sum())
+    assert 8 <= blinks <= 40
+    yaw = np.array([frame["headYaw"] for frame in frames])
+    assert 0.003 < yaw.std() < 0.1
+    assert np.abs(np.diff(yaw)).max() < 0.01
+    assert any(frame["eyeLookOutLeft"] > 0.15 or frame["eyeLookInLeft"] > 0.15 for frame in frames)
+    assert "eyeBlinkLeft" not in mouth_alone[0].weights
+    stream = Stream()
+    stream.look_at(0.5)
+    turned = stream.push(minute[:48_000])[-1]
+    assert 0.2 < turned["headYaw"] < 0.5
+    assert turned["eyeLookOutLeft"] > 0.05
+    with pytest.raises(InputError, match="required at most 1"):
+        stream.look_at(2.0)
 
 
 def test_steps_are_those_of_the_whole_network(sound: np.ndarray) -> None:

@@ -42,8 +42,9 @@ BROW_LEAD_S = 0.2
 """Brows rise so long before an accent, as those of tracked talkers do (docs/expression.md)."""
 GAZE_COUNTER_SHARE = 0.85
 """The eyes turn against the head by this part of its way, and so hold their target."""
-SWAY = (0.034, 0.016, 0.018)
-"""Deviations of the slow turning of the head in speech: to the side, up and down, to a shoulder, in radians."""
+SWAY, SWAY_HZ = (0.034, 0.016, 0.018), (0.08, 0.45)
+"""Deviations of the slow turning of the head in speech, to the side, up and down, to a shoulder, in radians; and the
+slowest and fastest parts of it."""
 NOD_RAD, PHRASE_FALL_RAD = 0.045, 0.03
 """How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
 STILL_SHARE = 0.35
@@ -157,7 +158,7 @@ def compute_liveliness(  # noqa: PLR0913
     raised = _raise_brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
     mood, eyes = action_units(motion, time_s), aim - GAZE_COUNTER_SHARE * turn[:, :2]
     if mood and brows:  # it comes and goes in the upper face, and grows with accents
-        slow = np.tanh(_sway(time_s, _generator(seed, 5), 0.06, 0.3))
+        slow = np.tanh(sway(time_s, _generator(seed, 5), 0.06, 0.3))
         accented = _at(_smooth(accent, 0.2), time_s + BROW_LEAD_S) - 0.4
         lively = 1 + MOOD_WANDER * slow + MOOD_ACCENT * accented
         mood |= {unit: np.clip(mood[unit] * lively, 0, 1) for unit in UPPER_FACE_UNITS.values() if unit in mood}
@@ -256,7 +257,7 @@ def _find_talking(spoken: list[tuple[float, float]], time_s: Curve) -> Curve:
     return level
 
 
-def _sway(time_s: Curve, rng: np.random.Generator, slowest_hz: float, fastest_hz: float) -> Curve:
+def sway(time_s: Curve, rng: np.random.Generator, slowest_hz: float, fastest_hz: float) -> Curve:
     """Return smooth noise of about unit deviation: five sines of random frequencies and phases [shape=(N,)]."""
     rates = np.exp(rng.uniform(np.log(slowest_hz), np.log(fastest_hz), 5))
     phases = rng.uniform(0, 2 * np.pi, 5)
@@ -269,7 +270,7 @@ def _turn_head(
     time_s: Curve, accent: Curve, talking: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
 ) -> Curve:
     lively = STILL_SHARE + (1 - STILL_SHARE) * talking
-    yaw, pitch, roll = (size * _sway(time_s, rng, 0.08, 0.45) for size in SWAY)
+    yaw, pitch, roll = (size * sway(time_s, rng, *SWAY_HZ) for size in SWAY)
     nod = _at(_smooth(accent, 0.11), time_s + 0.04)
     tilt = np.zeros(len(time_s))
     for begin, end in spoken:  # every phrase has its own pose, and ends a little lower
@@ -285,7 +286,7 @@ def _turn_head(
 
 def _raise_brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
     raised = BROW_RAISE * _at(_smooth(accent, 0.1), time_s + BROW_LEAD_S)
-    raised += 0.003 * (1 + np.tanh(_sway(time_s, rng, 0.05, 0.3)))
+    raised += 0.003 * (1 + np.tanh(sway(time_s, rng, 0.05, 0.3)))
     for begin, _ in spoken:  # some phrases begin with raised brows
         strength = float(rng.uniform(-0.6, 1.0))
         if strength > 0:
@@ -295,21 +296,28 @@ def _raise_brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]]
     return raised
 
 
+def draw_fixation(
+    rng: np.random.Generator, last: tuple[float, float], at_border: bool
+) -> tuple[tuple[float, float], float]:
+    """Return where the eyes look next, to the left and upwards, radians, and for how long, seconds.
+
+    last      : where they look now: who looks away looks back
+    at_border : a phrase begins, where they rather leave the listener
+    """
+    if abs(last[0]) < 0.04 and rng.random() < (0.5 if at_border else 0.14):
+        side = float(rng.choice([-1.0, 1.0]))
+        far, high = float(rng.uniform(0.45, 1)), float(rng.uniform(-0.6, 1))
+        return (side * LARGEST_GLANCE[0] * far, LARGEST_GLANCE[1] * high), float(rng.uniform(0.35, 0.9))
+    return (float(rng.normal(0, 0.018)), float(rng.normal(0, 0.012))), float(rng.uniform(0.5, 2.0))
+
+
 def _aim_eyes(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
     """Return where the eyes look, to the left and upwards in radians [shape=(F, 2)]: steps between fixations."""
     moments, targets = [0.0], [(0.0, 0.0)]
     begins = np.array([begin for begin, _ in spoken] or [np.inf])
     at = float(rng.uniform(0.4, 1.2))
     while at < end_s:
-        near_begin = np.abs(begins - at).min() < 0.8
-        if abs(targets[-1][0]) < 0.04 and rng.random() < (0.5 if near_begin else 0.14):
-            side = float(rng.choice([-1.0, 1.0]))
-            far, high = float(rng.uniform(0.45, 1)), float(rng.uniform(-0.6, 1))
-            target = (side * LARGEST_GLANCE[0] * far, LARGEST_GLANCE[1] * high)
-            stay = float(rng.uniform(0.35, 0.9))
-        else:
-            target = (float(rng.normal(0, 0.018)), float(rng.normal(0, 0.012)))
-            stay = float(rng.uniform(0.5, 2.0))
+        target, stay = draw_fixation(rng, targets[-1], np.abs(begins - at).min() < 0.8)
         moments.append(at)
         targets.append(target)
         at += stay

@@ -20,8 +20,9 @@ from typing import Any, Protocol, TextIO, runtime_checkable
 
 from lipmotion.errors import InputError
 from lipmotion.extensions import Registry
+from lipmotion.live.face import LiveFrame
 from lipmotion.live.network import STEP_S
-from lipmotion.live.stream import LiveFrame
+from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import ARKIT_52
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import atomic_file
@@ -65,8 +66,10 @@ VRM_VOWELS = {"A": ("aa",), "I": ("ih",), "U": ("ou",), "E": ("E",), "O": ("oh",
 SUBJECT = "lipmotion"
 DEVICE = "$00000000-0000-0000-0000-6c69706d6f74"
 """The device of Live Link packets: 37 characters, as the app sends them."""
-HEAD_AND_EYES = 9
-"""Turns of head and eyes that follow the 52 blendshapes in a Live Link packet."""
+HEAD_SIGNS = (1.0, -1.0, 1.0)
+"""Live Link's head pitch is positive downwards."""
+EYES = 6
+"""Angles of both eyes in a Live Link packet, which their blendshapes turn instead."""
 
 
 @contextmanager
@@ -128,7 +131,7 @@ def _send(channel: socket.socket, packet: bytes, place: tuple[str, int]) -> None
 
 def json_line(frame: LiveFrame) -> str:
     """Return a frame as one line of JSON: times, opening and width, the weights that are not 0."""
-    weights = {name: round(value, 4) for name, value in frame.weights.items() if value >= 5e-5}
+    weights = {name: round(value, 4) for name, value in frame.weights.items() if abs(value) >= 5e-5}
     shown = {name: round(frame[name], 5) for name in ("opening", "width") if name in frame.names}
     times = {"time_s": round(frame.time_s, 3), "known_s": round(frame.known_s, 4)}
     return json.dumps({**times, **shown, "weights": weights}, separators=(",", ":"))
@@ -175,8 +178,9 @@ def osc_packet(frame: LiveFrame) -> bytes:
 
 
 def live_link_packet(frame: LiveFrame) -> bytes:
-    """Return the packet that the Live Link Face app would send: 52 blendshapes, then head and eyes, which are still."""
-    values = [frame.weights.get(name, 0.0) for name in ARKIT_52] + [0.0] * HEAD_AND_EYES
+    """Return the packet that the Live Link Face app would send: 52 blendshapes, then head and eyes, radians."""
+    head = [frame.weights.get(name, 0.0) * sign for name, sign in zip(ANGLES, HEAD_SIGNS, strict=True)]
+    values = [frame.weights.get(name, 0.0) for name in ARKIT_52] + head + [0.0] * EYES
     name, rate = SUBJECT.encode(), round(1 / STEP_S)
     head = struct.pack("<I", 6) + DEVICE.encode() + struct.pack(">i", len(name)) + name
     return (

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import copy
 from collections import deque
-from collections.abc import AsyncIterable, AsyncIterator
-from dataclasses import dataclass, replace
-from functools import cached_property
-from math import gcd
-from typing import Any
+from collections.abc import AsyncIterable, AsyncIterator, Iterable
+from dataclasses import replace
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.live.face import WEIGHT_NAMES, Face, LiveFrame, between
+from lipmotion.live.idling import LARGEST_TURN_RAD, Idling
 from lipmotion.live.network import (
     HEARD_S,
     LAGS,
@@ -26,15 +26,19 @@ from lipmotion.live.network import (
     live_network,
     silent_step,
 )
-from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
+from lipmotion.live.sound import BLOCK, Resampler, mono_samples
+from lipmotion.live.timings import GivenPhones
+from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
+from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
-from lipmotion.motion.closure import OPENING, clip_at_zero
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.curve_sets import make_curves
+from lipmotion.pipeline.request import Pauses, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.types import Audio, Motion
+from lipmotion.types import Audio
+from lipmotion.types.delivery import Staging
+from lipmotion.units.lexicon import Lexicon
 
 Array = NDArray[np.float64]
 LONGEST_LOOK_AHEAD_MS = 640.0
@@ -46,47 +50,13 @@ CLOSED = (0.07, 0.18)
 """Probabilities of p, b and m from which on the lips begin to close, and are closed."""
 CLOSING_STEPS, OPENING_STEPS = 2, 4
 """Steps in which they close, also where it is seen late, and in which they open again: 40 and 80 ms."""
-TAPS, BLOCK = 16, 160
-"""Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""
+TIMED_SHARE = 0.5
+"""Weight of phones that are given with their times in the articulators; the rest is what is heard."""
 CORRELATED_STEPS = 0.02
 """The network's errors are alike for about so many steps."""
 KEPT_STEPS, SHOWN_FRAMES = LAGS[-1] + 3, 500
+OPENING_ROW = ARTICULATORS.index("opening")
 LOWEST_RATE_HZ, HIGHEST_RATE_HZ = 4_000, 384_000
-
-
-@dataclass(frozen=True, eq=False)
-class LiveFrame:
-    """One frame of live motion.
-
-    time_s  : its time in the sound
-    known_s : when it was known, in the sound's own time
-    motion  : values of all channels of the model [shape=(P,)], by ``names``
-    weights : ARKit's weights of the mouth, and visemes of Oculus, by name
-
-    >>> import numpy as np, lipmotion
-    >>> frame = lipmotion.Stream(look_ahead_ms=80).push(np.zeros(16_000, np.float32))[-1]
-    >>> frame.number, round(frame.time_s, 2), round(frame["viseme_sil"])
-    (46, 0.92, 1)
-    """
-
-    time_s: float
-    known_s: float
-    motion: Array
-    names: tuple[str, ...]
-    weights: dict[str, float]
-
-    def __getitem__(self, name: str) -> float:
-        """Return one channel, weight or viseme. Raises KeyError: there is none of that name."""
-        if name in self.weights:
-            return self.weights[name]
-        if name not in self.names:
-            raise KeyError(name)
-        return float(self.motion[self.names.index(name)])
-
-    @property
-    def number(self) -> int:
-        """The number of the frame, from 0."""
-        return round(self.time_s / STEP_S)
 
 
 class Stream:
@@ -96,6 +66,9 @@ class Stream:
     look_ahead_ms : how long after its time a frame may be known, 0 to 640; more is better. None: frames come with
                     ``flush`` alone, and are those of ``animate``
     model         : whose face moves; None: the one that ships
+    pauses        : "rest": the lips close in pauses; "natural": they stay as people's do
+    lexicon       : pronounces the words of ``add_words``
+    seed          : of blinks, glances and the sway of the head; None: only the mouth moves
     The same sound in any pieces gives the same frames, 50 a second. The state is small: ``copy.deepcopy`` copies it.
     Raises InputError: a rate or a look-ahead out of range.
 
@@ -107,7 +80,14 @@ class Stream:
     """
 
     def __init__(
-        self, sample_rate: int = SPEECH_RATE_HZ, look_ahead_ms: float | None = 160.0, model: Model | None = None
+        self,
+        sample_rate: int = SPEECH_RATE_HZ,
+        look_ahead_ms: float | None = 160.0,
+        model: Model | None = None,
+        *,
+        pauses: Pauses = "rest",
+        lexicon: Lexicon | None = None,
+        seed: int | None = 0,
     ) -> None:
         if not LOWEST_RATE_HZ <= sample_rate <= HIGHEST_RATE_HZ or sample_rate != int(sample_rate):
             raise InputError(
@@ -115,8 +95,10 @@ class Stream:
             )
         if look_ahead_ms is not None and not 0 <= look_ahead_ms <= LONGEST_LOOK_AHEAD_MS:
             raise InputError(f"a look-ahead of {look_ahead_ms} ms, required 0 to {LONGEST_LOOK_AHEAD_MS:g}, or None")
-        self.sample_rate, self.look_ahead_ms = int(sample_rate), look_ahead_ms
-        self._face = _Face(model if model is not None else load_model())
+        if pauses not in get_args(Pauses):
+            raise InputError(f"pauses {pauses!r}, required one of {', '.join(get_args(Pauses))}")
+        self.sample_rate, self.look_ahead_ms, self._pauses, self._seed = int(sample_rate), look_ahead_ms, pauses, seed
+        self._face = Face(model if model is not None else load_model())
         self._sound: list[NDArray[np.float32]] | None = [] if look_ahead_ms is None else None
         self._lag = max(int(np.floor(((look_ahead_ms or 0.0) / 1000 - HEARD_S) / STEP_S + 1e-9)), -1)
         self._smoother = _Smoother(live_network(), self._lag)
@@ -124,6 +106,8 @@ class Stream:
         self._next = 0
         self._shown: deque[tuple[Array, Array]] = deque([self._face.resting], maxlen=SHOWN_FRAMES)
         self._features = SoundFeatures(live_network().typical)
+        self._idling = None if seed is None else Idling(seed)
+        self._given, self._lexicon = GivenPhones(), lexicon or Lexicon()
         self._listen()
 
     def push(self, samples: Any) -> list[LiveFrame]:
@@ -133,7 +117,7 @@ class Stream:
                   of several channels [shape=(N, C)], which are mixed
         Raises InputError: other numbers, or some that are not finite; the stream stays as it was.
         """
-        mono = _mono_samples(samples)
+        mono = mono_samples(samples)
         if self._sound is not None:
             self._sound.append(mono)
             return []
@@ -158,7 +142,7 @@ class Stream:
 
         time_s : of the frame after which it rests, for sound that was pushed ahead of what is heard; at most 10 s
                  before the last frame. None: the last frame
-        Sound that is pushed now follows these frames.
+        Sound that is pushed now follows these frames; words that were added are forgotten, too.
         """
         last = self._next if time_s is None else min(max(int(time_s / STEP_S) + 1, 0), self._next)
         for _ in range(min(self._next - last, len(self._shown) - 1)):
@@ -167,12 +151,46 @@ class Stream:
         shown, frames = self._shown[-1], []
         for number in range(1, REST_STEPS + 1):
             share = (1 - np.cos(np.pi * number / REST_STEPS)) / 2
-            frames.append(self._frame(_between(shown, self._face.resting, share), self._next * STEP_S))
-        self._first = self._next
+            frames.append(self._frame(between(shown, self._face.resting, share), self._next * STEP_S))
+        self._first, self._given = self._next, GivenPhones()
         if self._sound is not None:
             self._sound = []
         self._listen()
         return frames
+
+    @property
+    def time_s(self) -> float:
+        """The time of the next frame, seconds: sound that is pushed after ``flush`` or ``interrupt`` begins there."""
+        return self._next * STEP_S
+
+    @property
+    def begins_s(self) -> float:
+        """The time of the frame at which the sound began that is heard now, seconds."""
+        return self._first * STEP_S
+
+    def add_words(self, words: Iterable[tuple[str, float, float]]) -> None:
+        """Take words that are said, each with its start and end in seconds of the stream, in order.
+
+        A speech service sends them with its sound, or before it; frames that were given already stay as they are. The
+        mouth then says these words, not what is recognised. Markup and punctuation alone are silence.
+        Raises InputError: times that overlap or are no seconds; the stream stays as it was.
+        """
+        self._given.add(words, phones=False, lexicon=self._lexicon, now_s=self.time_s)
+
+    def add_phones(self, phones: Iterable[tuple[str, float, float]]) -> None:
+        """Take phones (ARPAbet; "" is silence) as ``add_words`` does words. Raises InputError: also an unknown one."""
+        self._given.add(phones, phones=True, lexicon=self._lexicon, now_s=self.time_s)
+
+    def look_at(self, yaw_rad: float, pitch_rad: float = 0.0) -> None:
+        """Turn eyes and head to somebody, so far to the face's left and upwards; ``look_at(0)``: to the viewer.
+
+        Raises InputError: further than 1 radian.
+        """
+        target = np.array([yaw_rad, pitch_rad], float)
+        if not (np.abs(target) <= LARGEST_TURN_RAD).all():
+            raise InputError(f"somebody at {yaw_rad}, {pitch_rad} radians, required at most {LARGEST_TURN_RAD:g} away")
+        if self._idling is not None:
+            self._idling.target = target
 
     async def frames(self, sound: AsyncIterable[Any]) -> AsyncIterator[LiveFrame]:
         """Yield the frames of pieces of sound as they come, those of ``flush`` at their end. Raises as ``push``."""
@@ -185,20 +203,20 @@ class Stream:
     def __deepcopy__(self, memo: dict[int, Any]) -> Stream:
         result = copy.copy(self)
         for name, value in vars(self).items():
-            shared = name in ("_face", "_smoother")  # these never change
+            shared = name in ("_face", "_smoother", "_lexicon")  # these never change
             setattr(result, name, value if shared else copy.deepcopy(value, memo))
         return result
 
     def _listen(self) -> None:
         """Begin to hear, as after silence; how loud and how coloured the sound is stays known."""
-        self._resampler = _Resampler(self.sample_rate)
+        self._resampler = Resampler(self.sample_rate)
         self._features.restart()
         self._steps = CausalSteps(live_network().network, silent_step(live_network().typical))
         self._rows: list[NDArray[np.float32]] = []
         self._answers = deque([self._smoother.silent] * KEPT_STEPS, KEPT_STEPS)
         self._heard = 0  # steps
         self._before = [self._smoother.rest] * 2
-        self._closing, self._resting = 0.0, 1.0
+        self._closing, self._resting, self._opening, self._timed = 0.0, 1.0, 0.0, 0.0
         self._last, self._leaving = self._shown[-1], 1.0  # the pose from which the mouth goes on
 
     def _hear(self, samples: NDArray[np.float32]) -> list[LiveFrame]:
@@ -219,31 +237,40 @@ class Stream:
         """Return pose and weights of the frame that is known now."""
         smooth, said = self._smoother.solve(self._answers, self._before)
         self._before = [smooth, self._before[0]]
+        given = self._given.row(self._next)
+        self._timed = min(self._timed + 1 / START_STEPS, 1.0) if given is not None else 0.0
+        if given is not None:
+            said = given[len(ARTICULATORS) :]
+            share = TIMED_SHARE * self._timed * (1 - said[VISEMES_15.index("sil")])
+            smooth = smooth + share * (given[: len(ARTICULATORS)] - smooth)
         silent = float(said[VISEMES_15.index("sil")])
         change = 1 / REST_STEPS if silent > SILENT else -1 / START_STEPS if silent < SPOKEN else 0.0
         self._resting = float(np.clip(self._resting + change, 0, 1))
-        wanted = float(np.interp(said[VISEMES_15.index("PP")], CLOSED, (0, 1)))
+        wanted = float(np.interp(said[VISEMES_15.index("PP")], CLOSED if given is None else (0, 1), (0, 1)))
         self._closing += float(np.clip(wanted - self._closing, -1 / OPENING_STEPS, 1 / CLOSING_STEPS))
+        self._opening = float(smooth[OPENING_ROW])
         spoken = self._face.pose(smooth, np.clip(said, 0, 1), self._closing)
-        shown = _between(spoken, self._face.resting, (1 - np.cos(np.pi * self._resting)) / 2)
+        resting = self._resting if self._pauses == "rest" else 0.0
+        shown = between(spoken, self._face.resting, (1 - np.cos(np.pi * resting)) / 2)
         self._leaving = max(self._leaving - 1 / REST_STEPS, 0.0)
-        return _between(shown, self._last, self._leaving)
+        return between(shown, self._last, self._leaving)
 
     def _frame(self, shown: tuple[Array, Array], known_s: float) -> LiveFrame:
         self._shown.append(shown)
         pose, weights = shown
-        frame = LiveFrame(
-            self._next * STEP_S, known_s, pose, self._face.names, dict(zip(WEIGHT_NAMES, weights.tolist(), strict=True))
-        )
+        named = dict(zip(WEIGHT_NAMES, weights.tolist(), strict=True))
+        time_s = self._next * STEP_S
+        if self._idling is not None:
+            named |= self._idling.step(time_s, self._opening, self._resting < 0.5)
         self._next += 1
-        return frame
+        return LiveFrame(time_s, known_s, pose, self._face.names, named)
 
     def _animate_all(self) -> list[LiveFrame]:
         """Return the frames of ``animate`` of all sound."""
         sound, self._sound = np.concatenate(self._sound or [np.zeros(0, np.float32)]), []
         if not len(sound):
             return []
-        result = animate(Audio(sound, self.sample_rate), model=self._face.model)
+        result = animate(Request(Audio(sound, self.sample_rate), pauses=self._pauses), model=self._face.model)
         end_s = self._first * STEP_S + len(sound) / self.sample_rate
         motion = result.motion.resampled(1 / STEP_S)
         arkit, visemes = (
@@ -252,6 +279,10 @@ class Stream:
         count = min(len(motion.values), len(arkit), len(visemes))
         weights = np.concatenate([arkit[:count], visemes[:count]], axis=1)
         frames = [self._frame((motion.values[n], weights[n]), end_s) for n in range(count)]
+        if self._seed is not None:
+            lively = compute_living_curves(motion, result.units, Staging(seed=self._seed))
+            rows = (dict(zip(lively.names, values, strict=True)) for values in lively.values.tolist())
+            frames = [replace(frame, weights=frame.weights | row) for frame, row in zip(frames, rows, strict=False)]
         self._first = self._next
         return frames
 
@@ -294,116 +325,3 @@ class _Smoother:
         wanted = rows[:, : len(ARTICULATORS)] * self._gains * self._of_answers
         previous = np.stack([before[1], before[0]]) * self._of_before
         return wanted.sum(axis=0) + previous.sum(axis=0), rows[0, len(ARTICULATORS) :]
-
-
-class _Face:
-    """The face of a model, which follows articulators in standard deviations."""
-
-    def __init__(self, model: Model) -> None:
-        learned = model.learned
-        if getattr(learned, "prior", None) is None or learned.closure is None:
-            raise InputError("the model has no table of articulation, which live motion needs; train it again")
-        self.model, self._space, self._prior, self._closure = model, learned.space, learned.prior, learned.closure
-        self.names = tuple(channel.name for channel in self._space.channels)
-        row = ARTICULATORS.index(OPENING)
-        column = self._closure.column
-        self._closed = (self._closure.closed - self._prior.centre[column]) / self._prior.matrix[row, column]
-        self._opening = row
-
-    @cached_property
-    def resting(self) -> tuple[Array, Array]:
-        """Pose and weights of the mouth at rest."""
-        articulators = answer_silence().reshape(len(LAGS), -1)[-1, : len(ARTICULATORS)].astype(float)
-        said = np.eye(len(VISEMES_15))[VISEMES_15.index("sil")]
-        return self.pose(articulators, said, 1.0)
-
-    def pose(self, articulators: Array, said: Array, closing: float) -> tuple[Array, Array]:
-        """Return the values of all channels, and the weights, with the lips closed so far, 0 to 1."""
-        moved = articulators.copy()
-        moved[self._opening] += closing * min(self._closed - moved[self._opening], 0.0)
-        reduced = self._prior.centre + articulators @ self._prior.matrix
-        opening = self._prior.centre[self._closure.column] + (
-            moved[self._opening] * self._prior.matrix[self._opening, self._closure.column]
-        )
-        reduced += (opening - reduced[self._closure.column]) * self._closure.follow
-        values, _ = self._space.restore(reduced[None], np.zeros((1, len(reduced))))
-        motion = Motion(values, 1 / STEP_S, self._space.channels)
-        clip_at_zero(motion)
-        arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
-        return motion.values[0], np.concatenate([arkit, said / max(float(said.sum()), 1.0)])
-
-
-def _between(shown: tuple[Array, Array], goal: tuple[Array, Array], share: float) -> tuple[Array, Array]:
-    """Return a pose and weights that are a share of the way to others, 0 to 1."""
-    (pose, weights), (last, others) = shown, goal
-    return pose + share * (last - pose), weights + share * (others - weights)
-
-
-class _Resampler:
-    """Sound at 16 kHz, block by block, with a windowed sinc (Kaiser); how it is cut into pieces changes no bit."""
-
-    def __init__(self, rate_hz: int) -> None:
-        shared = gcd(rate_hz, SPEECH_RATE_HZ)
-        self._up, self._down, self._rate_hz = SPEECH_RATE_HZ // shared, rate_hz // shared, rate_hz
-        slower = max(1.0, rate_hz / SPEECH_RATE_HZ)
-        self._reach = int(np.ceil(TAPS * slower))
-        x = np.arange(1 - self._reach, self._reach + 1) - np.arange(self._up)[:, None] / self._up
-        window = np.i0(8.0 * np.sqrt(np.maximum(1 - np.square(x / self._reach), 0))) / np.i0(8.0)
-        self._filters = (np.sinc(0.95 * x / slower) * 0.95 / slower * window).astype(np.float32)
-        self._pending = np.zeros(self._reach - 1, np.float32)  # beginning at the sample ``_reach`` - 1 before the next
-        self._made, self._taken, self.pushed = 0, 0, 0
-
-    @property
-    def seconds(self) -> float:
-        """Seconds of sound that were pushed."""
-        return self.pushed / self._rate_hz
-
-    def push(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return what is known of the sound at 16 kHz now."""
-        self.pushed += len(samples)
-        if self._up == self._down:
-            return samples
-        self._pending = np.concatenate([self._pending, samples])
-        blocks = []
-        while True:
-            numbers = np.arange(self._made, self._made + BLOCK)
-            first, phase = np.divmod(numbers * self._down, self._up)
-            if first[-1] - self._taken + 2 * self._reach > len(self._pending):
-                break
-            rows = self._pending[(first - self._taken)[:, None] + np.arange(2 * self._reach)]
-            blocks.append(np.einsum("nt,nt->n", rows, self._filters[phase]))
-            self._made += BLOCK
-            drop = int(first[-1]) - self._taken
-            self._pending, self._taken = self._pending[drop:], self._taken + drop
-        return np.concatenate([*blocks, np.zeros(0, np.float32)])
-
-    def finish(self) -> NDArray[np.float32]:
-        """Return the rest, with silence after it."""
-        seconds = self.seconds
-        pushed, rest = self.pushed, self.push(np.zeros(2 * self._reach + self._rate_hz // 50, np.float32))
-        self.pushed = pushed
-        return rest[: max(int(np.ceil(seconds * SPEECH_RATE_HZ)) - (self._made - len(rest)), 0)]
-
-
-def _mono_samples(samples: Any) -> NDArray[np.float32]:
-    """Return samples as floats of one channel, full scale 1. Raises InputError: as ``Stream.push``."""
-    if isinstance(samples, bytes | bytearray | memoryview):
-        if len(samples) % 2:
-            raise InputError(f"{len(samples)} bytes of sound, required whole samples of 16 bits")
-        samples = np.frombuffer(samples, "<i2")
-    values = np.asarray(samples)
-    if (
-        values.ndim not in (1, 2)
-        or values.dtype.kind not in "if"
-        or (values.dtype.kind == "i" and values.itemsize != 2)
-    ):
-        raise InputError(
-            f"samples of shape {values.shape} and type {values.dtype}, required (N,) or (N, C), floats or int16"
-        )
-    floats = values.astype(np.float32) / np.float32(32768) if values.dtype.kind == "i" else values.astype(np.float32)
-    if not np.isfinite(floats).all():
-        raise InputError("samples that are not finite; leave them out, or put 0 there")
-    return floats.mean(axis=1, dtype=np.float32) if floats.ndim == 2 else floats
-
-
-WEIGHT_NAMES = (*ARKIT_MOUTH, *VISEME_CHANNELS)

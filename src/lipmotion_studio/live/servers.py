@@ -17,6 +17,7 @@ import numpy as np
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.live.consumers import Consumer, LiveSound, json_line, read_address
+from lipmotion.live.sound import mono_samples
 from lipmotion_studio.web.listening import open_socket
 
 if TYPE_CHECKING:
@@ -203,10 +204,4 @@ def check_installed(to: str) -> None:
 
 def pcm_16(samples: Any) -> bytes:
     """Return samples as ``Stream.push`` takes them as integers of 16 bits, little-endian, of one channel."""
-    if isinstance(samples, bytes | bytearray | memoryview):
-        return bytes(samples)
-    values = np.asarray(samples)
-    if values.dtype.kind == "f":
-        values = np.clip(values, -1, 1) * 32767
-    mono = values.mean(axis=1) if values.ndim == 2 else values
-    return np.rint(mono).astype("<i2").tobytes()
+    return np.rint(np.clip(mono_samples(samples), -1, 1) * 32767).astype("<i2").tobytes()

@@ -18,8 +18,8 @@ from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.live.consumers import Consumer, LiveSound
+from lipmotion.live.face import LiveFrame
 from lipmotion.live.network import STEP_S
-from lipmotion.live.stream import LiveFrame
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion_studio.live.servers import Server, open_server, pcm_16
 

@@ -10,6 +10,7 @@ import asyncio
 import itertools
 import json
 import logging
+import math
 import os
 import sys
 from collections.abc import Iterator
@@ -19,7 +20,8 @@ from typing import Any
 
 from lipmotion.errors import ExportError
 from lipmotion.live.consumers import Consumer, LiveSound, read_address
-from lipmotion.live.stream import LiveFrame
+from lipmotion.live.face import LiveFrame
+from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.storage.files import atomic_file
 from lipmotion_studio.live.servers import CLOSE_S, check_installed, in_background
 
@@ -40,8 +42,8 @@ MADE = {
 LOG = logging.getLogger("lipmotion")
 
 
-def mouth_parameters(frame: LiveFrame) -> dict[str, float]:
-    """Return the parameters of the mouth: those of VTube Studio itself, and those of ``MADE``."""
+def face_parameters(frame: LiveFrame) -> dict[str, float]:
+    """Return the parameters of the mouth, and of lids and head, where the frame moves them."""
 
     def both(name: str) -> float:
         return frame[f"{name}Left"] + frame[f"{name}Right"]
@@ -50,7 +52,11 @@ def mouth_parameters(frame: LiveFrame) -> dict[str, float]:
     narrow = both("mouthFrown") + frame["mouthPucker"]
     parted = (both("mouthUpperUp") + both("mouthLowerDown")) / 1.8
     pressed = frame["mouthRollLower"] + frame["mouthRollUpper"]
-    return {
+    living = {}
+    if "headYaw" in frame.weights:
+        living = {f"EyeOpen{side}": 1 - frame[f"eyeBlink{side}"] for side in ("Left", "Right")}
+        living |= {f"FaceAngle{axis}": math.degrees(frame[name]) for axis, name in zip("XYZ", ANGLES, strict=True)}
+    return living | {
         "MouthOpen": min(max(frame["jawOpen"] - frame["mouthClose"], 0.0) / OPEN_JAW, 1.0),
         "MouthSmile": min(max(0.5 + (wide - narrow) / 4, 0.0), 1.0),  # 0.5 is neither a smile nor a pout
         "MouthX": frame["mouthLeft"] - frame["mouthRight"],
@@ -140,7 +146,7 @@ class VTubeStudio:
             await self._is_new.wait()
             self._is_new.clear()
             if self._frame is not None:
-                values = {name: value for name, value in mouth_parameters(self._frame).items() if name in names}
+                values = {name: value for name, value in face_parameters(self._frame).items() if name in names}
                 listed = [{"id": name, "value": value} for name, value in values.items()]
                 about = {"faceFound": True, "mode": "set", "parameterValues": listed}
                 await self._ask(connection, "InjectParameterDataRequest", **about)

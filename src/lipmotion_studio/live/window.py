@@ -14,14 +14,18 @@ import webbrowser
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from lipmotion.cli.terminal.printing import print_error
 from lipmotion.live.consumers import Consumer, LiveSound, json_line
-from lipmotion.live.stream import LiveFrame
+from lipmotion.live.face import LiveFrame
+from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
 from lipmotion_studio.live.servers import Server, open_server, pcm_16
 from lipmotion_studio.web.files import read_page
 
@@ -35,6 +39,11 @@ FIRST = "live/live.html"
 HEAD_FILE = "head.glb"
 READY = "ready"
 """What the page says when it shows what comes."""
+PARTING = ("mouthLowerDownLeft", "mouthLowerDownRight", "mouthUpperUpLeft", "mouthUpperUpRight", "mouthFunnel")
+NEARLY_CLOSED = 0.02
+"""Opening, in eye distances, under which the lips of the head come together more than ARKit's weights say."""
+TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")
+"""Names of the quaternion that turns the head, as the page knows them."""
 REJOIN_S = 1.5
 """A page that is open from before connects again within this time, and no other one is opened."""
 FILE_HEADERS = {
@@ -63,7 +72,16 @@ class Window:
 
     def __call__(self, frame: LiveFrame) -> None:
         """Take a frame."""
-        self._server.send(json_line(frame))
+        self._server.send(json_line(replace(frame, weights=head_weights(frame))))
+
+
+def head_weights(frame: LiveFrame) -> dict[str, float]:
+    """Return the weights of a frame for the 3D head, whose closed lips only jaw and ``mouthClose`` may move apart."""
+    closing = max(1 - frame["opening"] / NEARLY_CLOSED, 0.0)
+    weights = {name: value * (1 - closing * (name in PARTING)) for name, value in frame.weights.items()}
+    weights["mouthClose"] += closing * max(weights["jawOpen"] - weights["mouthClose"], 0.0)
+    (turn,) = head_quaternions(np.array([[frame.weights.get(name, 0.0) for name in ANGLES]])).tolist()
+    return weights | dict(zip(TURN, turn, strict=True))
 
 
 @contextmanager

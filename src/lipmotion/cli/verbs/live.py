@@ -30,6 +30,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add("--look-ahead", type=float, default=160.0, metavar="MS", help=told)
     add("--rate", type=int, default=16_000, metavar="HZ", help="of sound on standard input (default: 16000)")
     add("--model", help="a trained model (default: the one that ships)")
+    add(
+        "--pauses",
+        choices=("rest", "natural"),
+        default="rest",
+        help="lips close in pauses (default), or stay as people's",
+    )
+    add("--still", action="store_true", help="only the mouth moves: no blinks, glances, brows, head")
     add("--as-fast-as-possible", action="store_true", help="do not wait for a file's own time")
     parser.set_defaults(run=run)
 
@@ -44,7 +51,8 @@ def run(options: argparse.Namespace) -> None:
 
     with ExitStack() as stack:
         rate_hz, sound = _open_sound(options)
-        stream = Stream(rate_hz, options.look_ahead, load_model(options.model))
+        seed = None if options.still else 0
+        stream = Stream(rate_hz, options.look_ahead, load_model(options.model), pauses=options.pauses, seed=seed)
         about = LiveSound(rate_hz, options.look_ahead, is_microphone=_is_microphone(options.input))
         consumers = [stack.enter_context(open_consumer(to, print_line, about)) for to in options.to or ["-"]]
         listeners = [each for each in consumers if isinstance(each, Listener)]

@@ -124,11 +124,8 @@ def weights_to_gaze(weights: Mapping[str, Array]) -> Array:
 def gaze_to_weights(gaze: Array) -> dict[str, Array]:
     """Return ARKit's weights that turn the eyes [each shape=(F,)] to a gaze, left and up, in radians [shape=(F, 2)]."""
     across, upwards = gaze.T
-    return {
-        f"eyeLook{name}{side}": np.clip(angle / FULL_LOOK_RAD, 0, 1)
-        for side, outward in (("Left", 1.0), ("Right", -1.0))
-        for name, angle in (("Out", outward * across), ("In", -outward * across), ("Up", upwards), ("Down", -upwards))
-    }
+    angles = np.stack([across, -across, upwards, -upwards, -across, across, upwards, -upwards])
+    return dict(zip((f"eyeLook{name}" for name in LOOKS), np.clip(angles / FULL_LOOK_RAD, 0, 1), strict=True))
 
 
 def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:

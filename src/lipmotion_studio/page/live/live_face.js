@@ -4,6 +4,8 @@ import { Curves } from "../curves.js";
 import { Head } from "../face/head.js";
 import { Playback } from "./playback.js";
 
+/** Names of the quaternion that turns the head. */
+const TURN = ["x", "y", "z", "w"].map((axis) => `head.rotation.${axis}`);
 const AGAIN_MS = 1000, COUNTED_MS = 1000;
 
 export class LiveFace {
@@ -30,8 +32,9 @@ export class LiveFace {
     const reply = await fetch(`//${this.host}/head.glb`);
     if (!reply.ok) throw new Error(`${reply.status} ${reply.statusText}`);
     await this.head.load(await reply.arrayBuffer());
-    const names = [...new Set(this.head.meshes.flatMap((mesh) => Object.keys(mesh.morphTargetDictionary)))];
-    this.weights = new Curves(names, 50, new Float32Array(names.length));
+    const names = [...new Set(this.head.meshes.flatMap((mesh) => Object.keys(mesh.morphTargetDictionary))), ...TURN];
+    this.playback.rest = names.map((name) => Number(name === TURN.at(-1)));
+    this.weights = new Curves(names, 50, Float32Array.from(this.playback.rest));
     this.connect();
   }
 

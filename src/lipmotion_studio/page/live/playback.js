@@ -10,6 +10,7 @@ const LOOKED_AT_S = 5, SPARE_S = 0.15;
 export class Playback {
   constructor() {
     this.context = null;
+    this.rest = []; // the values at rest
     this.begin({ rate_hz: 16000, look_ahead_ms: 160 });
   }
 
@@ -126,7 +127,10 @@ export class Playback {
     if (!before || time_s < before.time_s) return Boolean(before);
     const span_s = after.time_s - before.time_s, share = span_s ? Math.min((time_s - before.time_s) / span_s, 1) : 0;
     const age_s = time_s - after.time_s, rest = Math.min(Math.max((age_s - STALE_S) / REST_S, 0), 1);
-    for (let n = 0; n < values.length; n++) values[n] = (1 - rest) * (before.values[n] + share * (after.values[n] - before.values[n]));
+    for (let n = 0; n < values.length; n++) {
+      const value = before.values[n] + share * (after.values[n] - before.values[n]);
+      values[n] = value + rest * (this.rest[n] - value);
+    }
     return rest < 1;
   }
 }

@@ -1,0 +1,102 @@
+"""The face of a stream: its frames, and the pose of a model's face for articulators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.live.network import LAGS, STEP_S, answer_silence, live_network
+from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
+from lipmotion.motion.articulation import ARTICULATORS
+from lipmotion.motion.closure import OPENING, is_never_negative
+from lipmotion.pipeline.model import Model
+
+Array = NDArray[np.float64]
+WEIGHT_NAMES = (*ARKIT_MOUTH, *VISEME_CHANNELS)
+
+
+@dataclass(frozen=True, eq=False)
+class LiveFrame:
+    """One frame of live motion.
+
+    time_s  : its time in the sound
+    known_s : when it was known, in the sound's own time
+    motion  : values of all channels of the model [shape=(P,)], by ``names``
+    weights : by name: ARKit's weights of mouth, eyes and brows, visemes of Oculus, and the angles of the head, radians
+              (``headYaw`` to its left, ``headPitch`` up, ``headRoll`` to its left shoulder)
+
+    >>> import numpy as np, lipmotion
+    >>> frame = lipmotion.Stream(look_ahead_ms=80).push(np.zeros(16_000, np.float32))[-1]
+    >>> frame.number, round(frame.time_s, 2), round(frame["viseme_sil"])
+    (46, 0.92, 1)
+    """
+
+    time_s: float
+    known_s: float
+    motion: Array
+    names: tuple[str, ...]
+    weights: dict[str, float]
+
+    def __getitem__(self, name: str) -> float:
+        """Return one channel, weight or viseme. Raises KeyError: there is none of that name."""
+        if name in self.weights:
+            return self.weights[name]
+        if name not in self.names:
+            raise KeyError(name)
+        return float(self.motion[self.names.index(name)])
+
+    @property
+    def number(self) -> int:
+        """The number of the frame, from 0."""
+        return round(self.time_s / STEP_S)
+
+
+class Face:
+    """The face of a model, which follows articulators in standard deviations."""
+
+    def __init__(self, model: Model) -> None:
+        learned = model.learned
+        if getattr(learned, "prior", None) is None or learned.closure is None:
+            raise InputError("the model has no table of articulation, which live motion needs; train it again")
+        self.model, self._space, self._prior, self._closure = model, learned.space, learned.prior, learned.closure
+        self.names = tuple(channel.name for channel in self._space.channels)
+        self._bounded = np.array([is_never_negative(channel) for channel in self._space.channels])
+        poses = np.concatenate([np.zeros((1, self._space.dimensions)), np.eye(self._space.dimensions)])
+        rows, _ = self._space.restore(poses, np.zeros_like(poses))
+        self._base, self._basis = rows[0], rows[1:] - rows[0]
+        row = ARTICULATORS.index(OPENING)
+        column = self._closure.column
+        self._closed = (self._closure.closed - self._prior.centre[column]) / self._prior.matrix[row, column]
+        self._opening = row
+
+    @cached_property
+    def resting(self) -> tuple[Array, Array]:
+        """Pose and weights of the mouth at rest."""
+        articulators = answer_silence().reshape(len(LAGS), -1)[-1, : len(ARTICULATORS)].astype(float)
+        said = np.eye(len(VISEMES_15))[VISEMES_15.index("sil")]
+        return self.pose(articulators, said, 1.0)
+
+    def pose(self, articulators: Array, said: Array, closing: float) -> tuple[Array, Array]:
+        """Return the values of all channels, and the weights, with the lips closed so far, 0 to 1."""
+        moved = articulators.copy()
+        moved[self._opening] += closing * min(self._closed - moved[self._opening], 0.0)
+        reduced = self._prior.centre + articulators @ self._prior.matrix
+        opening = self._prior.centre[self._closure.column] + (
+            moved[self._opening] * self._prior.matrix[self._opening, self._closure.column]
+        )
+        reduced += (opening - reduced[self._closure.column]) * self._closure.follow
+        values = self._base + reduced @ self._basis
+        values[self._bounded] = np.maximum(values[self._bounded], 0)
+        arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
+        return values, np.concatenate([arkit, said / max(float(said.sum()), 1.0)])
+
+
+def between(shown: tuple[Array, Array], goal: tuple[Array, Array], share: float) -> tuple[Array, Array]:
+    """Return a pose and weights that are a share of the way to others, 0 to 1."""
+    (pose, weights), (last, others) = shown, goal
+    return pose + share * (last - pose), weights + share * (others - weights)
