@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lipmotion.cli.terminal.printing import print_error
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.live.consumers import Consumer, LiveSound, json_line, read_address
@@ -40,6 +41,7 @@ LOG = logging.getLogger("lipmotion")
 def open_websocket(to: str, sound: LiveSound) -> Iterator[Consumer]:  # noqa: ARG001
     """Give a consumer that sends each client a line of JSON for each frame. Raises as ``open_server``."""
     with open_server(to, PORT) as server:
+        print_error(f"frames are at ws://{server.address}/")
         yield lambda frame: server.send(json_line(frame))
 
 

@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from lipmotion.cli.terminal.printing import print_error
 from lipmotion.errors import InputError
 from lipmotion.live.consumers import Consumer, LiveSound
 from lipmotion.live.face import LiveFrame
@@ -149,6 +150,7 @@ def open_talking_head(to: str, sound: LiveSound) -> Iterator[Consumer]:
     server = Server(call("streamStart", sampleRate=sound.rate_hz, lipsyncType="blendshapes"), joined=join)
     head = TalkingHead(sound.rate_hz, server)
     with open_server(to, PORT, server):
+        print_error(f"calls of TalkingHead are at ws://{server.address}/")
         try:
             yield head
         finally:
