@@ -42,6 +42,7 @@ function show() {
   state.classList.toggle("bad", !isConnected);
   delay.textContent = delay_ms === null ? "" : TEXT.delay.replace("{ms}", String(Math.round(delay_ms)));
   frames.textContent = TEXT.frames.replace("{count}", String(Math.round(frames_s)));
+  if (!isConnected) tried = false; // the next stream may begin at once, too
   start.hidden = !waits || trying;
   if (waits && !tried) begin();
 }
