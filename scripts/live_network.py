@@ -50,6 +50,7 @@ from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.acoustic_conditions import in_condition
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
 from lipmotion.types import SPECTRUM_BANDS, Audio, Motion, Timeline, Track, Unit
 
@@ -82,7 +83,8 @@ PIECE_STEPS, HELD_OUT = 250, 20
 WEIGHTS_OF = dict.fromkeys(ARTICULATORS, 1.0) | {"opening": 4.0, "width": 3.0, "outer": 2.0}
 Array = NDArray[np.float32]
 Lesson = tuple[Array, list[Array]]
-"""Targets of every step, and its encoding [shape=(N, 23 + 64)], and the features of the sound in several versions [each shape=(N, 82)]."""
+"""Targets of every step, and its encoding [shape=(N, 23 + 64)], and what is heard in several versions [each
+shape=(N, 82)]."""
 
 
 def main() -> None:
@@ -92,10 +94,9 @@ def main() -> None:
     parser.add_argument("text", type=Path)
     parser.add_argument("voices", type=Path, nargs="+")
     parser.add_argument("--split", default="train")
-    parser.add_argument("--prompts", type=Path, help="folder of recorded sentences, G.722 (asterisk-core-sounds-en)")
-    parser.add_argument("--minutes", type=float, default=20.0, help="of synthetic speech")
+    parser.add_argument("--minutes", type=float, default=12.0, help="of synthetic speech")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--steps", type=int, default=2400, help="of the optimiser")
+    parser.add_argument("--steps", type=int, default=4000, help="of the optimiser")
     parser.add_argument("--keep", type=Path, help="a file that keeps what was prepared")
     parser.add_argument("--output", type=Path, default=OUTPUT)
     options = parser.parse_args()
@@ -107,28 +108,7 @@ def main() -> None:
             options.keep.write_bytes(pickle.dumps(lessons))
     print(f"{len(lessons)} recordings, {sum(len(targets) for targets, _ in lessons) * STEP_S / 60:.1f} minutes")
     typical = measure_bands(lessons)
-    sequences = [
-        [shift(hear(levels, typical, (number, version)), targets, typical) for version, levels in enumerate(versions)]
-        for number, (targets, versions) in enumerate(lessons)
-        if number % HELD_OUT
-    ]
-    weights = np.tile([*(WEIGHTS_OF[name] for name in ARTICULATORS), *np.ones(len(VISEMES_15))], len(LAGS))
-    weights = np.append(weights, np.full(HINTS, HINT_SHARE * weights.sum() / HINTS))
-
-    def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        whole = sequences[number][int(rng.integers(len(sequences[number])))]
-        return cut(whole, int(rng.integers(max(len(whole.inputs) - PIECE_STEPS, 0) + 1)))
-
-    def report(step: int, error: float) -> None:
-        if step % 100 == 0:
-            print(step, round(error, 4), flush=True)
-
-    plan = TrainingPlan(options.steps, batch_size=16, rate=2e-3, dropout=0.3, seed=0)
-    network = SHAPE.initial(len(LAGS) * OUTPUTS + HINTS, 0)
-    network = fit_network(network, draw, len(sequences), weights, plan, report)
-    network = network.with_parameters(
-        [*network.parameters[:-2], *(array[..., :-HINTS] / output_scale() for array in network.parameters[-2:])]
-    )
+    network = learn(lessons, typical, options.steps)
     arrays = {name: array.astype(np.float16) for name, array in SHAPE.arrays(network).items()}
     rounded = SHAPE.from_arrays(arrays, len(LAGS) * OUTPUTS)
     count, predicted, wanted = len(ARTICULATORS), [], []
@@ -152,6 +132,32 @@ def main() -> None:
     with options.output.open("wb") as file:
         np.savez_compressed(file, **arrays)
     print(f"{options.output.name}: {options.output.stat().st_size} bytes")
+
+
+def learn(lessons: list[Lesson], typical: Array, steps: int) -> ConvolutionalNetwork:
+    """Return a network that is trained with all lessons but those that measure its errors, without its hints."""
+    sequences = [
+        [shift(hear(levels, typical, (number, version)), targets, typical) for version, levels in enumerate(versions)]
+        for number, (targets, versions) in enumerate(lessons)
+        if number % HELD_OUT
+    ]
+    weights = np.tile([*(WEIGHTS_OF[name] for name in ARTICULATORS), *np.ones(len(VISEMES_15))], len(LAGS))
+    weights = np.append(weights, np.full(HINTS, HINT_SHARE * weights.sum() / HINTS))
+
+    def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
+        whole = sequences[number][int(rng.integers(len(sequences[number])))]
+        return cut(whole, int(rng.integers(max(len(whole.inputs) - PIECE_STEPS, 0) + 1)))
+
+    def report(step: int, error: float) -> None:
+        if step % 100 == 0:
+            print(step, round(error, 4), flush=True)
+
+    plan = TrainingPlan(steps, batch_size=16, rate=2e-3, dropout=0.3, seed=0)
+    network = SHAPE.initial(len(LAGS) * OUTPUTS + HINTS, 0)
+    network = fit_network(network, draw, len(sequences), weights, plan, report)
+    return network.with_parameters(
+        [*network.parameters[:-2], *(array[..., :-HINTS] / output_scale() for array in network.parameters[-2:])]
+    )
 
 
 def fit_curves(model: Model, corpus: Corpus) -> NDArray[np.float64]:
@@ -219,8 +225,7 @@ def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
     for name in corpus.names(options.split)[::2]:
         utterance = corpus.utterance(name)
         jobs.append((utterance.audio, utterance.track, " ".join(utterance.words or ())))
-    prompts = [read_audio(path) for path in sorted(options.prompts.glob("*.g722"))[::2]] if options.prompts else []
-    spoken = [audio for audio in (*sounds, *prompts) if audio.duration_s > LEAST_S]
+    spoken = [audio for audio in sounds if audio.duration_s > LEAST_S]
     spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in spoken]
     jobs += [(audio, None, None) for audio in (*spoken, *synthesise(options.text, options.minutes))]
     with ProcessPoolExecutor(options.workers) as pool:

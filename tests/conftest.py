@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 # Before NumPy is loaded: two threads of a matrix product wait for one another in a loop, and for long where the machine
-# has other work. The product itself computes under ``kernels.threads.one_thread``; two threads: ``make test-portable``.
+# has other work. It computes under ``kernels.compiler.one_thread``; two threads: ``make test-portable``.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import signal

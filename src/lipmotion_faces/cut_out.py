@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.units.visemes import BLAIR, LETTERS, SHAPES
+from lipmotion.units.phones import BLAIR, LETTERS, SHAPES
 from lipmotion_faces.base import TRANSPARENT, Staging
 
 Picture = NDArray[np.uint8]

@@ -12,7 +12,7 @@ import numpy as np
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.motion.space import resample_track
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.motion.transfer_map import count_speech_s, fit_transfer_map, select_channels

@@ -11,7 +11,7 @@ from typing import Any
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, describe_training, train

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures.curves import pooled_correlation
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.json_text import nan_as_null

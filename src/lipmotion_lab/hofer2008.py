@@ -14,8 +14,8 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.hmm.multistream.streams import SPEECH
-from lipmotion.kernels.threads import one_thread
+from lipmotion.hmm.multistream.densities import SPEECH
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool

@@ -14,7 +14,7 @@ import numpy as np
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor

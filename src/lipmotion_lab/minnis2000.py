@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.selection.concatenation import pieces_of
-from lipmotion.engines.selection.config import MINNIS_2000, SelectionConfig
-from lipmotion.engines.selection.costs import ABUTTING_JOIN
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, MINNIS_2000, SelectionConfig
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser

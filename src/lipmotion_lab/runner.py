@@ -25,7 +25,7 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.kernels.threads import blas_kernels
+from lipmotion.kernels.compiler import blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.pipeline.training.labels import digest_corpus, fingerprint_training
 from lipmotion.pipeline.training.train import Run, train

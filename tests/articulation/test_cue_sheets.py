@@ -22,7 +22,7 @@ from lipmotion.articulation.cue_sheets import (
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
-from lipmotion.units.visemes import OPTIONAL, SHAPES, choose_drawn_shape
+from lipmotion.units.phones import OPTIONAL, SHAPES, choose_drawn_shape
 
 FRAME_RATES = [12.0, 24.0, 25.0, 30.0, 60.0]
 

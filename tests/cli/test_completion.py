@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from children import run_child
-from lipmotion.cli.verbs.completion import SHELLS
+from lipmotion.cli.verbs.about import SHELLS
 
 ASKED: dict[tuple[str, ...], set[str]] = {
     ("cue",): {"cues"}, ("corpus", "pre"): {"prepare"}, ("corpus", "prepare", "--no"): {"--no-crops"},

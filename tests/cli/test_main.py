@@ -8,7 +8,7 @@ import pytest
 from children import PIPE, child, run_child
 from cli.conftest import check_refused, is_one_error
 from lipmotion.cli import main
-from lipmotion.cli.verbs import info
+from lipmotion.cli.verbs import about
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
 
 STOPPED = "lipmotion: stopped; run the same command again to go on"
@@ -88,7 +88,7 @@ def test_an_error_is_one_line(run, monkeypatch):
         (KeyboardInterrupt(), 130, STOPPED),
     ]  # fmt: skip
     for error, code, line in errors:
-        monkeypatch.setattr(info, "run", partial(_fail, error))
+        monkeypatch.setattr(about, "run_info", partial(_fail, error))
         assert run("info") == (code, [], [line])
 
 
@@ -97,7 +97,7 @@ def _fail(error: BaseException, _: object) -> None:
 
 
 def test_a_bug_is_not_hidden(monkeypatch):
-    monkeypatch.setattr(info, "run", partial(_fail, ZeroDivisionError()))
+    monkeypatch.setattr(about, "run_info", partial(_fail, ZeroDivisionError()))
     with pytest.raises(ZeroDivisionError):
         main.main(["info"])
 

@@ -20,11 +20,10 @@ import pytest
 from cli.conftest import is_one_error
 from lipmotion import Corpus
 from lipmotion.cli.main import main
-from lipmotion.cli.terminal.events import Events
+from lipmotion.cli.terminal.events import Events, Stopper
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
 from lipmotion.cli.terminal.progress import outcome, report_progress
-from lipmotion.cli.terminal.stop import Stopper
-from lipmotion.cli.verbs import info
+from lipmotion.cli.verbs import about
 from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text
@@ -155,7 +154,7 @@ def test_warnings(run, monkeypatch):
             warnings.simplefilter("always")
             warnings.warn(EVIL, stacklevel=1)
 
-    monkeypatch.setattr(info, "run", warn)
+    monkeypatch.setattr(about, "run_info", warn)
     head = "lipmotion: warning: "
     with logged():
         done = run("info")

@@ -13,9 +13,8 @@ import pytest
 from children import LIPMOTION, environment, run_child
 from cli.conftest import Done
 from lipmotion.cli.main import main
-from lipmotion.cli.terminal.events import Events, JsonLines
+from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
 from lipmotion.cli.terminal.progress import report_progress
-from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.errors import CorpusError
 from lipmotion.types import Item, Progress
 from lipmotion_lab.verbs import evaluate

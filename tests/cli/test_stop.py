@@ -14,8 +14,8 @@ import lipmotion
 from children import LIPMOTION, PIPE, child, environment, run_child
 from children import Done as Completed
 from cli import signalled
-from lipmotion.cli.terminal.stop import Stopped, Stopper
-from lipmotion.cli.verbs import info
+from lipmotion.cli.terminal.events import Stopped, Stopper
+from lipmotion.cli.verbs import about
 
 LINE = "lipmotion: stopped; run the same command again to go on"
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -33,7 +33,7 @@ def test_a_signal_is_one_line_and_an_exit_code(run, monkeypatch, number):
         signal.raise_signal(number)
         raise AssertionError
 
-    monkeypatch.setattr(info, "run", kill)
+    monkeypatch.setattr(about, "run_info", kill)
     assert run("info") == (128 + number, [], [LINE])
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.excepthook) == before
 
@@ -46,7 +46,7 @@ def test_an_error_that_follows_from_a_signal_is_not_shown(run, monkeypatch):
             raise error from None
 
     for error in (ImportError("cannot import"), OSError("interrupted"), ZeroDivisionError()):
-        monkeypatch.setattr(info, "run", partial(kill, error))
+        monkeypatch.setattr(about, "run_info", partial(kill, error))
         assert run("info") == (130, [], [LINE])
 
 
@@ -60,7 +60,7 @@ def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(run, monkeypatc
             signal.raise_signal(signal.SIGINT)
             tidied.append(True)
 
-    monkeypatch.setattr(info, "run", kill)
+    monkeypatch.setattr(about, "run_info", kill)
     assert run("info").code == 130
     assert tidied == [True]
 
@@ -68,7 +68,7 @@ def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(run, monkeypatc
 def test_an_ignored_signal_stays_ignored(monkeypatch, run):
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        monkeypatch.setattr(info, "run", lambda _: signal.raise_signal(signal.SIGINT))
+        monkeypatch.setattr(about, "run_info", lambda _: signal.raise_signal(signal.SIGINT))
         assert run("info") == (0, [], [])
         assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     finally:
@@ -131,9 +131,9 @@ def test_a_second_signal_later_ends_the_program():
     """A second signal ends the program at once, even where the first one was swallowed."""
     program = (
         "import time\n"
-        "from lipmotion.cli.terminal import stop\n"
-        "stop.SAME_SIGNAL_S = 0.0\n"
-        "stop.Stopper().listen()\n"
+        "from lipmotion.cli.terminal import events\n"
+        "events.SAME_SIGNAL_S = 0.0\n"
+        "events.Stopper().listen()\n"
         "while True:\n"
         "    try:\n"
         "        print('ready', flush=True)\n"
@@ -254,6 +254,5 @@ def test_little_is_loaded_before_signals_are_listened_to():
     loaded = set(done.stdout.split())
     assert {name for name in loaded if name.startswith("lipmotion")} == {
         "lipmotion", "lipmotion.cli", "lipmotion.cli.terminal", "lipmotion.cli.terminal.events", "lipmotion.cli.main",
-        "lipmotion.cli.terminal.stop",
     }  # fmt: skip
     assert not loaded & {"typing", "re", "json", "argparse", "logging", "numpy", "pathlib"}

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from docs.test_links import DOCS
-from lipmotion.engines.coupled.config import CoupledConfig
+from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.joint.engine import JointEngineConfig
-from lipmotion.engines.selection.config import SelectionConfig
+from lipmotion.engines.selection.costs import SelectionConfig
 
 ROOT = DOCS.parent
 SOURCE, CORE, TESTS = ROOT / "src", ROOT / "src" / "lipmotion", ROOT / "tests"

@@ -8,7 +8,7 @@ import pytest
 
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
-from lipmotion.engines.selection.config import SelectionConfig
+from lipmotion.engines.selection.costs import SelectionConfig
 from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
 from lipmotion_lab.minnis2000 import (

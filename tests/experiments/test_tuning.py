@@ -6,8 +6,8 @@ import pytest
 
 from lipmotion import Corpus, Model, Selection
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
-from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
+from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.measures import curves
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.examples import examples

@@ -7,7 +7,7 @@ from PIL import Image
 
 from lipmotion import Staging
 from lipmotion.errors import InputError
-from lipmotion.units.visemes import BLAIR
+from lipmotion.units.phones import BLAIR
 from lipmotion_faces.cut_out import read_cut_out
 
 LETTERS = "ABCDEFGHX"

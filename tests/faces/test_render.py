@@ -9,9 +9,8 @@ from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion_faces import FACES, Staging, base, stage_face
 from lipmotion_faces.base import DrawsPlanes, Face
 from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
-from lipmotion_faces.portrait.geometry import MouthPose
+from lipmotion_faces.portrait.geometry import NECK_END, NECK_TOP, PIVOT_Y, HeadField, HeadPlacement, MouthPose, grid
 from lipmotion_faces.portrait.layer import View
-from lipmotion_faces.portrait.movement import NECK_END, NECK_TOP, PIVOT_Y, HeadField, HeadPlacement, grid
 from lipmotion_faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 from lipmotion_faces.testing import check_face

@@ -12,7 +12,7 @@ from lipmotion.errors import InputError
 from lipmotion.formats.cues import CUE_FORMATS, cue_motion, read_cues, write_cue_file
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import Span, Timeline
-from lipmotion.units.visemes import SHAPES
+from lipmotion.units.phones import SHAPES
 
 SHOWN = [("X", 0.5), ("A", 0.625), ("D", 0.875), ("G", 1.0), ("C", 1.25), ("F", 1.5), ("H", 1.625), ("B", 1.75),
          ("E", 2.0), ("X", 2.5)]  # fmt: skip

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from hmm.synthetic import SILENCE, UNITS, known_hmm, random_hmm, sentences, speaker, within_silence
-from lipmotion.hmm.decode import build_unit_loop, decode_units
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.hmm.network import compute_log_likelihoods
+from lipmotion.hmm.network import build_unit_loop, compute_log_likelihoods, decode_units
 from oracles import sequences
 
 INVENTORY = (SILENCE, "a", "b")

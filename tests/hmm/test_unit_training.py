@@ -19,9 +19,8 @@ from lipmotion.errors import CorpusError
 from lipmotion.hmm import unit_training
 from lipmotion.hmm.align import choose_pronunciations
 from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES
-from lipmotion.hmm.decode import build_unit_loop, decode_units
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.hmm.network import compute_log_likelihoods
+from lipmotion.hmm.network import build_unit_loop, compute_log_likelihoods, decode_units
 from lipmotion.hmm.unit_training import TranscribedUtterance, train_hmm
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.types.progress import silent_monitor

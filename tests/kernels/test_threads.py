@@ -4,7 +4,7 @@ from threading import Barrier
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from lipmotion.kernels.threads import blas_kernels, one_thread
+from lipmotion.kernels.compiler import blas_kernels, one_thread
 
 
 def threads() -> set[int]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from lipmotion.engines import Engine, engine_from_settings, engine_named
-from lipmotion.engines.trajectory.emission import NETWORK_SHARE
+from lipmotion.engines.trajectory.model import NETWORK_SHARE
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.extensions import GROUPS
 from lipmotion.motion.acoustic_network import AcousticNetwork

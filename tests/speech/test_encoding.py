@@ -1,20 +1,30 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.motion.encoding_regression import EncodingRegression
 from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.motion.prior_regression import EncodingRegression
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.encoding import COMPONENTS, LEVEL, WindowedEncoding, log_mel_spectrum
+from lipmotion.speech.features.encoding import (
+    COMPONENTS,
+    LEVEL,
+    WindowedEncoding,
+    encode_window,
+    log_mel_spectrum,
+    shipped_encoder,
+)
 from lipmotion.speech.features.mfcc import HOP, WINDOW
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.examples import example
 from lipmotion.types import Audio, Example
 from speech.made_voices import pulses, recording, vowels
 
 RATE_HZ = 16_000
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +41,20 @@ def test_a_tone_is_loud_in_its_band_alone() -> None:
     top = 15 + np.log(8) * 27 / np.log(6.4)
     assert np.all(spectrum.argmax(axis=1) == round(440 * 3 / 200 / (top / 81)) - 1)
     assert spectrum.min() == pytest.approx((-4.5 + 4) / 4, abs=1e-6)
+
+
+def test_the_forward_pass_is_that_of_the_network() -> None:
+    """The rows were computed by ONNX Runtime 1.32.0 from the published file, with activations that are not rounded.
+
+    Smart Turn v3.2, output of the first normalisation of the third layer, every 20th row from the fifth on, its first
+    eight components. With activations of eight bits, as the file has them, rows differ by a fifth of their deviation.
+    """
+    samples = read_audio(WELCOME).samples
+    padded = np.pad(samples, (0, 8 * RATE_HZ + WINDOW - HOP - len(samples)))
+    rows = encode_window(log_mel_spectrum(padded.astype(np.float32))[:800], shipped_encoder())
+    expected = np.loadtxt(Path(__file__).with_name("encoder_reference.csv"), delimiter=",")
+    assert rows[5:285:20, :8] == pytest.approx(expected, abs=0.04)
+    assert expected.std() > 0.4
 
 
 def test_rows_do_not_depend_on_what_is_asked_for() -> None:

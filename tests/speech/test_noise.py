@@ -19,8 +19,7 @@ from lipmotion.speech.sound.acoustic_conditions import (
     spoken_samples,
     white_noise,
 )
-from lipmotion.speech.sound.overlap_add import REACH_S, overlapped
-from lipmotion.speech.sound.resampling import decimated
+from lipmotion.speech.sound.resampling import REACH_S, decimated, overlapped
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import SPECTRUM_BANDS, Audio

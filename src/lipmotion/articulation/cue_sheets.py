@@ -22,7 +22,7 @@ from lipmotion.kernels.paths import best_segments
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import parse_clock, parse_number
 from lipmotion.units import SILENCE, VISEMES, group_words, is_silent, mark_closing_phones
-from lipmotion.units.visemes import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choose_drawn_shape
+from lipmotion.units.phones import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choose_drawn_shape
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")

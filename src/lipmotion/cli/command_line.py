@@ -16,17 +16,16 @@ from typing import Any, NoReturn
 
 from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.arguments.paths import check_paths
-from lipmotion.cli.terminal.events import Events
+from lipmotion.cli.terminal.events import Events, Stopper
 from lipmotion.cli.terminal.printing import flush_output, print_usage, with_program_name
-from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
 from lipmotion.types.values import parse_number, parse_whole
 
-_VERBS = "animate batch live speak render edit explain cues words train adapt character addon info cite doctor"
-VERBS: Registry[Callable[[Any], None]] = Registry(
-    "verb", "lipmotion.verbs", {name: f"lipmotion.cli.verbs.{name}:add" for name in [*_VERBS.split(), "completion"]}
-)
+_VERBS = "animate batch live speak render edit explain cues words train adapt character"
+_PLACES = {name: f"lipmotion.cli.verbs.{name}:add" for name in _VERBS.split()}
+_PLACES |= {name: f"lipmotion.cli.verbs.about:add_{name}" for name in "addon info cite doctor completion".split()}
+VERBS: Registry[Callable[[Any], None]] = Registry("verb", "lipmotion.verbs", _PLACES)
 """What adds each verb to the parser; those of faces, studio and lab are entry points."""
 OF_OTHER_TOOLS = {
     **dict.fromkeys(("convert", "export", "import", "draw", "video", "play"), "render IN -o OUT"),

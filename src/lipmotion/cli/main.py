@@ -6,8 +6,7 @@ import gc
 import os
 import sys
 
-from lipmotion.cli.terminal.events import Events, create_events
-from lipmotion.cli.terminal.stop import MESSAGE, Stopper
+from lipmotion.cli.terminal.events import MESSAGE, Events, Stopper, create_events
 
 NEW_OBJECTS = 50_000
 """Unreachable cycles are searched after so many new objects: Python's 700 cost a twentieth of a short command."""

@@ -28,7 +28,7 @@ from lipmotion.storage.files import atomic_file, read_text_file
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE
-from lipmotion.units.visemes import REST, SHAPES
+from lipmotion.units.phones import REST, SHAPES
 
 VERSION, SLOT, ANIMATION = "4.2.0", "mouth", "speech"
 PIXELS = 256

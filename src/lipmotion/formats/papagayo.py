@@ -22,7 +22,7 @@ from lipmotion.articulation.cue_sheets import (
 from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
-from lipmotion.units.visemes import REST, SHAPES
+from lipmotion.units.phones import REST, SHAPES
 
 MARK = "lipsync version 1"
 FASTEST_FPS = 1000

@@ -26,7 +26,7 @@ from lipmotion.articulation.cue_sheets import (
 )
 from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json
-from lipmotion.units.visemes import LETTERS, SHAPES
+from lipmotion.units.phones import LETTERS, SHAPES
 
 _NOT_XML = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _CONTROL = re.compile("[\t\n\x7f]")

@@ -3,20 +3,76 @@
 Loading numba takes as long as a short recording's motion, so importing this or any kernel does not load it. Three
 kernels also have a form in NumPy, which gives the same bits, and say why in their first line (``pays`` chooses).
 Compiled functions take many arrays as separate arguments: numba compiles that to the fastest code.
+Matrix products (BLAS) run on one thread (``one_thread``).
 """
 
 from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Callable
-from contextlib import suppress
-from functools import cache, update_wrapper
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache, lru_cache, update_wrapper
 from pathlib import Path
-from threading import RLock
+from threading import Lock, RLock
 from typing import Any, TypeVar, cast
 
 import numpy as np
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Compute matrix products in one thread inside the block (or the function that this decorates).
+
+    The last bits of a product depend on the number of threads: with one, results do not depend on ``OMP_NUM_THREADS``,
+    nor on the division of work among processes. For products as small as ours one thread is no slower. The limit holds
+    for the whole process, until the last of several Python threads has left such a block. Libraries that cannot be
+    limited (Accelerate on macOS) are not changed.
+    """
+    import numpy as np  # noqa: F401 # only what is loaded can be limited
+
+    with _LIMIT:
+        yield
+
+
+class _SharedLimit:
+    """The limit of one thread, from when the first Python thread needs it until the last one leaves."""
+
+    def __init__(self) -> None:
+        self._lock, self._users, self._limits = Lock(), 0, ExitStack()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self._limits.enter_context(_loaded_libraries(len(sys.modules)).limit(limits=1, user_api="blas"))
+            self._users += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._users -= 1
+            if not self._users:
+                self._limits.close()
+
+
+_LIMIT = _SharedLimit()
+
+
+@lru_cache(maxsize=1)
+def _loaded_libraries(_: int) -> Any:
+    """Return threadpoolctl's controller of the libraries in use; asked for again when modules have been imported."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def blas_kernels() -> list[str]:
+    """Return the name, version and processor of each BLAS in use, sorted; where these differ, rounding does."""
+    import numpy as np  # noqa: F401
+    import scipy.linalg  # noqa: F401 # has a copy of its own
+    from threadpoolctl import threadpool_info
+
+    loaded = [each for each in threadpool_info() if each["user_api"] == "blas" and "opencv" not in each["filepath"]]
+    return sorted(f"{each['internal_api']} {each['version']} {each.get('architecture')}" for each in loaded)
+
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 LONG_FRAMES = 30_000

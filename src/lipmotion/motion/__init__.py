@@ -17,17 +17,7 @@ from lipmotion.motion.generation import LearnedMotion, fit_motion
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 
 __all__ = [
-    "LEARNED_MOTION_ARRAYS",
-    "WINDOW",
-    "AcousticContext",
-    "LearnedMotion",
-    "acoustic_context_from_arrays",
-    "acoustic_context_to_arrays",
-    "fit_acoustic_context",
-    "fit_motion",
-    "learned_motion_from_arrays",
-    "learned_motion_to_arrays",
-    "mark_known_dynamics",
-    "with_dynamics",
-    "with_unit_names",
-]
+    "LEARNED_MOTION_ARRAYS", "WINDOW", "AcousticContext", "LearnedMotion", "acoustic_context_from_arrays",
+    "acoustic_context_to_arrays", "fit_acoustic_context", "fit_motion", "learned_motion_from_arrays",
+    "learned_motion_to_arrays", "mark_known_dynamics", "with_dynamics", "with_unit_names",
+]  # fmt: skip

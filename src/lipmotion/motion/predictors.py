@@ -143,7 +143,7 @@ PREDICTORS: Registry[type[Predictor]] = Registry(
         "network": "lipmotion.motion.acoustic_network:AcousticNetwork",
         "posteriors": "lipmotion.motion.posterior_network:PosteriorNetwork",
         "prior": "lipmotion.motion.prior_regression:PriorRegression",
-        "encoding": "lipmotion.motion.encoding_regression:EncodingRegression",
+        "encoding": "lipmotion.motion.prior_regression:EncodingRegression",
     },
 )
 

@@ -29,8 +29,7 @@ from lipmotion.articulation.curve_edits import (
 )
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import AlignmentError, InputError, shorten
-from lipmotion.kernels.compiler import numba_works
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import numba_works, one_thread
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.analysis.language import resolve_language
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request

@@ -19,7 +19,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.types import ParallelMap
 
 ItemT = TypeVar("ItemT")

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 
 Array = NDArray[np.float32]
 NetworkT = TypeVar("NetworkT", bound="SequenceNetwork")

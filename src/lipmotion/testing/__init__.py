@@ -4,12 +4,6 @@ from lipmotion.testing.check_engine import ENGINE_CHECKS, ContractError, Trained
 from lipmotion.testing.toy import toy_motion, toy_sentences, toy_utterances
 
 __all__ = [
-    "ENGINE_CHECKS",
-    "ContractError",
-    "TrainedEngine",
-    "check_engine",
-    "check_exporter",
-    "toy_motion",
-    "toy_sentences",
-    "toy_utterances",
-]
+    "ENGINE_CHECKS", "ContractError", "TrainedEngine", "check_engine", "check_exporter", "toy_motion",
+    "toy_sentences", "toy_utterances",
+]  # fmt: skip

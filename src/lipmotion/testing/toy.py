@@ -18,6 +18,7 @@ from lipmotion.motion.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
+from lipmotion.units.spelling import parse_table
 
 SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)
 """Colours, RGB."""
@@ -28,19 +29,12 @@ SHADE = 0.15
 THINNEST_PX = 0.2
 
 
-WORDS: dict[str, tuple[str, ...]] = {
-    "baby": ("b", "ey", "b", "iy"),
-    "blue": ("b", "l", "uw"),
-    "bob": ("b", "aa", "b"),
-    "five": ("f", "ay", "v"),
-    "mama": ("m", "aa", "m", "ax"),
-    "map": ("m", "ae", "p"),
-    "now": ("n", "aw"),
-    "papa": ("p", "aa", "p", "ax"),
-    "pop": ("p", "aa", "p"),
-    "see": ("s", "iy"),
-    "tea": ("t", "iy"),
-    "two": ("t", "uw"),
+WORDS = {
+    word: tuple(phones.split())
+    for word, phones in parse_table(
+        "baby=b_ey_b_iy blue=b_l_uw bob=b_aa_b five=f_ay_v mama=m_aa_m_ax map=m_ae_p now=n_aw papa=p_aa_p_ax "
+        "pop=p_aa_p see=s_iy tea=t_iy two=t_uw"
+    ).items()
 }
 """The vocabulary, pronounced as in the CMU dictionary."""
 

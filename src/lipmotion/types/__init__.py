@@ -22,7 +22,6 @@ if TYPE_CHECKING:
         from_sixteen_bits,
         to_sixteen_bits,
     )
-    from lipmotion.types.confidence import SpeechKnowledge
     from lipmotion.types.configuration import Configuration, Rule, option
     from lipmotion.types.delivery import Delivery, Staging
     from lipmotion.types.explanation import (
@@ -62,7 +61,7 @@ if TYPE_CHECKING:
         sub_monitor,
         with_progress,
     )
-    from lipmotion.types.timeline import Span, Timeline, Unit
+    from lipmotion.types.timeline import Span, SpeechKnowledge, Timeline, Unit
     from lipmotion.types.utterance import TimedTranscript, TimedWord, Track, TranscriptLine, Utterance, sort_lines
 
 __all__ = [
@@ -78,7 +77,7 @@ __all__ = [
 ]  # fmt: skip
 
 _MODULES = (
-    *("configuration", "delivery", "audio", "timeline", "motion", "confidence"),
+    *("configuration", "delivery", "audio", "timeline", "motion"),
     *("generation", "progress", "explanation", "utterance"),
 )
 """Where the names are looked for, in this order."""

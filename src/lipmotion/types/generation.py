@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.types.audio import FRAME_RATE_HZ, Audio, Features, TokenPosteriors, VoiceEvent
-from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.delivery import MoodKey
 from lipmotion.types.motion import Motion, interpolate_rows
-from lipmotion.types.timeline import Span, Timeline, Unit
+from lipmotion.types.timeline import Span, SpeechKnowledge, Timeline, Unit
 
 CachedT = TypeVar("CachedT")
 LARGEST_GAIN, MAX_DRAWN = 3.0, 10_000

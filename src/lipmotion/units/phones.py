@@ -1,12 +1,80 @@
-"""The phone inventory: the 47 phones of Xie & Liu 2007, Table 1; their likeness, and classes of them."""
+"""The phone inventory: the 47 phones of Xie & Liu 2007, Table 1; their likeness, classes, visemes.
+
+The chart of mouth shapes has nine drawings: six that every character has, A to F (they go back to Hanna-Barbera), and
+three that are optional. Letters, meanings, fallbacks and the other names are those of Rhubarb Lip Sync's documentation.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 from lipmotion.errors import shorten
 from lipmotion.types import Timeline, Unit
-from lipmotion.units.visemes import VISEME_OF, VISEMES
+from lipmotion.units.spelling import parse_table
+
+VISEMES: dict[str, tuple[str, ...]] = {
+    "sip": ("sil", "sp"),  # silence (the print's /sip/ is /sil/; sp joins it)
+    "lr1": ("ao", "aa", "ah", "er", "oy", "aw", "hh"),  # vowels by lip rounding, 1 to 4
+    "lr2": ("uw", "uh", "ow", "em"),
+    "lr3": ("ae", "eh", "ey", "ay"),
+    "lr4": ("ih", "iy", "ax", "axr", "ix"),
+    "as": ("l", "el", "r", "y"),  # alveolar semi-vowels
+    "af": ("s", "z"),  # alveolar fricatives
+    "al": ("t", "d", "n", "en"),  # alveolar
+    "pa": ("sh", "zh", "ch", "jh"),  # palato-alveolar
+    "bi": ("p", "b", "m"),  # bilabial: the mouth closes
+    "de": ("th", "dh"),  # dental
+    "ld": ("f", "v"),  # labio-dental
+    "ve": ("ng", "k", "g", "w"),  # velar
+}
+
+VISEME_OF: dict[str, str] = {phone: viseme for viseme, phones in VISEMES.items() for phone in phones}
+
+VOWELS = frozenset(phone for viseme in ("lr1", "lr2", "lr3", "lr4") for phone in VISEMES[viseme]) - {"hh", "em"}
+"""The phones of the visemes of vowels that are vowels."""
+
+
+@dataclass(frozen=True)
+class MouthShape:
+    """One drawing of the mouth.
+
+    meaning  : what is drawn
+    opening  : between the lips, 0 closed, 1 as wide as in speech
+    spread   : of the corners of the mouth, 1 a smile, -1 puckered
+    blair    : its name among Preston Blair's shapes
+    fallback : the basic shape that is shown where this one is not drawn; empty: it is a basic shape itself
+    """
+
+    meaning: str
+    opening: float
+    spread: float
+    blair: str
+    fallback: str = ""
+
+
+SHAPES: dict[str, MouthShape] = {
+    "A": MouthShape("closed, lips pressed: p b m", 0.0, 0.0, "MBP"),
+    "B": MouthShape("slightly open, teeth together: most consonants, ee", 0.35, 0.4, "etc"),
+    "C": MouthShape("open: e as in men, a as in bat", 0.6, 0.2, "E"),
+    "D": MouthShape("wide open: a as in father", 0.85, 0.0, "AI"),
+    "E": MouthShape("slightly rounded: o as in off, ir as in bird", 0.5, -0.5, "O"),
+    "F": MouthShape("puckered: oo as in you, w", 0.2, -1.0, "U"),
+    "G": MouthShape("upper teeth on the lower lip: f v", 0.15, 0.0, "FV", fallback="A"),
+    "H": MouthShape("open, tongue raised behind the upper teeth: l", 0.6, 0.0, "L", fallback="C"),
+    "X": MouthShape("at rest, lips closed and relaxed: silence", 0.0, 0.0, "rest", fallback="A"),
+}
+OPTIONAL = "".join(name for name, shape in SHAPES.items() if shape.fallback)
+REST = "X"
+LETTERS = {name.lower(): name for name in SHAPES}
+BLAIR = {shape.blair.lower(): name for name, shape in SHAPES.items()} | {"wq": "F"}
+"""Shapes by Preston Blair's names; his E is another shape than the letter."""
+
+
+def choose_drawn_shape(shape: str, drawn: str) -> str:
+    """Return the shape itself if it is drawn, else its fallback."""
+    return shape if shape in drawn else SHAPES[shape].fallback
+
 
 SILENCE = "sil"
 PAUSE = "sp"
@@ -43,55 +111,16 @@ LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")
 """The phones in which the lips meet."""
 
 SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
-    # A phone that is not in a corpus borrows the model of the first of these that is.
-    "aa": ("ao", "ah"),
-    "ae": ("eh", "aa"),
-    "ah": ("ax", "aa"),
-    "ao": ("aa", "ow"),
-    "aw": ("aa", "ow"),
-    "ax": ("ah", "ix", "ih"),
-    "axr": ("er", "r", "ax"),
-    "ay": ("aa", "ey"),
-    "b": ("p", "m", "d"),
-    "ch": ("jh", "sh", "t"),
-    "d": ("t", "dh", "n"),
-    "dh": ("th", "v", "d"),
-    "eh": ("ae", "ih"),
-    "el": ("l", "ow"),
-    "em": ("m", "ax"),
-    "en": ("n", "ax"),
-    "er": ("axr", "r", "ax"),
-    "ey": ("eh", "iy"),
-    "f": ("v", "th", "s"),
-    "g": ("k", "d"),
-    "hh": ("th", "f", "k"),
-    "ih": ("ix", "iy", "eh"),
-    "ix": ("ih", "ax"),
-    "iy": ("ih", "ey"),
-    "jh": ("ch", "zh", "d"),
-    "k": ("g", "t"),
-    "l": ("el", "ow", "w"),
-    "m": ("n", "em"),
-    "n": ("m", "en"),
-    "ng": ("n", "m"),
-    "ow": ("ao", "uh", "uw"),
-    "oy": ("ao", "ow"),
-    "p": ("b", "t"),
-    "r": ("axr", "er", "w"),
-    "s": ("z", "sh", "f"),
-    "sh": ("ch", "s"),
-    "t": ("d", "k"),
-    "th": ("f", "dh", "s"),
-    "uh": ("uw", "ax", "ow"),
-    "uw": ("uh", "ow"),
-    "v": ("f", "dh", "b"),
-    "w": ("uw", "l", "r"),
-    "y": ("iy", "ih"),
-    "z": ("s", "zh"),
-    "zh": ("jh", "sh", "z"),
-    "sil": ("sp",),
-    "sp": ("sil",),
+    phone: tuple(others.split())
+    for phone, others in parse_table(
+        "aa=ao_ah ae=eh_aa ah=ax_aa ao=aa_ow aw=aa_ow ax=ah_ix_ih axr=er_r_ax ay=aa_ey b=p_m_d ch=jh_sh_t d=t_dh_n "
+        "dh=th_v_d eh=ae_ih el=l_ow em=m_ax en=n_ax er=axr_r_ax ey=eh_iy f=v_th_s g=k_d hh=th_f_k ih=ix_iy_eh "
+        "ix=ih_ax iy=ih_ey jh=ch_zh_d k=g_t l=el_ow_w m=n_em n=m_en ng=n_m ow=ao_uh_uw oy=ao_ow p=b_t r=axr_er_w "
+        "s=z_sh_f sh=ch_s t=d_k th=f_dh_s uh=uw_ax_ow uw=uh_ow v=f_dh_b w=uw_l_r y=iy_ih z=s_zh zh=jh_sh_z sil=sp "
+        "sp=sil"
+    ).items()
 }
+"""A phone that is not in a corpus borrows the model of the first of these that is."""
 
 
 def count_phone_edits(wanted: Sequence[str], found: Sequence[str]) -> int:

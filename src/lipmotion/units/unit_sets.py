@@ -22,8 +22,15 @@ from typing import NamedTuple
 from lipmotion.errors import InputError, shorten
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import Unit
-from lipmotion.units.phones import PAUSE, PHONES, SILENCE, describe_unknown_phone, is_silent, list_phone_classes
-from lipmotion.units.visemes import VISEME_OF
+from lipmotion.units.phones import (
+    PAUSE,
+    PHONES,
+    SILENCE,
+    VISEME_OF,
+    describe_unknown_phone,
+    is_silent,
+    list_phone_classes,
+)
 
 LARGEST_TABLE_BYTES = 1 << 18
 """The most bytes of a table file; one of 47 phones has a few hundred."""

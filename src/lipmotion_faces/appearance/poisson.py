@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, read_entry
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures.curves import Offset, best_offset, pooled_offset, shift_scores
 from lipmotion.motion.space import resample_to_model
 from lipmotion.speech.features.analysed_audio import analysed

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import FULL_DEFICIT_GAP, close_lips, gap_to_opening, read_gap, sample_pictures
 from lipmotion.errors import InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Mark, Outputs

@@ -7,7 +7,7 @@ from threading import RLock
 from typing import Any
 
 from lipmotion.errors import InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import measure_prosody, shift_prosody

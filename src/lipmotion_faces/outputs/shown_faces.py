@@ -17,7 +17,7 @@ from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Generation, Prosody
 from lipmotion.types.delivery import MOODS
 from lipmotion.types.progress import with_reports
-from lipmotion.units.visemes import OPTIONAL
+from lipmotion.units.phones import OPTIONAL
 from lipmotion_faces.base import Face, Staging
 from lipmotion_faces.cut_out import CutOut, read_cut_out
 from lipmotion_faces.film.filmed_video import (

@@ -15,9 +15,8 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.kernels.painting import warp_bytes
-from lipmotion_faces.portrait.geometry import MouthPose
+from lipmotion_faces.portrait.geometry import PIVOT_Y, MouthPose
 from lipmotion_faces.portrait.layer import lay_over
-from lipmotion_faces.portrait.movement import PIVOT_Y
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, face_poses
 from lipmotion_faces.portrait.svg_document import Drawing, Shape, read_drawing
 

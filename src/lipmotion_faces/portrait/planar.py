@@ -27,9 +27,9 @@ from lipmotion_faces.kernels.planes import (
     warp_planes,
 )
 from lipmotion_faces.portrait.design import Colour, Design
+from lipmotion_faces.portrait.geometry import BrowField, HeadField, SkinField, brow_pose
 from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter, MouthTextures, mouth_textures
-from lipmotion_faces.portrait.movement import BrowField, HeadField, SkinField, brow_pose
 from lipmotion_faces.portrait.parts import GAZE_STEPS, LID_POSITIONS, EyePainter, LidPose, lid_pose, paint_still_layers
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, moving_parts
 

@@ -16,10 +16,18 @@ from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, Picture, Staging, stage_liveliness
 from lipmotion_faces.kernels.painting import stack, warp, warp_bytes
 from lipmotion_faces.portrait.design import Colour, Design
-from lipmotion_faces.portrait.geometry import MouthPose
+from lipmotion_faces.portrait.geometry import (
+    STEP,
+    BrowField,
+    BrowPose,
+    HeadField,
+    HeadPlacement,
+    MouthPose,
+    SkinField,
+    brow_pose,
+)
 from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter
-from lipmotion_faces.portrait.movement import STEP, BrowField, BrowPose, HeadField, HeadPlacement, SkinField, brow_pose
 from lipmotion_faces.portrait.parts import EyePainter, paint_still_layers
 
 CanvasT = TypeVar("CanvasT")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.measures.closures import clip_closure_counts, closure_figures, phone_closures
 from lipmotion.measures.curves import Clips, bootstrap_interval

@@ -16,7 +16,7 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY

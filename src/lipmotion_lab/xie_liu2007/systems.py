@@ -15,8 +15,8 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Animator, Engine, engine_named
 from lipmotion.engines.coupled.arrays import coupled_arrays
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, HMM, SYSTEMS
-from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
+from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import growing_models
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs

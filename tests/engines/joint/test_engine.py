@@ -7,7 +7,7 @@ import pytest
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.engines.joint.engine import JointEngine, JointModel
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.streams import StreamWeights
+from lipmotion.hmm.multistream.densities import StreamWeights
 from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types import Example, Generation, Span, Speech, Timeline, Unit
 from lipmotion.types.progress import silent_monitor

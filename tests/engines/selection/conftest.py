@@ -2,7 +2,7 @@
 
 import pytest
 
-from lipmotion.engines.selection.config import SelectionConfig
+from lipmotion.engines.selection.costs import SelectionConfig
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.testing.examples import examples

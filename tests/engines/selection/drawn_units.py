@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import Costs, Target
+from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.windows import phone_windows
 from lipmotion.types import Span, Timeline, Unit

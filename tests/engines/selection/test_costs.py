@@ -7,8 +7,15 @@ import pytest
 
 from engines.selection.drawn_units import PHONE_S, array, costs_of, inventory, target_of, timeline, with_stress
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of, shown_units
-from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE, Costs, Target
+from lipmotion.engines.selection.costs import (
+    ABUTTING_JOIN,
+    FRACTIONS,
+    JOIN_AFTER,
+    JOIN_BEFORE,
+    Costs,
+    SelectionConfig,
+    Target,
+)
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import phone_windows

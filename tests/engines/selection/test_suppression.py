@@ -8,8 +8,7 @@ import pytest
 from engines.selection.drawn_units import costs_of, inventory, timeline
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
-from lipmotion.engines.selection.config import MINNIS_2000, SelectionConfig
-from lipmotion.engines.selection.costs import Target
+from lipmotion.engines.selection.costs import MINNIS_2000, SelectionConfig, Target
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel

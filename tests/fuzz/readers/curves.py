@@ -18,7 +18,7 @@ from lipmotion.formats.base import write_motion
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
-from lipmotion.units.visemes import SHAPES
+from lipmotion.units.phones import SHAPES
 from lipmotion_faces.corpus.supplied import read_supplied_track
 from meshes import gltf
 from meshes.flame import head

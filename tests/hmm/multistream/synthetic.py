@@ -4,7 +4,18 @@ from itertools import product
 
 import numpy as np
 
-from lipmotion.hmm.multistream.densities import GaussianStatistics, StreamScale, TiedDensities
+from lipmotion.hmm.multistream.densities import (
+    F0_STREAMS,
+    MOTION,
+    SPEECH,
+    STREAMS,
+    GaussianStatistics,
+    ObservedStream,
+    StreamObservations,
+    StreamScale,
+    TiedDensities,
+    stream_observations,
+)
 from lipmotion.hmm.multistream.model import (
     JointConfig,
     JointHmm,
@@ -14,15 +25,6 @@ from lipmotion.hmm.multistream.model import (
     grow_forest,
 )
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance
-from lipmotion.hmm.multistream.streams import (
-    F0_STREAMS,
-    MOTION,
-    SPEECH,
-    STREAMS,
-    ObservedStream,
-    StreamObservations,
-    stream_observations,
-)
 from lipmotion.hmm.multistream.unit_states import Inventory
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.mixture import Mixtures

@@ -3,9 +3,9 @@ import pytest
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.multistream.align import align, measure_durations
+from lipmotion.hmm.multistream.densities import StreamWeights
 from lipmotion.hmm.multistream.multistream_training import train_joint
-from lipmotion.hmm.multistream.streams import StreamWeights
+from lipmotion.hmm.multistream.recognise import align, measure_durations
 from lipmotion.hmm.multistream.unit_states import expand_triphones
 from oracles import joint as slow
 from oracles.sequences import segmentations

@@ -3,24 +3,21 @@ import pytest
 
 from hmm.multistream.synthetic import observed, random_joint
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.densities import (
+    STREAMS,
     GaussianStatistics,
+    ObservedStream,
+    StreamObservations,
     StreamScale,
+    StreamWeights,
     TiedDensities,
     fit_scale,
     make_standard_normals,
+    stream_observations,
 )
 from lipmotion.hmm.multistream.generate import select_densities, solve_trajectory
 from lipmotion.hmm.multistream.model import joint_from_arrays, joint_to_arrays
-from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import (
-    STREAMS,
-    ObservedStream,
-    StreamObservations,
-    StreamWeights,
-    stream_observations,
-)
+from lipmotion.hmm.multistream.recognise import JointRecogniser, align
 from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
 

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from hmm.multistream.synthetic import CLASSES, NAMES, inventory, random_joint
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.densities import GaussianStatistics
+from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, GaussianStatistics
 from lipmotion.hmm.multistream.model import TreeCosts, choose_positions, context_questions, grow_forest, unit_forest
-from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS
 from lipmotion.hmm.multistream.unit_states import (
     Inventory,
     RecognisedUnit,

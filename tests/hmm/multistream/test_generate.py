@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.align import align
+from lipmotion.hmm.multistream.densities import MOTION, SPEECH
 from lipmotion.hmm.multistream.generate import (
     FrameDensities,
     average_densities,
@@ -17,7 +17,7 @@ from lipmotion.hmm.multistream.generate import (
 )
 from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
 from lipmotion.hmm.multistream.multistream_training import train_joint
-from lipmotion.hmm.multistream.streams import MOTION, SPEECH
+from lipmotion.hmm.multistream.recognise import align
 from lipmotion.stats.curves import with_dynamics
 from oracles import trajectories
 

@@ -8,7 +8,7 @@ from hmm.multistream.synthetic import CLASSES, config, inventory, random_joint, 
 from hmm.multistream.synthetic import observed as noise
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.multistream import densities
-from lipmotion.hmm.multistream.align import align
+from lipmotion.hmm.multistream.densities import F0_STREAMS, STREAMS, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.model import MOTION_ONLY
 from lipmotion.hmm.multistream.multistream_training import (
     TrainingUtterance,
@@ -19,8 +19,7 @@ from lipmotion.hmm.multistream.multistream_training import (
     reestimate_hmm,
     train_joint,
 )
-from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, ObservedStream, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.recognise import JointRecogniser, align
 from lipmotion.types import Progress
 from oracles import joint as slow
 from oracles import paths

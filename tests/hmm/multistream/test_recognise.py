@@ -6,12 +6,11 @@ import pytest
 from hmm.multistream.synthetic import observed, random_joint, utterances
 from kernels.networks import network_posteriors
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.decode import build_unit_loop, decode_units
 from lipmotion.hmm.model import HmmConfig, StateTable, UnitHmm
+from lipmotion.hmm.multistream.densities import SPEECH, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.recognise import JointRecogniser, build_context_loop
-from lipmotion.hmm.multistream.streams import SPEECH, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import expand_triphones
-from lipmotion.hmm.network import compute_log_likelihoods
+from lipmotion.hmm.network import build_unit_loop, compute_log_likelihoods, decode_units
 from oracles import joint as slow
 from oracles.sequences import sequences
 

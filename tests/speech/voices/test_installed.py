@@ -14,7 +14,7 @@ from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
-from lipmotion.speech.voices import espeak_events, programs
+from lipmotion.speech.voices import espeak_events, synthesiser
 from lipmotion.speech.voices.installed import (
     SYNTHESISERS,
     all_voices,
@@ -25,8 +25,7 @@ from lipmotion.speech.voices.installed import (
     voice_named,
     voiced_sentences,
 )
-from lipmotion.speech.voices.programs import program_output
-from lipmotion.speech.voices.synthesiser import SyntheticVoice
+from lipmotion.speech.voices.synthesiser import SyntheticVoice, program_output
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 
 FAKED = [
@@ -218,7 +217,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small bounds."""
     bounds = {"LARGEST_OUTPUT_BYTES": 1000, "LARGEST_SOUND_BYTES": 1000, "STILL_S": 0.15, "POLL_S": 0.01}
     for name, value in bounds.items():
-        monkeypatch.setattr(programs, name, value)
+        monkeypatch.setattr(synthesiser, name, value)
 
 
 @needs_scripts

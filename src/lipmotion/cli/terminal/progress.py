@@ -12,9 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from lipmotion.cli.terminal.events import Events, JsonLines, RhubarbStatus
+from lipmotion.cli.terminal.events import Events, JsonLines, RhubarbStatus, Stopper
 from lipmotion.cli.terminal.printing import print_error, print_lines, with_program_name
-from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.errors import ExportError, InputError, LipMotionError
 from lipmotion.extensions import describe_failed_extension
 from lipmotion.printable import printable

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import StreamGroup
-from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
+from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import Grammar, Transitions, reachable
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, Structure
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream
-from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
-from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays, motion_to_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from_arrays

@@ -15,10 +15,9 @@ from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Inference
-from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
 from lipmotion.engines.coupled.conversion.em_conversion import convert, path_means
 from lipmotion.engines.coupled.explanation import concatenated, describe, explain_frames, unit_posteriors
-from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import fit_coupled
 from lipmotion.kernels.banded import solve_mlpg

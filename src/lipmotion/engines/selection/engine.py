@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, motion_of_units, pieces_of, shown_units
-from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, Target
+from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target
 from lipmotion.engines.selection.inventory import RecordedUnits, inventory_text, is_source, source_of, units_by_source
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.search import select

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import FRACTIONS, POINTS, Costs
+from lipmotion.engines.selection.costs import FRACTIONS, POINTS, Costs, SelectionConfig
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.windows import PhoneWindows
 from lipmotion.hmm.multistream.phone_recogniser import (

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.concatenation import Chosen, concatenated, motion_of_units, pieces_of
-from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import Costs, Target
+from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import Guide, SelectionModel, at_points, fit_guide
 from lipmotion.engines.selection.search import select

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, close_gaps, describe_unknown_phone, is_silent
+from lipmotion.units.phones import VISEME_OF, VISEMES
 from lipmotion.units.stress import NUCLEI, find_stress
-from lipmotion.units.visemes import VISEME_OF, VISEMES
 
 PROTECTED_PHONES = ("f", "v", "m", "em", "p", "b")
 """Phones whose lip shape every join must preserve. The print names /v/ twice and /b/ never."""

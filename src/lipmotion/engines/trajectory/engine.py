@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
-from lipmotion.engines.trajectory.emission import Experts
-from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
+from lipmotion.engines.trajectory.model import Experts, TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.trajectory_training import TrainingOptions, fit_trajectory
 from lipmotion.motion.frame_labels import StateLayout, label_full_context, with_unit_names
 from lipmotion.motion.modulation_filter import STRENGTH

@@ -1,8 +1,8 @@
-"""The model of the trajectory engine."""
+"""The model of the trajectory engine: a Gaussian for each tied state, and how states and predictor are combined."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -10,13 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.emission import (
-    EMISSION,
-    NETWORK_SHARE,
-    Emission,
-    emission_arrays,
-    emission_from_arrays,
-)
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,
@@ -24,11 +17,23 @@ from lipmotion.hmm.multistream.phone_recogniser import (
     recogniser_to_arrays,
 )
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_from_arrays, motion_to_arrays
-from lipmotion.motion.articulation import KNOWN_VOICE_SHARE, TABLE_WEIGHT_WITH_PREDICTOR, ArticulationPrior
+from lipmotion.motion.articulation import (
+    KNOWN_VOICE_SHARE,
+    TABLE_WEIGHT_WITH_PREDICTOR,
+    ArticulationPrior,
+    slice_dynamics,
+    unseen_share,
+)
 from lipmotion.motion.closure import Closure
-from lipmotion.motion.frame_labels import StateLayout
-from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.limits import MotionLimits, check_poses, measure_limits
+from lipmotion.motion.context_window import (
+    WINDOW,
+    AcousticContext,
+    acoustic_context_from_arrays,
+    acoustic_context_to_arrays,
+)
+from lipmotion.motion.frame_labels import FullContextState, StateLayout
+from lipmotion.motion.generation import LearnedMotion, Statistics
+from lipmotion.motion.limits import MotionLimits, check_poses, check_spread, measure_limits
 from lipmotion.motion.modulation_filter import MODULATION, ModulationFilter, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import (
     ADDED,
@@ -37,10 +42,230 @@ from lipmotion.motion.predictors import (
     predictor_from_arrays,
     predictor_to_arrays,
 )
+from lipmotion.motion.rest import rate_phones
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
+from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays, trees_to_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
+from lipmotion.types import Speech
 from lipmotion.units import UnitSet
+
+Array = NDArray[np.float64]
+
+MOST_CONTEXTS = 50_000
+"""Contexts whose leaves are kept, so that motion is generated again sooner."""
+
+
+@dataclass(frozen=True, eq=False)
+class AcousticRegression:
+    """Linear regressions of the means of motion on the acoustic features around a frame.
+
+    context      : reduces the features around a frame to F numbers
+    coefficients : float32 array [shape=(R, F, 3·Q)], of R regressions
+    rows         : int array [shape=(L,)], number of the regression of each density; -1: its mean is constant
+    """
+
+    context: AcousticContext
+    coefficients: NDArray[np.float32]
+    rows: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Emission:
+    """Densities of static value, Δ and Δ² (Q dimensions each) of all tied states.
+
+    forest     : a decision tree for every state of speech and of silence (``StateLayout.names``)
+    means, variances : float32 arrays [shape=(L, 3, Q)], leaf by leaf, tree by tree; the last row is the rest pose
+    regression : regression of the means on acoustic features (None: the means are constant)
+    """
+
+    forest: Mapping[str, Tree]
+    means: NDArray[np.float32]
+    variances: NDArray[np.float32]
+    regression: AcousticRegression | None
+
+    @cached_property
+    def _first(self) -> dict[str, int]:
+        counts = np.cumsum([0, *(len(tree.leaves) for tree in self.forest.values())])
+        return dict(zip(self.forest, counts.tolist(), strict=False))
+
+    @cached_property
+    def _rank(self) -> dict[str, NDArray[np.intp]]:
+        return {name: np.cumsum(tree.asked < 0) - 1 for name, tree in self.forest.items()}
+
+    def row(self, state: FullContextState, layout: StateLayout) -> int:
+        """Return the number of the density of a full-context state: its row in ``means``."""
+        if state == layout.rest:
+            return len(self.means) - 1
+        name = layout.name(state)
+        return self._first[name] + int(self._rank[name][self._leaf(name, state.context)])
+
+    def _leaf(self, name: str, context: Context) -> int:
+        """Return the leaf of a context in a tree; it is looked for once."""
+        found = self._leaves.get((name, context))
+        if found is None:
+            if len(self._leaves) > MOST_CONTEXTS:
+                self._leaves.clear()
+            found = self._leaves[name, context] = self.forest[name].path(context)[-1]
+        return found
+
+    @cached_property
+    def _leaves(self) -> dict[tuple[str, Context], int]:
+        return {}
+
+    @cached_property
+    def _names(self) -> dict[tuple[str, int], str]:
+        return {}
+
+    def source(self, state: FullContextState, layout: StateLayout) -> str:
+        """Return the origin of the density of a state, in words: its tree, its leaf, and the frames of the leaf."""
+        if state == layout.rest:
+            return "rest"
+        name = layout.name(state)
+        leaf = self._leaf(name, state.context)
+        if (name, leaf) not in self._names:
+            tree = self.forest[name]
+            self._names[name, leaf] = f"{tree.name(leaf)} ({tree.frames[leaf]:.0f} frames)"
+        left, unit, right = state.context
+        return f"{left}-{unit}+{right} {name}: {self._names[name, leaf]}"
+
+    def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice) -> tuple[Array, Array]:
+        """Return means and precisions [each shape=(N, 3, Q)] of N successive frames of densities [shape=(N,)]."""
+        means, precisions = self.means[rows].astype(float), 1 / self.variances[rows].astype(float)
+        if self.regression is not None:
+            add_acoustic_regression(means, self.regression, rows, self.regression.context(features, frames))
+        return means, precisions
+
+
+def add_acoustic_regression(
+    means: Array, regression: AcousticRegression, rows: NDArray[np.intp], z: NDArray[np.float32]
+) -> None:
+    """Add the regressions on reduced features [shape=(N, F)] to constant means [shape=(N, 3, Q)], in place."""
+    used = regression.rows[rows]
+    for row in np.unique(used[used >= 0]):
+        frames = np.nonzero(used == row)[0]
+        means[frames] += (z[frames] @ regression.coefficients[row]).reshape(len(frames), *means.shape[1:])
+
+
+def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
+    """Serialise the densities; means and coefficients are stored at half precision."""
+    arrays = trees_to_arrays(emission.forest) | {
+        "means": emission.means.astype(np.float16),
+        "variances": emission.variances,
+    }
+    if emission.regression is not None:
+        context = emission.regression.context
+        arrays |= {
+            **acoustic_context_to_arrays(context),
+            "coefficients": emission.regression.coefficients.astype(np.float16),
+            "coefficient_rows": emission.regression.rows,
+        }
+    return arrays
+
+
+def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -> Emission:
+    """Deserialise the densities.
+
+    layout     : the states of phones and silences
+    dimensions : of the motion space, Q
+    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    """
+    forest = trees_from_arrays(arrays)
+    if len(forest) != layout.speech + layout.silence or list(forest) != layout.names:
+        raise ValueError(
+            f"trees for {len(forest)} states, required {layout.speech} of speech and {layout.silence} of silence"
+        )
+    leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
+    densities = check_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
+    check_spread(densities["means"][:, 0], densities["variances"][:, 0])
+    regression = _regression_from_arrays(arrays, leaves, dimensions) if REGRESSION.keys() & arrays.keys() else None
+    return Emission(forest, densities["means"], densities["variances"], regression)
+
+
+DENSITIES = {"means": ArraySpec(np.float32, "L 3 Q"), "variances": ArraySpec(np.float32, "L 3 Q", POSITIVE)}
+REGRESSION = {
+    **WINDOW,
+    "coefficients": ArraySpec(np.float32, "C A V"),
+    "coefficient_rows": ArraySpec(np.int32, "L", -1, 1e6),
+}
+EMISSION = (*TREES, *DENSITIES, *REGRESSION)
+"""Names of the arrays of ``emission_arrays``: L densities, C regressions on A components."""
+
+
+def _regression_from_arrays(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
+    stored = check_arrays(arrays, REGRESSION, L=leaves, V=3 * dimensions)
+    rows = stored["coefficient_rows"]
+    if rows.max() >= stored.sizes["C"]:
+        raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
+    return AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)
+
+
+NETWORK_SHARE = 0.6
+"""Weight of the predictor beside the states, 0 to 1, in models that have no other."""
+RESTING_SHARE = 0.5
+"""Share of its weight that the predictor has where the states rest, with voices that training knows: their mouths open
+before they speak."""
+STRANGER_LOSS = 0.8
+"""Share of their weight that states lose with voices that training does not know at all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Experts:
+    """The states and the predictor on one recording.
+
+    emission, rows : densities, and the one of each frame [shape=(T,)]; the last density is that of the rest pose
+    network        : predicts motion without the states (None: there was too little speech to train it)
+    network_share  : weight of that predictor, 0 to 1, in contexts that training knows well
+    prior          : says how well training knows a phone in its context (None: taken as well known)
+    silent         : frames of digital silence, in which states count alone [shape=(T,)] (None: there are none)
+    """
+
+    emission: Emission
+    rows: NDArray[np.intp]
+    speech: Speech
+    network: Predictor | None
+    prior: ArticulationPrior | None
+    network_share: float = NETWORK_SHARE
+    silent: NDArray[np.bool_] | None = None
+
+    def statistics(self, frames: slice) -> Statistics:
+        """Return means and precisions of a range of N frames [each shape=(N, 3, Q)]: weighted means of both."""
+        means, precisions = self.emission.statistics(self.rows[frames], np.asarray(self.speech.features.values), frames)
+        if self.network is None or self._predicted is None:
+            return means, precisions
+        share = self._share[frames, None, None]
+        means += share * (slice_dynamics(self._predicted[0], frames) - means)
+        precisions += share * (1 / self.network.variances - precisions)
+        return means, precisions
+
+    @cached_property
+    def reliability(self) -> Array:
+        """How far the phones in time can be relied on, 0 to 1 [shape=(T,)]."""
+        return rate_phones(self.speech, None if self._predicted is None else self._predicted[1], len(self.rows))
+
+    @cached_property
+    def _predicted(self) -> tuple[Array, Array] | None:
+        """Motion [shape=(T, Q)] and distortion [shape=(T,)] by the predictor."""
+        if self.network is None or not self.network.can_predict(self.speech):
+            return None
+        return self.network.predict(self.speech)
+
+    @cached_property
+    def _share(self) -> Array:
+        """The share of the predictor in every frame, 0 to 1 [shape=(T,)]."""
+        familiarity = np.ones(len(self.rows))
+        if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
+            familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
+        resting = self.rows == len(self.emission.means) - 1
+        own = self.network is not None and self.network.uses_prior  # states of a person, not of a distant speaker
+        strange = unseen_share(self.speech.voice)
+        known = 1.0 if own else 1 - STRANGER_LOSS * strange
+        states = (1 - self.network_share) * self.reliability * familiarity * known
+        at_rest = np.maximum(1 - self.reliability, 0.0 if own else RESTING_SHARE * (1 - strange))
+        if self.silent is not None:
+            at_rest[self.silent] = 0
+        network = self.network_share * np.where(resting, at_rest, 1.0)
+        return network / np.maximum(states + network, 1e-12)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.emission import (
+from lipmotion.engines.trajectory.model import (
     NETWORK_SHARE,
     AcousticRegression,
     Emission,
     Experts,
+    TrajectoryModel,
     add_acoustic_regression,
 )
-from lipmotion.engines.trajectory.model import TrajectoryModel
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.kernels.banded import solve_mlpg

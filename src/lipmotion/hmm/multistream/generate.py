@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.align import StatePath
+from lipmotion.hmm.multistream.densities import MOTION
 from lipmotion.hmm.multistream.model import JointHmm, StreamModel
-from lipmotion.hmm.multistream.streams import MOTION
+from lipmotion.hmm.multistream.recognise import StatePath
 from lipmotion.kernels.banded import normal_equations, pin, solve
 from lipmotion.stats.curves import with_dynamics
 

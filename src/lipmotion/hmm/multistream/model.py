@@ -11,8 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.densities import MIN_SCALE, GaussianStatistics, StreamScale, TiedDensities
-from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.densities import (
+    F0_STREAMS,
+    MIN_SCALE,
+    MOTION,
+    SPEECH,
+    STREAMS,
+    GaussianStatistics,
+    StreamObservations,
+    StreamScale,
+    StreamWeights,
+    TiedDensities,
+)
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState
 from lipmotion.printable import printable
 from lipmotion.stats.bigram import BIGRAM, Bigram, bigram_from_array

@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
-from lipmotion.hmm.multistream.align import check_bounds, measure_durations
 from lipmotion.hmm.multistream.densities import (
+    F0_STREAMS,
     MIN_POSTERIOR,
+    MOTION,
+    SPEECH,
+    STREAMS,
     GaussianStatistics,
+    StreamObservations,
     TiedDensities,
     fit_scale,
     make_standard_normals,
@@ -29,7 +33,7 @@ from lipmotion.hmm.multistream.model import (
     grow_forest,
     unit_forest,
 )
-from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, StreamObservations
+from lipmotion.hmm.multistream.recognise import check_bounds, measure_durations
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram

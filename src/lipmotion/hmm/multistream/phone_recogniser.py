@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
+from lipmotion.hmm.multistream.densities import SPEECH, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
 from lipmotion.hmm.multistream.recognise import joint_recogniser
-from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays

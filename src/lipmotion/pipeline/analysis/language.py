@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, SpeechInput, as_request

@@ -18,7 +18,7 @@ from typing import Any, Protocol, TypeVar
 
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError, shorten
 from lipmotion.extensions import install_command, installed_version
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     FAILED,

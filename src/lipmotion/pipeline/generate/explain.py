@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import ExportError, InputError
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generation import map_explanation

@@ -15,14 +15,13 @@ from lipmotion.corpora.store import Corpus, quantise
 from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
 from lipmotion.formats.subtitles import is_subtitles, subtitle_words
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generation import speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import ASKED, Onto, Pauses, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.speech.sound.overlap_add import JoinedPieces, overlapped
-from lipmotion.speech.sound.resampling import at_speech_rate
+from lipmotion.speech.sound.resampling import JoinedPieces, at_speech_rate, overlapped
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import read_text_file

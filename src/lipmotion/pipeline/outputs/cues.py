@@ -17,7 +17,7 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
-from lipmotion.units.visemes import OPTIONAL, SHAPES
+from lipmotion.units.phones import OPTIONAL, SHAPES
 
 SHEET = ".cues."
 """What the name of a cue sheet among other outputs has before its format."""

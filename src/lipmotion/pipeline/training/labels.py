@@ -21,7 +21,7 @@ from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.kernels.threads import blas_kernels
+from lipmotion.kernels.compiler import blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE, transcript_fit

@@ -20,7 +20,7 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
-from lipmotion.kernels.threads import one_thread
+from lipmotion.kernels.compiler import one_thread
 from lipmotion.motion.space import resample_track
 from lipmotion.motion.speaker_maps import add_habits, map_to_mean_person
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise, warn_of_guesses

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, spread_windows
-from lipmotion.hmm.decode import UnitLoop, build_unit_loop
 from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import (
     LogLikelihoods,
+    UnitLoop,
+    build_unit_loop,
     compute_log_likelihoods,
     penalise_silence,
     penalise_speech,

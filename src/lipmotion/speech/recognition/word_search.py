@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, MissingDependencyError
-from lipmotion.hmm.decode import UnitLoop, decode_path
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.hmm.network import LogLikelihoods, penalise_silence, wrap_log_likelihoods
+from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, penalise_silence, wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.recognition.network.beam_search import decoded_words, english_words, scored

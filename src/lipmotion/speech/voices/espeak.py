@@ -30,7 +30,6 @@ from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak_events import PART
 from lipmotion.speech.voices.espeak_events import SILENCE as NO_SOUND
-from lipmotion.speech.voices.programs import program_output
 from lipmotion.speech.voices.synthesiser import (
     ESPEAK_PHONES,
     PhoneMap,
@@ -38,6 +37,7 @@ from lipmotion.speech.voices.synthesiser import (
     Synthesiser,
     SyntheticVoice,
     complete_map,
+    program_output,
 )
 from lipmotion.types import Audio, Span, Timeline
 from lipmotion.types.languages import ENGLISH, LANGUAGES, foreign_letters

@@ -16,8 +16,13 @@ from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.inventory_phones import inventory_timeline
-from lipmotion.speech.voices.programs import program_output
-from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, SynthesisedSentence, Synthesiser, SyntheticVoice
+from lipmotion.speech.voices.synthesiser import (
+    ARPABET_PHONES,
+    SynthesisedSentence,
+    Synthesiser,
+    SyntheticVoice,
+    program_output,
+)
 from lipmotion.storage.files import temporary_folder
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import Lexicon, split_words

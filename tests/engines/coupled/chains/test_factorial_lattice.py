@@ -6,7 +6,7 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from engines.coupled.training.test_training import sentences
-from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
+from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, UNSEEN_LOSS
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert

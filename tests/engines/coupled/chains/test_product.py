@@ -6,7 +6,7 @@ import pytest
 from engines.coupled.tiny import THREE, TWO, chains, grammar, structure
 from lipmotion.engines.coupled.chains.product import JointState, Transitions, initial_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS, unit_sets
-from lipmotion.engines.coupled.config import CoupledConfig
+from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.errors import InputError
 
 

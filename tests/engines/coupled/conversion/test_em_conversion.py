@@ -3,7 +3,6 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
-from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     PRINTED,
@@ -26,6 +25,7 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
     regression_weights,
 )
 from lipmotion.engines.coupled.engine import CoupledEngine
+from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import _state_regressions, fit_coupled
 from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types.progress import silent_monitor

@@ -7,8 +7,8 @@ import pytest
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, reestimated_group
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
-from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
+from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units, uniform_path
 from lipmotion.engines.coupled.training.chain_training import CONVERGENCE_GAIN, MixtureSchedule, growing_chains
 from lipmotion.engines.coupled.training.coupled_training import fit_coupled, frames_away_from_speech

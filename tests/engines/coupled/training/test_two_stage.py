@@ -9,9 +9,8 @@ import pytest
 from lipmotion.engines.coupled.chains.densities import LEAST_COMPONENT_FRAMES, AudioVisualObservations
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import Structure, unit_sets
-from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, TrainingStep, growing_chains
 from lipmotion.engines.coupled.training.coupled_training import SpeechOnlySchedule, train_on_speech

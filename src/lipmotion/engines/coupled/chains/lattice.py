@@ -1,16 +1,22 @@
-"""A lattice: the joint states in which an utterance can be, and inference over the paths through them."""
+"""A lattice, the joint states in which an utterance can be, and inference over its paths; of factorial HMMs, too."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import Single
+from lipmotion.engines.coupled.chains.product import Grammar
+from lipmotion.engines.coupled.chains.structures import Structure
+from lipmotion.kernels.factorial import factorial_posteriors
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, LoopCounts, factorial_best_path
 
 Index = NDArray[np.intp]
 
@@ -90,3 +96,231 @@ def tied_posteriors(posterior: Single, tie: Index, count: int) -> Single:
     result = np.zeros((len(posterior), count), np.float32)
     result[:, present] = np.add.reduceat(posterior.take(order, axis=1), starts, axis=1)
     return result
+
+
+Array = NDArray[np.float64]
+LEAST_ADVANCE = 1e-5
+"""Least probability of moving on, and of staying."""
+VISIBLE_FRAMES = 10
+"""The lips may be in a unit this many frames before and after the voice."""
+
+
+@dataclass(frozen=True, eq=False)
+class FactorialProduct:
+    """Two chains, each of which may be in any of its states; joint state = first chain's state · N_1 + second's."""
+
+    structure: Structure
+    grammar: Grammar
+
+    @cached_property
+    def chain_states(self) -> Index:
+        """The state of each chain in each joint state [shape=(2, S)]."""
+        return np.indices(self.structure.state_counts).reshape(2, -1)
+
+    def name(self, state: int) -> str:
+        """Return the name of a joint state, as ``Structure.name``."""
+        return self.structure.name(self.chain_states[:, state].tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class FactorialTransitions:
+    """Transitions of two independent chains.
+
+    advance            : probability of moving on in each state [shapes=(N_0,), (N_1,)]
+    own_density_states : the P joint states with emission densities of their own, as the states of both chains
+                         [shape=(P, 2)]
+    Source: Xie & Liu 2007, Fig. 3 c and Eq. 18.
+    """
+
+    product: FactorialProduct
+    advance: tuple[Array, Array]
+    own_density_states: Index
+
+    @property
+    def statistic_count(self) -> int:
+        """The number of transition statistics: chain by chain, how often each state is left, then how often kept."""
+        return 2 * sum(self.product.structure.state_counts)
+
+    def reestimated(self, counts: Array) -> FactorialTransitions:
+        """Return the transitions of an M-step, from counts of leaving and keeping [shape=(statistic_count,)]; unseen
+        states stay.
+        """
+        edges = np.cumsum([0, *np.repeat(self.product.structure.state_counts, 2)])
+        parts = [counts[a:b] for a, b in pairwise(edges.tolist())]
+        first, second = (
+            np.where(moved + stayed > 0, moved / np.maximum(moved + stayed, 1e-300), old)
+            for moved, stayed, old in zip(parts[::2], parts[1::2], self.advance, strict=True)
+        )
+        least, most = LEAST_ADVANCE, 1 - LEAST_ADVANCE
+        return replace(self, advance=(np.clip(first, least, most), np.clip(second, least, most)))
+
+    def loop(self, chain: int, units: Index) -> Loop:
+        """Return one chain, restricted to some of its units, as the kernel takes it."""
+        structure, grammar = self.product.structure, self.product.grammar
+        advance = self.advance[chain].reshape(-1, structure.states)[units].T
+        initial = np.zeros(advance.shape)
+        initial[0] = grammar.initial[chain][units] / grammar.initial[chain].sum()
+        enter = grammar.bigrams[chain][np.ix_(units, units)]
+        return Loop(1 - advance, advance[:-1], advance[-1], enter, initial, np.ones(advance.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class FactorialLattice(Lattice):
+    """Some units of both chains.
+
+    ``densities`` are those of the states of the group's chain, then those of the P' joint states inside the lattice
+    that have densities of their own.
+
+    units                 : of each chain
+    states                : of each chain, in the order of the kernel
+    own_density_positions : the joint states inside with densities of their own, as positions in ``states`` of both
+                            chains [shape=(P', 2)]
+    visible_units         : the units of the second chain that each frame may belong to [shape=(T, V)]; None: all
+    unseen_loss           : what joint states without densities of their own lose, nats
+    """
+
+    units: tuple[Index, Index]
+    states: tuple[Index, Index]
+    own_density_positions: Index
+    visible_units: NDArray[np.bool_] | None
+    unseen_loss: float
+
+    def masked(self, logs: Sequence[Single]) -> tuple[Single, ...]:  # noqa: D102
+        speech, *visual = super().masked(logs)
+        speech = speech.copy()
+        speech[:, : len(self.states[0])] -= np.float32(self.unseen_loss)
+        if self.visible_units is not None:
+            count = len(self.states[1])
+            forbidden = ~self.visible_units[:, np.tile(self.units[1], count // max(len(self.units[1]), 1))]
+            visual = [log.copy() for log in visual]
+            for log in visual:
+                log[:, :count][forbidden] = -np.inf
+                log[:, count:][forbidden[:, self.own_density_positions[:, 1]]] = -np.inf
+        return (speech, *visual)
+
+    def posteriors(self, transitions: FactorialTransitions, logs: Sequence[Single]) -> LatticePosteriors:  # noqa: D102
+        expected = factorial_posteriors(*self._loops(transitions), self._log_likelihoods(logs))
+        state_posteriors = expected.audio, expected.visual
+        structure = transitions.product.structure
+        speech, visual = self._density_posteriors(state_posteriors, expected.pair.astype(np.float32))
+        chains = []
+        for posterior, states, count in zip(state_posteriors, self.states, structure.state_counts, strict=True):
+            full = np.zeros((len(posterior), count), np.float32)
+            full[:, states] = posterior
+            chains.append(full)
+        return LatticePosteriors(
+            chains=tuple(chains),
+            densities=(speech, *[visual] * (len(logs) - 1)),
+            most_probable=chains[0].argmax(axis=1) * structure.state_counts[1] + chains[1].argmax(axis=1),
+            transition_counts=np.concatenate(
+                [_advance_counts(counts) for counts in (expected.audio_counts, expected.visual_counts)]
+            ),
+            log_likelihood=expected.log_likelihood,
+        )
+
+    def best_path(self, transitions: FactorialTransitions, logs: Sequence[Single]) -> tuple[Index, float]:  # noqa: D102
+        first, second, score = factorial_best_path(*self._loops(transitions), self._log_likelihoods(logs))
+        count = transitions.product.structure.state_counts[1]
+        return self.states[0][first] * count + self.states[1][second], score
+
+    def _density_posteriors(self, states: Sequence[Array], own: Single) -> list[Single]:
+        """Return the posteriors of each chain's ``densities`` [each shape=(T, G')].
+
+        states : posteriors of the states of each chain [each shape=(T, N'_c)]
+        own    : posteriors of the joint states with densities of their own [shape=(T, P')]
+        A state's own density has what is left of its posterior after these joint states.
+        """
+        densities = []
+        for chain, posterior in enumerate(states):
+            remaining = posterior.astype(np.float32)
+            np.subtract.at(remaining.T, self.own_density_positions[:, chain], own.T)
+            densities.append(np.concatenate([np.maximum(remaining, 0), own], axis=1))
+        return densities
+
+    def _loops(self, transitions: FactorialTransitions) -> tuple[Loop, Loop]:
+        return transitions.loop(0, self.units[0]), transitions.loop(1, self.units[1])
+
+    def _log_likelihoods(self, logs: Sequence[Single]) -> FactorialLogLikelihoods:
+        """Return the log densities of both chains, visual streams added up, as the kernel takes them."""
+        speech, visual = logs[0], sum(logs[2:], logs[1])
+        first, second = (len(states) for states in self.states)
+        return FactorialLogLikelihoods(
+            np.ascontiguousarray(speech[:, :first]),
+            np.ascontiguousarray(visual[:, :second]),
+            speech[:, first:] + visual[:, second:],
+            self.own_density_positions,
+        )
+
+
+def factorial_lattice(
+    transitions: FactorialTransitions, ties: Sequence[Index], allowed_units: NDArray[np.bool_] | None
+) -> FactorialLattice:
+    """Return the lattice of the units that are allowed in some frame.
+
+    ties          : for each stream group, the density of each joint state [each shape=(S,)]
+    allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]; None: all
+    """
+    structure = transitions.product.structure
+    visible_units = None if allowed_units is None else _visible_units(structure, allowed_units)
+    first, second = (
+        np.arange(len(units)) if allowed is None else np.flatnonzero(allowed.any(axis=0))
+        for units, allowed in zip(structure.units, (allowed_units, visible_units), strict=True)
+    )
+    states = _kernel_states(first, structure.states), _kernel_states(second, structure.states)
+    columns = []
+    for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
+        position = np.full(count, -1)
+        position[own] = np.arange(len(own))
+        columns.append(position[transitions.own_density_states[:, chain]])
+    own_density_positions = np.stack(columns, axis=1)
+    inside = np.flatnonzero((own_density_positions >= 0).all(axis=1))
+    chains = [min(number, 1) for number in range(len(ties))]
+    densities = tuple(np.concatenate([states[chain], structure.state_counts[chain] + inside]) for chain in chains)
+    return FactorialLattice(
+        transition_index=_transition_index(states, structure),
+        densities=densities,
+        ties=tuple(_within(chosen, tie) for chosen, tie in zip(densities, ties, strict=True)),
+        density_units=np.concatenate([states[0], transitions.own_density_states[inside, 0]]) // structure.states,
+        allowed_units=allowed_units,
+        units=(first, second),
+        states=states,
+        own_density_positions=own_density_positions[inside],
+        visible_units=visible_units,
+        unseen_loss=structure.unseen_loss,
+    )
+
+
+def _visible_units(structure: Structure, allowed_units: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the units of the second chain that correspond to those allowed within 100 ms [shape=(T, V)]."""
+    padded = np.pad(allowed_units.astype(np.intp), ((VISIBLE_FRAMES + 1, VISIBLE_FRAMES), (0, 0)))
+    total = np.cumsum(padded, axis=0)
+    near = (total[2 * VISIBLE_FRAMES + 1 :] - total[: -2 * VISIBLE_FRAMES - 1]) > 0
+    visible = np.zeros((len(allowed_units), len(structure.units[1])), bool)
+    np.logical_or.at(visible.T, np.asarray(structure.corresponding_units[1]), near.T)
+    return visible
+
+
+def _kernel_states(units: Index, states: int) -> Index:
+    """Return the states of some units in the order of the kernel: the first state of every unit, then the second."""
+    return np.concatenate([units * states + state for state in range(states)])
+
+
+def _transition_index(states: tuple[Index, Index], structure: Structure) -> Index:
+    index, start = [], 0
+    for own, count in zip(states, structure.state_counts, strict=True):
+        index += [start + own, start + count + own]
+        start += 2 * count
+    return np.concatenate(index)
+
+
+def _within(densities: Index, tie: Index) -> Index:
+    """Return ``tie`` for the joint states whose density is one of ``densities``, as positions there."""
+    position = np.zeros(int(tie.max()) + 1, np.intp)
+    position[densities] = np.arange(len(densities))
+    return position[tie[np.isin(tie, densities)]]
+
+
+def _advance_counts(counts: LoopCounts) -> Array:
+    """Return how often each state is left, then how often it is kept, in the kernel's order [shape=(2 N',)]."""
+    moved = np.concatenate([counts.onward, counts.enter.sum(axis=1)[None]])
+    return np.concatenate([moved.ravel(), counts.stay.ravel()])

@@ -10,8 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, EmissionEvaluator, Single, StreamGroup
-from lipmotion.engines.coupled.chains.factorial_lattice import FactorialTransitions, factorial_lattice
-from lipmotion.engines.coupled.chains.lattice import Index, JointPosteriors, Lattice, LatticePosteriors, tied_posteriors
+from lipmotion.engines.coupled.chains.lattice import (
+    FactorialTransitions,
+    Index,
+    JointPosteriors,
+    Lattice,
+    LatticePosteriors,
+    factorial_lattice,
+    tied_posteriors,
+)
 from lipmotion.engines.coupled.chains.product import Transitions
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.kernels.network import ForwardBackwardNetwork

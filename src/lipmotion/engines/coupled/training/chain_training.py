@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import Single, StreamGroup, zero_emission_statistics
-from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
+from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import Transitions, initial_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure

@@ -25,7 +25,6 @@ from lipmotion.engines.coupled.chains.visual_streams import (
     fit_visual_streams,
     speech_observations,
 )
-from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.conversion.em_conversion import without_visual_streams
 from lipmotion.engines.coupled.conversion.mean_regression import (
     RegressionInputs,
@@ -35,7 +34,7 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
     fit_visual_regression,
     posterior_axes,
 )
-from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledModel
+from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.chain_training import (
     MixtureSchedule,

@@ -1,0 +1,153 @@
+"""Verbs about lipmotion itself: ``addon``, ``cite``, ``completion``, ``doctor``, ``info``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.cli.terminal.printing import print_line, print_lines
+from lipmotion.cli.terminal.progress import report_progress
+from lipmotion.errors import InputError, LipMotionError
+from lipmotion.types.progress import Item
+
+if TYPE_CHECKING:
+    Verbs = argparse._SubParsersAction[argparse.ArgumentParser]
+
+SHELLS = ("bash", "zsh", "fish", "powershell")
+OF_PRIOR = ("engine", "corpus", "split", "utterances", "minutes", "licence", "attribution")
+"""What ``info`` prints of the model on which a model stands and which is part of its file."""
+
+
+def add_addon(verbs: Verbs) -> None:
+    """Add the verb that writes the add-on for another program, as a file that it installs."""
+    parser = verbs.add_parser("addon", help="write the add-on for Blender, which keys characters from motion files")
+    parser.add_argument("program", metavar="PROGRAM", help="blender")
+    add_output(parser, "-o", "--output", type=Path, required=True, metavar="FILE.zip", help="the file to install")
+    parser.set_defaults(run=_run_addon)
+
+
+def _run_addon(options: argparse.Namespace) -> None:
+    from lipmotion.formats.blender import write_addon
+
+    write_addon(options.program, options.output)
+    print_line(options.output)
+
+
+def add_cite(verbs: Verbs) -> None:
+    """Add the verb that prints what to cite, as BibTeX."""
+    parser = verbs.add_parser("cite", help="print what to cite, as BibTeX: lipmotion, an engine's papers, a corpus")
+    what = "a model file, an engine, or a citation key; default: the model that ships with the package"
+    parser.add_argument("name", nargs="?", metavar="NAME", help=what)
+    parser.set_defaults(run=_run_cite)
+
+
+def _run_cite(options: argparse.Namespace) -> None:
+    """Print the entries. Raises InputError: nothing has that name.  Raises ModelFormatError: the file is no model."""
+    from lipmotion.citations import bibliography, engine_citations, model_citations
+    from lipmotion.engines import ENGINES
+    from lipmotion.pipeline.model import read_header, shipped_path
+
+    name = options.name or str(shipped_path())
+    if name in ENGINES.names:
+        print_lines(engine_citations(name))
+    elif name in bibliography():
+        print_lines(bibliography()[name])
+    elif Path(name).exists():
+        print_lines(model_citations(read_header(Path(name))))
+    else:
+        known = ", ".join((*ENGINES.names, *bibliography()))
+        raise InputError(f"nothing to cite is called {name!r}; give a model file, or one of: {known}")
+
+
+def add_completion(verbs: Verbs) -> None:
+    """Add the verb that prints the script by which a shell completes the command line."""
+    parser = verbs.add_parser("completion", help="print the script by which a shell completes verbs and options")
+    parser.add_argument("shell", choices=SHELLS, help="bash and zsh: eval it; fish: | source")
+    parser.set_defaults(run=_run_completion)
+
+
+def _run_completion(options: argparse.Namespace) -> None:
+    import shtab
+
+    from lipmotion.cli.command_line import parser
+
+    whole = parser()
+    _complete_files(whole)
+    print_lines(shtab.complete(whole, shell=options.shell).removesuffix("\n"))
+
+
+def _complete_files(parser: argparse.ArgumentParser) -> None:
+    """Let every value that has no choices be a file."""
+    import shtab
+
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for part in action.choices.values():
+                _complete_files(part)
+        elif action.choices is None and action.nargs != 0:
+            action.complete = shtab.FILE  # type: ignore[attr-defined] # where shtab looks for it
+
+
+def add_doctor(verbs: Verbs) -> None:
+    """Add the verb that prints what is installed, what is missing, and whether the main path works."""
+    parser = verbs.add_parser("doctor", help="print what is installed, what missing parts would bring, and what fails")
+    add_machine_readable(parser)
+    parser.set_defaults(run=_run_doctor)
+
+
+def _run_doctor(options: argparse.Namespace) -> None:
+    """Print what is found, one line for each part. Raises LipMotionError, of exit code 1: something is broken."""
+    from lipmotion.cli.doctor import doctor
+
+    broken = []
+    with report_progress(options) as report:
+        for each in doctor():
+            if options.machine_readable:
+                report.receive(Item(each.name, each.state, each.text))
+            else:
+                print_line(f"{each.state:7} {each.name:20} {each.text}")
+            broken += [each.name] if each.state == "broken" else []
+        if broken:
+            raise LipMotionError(f"broken: {', '.join(broken)}; what to do is said above")
+        report.finish("all that is needed works", broken=broken)
+
+
+def add_info(verbs: Verbs) -> None:
+    """Add the verb that prints the header of a model, or its decision trees or chains."""
+    parser = verbs.add_parser("info", help="print what a model is, and whose recordings it was trained on")
+    shipped = "default: the model that ships with the package"
+    add_input(parser, "model", what="model", nargs="?", help=shipped)
+    parser.add_argument("--structure", action="store_true", help="print only its decision trees, or its chains")
+    parser.add_argument("--trees", action="store_true", dest="structure", help=argparse.SUPPRESS)  # its former name
+    parser.set_defaults(run=run_info)
+
+
+def run_info(options: argparse.Namespace) -> None:
+    """Print the header of the model, or its structure."""
+    from lipmotion.pipeline.model import load_model, read_header, shipped_path
+
+    path = options.model or shipped_path()
+    if options.structure:
+        model = load_model(path)
+        text = model.engine.describe(model.learned)
+        if not text:
+            raise InputError(f"models of the engine {model.engine.name!r} cannot be printed; leave --structure out")
+        print_lines(text)
+        return
+    header = read_header(path)
+    print_line(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    inside = header.pop("prior", None)
+    for name, value in header.items():
+        print_line(f"{name:14} {_plain(value) or 'none stated'}")
+    for name, value in (inside or {}).items():
+        if name in OF_PRIOR and value:
+            print_line(f"prior {name:12} {_plain(value)}")
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key}={item}" for key, item in value.items())
+    return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
