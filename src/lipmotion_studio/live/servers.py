@@ -19,7 +19,6 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.live.consumers import Consumer, LiveSound, json_line, read_address
 from lipmotion.live.sound import mono_samples
-from lipmotion_studio.web.listening import open_socket
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -160,10 +159,11 @@ def open_server(to: str, port: int, server: Server | None = None) -> Iterator[Se
     """
     check_installed(to)
     server = server or Server()
+    host, number = read_address(to, port)
     try:
-        place = open_socket(*read_address(to, port))
-    except InputError as error:
-        raise InputError(f"--to {to}: {str(error).partition(';')[0]}; give another :HOST:PORT") from error
+        place = socket.create_server((host, number), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    except (OSError, UnicodeError) as error:
+        raise InputError(f"--to {to}: {host}:{number} is taken, or not of this machine ({error})") from error
     with closing(place), server.serve(place):
         yield server
 
