@@ -26,7 +26,7 @@ from websockets.sync.client import connect
 from websockets.sync.server import serve
 
 from lipmotion_studio.live import servers, vtube
-from lipmotion_studio.live.window import Window, head_weights
+from lipmotion_studio.live.window import LiveWindow, head_weights
 
 RATE_HZ = 16_000
 FRAME = RATE_HZ // 50
@@ -230,7 +230,7 @@ def test_vtube_studio_is_asked_once_and_gets_the_newest_frame(studio, tmp_path):
 
 def test_the_window_sends_sound_with_its_time_and_lips_that_close():
     with servers.open_server("window:0", 0) as server:
-        window = Window(RATE_HZ, server)
+        window = LiveWindow(RATE_HZ, server)
         assert isinstance(window, Listener)
         with connect(f"ws://{server.address}/", proxy=None) as client:
             received = Queue()

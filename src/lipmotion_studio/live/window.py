@@ -55,7 +55,7 @@ FILE_HEADERS = {
 }
 
 
-class Window:
+class LiveWindow:
     """A consumer that pages are connected to.
 
     rate_hz : of the sound
@@ -105,7 +105,7 @@ def open_window(to: str, sound: LiveSound) -> Iterator[Consumer]:
                 webbrowser.open(f"http://{server.address}/")
             while not ready.wait(0.2):  # in steps, so that Ctrl-C ends it on Windows, too
                 pass
-        yield Window(sound.rate_hz, server)
+        yield LiveWindow(sound.rate_hz, server)
 
 
 def _make_head(head: Future[bytes]) -> None:
