@@ -23,7 +23,7 @@ ExtensionT = TypeVar("ExtensionT")
 GROUPS = (
     *("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers"),
     *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers", "lipmotion.phone_recognisers"),
-    *("lipmotion.motion_readers", "lipmotion.verbs", "lipmotion.names"),
+    *("lipmotion.motion_readers", "lipmotion.live", "lipmotion.verbs", "lipmotion.names"),
 )
 """Every group of entry points that is read."""
 PACKAGE = "lipmotion"

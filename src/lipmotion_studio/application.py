@@ -6,10 +6,8 @@ looked up by number or name among those that there are, and what is dropped gets
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from importlib.resources import files
-from importlib.resources.abc import Traversable
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -17,46 +15,19 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from lipmotion.formats.web_page import colour_code
 from lipmotion_studio.folder import RevisionError
 from lipmotion_studio.page_replies import ProjectReplies, RecordingReplies
 from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
+from lipmotion_studio.web.files import read_page
 from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, failed
 
 FIRST = "studio.html"
 """The page itself, whose address is empty."""
-KINDS = {
-    ".html": "text/html; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".mjs": "text/javascript; charset=utf-8",
-    ".json": "application/json",
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-    ".txt": "text/plain; charset=utf-8",
-    ".md": "text/plain; charset=utf-8",
-    ".woff2": "font/woff2",
-    ".wasm": "application/wasm",
-}
-"""What files are served as, by their suffixes; others are not served."""
 PAGE_POLICY = HEADERS["content-security-policy"] + (
     "; img-src 'self' blob: data:; media-src 'self' blob:; worker-src 'self' blob:; connect-src 'self' blob:"
 )
 """Pictures, sounds and textures of models become objects of the page, whose addresses begin with ``blob:``."""
-
-
-def read_page(folder: Traversable, before: str = "") -> Iterator[tuple[str, tuple[bytes, str]]]:
-    """Yield the files of the page: address, without the first slash, content, and what it is served as."""
-    for each in folder.iterdir():
-        kind = KINDS.get(f".{each.name.rpartition('.')[2].lower()}")
-        if each.is_dir():
-            yield from read_page(each, f"{before}{each.name}/")
-        elif kind is not None:
-            content = each.read_bytes()
-            if each.name.endswith(".css"):
-                content = colour_code(content.decode("utf-8")).encode()
-            yield f"{before}{each.name}", (content, kind)
 
 
 def studio_application(studio: Studio, access: Access) -> Starlette:

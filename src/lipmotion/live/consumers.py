@@ -1,5 +1,8 @@
 """What takes live frames: VMC and OSC receivers, Unreal's Live Link, files, other programs through a pipe.
 
+Further ones are entry points of the group ``lipmotion.live``: functions of what stands behind ``--to`` and a
+``LiveSound``, which return a context manager that gives a ``Consumer``.
+
 Sources: VMC protocol (VirtualMotionCapture, ``/VMC/Ext/Blend/Val``, ``/VMC/Ext/Blend/Apply``); Open Sound Control 1.0;
 packets of Live Link Face as PyLiveLinkFace reads them.
 """
@@ -10,18 +13,52 @@ import json
 import socket
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import Any, Protocol, TextIO, runtime_checkable
 
 from lipmotion.errors import InputError
+from lipmotion.extensions import Registry
 from lipmotion.live.face import LiveFrame
 from lipmotion.live.network import STEP_S
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import ARKIT_52
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import atomic_file
 
 Consumer = Callable[[LiveFrame], None]
+
+
+@runtime_checkable
+class Listener(Protocol):
+    """A consumer that takes the sound, too."""
+
+    def __call__(self, frame: LiveFrame) -> None:
+        """Take a frame."""
+
+    def hear(self, samples: Any) -> None:
+        """Take sound as ``Stream.push`` does, before the frames that it makes known."""
+
+
+@dataclass(frozen=True)
+class LiveSound:
+    """What consumers know of the sound.
+
+    rate_hz       : of the sound that listeners hear
+    look_ahead_ms : how late the frames come
+    is_microphone : whether it is heard in the room already
+    """
+
+    rate_hz: int = SPEECH_RATE_HZ
+    look_ahead_ms: float = 160.0
+    is_microphone: bool = False
+
+
+CONSUMERS: Registry[Callable[[str, LiveSound], AbstractContextManager[Consumer]]] = Registry(
+    "consumer of live frames", "lipmotion.live", {}
+)
+LARGEST_PORT = 65_535
 PORTS = {"vmc": 39539, "osc": 9000, "livelink": 11111}
 """The ports at which these receivers listen unless they are told another one."""
 VRM_VOWELS = {"A": ("aa",), "I": ("ih",), "U": ("ou",), "E": ("E",), "O": ("oh",)}
@@ -36,34 +73,49 @@ EYES = 6
 
 
 @contextmanager
-def open_consumer(to: str, print_line: Callable[[str], None]) -> Iterator[Consumer]:
-    """Give what takes frames.
+def open_consumer(to: str, print_line: Callable[[str], None], sound: LiveSound | None = None) -> Iterator[Consumer]:
+    """Give what takes frames, and the sound, where it is a ``Listener``.
 
-    to         : ``-`` (lines of JSON), FILE.csv, or ``vmc``, ``osc``, ``livelink``, perhaps with :HOST:PORT behind it
+    to         : ``-`` (lines of JSON), FILE.csv, or a name as ``vmc``, perhaps with :HOST:PORT behind it
     print_line : prints a line
-    Raises InputError: none of these. ExportError: the file cannot be written.
+    sound      : that the frames belong to; None: 16 kHz, with the usual look-ahead
+    Raises InputError: none of these. ExportError: the file cannot be written. MissingDependencyError: it needs a
+    package that is not installed.
     """
-    kind, _, address = to.partition(":")
+    kind = to.partition(":")[0]
     if to == "-":
         yield lambda frame: print_line(json_line(frame))
     elif to.lower().endswith(".csv"):
         with atomic_file(Path(to)) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
             yield lambda frame: _write(file, csv_lines(frame))
     elif kind in PORTS:
-        host, _, port = address.rpartition(":")
+        place = read_address(to, PORTS[kind])
         try:
-            place = host or "127.0.0.1", int(port or PORTS[kind])
             family = socket.getaddrinfo(*place, type=socket.SOCK_DGRAM)[0][0]
-            struct.pack(">H", place[1])
-        except (ValueError, OSError, struct.error) as error:
-            raise InputError(
-                f"--to {to}: no such address ({error}); required {kind}:PORT or {kind}:HOST:PORT"
-            ) from error
+        except OSError as error:
+            raise InputError(f"--to {to}: no such address ({error})") from error
         packets = {"vmc": vmc_packet, "osc": osc_packet, "livelink": live_link_packet}[kind]
         with socket.socket(family, socket.SOCK_DGRAM) as channel:
             yield lambda frame: _send(channel, packets(frame), place)
+    elif kind in CONSUMERS.names:
+        with CONSUMERS.load(kind)(to, sound or LiveSound()) as consumer:
+            yield consumer
     else:
-        raise InputError(f"--to {to}: required -, a FILE.csv, or one of {', '.join(PORTS)}, perhaps with :HOST:PORT")
+        names = ", ".join((*PORTS, *CONSUMERS.names))
+        raise InputError(f"--to {to}: required -, a FILE.csv, or one of {names}, perhaps with :HOST:PORT")
+
+
+def read_address(to: str, port: int) -> tuple[str, int]:
+    """Return host and port of KIND, KIND:PORT or KIND:HOST:PORT; this machine, and ``port``, where they are left out.
+
+    Raises InputError: something else.
+    """
+    kind, _, address = to.partition(":")
+    host, _, digits = address.rpartition(":")
+    number = int(digits or port) if (digits or "0").isdecimal() else -1
+    if not 0 <= number <= LARGEST_PORT:
+        raise InputError(f"--to {to}: no such address; required {kind}:PORT or {kind}:HOST:PORT")
+    return host.strip("[]") or "127.0.0.1", number
 
 
 def _write(file: TextIO, lines: str) -> None:

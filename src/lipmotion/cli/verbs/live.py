@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from lipmotion.cli.terminal.printing import flush_output, print_line
@@ -22,8 +23,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add = parser.add_argument
     told = "a microphone by name or number (default: the usual one), a sound file, or - for raw sound of 16 bits"
     add("-i", "--input", default="", metavar="DEVICE|FILE|-", help=told)
-    told = "what takes the frames, perhaps several (default: -, JSON lines); vmc:HOST:PORT, osc, livelink alike"
-    add("--to", action="append", metavar="-|FILE.csv|vmc|osc|livelink", help=told)
+    told = "what takes the frames, perhaps several (default: -, JSON lines); vmc:HOST:PORT, the others alike"
+    metavar = "-|FILE.csv|window|vmc|osc|livelink|vtube|websocket|talkinghead"
+    add("--to", action="append", metavar=metavar, help=told)
     told = "how late a frame may be known, 0 to 640; more is better (default: 160)"
     add("--look-ahead", type=float, default=160.0, metavar="MS", help=told)
     add("--rate", type=int, default=16_000, metavar="HZ", help="of sound on standard input (default: 16000)")
@@ -43,7 +45,7 @@ def run(options: argparse.Namespace) -> None:
     """Push sound into a ``lipmotion.Stream`` and give its frames to all consumers."""
     from contextlib import ExitStack
 
-    from lipmotion.live.consumers import open_consumer
+    from lipmotion.live.consumers import Listener, LiveSound, open_consumer
     from lipmotion.live.stream import Stream
     from lipmotion.pipeline.model import load_model
 
@@ -51,11 +53,16 @@ def run(options: argparse.Namespace) -> None:
         rate_hz, sound = _open_sound(options)
         seed = None if options.still else 0
         stream = Stream(rate_hz, options.look_ahead, load_model(options.model), pauses=options.pauses, seed=seed)
-        consumers = [stack.enter_context(open_consumer(to, print_line)) for to in options.to or ["-"]]
+        about = LiveSound(rate_hz, options.look_ahead, is_microphone=_is_microphone(options.input))
+        consumers = [stack.enter_context(open_consumer(to, print_line, about)) for to in options.to or ["-"]]
+        listeners = [each for each in consumers if isinstance(each, Listener)]
         pieces = iter(sound)
         while True:
             try:
-                frames, ended = stream.push(next(pieces)), False
+                piece = next(pieces)
+                for listener in listeners:
+                    listener.hear(piece)
+                frames, ended = stream.push(piece), False
             except StopIteration:
                 frames, ended = stream.flush(), True
             for frame in frames:
@@ -68,8 +75,6 @@ def run(options: argparse.Namespace) -> None:
 
 def _open_sound(options: argparse.Namespace) -> tuple[int, Iterator[Any]]:
     """Return the rate of the sound, and its pieces, as they come."""
-    from pathlib import Path
-
     from lipmotion.speech.sound.audio_files import read_audio
 
     if options.input == "-":
@@ -80,6 +85,10 @@ def _open_sound(options: argparse.Namespace) -> tuple[int, Iterator[Any]]:
         pieces = (audio.samples[first : first + step] for first in range(0, len(audio.samples), step))
         return audio.rate_hz, pieces if options.as_fast_as_possible else _in_time(pieces)
     return options.rate, _listen(options.input, options.rate)
+
+
+def _is_microphone(source: str) -> bool:
+    return source != "-" and not Path(source).is_file()
 
 
 def _read_pipe(rate_hz: int) -> Iterator[bytes]:

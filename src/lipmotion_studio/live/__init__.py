@@ -1,0 +1,1 @@
+"""Consumers of live frames over WebSockets: servers that pages connect to, and VTube Studio (needs websockets)."""
