@@ -1,6 +1,7 @@
 """A LiveKit agent whose face moves: it greets whoever comes into the room.
 
 python examples/live/livekit_agent.py dev      # with LIVEKIT_URL, LIVEKIT_API_KEY and LIVEKIT_API_SECRET
+python examples/live/livekit_agent.py dev video
 python examples/live/livekit_agent.py offline  # no room: prints how far the jaw is open
 
 Add ``stt=``, ``llm=`` and ``tts=`` of your choice to ``AgentSession``: the rest stays as it is.
@@ -12,10 +13,11 @@ from pathlib import Path
 
 from livekit import rtc
 from livekit.agents import Agent, AgentSession, JobContext, WorkerOptions, cli
-from livekit.agents.voice.avatar import AudioSegmentEnd, QueueAudioOutput
+from livekit.agents.voice.avatar import AudioSegmentEnd, AvatarRunner, QueueAudioOutput
 
 from lipmotion.live.livekit import LipSync
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion_faces.livekit import AvatarVideo
 
 SPEECH = Path(__file__).parent.parent / "welcome.flac"
 
@@ -34,6 +36,16 @@ async def talk(ctx: JobContext):
     session = AgentSession()
     await session.start(Agent(instructions="Greet."), room=ctx.room)
     session.output.audio = LipSync(session.output.audio, room=ctx.room)
+    await session.say("Welcome.", audio=recording())
+
+
+async def talk_as_video(ctx: JobContext):
+    """Greet in a room, as a drawn face."""
+    session, video, sound = AgentSession(), AvatarVideo("portrait"), QueueAudioOutput(sample_rate=24_000)
+    runner = AvatarRunner(ctx.room, audio_recv=sound, video_gen=video, options=video.options)
+    await runner.start()
+    session.output.audio = sound
+    await session.start(Agent(instructions="Greet."), room=ctx.room)
     await session.say("Welcome.", audio=recording())
 
 
@@ -64,4 +76,5 @@ if __name__ == "__main__":
     if "offline" in sys.argv:
         asyncio.run(talk_offline())
     else:
-        cli.run_app(WorkerOptions(entrypoint_fnc=talk))
+        as_video = sys.argv[-1] == "video" and sys.argv.pop()
+        cli.run_app(WorkerOptions(entrypoint_fnc=talk_as_video if as_video else talk))

@@ -75,6 +75,7 @@ class LipSync(AudioOutput):
             raise InputError("where should motion go? give LipSync either a room or on_frames")
         pause = AudioOutputCapabilities(pause=True)
         super().__init__(label="LipSync", next_in_chain=next_in_chain, capabilities=pause)
+        self._sink: AudioOutput = self.next_in_chain or next_in_chain
         self._room, self._on_frames = room, on_frames
         self._conversation, self._playout = Conversation(look_ahead_ms, model), Playout()
         self._held: deque[tuple[float, rtc.AudioFrame]] = deque()  # sound that waits for motion up to a time
@@ -88,15 +89,9 @@ class LipSync(AudioOutput):
         self._sending: asyncio.Task[None] | None = None
 
     @property
-    def sink(self) -> AudioOutput:
-        """What takes the sound."""
-        assert self.next_in_chain is not None  # noqa: S101
-        return self.next_in_chain
-
-    @property
     def sample_rate(self) -> int | None:
         """The rate that the sink requires; None: any."""
-        return self.sink.sample_rate
+        return self._sink.sample_rate
 
     async def capture_frame(self, frame: rtc.AudioFrame) -> None:
         """Take sound of the utterance."""
@@ -118,7 +113,7 @@ class LipSync(AudioOutput):
         """End the utterance."""
         super().flush()
         if not self._open:
-            self.sink.flush()
+            self._sink.flush()
             return
         self._open = False
         self._add(self._conversation.finish())
@@ -140,7 +135,7 @@ class LipSync(AudioOutput):
             self._playout.pass_on(self._conversation.sound_s, REST_S, now_s)
             self._playout.add(frames)
             self._send_motion(frames)
-        self.sink.clear_buffer()
+        self._sink.clear_buffer()
 
     def pause(self) -> None:
         """Rest until ``resume``."""
@@ -191,7 +186,7 @@ class LipSync(AudioOutput):
             end_s, frame = self._held.popleft()
             self._now |= self._playout.pass_on(end_s, frame.duration, self._clock_s())
             self._given_s += frame.duration
-            await self.sink.capture_frame(frame)
+            await self._sink.capture_frame(frame)
             self._passed = True
 
     async def _end(self) -> None:
@@ -202,7 +197,7 @@ class LipSync(AudioOutput):
             self._close()
 
     def _close(self) -> None:
-        self.sink.flush()
+        self._sink.flush()
         if not self._passed:  # then the sink does not say that this utterance is over
             self.on_playback_finished(playback_position=0.0, interrupted=True)
 
