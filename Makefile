@@ -4,6 +4,7 @@
 # make test-long      tests that take seconds: mutations, kills, real recordings, copies of the repository, pages
 # make test-portable  the numeric tests as other processors would run them
 # make test-explore   the property tests with other random cases at every run
+# make test-agents    the plug-ins for voice agents with both frameworks, in an environment of their own
 # make check  lint, types, import contracts
 # make coverage   the tests of `make test`, and which lines and branches they reach
 # make fuzz   mutated input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
@@ -14,6 +15,7 @@
 
 PYTHON ?= python3
 VENV ?= .venv
+AGENTS ?= $(VENV)-agents
 GRID ?= ../shared/corpora/grid-s1
 BUILD ?= build
 MINUTES ?= 10
@@ -25,7 +27,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
 TIMED := $(BIN)/python scripts/processor_time.py
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --slowest 20
-.PHONY: demo test test-all test-long test-portable test-explore check coverage fuzz bench model site requirements clean
+.PHONY: demo test test-all test-long test-portable test-explore test-agents check coverage fuzz bench model site requirements clean
 .DELETE_ON_ERROR:
 # each run of pytest would read and rewrite all tests again
 unexport PYTHONDONTWRITEBYTECODE
@@ -48,6 +50,10 @@ test-portable: $(VENV)/dev
 
 test-explore: $(VENV)/dev
 	$(PYTEST) -m "hypothesis and not long" --hypothesis-profile=explore
+
+# their own warnings of what Python will remove are not ours
+test-agents: $(AGENTS)/ready
+	PYTHONPATH=src $(TIMED) --limit 60 $(AGENTS)/bin/python -m pytest -W ignore::DeprecationWarning tests/agents
 
 check: $(VENV)/dev
 	$(BIN)/ruff format --check .
@@ -84,11 +90,11 @@ site: $(VENV)/site
 	  -c docs -d $(BUILD)/site-cache . $(BUILD)/site
 
 requirements:
-	for list in core video dev site; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
+	for list in core video dev site agents; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
 	  --no-annotate --no-header --override requirements/overrides.txt requirements/$$list.in -o requirements/$$list.txt; done
 
 clean:
-	rm -rf $(VENV) $(BUILD)
+	rm -rf $(VENV) $(AGENTS) $(BUILD)
 
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
@@ -106,4 +112,9 @@ $(VENV)/site: $(VENV)/dev requirements/site.txt
 $(VENV)/dev: $(BIN)/python requirements/dev.txt $(SOURCES)
 	$(PIP) --no-deps --require-hashes -r requirements/dev.txt
 	$(PIP) --no-deps --no-build-isolation --force-reinstall .
+	touch $@
+
+$(AGENTS)/ready: requirements/agents.txt
+	$(PYTHON) -m venv $(AGENTS)
+	$(AGENTS)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --require-hashes -r requirements/agents.txt
 	touch $@

@@ -1,13 +1,14 @@
 """Anyone's voice, any words, any room: accuracy of a model outside the training speaker's quiet studio.
 
     python benchmarks/anyone.py [--model FILE] [--split val] [--open FOLDER] [--tracks FOLDER]
-        [--only rooms|strangers|phones|open]
+        [--only rooms|strangers|phones|open] [--live MS] [--pauses natural|rest]
 
 rooms     : clips of the corpus of ``--corpus`` in babble, white noise, a room, over a telephone; ACC of opening, pooled
 strangers : GRID clips of other speakers, audio only and with transcript; mean ACC per clip, best lag within 60 ms
 phones    : ``speech-open`` with transcripts: mean opening and width by phone, and their rank correlation with the table
 open      : recordings with a face of ``--open`` (docs/results/voices.md), in pieces of 5 s or ``--whole``; mean
             ACC per clip, best lag within 120 ms
+With ``--live``, what a stream makes of the sound alone with so much look-ahead, instead of ``animate``.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from robust import SPOKEN
 from scipy.signal import butter, fftconvolve, sosfilt
 from scipy.stats import spearmanr
 
-from lipmotion import Corpus, animate, load_model
+from lipmotion import Corpus, Stream, animate, load_model
 from lipmotion.corpora.folder import spell_name
+from lipmotion.live.network import STEP_S
 from lipmotion.motion.articulation import read_articulation_table
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
@@ -74,11 +76,25 @@ def main() -> None:
     parser.add_argument("--tracks", type=Path, help="where tracks of videos are kept; default: they are not")
     parser.add_argument("--model", type=Path, help="default: the one that ships")
     parser.add_argument("--recogniser", default="auto")
+    parser.add_argument("--live", type=float, metavar="MS", help="look-ahead of a stream")
+    parser.add_argument("--pauses", choices=("natural", "rest"), default="natural")
     parser.add_argument("--only", action="append", choices=list(PARTS), help="repeatable; default: all")
     options = parser.parse_args()
     model = load_model(options.model)
     for name in options.only or PARTS:
         PARTS[name](options, model)
+
+
+def move(sound: Audio | Path, options: argparse.Namespace, model: Model, words: str | None = None) -> Motion:
+    """Return the motion of a recording, by ``animate`` or a stream."""
+    if options.live is None:
+        request = Request(sound, transcript=words, recogniser=options.recogniser, pauses=options.pauses)
+        return animate(request, model=model).motion
+    audio = read_audio(sound) if isinstance(sound, Path) else sound
+    stream = Stream(audio.rate_hz, options.live, model, pauses=options.pauses, seed=None)
+    frames = stream.push(audio.samples) + stream.flush()
+    values = np.array([[frame[name] for name in CHANNELS] for frame in frames])
+    return Motion(values, 1 / STEP_S, tuple(Channel(name) for name in CHANNELS))
 
 
 def show(figure: str, **values: object) -> None:
@@ -118,8 +134,7 @@ def rooms(options: argparse.Namespace, model: Model) -> None:
     for name, condition in conditions(options.corpora).items():
         pairs = []
         for seed, utterance in enumerate(utterances):
-            request = Request(condition(utterance.audio, seed), recogniser=options.recogniser, pauses="natural")
-            pairs.append(compared(animate(request, model=model).motion, utterance.track))
+            pairs.append(compared(move(condition(utterance.audio, seed), options, model), utterance.track))
         generated, tracked = (np.concatenate(each) for each in zip(*pairs, strict=True))
         show(f"{options.split}, {name}", clips=len(pairs), **correlations(generated, tracked))
 
@@ -128,12 +143,11 @@ def strangers(options: argparse.Namespace, model: Model) -> None:
     """Print the correlations of other GRID speakers."""
     clips = sorted((options.corpora / "grid-others").glob("*.mpg"))
     tracks = {clip: kept_track(clip, options.tracks) for clip in clips}
-    for condition in ("audio only", "transcript"):
+    for condition in ("audio only", "transcript") if options.live is None else ("audio only",):
         each = {}
         for clip in clips:
             words = " ".join(spell_name(clip.stem) or ()) if condition == "transcript" else None
-            request = Request(clip, transcript=words, recogniser=options.recogniser, pauses="natural")
-            each[clip.stem] = best_lag(animate(request, model=model).motion, tracks[clip], 0.06)
+            each[clip.stem] = best_lag(move(clip, options, model, words), tracks[clip], 0.06)
         show_means(f"grid-others, {condition}", each)
 
 
@@ -179,8 +193,7 @@ def open_english(options: argparse.Namespace, model: Model) -> None:
         if "french" in path.stem:
             continue
         for name, audio, piece in pieces(path, options.tracks, whole=options.whole):
-            request = Request(audio, recogniser=options.recogniser, pauses="natural")
-            each[name] = best_lag(animate(request, model=model).motion, piece, 0.12)
+            each[name] = best_lag(move(audio, options, model), piece, 0.12)
     show_means("open English, audio only", each)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import sound_reference
-from lipmotion_studio.web.connections import HOST, check_installed, open_socket, serve
+from lipmotion_studio.web.listening import HOST, check_installed, open_socket, serve
 
 TOKEN_BYTES = 24
 NAMES = (HOST, "localhost")

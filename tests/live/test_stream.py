@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import copy
+import gc
+import tracemalloc
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -101,9 +103,10 @@ def test_a_gain_changes_little(sound: np.ndarray) -> None:
     assert np.corrcoef(loud, soft)[0, 1] > 0.9
 
 
-def test_an_interruption_rests_and_time_goes_on(sound: np.ndarray) -> None:
+@pytest.mark.parametrize("turns", [40, pytest.param(1000, marks=pytest.mark.long)])
+def test_an_interruption_rests_and_time_goes_on(sound: np.ndarray, turns: int) -> None:
     rng, stream, frames = np.random.default_rng(5), Stream(look_ahead_ms=80), []
-    for _ in range(40):
+    for _ in range(turns):
         start = int(rng.integers(len(sound) - 16_000))
         frames += stream.push(sound[start : start + int(rng.integers(1, 12_000))])
         if rng.random() < 0.4:
@@ -156,6 +159,25 @@ def test_sound_that_comes_while_others_work(sound: np.ndarray) -> None:
         return [frame async for frame in Stream().frames(pieces())]
 
     assert np.array_equal(values_of(asyncio.run(collect())), values_of(all_of(Stream(), sound[:32_000], [640])))
+
+
+@pytest.mark.long
+def test_hours_need_no_more_memory_than_minutes(sound: np.ndarray) -> None:
+    stream, sizes = Stream(), []
+    line = np.concatenate([sound, np.zeros(80_000, np.float32)])
+    tracemalloc.start()
+    try:
+        for number in range(12):
+            stream.add_words([("welcome", stream.begins_s + 0.3, stream.begins_s + 0.8)])
+            for first in range(0, len(line), 640):
+                stream.push(line[first : first + 640])
+            stream.flush()
+            if number > 3:
+                gc.collect()
+                sizes.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert max(sizes[4:]) - max(sizes[:4]) < 10_000  # of 43 s of sound, 2,100 frames
 
 
 def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarray) -> None:

@@ -20,7 +20,7 @@ from starlette.responses import Response  # noqa: E402
 from starlette.routing import Route  # noqa: E402
 
 from lipmotion_studio.web import connections  # noqa: E402
-from lipmotion_studio.web.connections import open_socket  # noqa: E402
+from lipmotion_studio.web.listening import open_socket  # noqa: E402
 from lipmotion_studio.web.replies import ERRORS  # noqa: E402
 
 LARGE, SMALL = 1 << 26, b"small"

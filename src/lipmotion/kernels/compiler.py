@@ -29,8 +29,6 @@ def one_thread() -> Iterator[None]:
     for the whole process, until the last of several Python threads has left such a block. Libraries that cannot be
     limited (Accelerate on macOS) are not changed.
     """
-    import numpy as np  # noqa: F401 # only what is loaded can be limited
-
     with _LIMIT:
         yield
 
@@ -66,7 +64,6 @@ def _loaded_libraries(_: int) -> Any:
 
 def blas_kernels() -> list[str]:
     """Return the name, version and processor of each BLAS in use, sorted; where these differ, rounding does."""
-    import numpy as np  # noqa: F401
     import scipy.linalg  # noqa: F401 # has a copy of its own
     from threadpoolctl import threadpool_info
 

@@ -197,72 +197,61 @@ class UnitGroup(NamedTuple):
     reason: str
 
 
-_OPEN_PHONES = (
-    "aa ae ah ao aw ax axr ay ch d dh eh el en er ey f g hh ih ix iy jh k l n ng ow oy r s sh t th uh uw v w y z zh"
-)
-_BILABIAL = UnitGroup("bilabial", "p b m em", "the lips meet")
-_LABIODENTAL = UnitGroup("labiodental", "f v", "the lower lip is at the upper teeth")
-_SILENCE = UnitGroup("silence", "sil sp", "no speech; the mouth rests or prepares for speech")
+def _list_groups(*rows: str) -> tuple[UnitGroup, ...]:
+    return tuple(UnitGroup(*row.split("; ", 2)) for row in rows)
 
+
+_BILABIAL = "bilabial; p b m em; the lips meet"
+_LABIODENTAL = "labiodental; f v; the lower lip is at the upper teeth"
+_SILENCE = "silence; sil sp; no speech; the mouth rests or prepares for speech"
 GROUPS: dict[str, tuple[UnitGroup, ...]] = {
-    "2vis": (
-        UnitGroup(
-            "open", _OPEN_PHONES, "the lips are apart, in f v, too: the lip is at the teeth, not at the other lip"
-        ),
-        UnitGroup(CLOSED_UNIT, "p b m em sil sp", "the lips meet; in silence they rest on each other"),
+    "2vis": _list_groups(
+        "open; aa ae ah ao aw ax axr ay ch d dh eh el en er ey f g hh ih ix iy jh k l n ng ow oy r s sh t th "
+        "uh uw v w y z zh; the lips are apart, in f v, too: the lip is at the teeth, not at the other lip",
+        "closed; p b m em sil sp; the lips meet; in silence they rest on each other",
     ),
-    "sVis": (
-        UnitGroup("front", "iy ih ix eh ey ax axr er", "not low, not back: jaw half shut, lips spread or slack"),
-        UnitGroup(
-            "low", "aa ae ah aw ay", "low: the jaw drops; diphthongs stand where they begin, for that part is longer"
-        ),
-        UnitGroup("back", "ao ow oy uh uw", "back, not low: the vowels that round the lips"),
+    "sVis": _list_groups(
+        "front; iy ih ix eh ey ax axr er; not low, not back: jaw half shut, lips spread or slack",
+        "low; aa ae ah aw ay; low: the jaw drops; diphthongs stand where they begin, for that part is longer",
+        "back; ao ow oy uh uw; back, not low: the vowels that round the lips",
         _BILABIAL,
         _LABIODENTAL,
-        UnitGroup(
-            "other",
-            "ch d dh el en g hh jh k l n ng r s sh t th w y z zh",
-            "all other consonants: lips hardly needed; w rounds them, but does not shut them",
-        ),
+        "other; ch d dh el en g hh jh k l n ng r s sh t th w y z zh; all other consonants: lips hardly "
+        "needed; w rounds them, but does not shut them",
         _SILENCE,
     ),
-    "pbVis": (
-        UnitGroup("AI", "aa ae ah aw ay", "wide open: a as in father, i as in ice"),
-        UnitGroup(
-            "E", "eh ey iy ih ix ax er axr", "open and spread: e as in let and in see, and the slack vowels near them"
-        ),
-        UnitGroup("O", "ao ow oy", "round and open"),
-        UnitGroup("U", "uh uw", "round and nearly shut"),
-        UnitGroup("WQ", "w", "puckered tightly; q is written k w here"),
-        UnitGroup("MBP", "p b m em", "the lips meet"),
-        UnitGroup("FV", "f v", "the lower lip is at the upper teeth"),
-        UnitGroup("L", "l el", "the tongue shows behind the upper teeth"),
-        UnitGroup(
-            "etc",
-            "ch d dh en g hh jh k n ng r s sh t th y z zh",
-            "teeth together: his C D G K N R S TH Y Z and those made like them",
-        ),
-        UnitGroup("rest", "sil sp", "lips together and relaxed"),
+    "pbVis": _list_groups(
+        "AI; aa ae ah aw ay; wide open: a as in father, i as in ice",
+        "E; eh ey iy ih ix ax er axr; open and spread: e as in let and in see, and the slack vowels near them",
+        "O; ao ow oy; round and open",
+        "U; uh uw; round and nearly shut",
+        "WQ; w; puckered tightly; q is written k w here",
+        "MBP; p b m em; the lips meet",
+        "FV; f v; the lower lip is at the upper teeth",
+        "L; l el; the tongue shows behind the upper teeth",
+        "etc; ch d dh en g hh jh k n ng r s sh t th y z zh; teeth together: his C D G K N R S TH Y Z and "
+        "those made like them",
+        "rest; sil sp; lips together and relaxed",
     ),
-    "eVis": (
-        UnitGroup("aw", "aw", "diphthong: open, then rounding"),
-        UnitGroup("ay", "ay", "diphthong: open, then spreading"),
-        UnitGroup("ey", "ey", "diphthong: half open, then spreading"),
-        UnitGroup("ow", "ow", "diphthong: rounded, then narrower"),
-        UnitGroup("oy", "oy", "diphthong: rounded, then spreading"),
-        UnitGroup("high", "iy ih ix", "high front vowels: jaw nearly shut, lips spread"),
-        UnitGroup("mid", "eh ax axr er", "mid vowels, front and central: jaw half shut, lips slack"),
-        UnitGroup("low", "aa ae ah", "low vowels: the jaw drops"),
-        UnitGroup("back", "ao uh uw", "back vowels: lips rounded"),
+    "eVis": _list_groups(
+        "aw; aw; diphthong: open, then rounding",
+        "ay; ay; diphthong: open, then spreading",
+        "ey; ey; diphthong: half open, then spreading",
+        "ow; ow; diphthong: rounded, then narrower",
+        "oy; oy; diphthong: rounded, then spreading",
+        "high; iy ih ix; high front vowels: jaw nearly shut, lips spread",
+        "mid; eh ax axr er; mid vowels, front and central: jaw half shut, lips slack",
+        "low; aa ae ah; low vowels: the jaw drops",
+        "back; ao uh uw; back vowels: lips rounded",
         _BILABIAL,
         _LABIODENTAL,
-        UnitGroup("dental", "th dh", "the tongue's tip at or between the teeth: the jaw stays a little open for it"),
-        UnitGroup("alveolar", "t d n en", "the tongue at the gum, lips free to do what the neighbours want"),
-        UnitGroup("sibilant", "s z", "teeth together"),
-        UnitGroup("palatal", "sh zh ch jh", "teeth together, lips pushed forward"),
-        UnitGroup("hidden", "k g ng hh", "made at the back: nothing of it shows, the neighbours decide"),
-        UnitGroup("glide", "l el y", "the tongue raised, lips not rounded"),
-        UnitGroup("rounded", "w r", "lips rounded or pushed forward"),
+        "dental; th dh; the tongue's tip at or between the teeth: the jaw stays a little open for it",
+        "alveolar; t d n en; the tongue at the gum, lips free to do what the neighbours want",
+        "sibilant; s z; teeth together",
+        "palatal; sh zh ch jh; teeth together, lips pushed forward",
+        "hidden; k g ng hh; made at the back: nothing of it shows, the neighbours decide",
+        "glide; l el y; the tongue raised, lips not rounded",
+        "rounded; w r; lips rounded or pushed forward",
         _SILENCE,
     ),
     "phone": tuple(UnitGroup(phone, phone, "itself") for phone in PHONES),

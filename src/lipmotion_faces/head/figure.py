@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.meshes.model.surface import compute_normals
@@ -154,8 +154,6 @@ def earring() -> Part:
 
 def _rings(name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish) -> Part:
     """Return a part of rings about the body from rows (height, half width, half depth, middle z, squareness)."""
-    from scipy.interpolate import PchipInterpolator
-
     at = np.linspace(0, len(table) - 1, count)
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
     c, s = np.cos(around), np.sin(around)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace, measure_prosody, shift_prosody
@@ -44,9 +44,6 @@ from lipmotion_faces.outputs.drawn_video import (
 )
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.registry import FACES, is_drawings, make_face, stage_face
-
-if TYPE_CHECKING:
-    from lipmotion.pipeline.model import Model
 
 LOG = logging.getLogger("lipmotion")
 AnyFace = str | Path | Face | FilmedFace | CutOut | DrivenCharacter

@@ -10,7 +10,7 @@ from lipmotion.errors import InputError
 from lipmotion_studio.study.answers import Answer, write_answers
 from lipmotion_studio.study.manifest import Study, check_videos, list_questions, order_trials, read_study
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name, rater_number
-from lipmotion_studio.web.connections import HOST, check_installed, open_socket, serve
+from lipmotion_studio.web.listening import HOST, check_installed, open_socket, serve
 
 PORT = 8000
 
