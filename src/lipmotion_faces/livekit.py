@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.live.conversation import LOOK_AHEAD_MS, Conversation
-from lipmotion.live.stream import LiveFrame
+from lipmotion.live.face import LiveFrame
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.types import Channel, Motion, Timeline
 from lipmotion_faces.base import DrawsSingly, Face, Staging

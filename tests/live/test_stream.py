@@ -207,7 +207,7 @@ def test_natural_pauses_stay_as_people_s_do(sound: np.ndarray) -> None:
     assert np.abs(rested - natural)[-20:].max() < 0.02
     assert np.abs(rested - natural).max() > 0.01
     with pytest.raises(InputError, match="'none'"):
-        Stream(pauses="none")
+        Stream(pauses="none")  # type: ignore[arg-type]
 
 
 WORDS = [("map", 0.5, 0.9), ("[music]", 0.9, 1.0), ("boom", 1.7, 2.1)]

@@ -179,8 +179,8 @@ def osc_packet(frame: LiveFrame) -> bytes:
 
 def live_link_packet(frame: LiveFrame) -> bytes:
     """Return the packet that the Live Link Face app would send: 52 blendshapes, then head and eyes, radians."""
-    head = [frame.weights.get(name, 0.0) * sign for name, sign in zip(ANGLES, HEAD_SIGNS, strict=True)]
-    values = [frame.weights.get(name, 0.0) for name in ARKIT_52] + head + [0.0] * EYES
+    turned = [frame.weights.get(name, 0.0) * sign for name, sign in zip(ANGLES, HEAD_SIGNS, strict=True)]
+    values = [frame.weights.get(name, 0.0) for name in ARKIT_52] + turned + [0.0] * EYES
     name, rate = SUBJECT.encode(), round(1 / STEP_S)
     head = struct.pack("<I", 6) + DEVICE.encode() + struct.pack(">i", len(name)) + name
     return (

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from lipmotion.live.face import LiveFrame
 from lipmotion.live.network import STEP_S
-from lipmotion.live.stream import REST_STEPS, LiveFrame, Stream
+from lipmotion.live.stream import REST_STEPS, Stream
 from lipmotion.pipeline.model import Model, load_model
 
 LOOK_AHEAD_MS = 320.0

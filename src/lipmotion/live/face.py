@@ -17,6 +17,8 @@ from lipmotion.motion.closure import OPENING, is_never_negative
 from lipmotion.pipeline.model import Model
 
 Array = NDArray[np.float64]
+PARTING = np.array([name.startswith(("mouthLowerDown", "mouthUpperUp")) for name in ARKIT_MOUTH])
+"""Of the weights of the mouth, those that part the lips: closed lips have none of them."""
 WEIGHT_NAMES = (*ARKIT_MOUTH, *VISEME_CHANNELS)
 
 
@@ -56,7 +58,7 @@ class LiveFrame:
         return round(self.time_s / STEP_S)
 
 
-class Face:
+class ModelFace:
     """The face of a model, which follows articulators in standard deviations."""
 
     def __init__(self, model: Model) -> None:
@@ -93,6 +95,7 @@ class Face:
         values = self._base + reduced @ self._basis
         values[self._bounded] = np.maximum(values[self._bounded], 0)
         arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
+        arkit[PARTING] *= 1 - closing
         return values, np.concatenate([arkit, said / max(float(said.sum()), 1.0)])
 
 

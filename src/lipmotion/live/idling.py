@@ -78,7 +78,7 @@ class Idling:
         turn = (STILL_SHARE + (1 - STILL_SHARE) * self._talking) * self._sway_at(time_s)
         turn[1] -= NOD_RAD * self._accent
         (_, before), (began_s, aimed) = self._fixations
-        aim = np.array(before) + smooth_step((time_s - began_s) / SACCADE_S) * np.subtract(aimed, before)
+        aim = np.array(before) + smooth_step(np.array([time_s - began_s]) / SACCADE_S) * np.subtract(aimed, before)
         gaze = aim - GAZE_COUNTER_SHARE * turn[:2] + self.target - self._turn
         turn[:2] += self._turn
         lids = lid_closure(np.array([time_s]), [begin for begin in self._blinks if begin <= time_s < begin + BLINK_S])
@@ -93,7 +93,7 @@ class Idling:
         if number != self._swayed[0]:
             rng, ahead_s = (
                 np.random.default_rng([self._seed, 1]),
-                (number * SWAY_STEPS + np.arange(SWAY_STEPS)) * STEP_S,
+                (number * SWAY_STEPS + np.arange(SWAY_STEPS, dtype=float)) * STEP_S,
             )
             rows = np.stack([size * sway(ahead_s, rng, *SWAY_HZ) for size in SWAY], axis=1)
             self._swayed = number, rows

@@ -20,7 +20,8 @@ from lipmotion.live.conversation import (
     blend,
     list_messages,
 )
-from lipmotion.live.stream import REST_STEPS, LiveFrame
+from lipmotion.live.face import LiveFrame
+from lipmotion.live.stream import REST_STEPS
 from lipmotion.pipeline.model import Model
 
 try:

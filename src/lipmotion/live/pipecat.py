@@ -11,7 +11,7 @@ from typing import Any
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.live.conversation import LOOK_AHEAD_MS, REST_S, Conversation, Playout, list_messages
-from lipmotion.live.stream import LiveFrame
+from lipmotion.live.face import LiveFrame
 from lipmotion.pipeline.model import Model
 
 try:

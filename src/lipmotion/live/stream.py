@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.live.face import WEIGHT_NAMES, Face, LiveFrame, between
+from lipmotion.live.face import WEIGHT_NAMES, LiveFrame, ModelFace, between
 from lipmotion.live.idling import LARGEST_TURN_RAD, Idling
 from lipmotion.live.network import (
     HEARD_S,
@@ -98,7 +98,7 @@ class Stream:
         if pauses not in get_args(Pauses):
             raise InputError(f"pauses {pauses!r}, required one of {', '.join(get_args(Pauses))}")
         self.sample_rate, self.look_ahead_ms, self._pauses, self._seed = int(sample_rate), look_ahead_ms, pauses, seed
-        self._face = Face(model if model is not None else load_model())
+        self._face = ModelFace(model if model is not None else load_model())
         self._sound: list[NDArray[np.float32]] | None = [] if look_ahead_ms is None else None
         self._lag = max(int(np.floor(((look_ahead_ms or 0.0) / 1000 - HEARD_S) / STEP_S + 1e-9)), -1)
         self._smoother = _Smoother(live_network(), self._lag)

@@ -81,7 +81,7 @@ def _trace(spans: list[Span[Unit]], now_s: float) -> dict[int, NDArray[np.float6
     origin_s = spans[0].start_s
     units = Timeline(tuple(Span(span.start_s - origin_s, span.end_s - origin_s, span.label) for span in spans))
     first, stop = int(np.ceil(max(origin_s, now_s) / STEP_S - 1e-9)), int(np.ceil(spans[-1].end_s / STEP_S - 1e-9))
-    time_s = np.arange(first, stop) * STEP_S - origin_s
+    time_s: NDArray[np.float64] = np.arange(first, stop, dtype=float) * STEP_S - origin_s
     frames = max(int(np.ceil((spans[-1].end_s - origin_s) * FRAME_RATE_HZ)), 1)
     known_s = np.arange(frames) / FRAME_RATE_HZ
     articulators = [np.interp(time_s, known_s, column) for column in GAIN * trace_articulators(units, frames).T]

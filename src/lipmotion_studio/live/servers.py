@@ -90,7 +90,7 @@ class Server:
             self._serve_client,
             sock=place,
             process_request=self._process,
-            origins=origins,  # type: ignore[arg-type] # None: what is no browser
+            origins=origins,  # None: what is no browser
             compression=None,
             open_timeout=REPLY_S,
             close_timeout=CLOSE_S,

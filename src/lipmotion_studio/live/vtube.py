@@ -119,7 +119,7 @@ class VTubeStudio:
             reply = await self._ask(connection, "AuthenticationRequest", **PLUGIN, authenticationToken=token)
             if reply.get("authenticated"):
                 return True
-        token = (await self._ask(connection, "AuthenticationTokenRequest", **PLUGIN)).get("authenticationToken")
+        token = (await self._ask(connection, "AuthenticationTokenRequest", **PLUGIN)).get("authenticationToken") or ""
         if not token:
             return False
         with suppress(OSError, ExportError):  # where nothing can be stored, the user is asked again next time
