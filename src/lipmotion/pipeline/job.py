@@ -17,7 +17,6 @@ from lipmotion.extensions import load_provided
 from lipmotion.pipeline.request import Outputs, Request, locate_paths
 from lipmotion.storage.files import check_listable, portable_name
 from lipmotion.storage.json_text import read_toml
-from lipmotion.types import Audio, Generation
 from lipmotion.types.configuration import Configuration, option
 from lipmotion.types.delivery import Delivery, Staging
 from lipmotion.types.progress import Monitor, silent_monitor, sub_monitor
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from lipmotion.meshes.fitting.driven import DrivenCharacter
     from lipmotion.pipeline.model import Model
     from lipmotion.pipeline.outputs.output import Output, OutputSettings, ShownFace
+    from lipmotion.types import Audio, Generation
 
 RECOGNITION = 0.3
 """The share of the work that is recognition, where a video is drawn, too."""
@@ -219,6 +219,7 @@ def write_outputs(
     """
     from lipmotion.pipeline.outputs.motion_files import with_articulation
     from lipmotion.pipeline.outputs.output import create_outputs, write_planned
+    from lipmotion.types import Audio
 
     if job.outputs.articulation:
         generation = with_articulation(generation)

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
 from lipmotion.errors import InputError, shorten
 from lipmotion.extensions import load_provided
 from lipmotion.storage.sources import is_file
-from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 
 if TYPE_CHECKING:
+    from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
     from lipmotion.units import Lexicon
 
 Onto: TypeAlias = Any
@@ -187,6 +187,8 @@ class Request(Configuration):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.units, str | Path | None):
+            from lipmotion.types import Unit
+
             for span in self.units:
                 if not isinstance(span.label, Unit):
                     raise InputError(f"a unit is {shorten(repr(span.label))}, required a Unit: Unit('p')")

@@ -8,7 +8,6 @@ from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_machine_readable, add_workers
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_error, print_json, print_line
-from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.request import Request
 
 LINES = 12
@@ -59,6 +58,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run_prepare(options: argparse.Namespace) -> None:
     """Call ``lipmotion.prepare``; report what was prepared, kept and skipped."""
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion_faces.corpus.prepare import prepare
 
     with report_progress(options) as report:

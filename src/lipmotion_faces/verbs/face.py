@@ -7,9 +7,6 @@ import argparse
 from lipmotion.cli.arguments.options import add_execution
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line
-from lipmotion.cli.terminal.progress import report_progress
-from lipmotion.errors import ExportError
-from lipmotion.storage.files import check_target
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -33,6 +30,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run_build(options: argparse.Namespace) -> None:
     """Call ``lipmotion.build_face`` and ``lipmotion.save_face``; report what was made."""
+    from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.errors import ExportError
+    from lipmotion.storage.files import check_target
     from lipmotion_faces.film.build import build_face
     from lipmotion_faces.filmed.face import SUFFIX, save_face
 

@@ -9,7 +9,6 @@ from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_figures_arguments, list_or_all, report_figures
 from lipmotion.cli.arguments.paths import add_input
 from lipmotion.pipeline.request import Request
-from lipmotion.types import Monitor
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -29,6 +28,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.measures.evaluation_table import figures_table
     from lipmotion.pipeline.model import load_model
+    from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
     from lipmotion_lab.evaluation.evaluate import evaluate
 

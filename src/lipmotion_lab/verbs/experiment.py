@@ -20,15 +20,12 @@ from lipmotion.cli.arguments.options import (
     worker_count,
 )
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.terminal.progress import report_progress
-from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
-from lipmotion.storage.files import unfinished_work
-from lipmotion.types import Monitor
 
 if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus
+    from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
     from lipmotion_lab.runner import ExperimentSettings
 
@@ -72,6 +69,7 @@ def run_experiment(
     ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
+    from lipmotion.storage.files import unfinished_work
     from lipmotion_lab.runner import ExperimentSettings, Stamp, take_quick_part
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
@@ -178,6 +176,7 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 def run_xieliu2007(options: argparse.Namespace) -> None:
     """Call ``xieliu2007`` and print its table."""
     from lipmotion.corpora.source_recordings import read_names
+    from lipmotion.errors import InputError
     from lipmotion_lab.evaluation.held_out import NoiseConditions, read_talkers
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, table, xieliu2007
 
@@ -251,6 +250,7 @@ def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 
 def run_all(options: argparse.Namespace) -> None:
     """Call ``experiment_report``; print what was found, and the page. Raises the error of an experiment that failed."""
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora.store import Corpus
     from lipmotion.units import Lexicon
     from lipmotion_lab.report.report import describe_error, experiment_report

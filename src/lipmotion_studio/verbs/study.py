@@ -8,7 +8,6 @@ from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, report_figures
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import flush_output, print_line
-from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.printable import printable
 from lipmotion_studio.study.answers import MOS, PAIRED, RANKING
 
@@ -75,6 +74,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run_design(options: argparse.Namespace) -> None:
     """Call ``design_study``; report what was made."""
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion_studio.study.design import design_study
     from lipmotion_studio.study.settings import StudySettings
 

@@ -11,19 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.paths import add_output, is_pipe
-from lipmotion.cli.terminal.printing import print_line, print_lines
-from lipmotion.cli.terminal.progress import Report, outcome, report_progress
-from lipmotion.errors import InputError, LipMotionError
-from lipmotion.extensions import installed_version
-from lipmotion.pipeline.job import Job, check_outputs, is_for_several, list_recordings, open_face, plan_outputs, run
+from lipmotion.cli.terminal.printing import print_lines
+from lipmotion.cli.terminal.progress import outcome
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
-from lipmotion.storage.files import atomic_file, check_target, create_folders
-from lipmotion.storage.json_text import as_json, nan_as_null
-from lipmotion.types import Monitor
-from lipmotion.types.progress import Item, sub_monitor
 
 if TYPE_CHECKING:
+    from lipmotion.cli.terminal.progress import Report
+    from lipmotion.pipeline.job import Job
+    from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
 
 
@@ -31,6 +27,8 @@ class Version(argparse.Action):
     """Prints the version, and a text behind it; it is looked up only when the option is given."""
 
     def __call__(self, *_: object) -> None:  # noqa: D102
+        from lipmotion.cli.terminal.printing import print_line
+        from lipmotion.extensions import installed_version
 
         print_line(f"lipmotion {installed_version()}{self.const or ''}")
         sys.exit(0)
@@ -87,6 +85,9 @@ def report_figures(
     options: argparse.Namespace, compute: Callable[[Lexicon | None, Monitor], Figures], table: Callable[[Figures], str]
 ) -> None:
     """Call ``compute(lexicon, monitor)``, write its figures, and print their table."""
+    from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.storage.files import atomic_file, check_target
+    from lipmotion.storage.json_text import as_json, nan_as_null
     from lipmotion.units import Lexicon
 
     with report_progress(options) as report:
@@ -110,7 +111,11 @@ def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namesp
     Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
+    from lipmotion.errors import InputError, LipMotionError
+    from lipmotion.pipeline.job import check_outputs, is_for_several, list_recordings, open_face, plan_outputs, run
     from lipmotion.pipeline.model import load_model
+    from lipmotion.storage.files import create_folders
+    from lipmotion.types.progress import Item, sub_monitor
 
     if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
@@ -161,6 +166,9 @@ def place_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterato
     If the block fails, no new folders are left.
     Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``plan_outputs``.
     """
+    from lipmotion.pipeline.job import is_for_several, plan_outputs
+    from lipmotion.storage.files import create_folders
+
     if not any(map(is_for_several, outputs)):
         yield [Path(output) for output in outputs]
         return
@@ -175,6 +183,8 @@ def _check_named(recordings: Sequence[Path]) -> None:
     """Raise InputError where a recording has no name for a file in a folder."""
     for recording in recordings:
         if is_pipe(recording):
+            from lipmotion.errors import InputError
+
             raise InputError(
                 f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
                 "the name of a file: -o FILE.json"

@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import IO, Any
 
 from lipmotion.cli.terminal.printing import write_bytes
-from lipmotion.errors import InputError
-from lipmotion.storage.files import temporary_folder, work_folder
 from lipmotion.storage.sources import Source, check_apart, is_folder
 
 
@@ -83,6 +81,8 @@ def add_output(
 
 def check_paths(options: argparse.Namespace) -> None:
     """Raise ExportError if an output of a command is one of its inputs."""
+    from lipmotion.storage.files import work_folder
+
     declared: tuple[OutputArgument, ...] = getattr(options, "writes", ())
     written = [(output, path) for output in declared for path in _paths(getattr(options, output.name))]
     if not written:
@@ -147,6 +147,8 @@ def read_pipe(path: Path) -> Iterator[Path]:
     if not is_pipe(path):
         yield path
         return
+    from lipmotion.errors import InputError
+    from lipmotion.storage.files import temporary_folder
 
     with temporary_folder() as folder:
         stored = folder / "standard-input"
@@ -171,6 +173,7 @@ def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], b
     if PIPE not in outputs:
         yield outputs, False
         return
+    from lipmotion.storage.files import temporary_folder
 
     with temporary_folder() as folder:
         motion = folder / f"motion.{options.format}"
@@ -179,6 +182,8 @@ def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], b
 
 
 def _copy(source: IO[bytes], target: IO[bytes]) -> None:
+    from lipmotion.errors import InputError
+
     size = 0
     while block := source.read(BLOCK):
         size += len(block)

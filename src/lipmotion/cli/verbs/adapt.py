@@ -9,7 +9,6 @@ from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line
 from lipmotion.pipeline.request import Request
-from lipmotion.storage.files import check_target
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -26,6 +25,7 @@ def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.adapt`` and ``lipmotion.save_model``; print how much speech was used."""
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.training.train import adapt
+    from lipmotion.storage.files import check_target
 
     check_target(options.output)
     model = adapt(options.model, options.recordings)

@@ -8,7 +8,6 @@ from lipmotion.cli.arguments.declared import OF_ANIMATE, add_job_file, add_optio
 from lipmotion.cli.arguments.options import add_execution, animate_one_by_one, worker_count
 from lipmotion.cli.arguments.paths import add_pipe_format, is_pipe, read_pipe, write_pipe
 from lipmotion.cli.terminal.printing import print_note
-from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
@@ -28,6 +27,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the job of each recording; print the paths that were written."""
+    from lipmotion.cli.terminal.progress import report_progress
+
     note = ""
     recordings = options.speech if isinstance(options.speech, list) else [options.speech]
     with report_progress(options) as report:

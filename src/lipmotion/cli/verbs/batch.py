@@ -8,11 +8,8 @@ from typing import Any
 from lipmotion.cli.arguments.declared import add_detail, add_job_file, add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.terminal.progress import report_progress
-from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
-from lipmotion.types import Item
 from lipmotion.types.delivery import Delivery, Staging
 
 
@@ -49,7 +46,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``batch`` or, with ``--check``, ``check``; print what was done. Raises InputError: some lines failed."""
+    from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.errors import InputError
     from lipmotion.pipeline.batch import batch, check
+    from lipmotion.types import Item
 
     with report_progress(options) as report:
         job, monitor = part_of(options, options.start), report.receive

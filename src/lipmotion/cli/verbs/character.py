@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.errors import InputError, shorten
-from lipmotion.extensions import load_provided
-from lipmotion.pipeline.job import open_character
 from lipmotion.pipeline.request import Outputs
-from lipmotion.storage.sources import is_file
 from lipmotion.types.values import parse_number
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from lipmotion.meshes.files.rig_tables import RigRow
     from lipmotion.meshes.fitting.driven import DrivenCharacter
 
@@ -53,11 +51,14 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
+    from lipmotion.extensions import load_provided
     from lipmotion.meshes.files.binding_files import save_binding, write_points, write_weights
     from lipmotion.meshes.files.character_files import read_character
     from lipmotion.meshes.files.rig_tables import read_rig_table, table_path, write_rig_table
     from lipmotion.meshes.fitting.driven import list_rows
+    from lipmotion.pipeline.job import open_character
     from lipmotion.pipeline.outputs.curve_sets import describe_character
+    from lipmotion.storage.sources import is_file
 
     stated, path = _read_values(options), options.character
     if path.suffix.lower() == ".csv":

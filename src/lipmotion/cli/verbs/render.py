@@ -10,14 +10,10 @@ from pathlib import Path
 from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_pipe_format, write_pipe
-from lipmotion.cli.terminal.progress import report_progress
-from lipmotion.errors import InputError
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
-from lipmotion.storage.sources import is_file
-from lipmotion.types import Audio
 
 LOG = logging.getLogger("lipmotion")
 
@@ -44,6 +40,8 @@ def run(options: argparse.Namespace) -> None:
 
     The motion of a file of edits is generated again, and its outputs are written as ``animate`` does.
     """
+    from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import is_edit_file, read_edits
 
     with report_progress(options) as report:
@@ -62,6 +60,7 @@ def run(options: argparse.Namespace) -> None:
 
                 from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
                 from lipmotion.speech.sound.audio_files import read_audio
+                from lipmotion.types import Audio
 
                 sound, face = job.request.recording, open_face(job.outputs)
                 planned = check_outputs(job, face, sound)
@@ -81,6 +80,7 @@ def run(options: argparse.Namespace) -> None:
 def _find_sound(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
     from lipmotion.meshes.files.gltf_writer import find_named_sound
+    from lipmotion.storage.sources import is_file
 
     named = find_named_sound(motion) if motion.suffix.lower() == ".glb" and is_file(motion) else None
     if named is None:

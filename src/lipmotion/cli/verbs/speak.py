@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.terminal.progress import Report, report_progress
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 from lipmotion.storage.sources import is_file
+
+if TYPE_CHECKING:
+    from lipmotion.cli.terminal.progress import Report
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -39,6 +42,7 @@ def run(options: argparse.Namespace) -> None:
         options.wrong("required: a text, or --text FILE, not both")
     if options.words is not None and is_file(Path(options.words)):
         options.wrong(f"{options.words} is the name of a file; to say what is in it: --text {options.words}")
+    from lipmotion.cli.terminal.progress import report_progress
 
     with report_progress(options) as report:
         if not options.voices:

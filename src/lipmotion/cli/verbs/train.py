@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING, Any
 from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_execution, list_or_all, worker_count
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.terminal.progress import report_progress
-from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
-from lipmotion.storage.files import unfinished_work
 
 if TYPE_CHECKING:
     from lipmotion.engines import Engine
@@ -26,6 +23,7 @@ def model_to_start_from(name: str, engine: Engine[Any]) -> Model | None:
 
     Raises InputError: a model is given, but the engine's models do not stand on others.
     """
+    from lipmotion.errors import InputError
     from lipmotion.pipeline.model import load_model
 
     if name == NONE:
@@ -71,11 +69,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_from_settings, preset_visual
     from lipmotion.pipeline.model import GEOMETRY, save_model
     from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion.pipeline.training.train import Run, train
+    from lipmotion.storage.files import unfinished_work
     from lipmotion.units import Lexicon
 
     with report_progress(options) as report:

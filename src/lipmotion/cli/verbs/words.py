@@ -8,7 +8,6 @@ from typing import Any
 from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_execution, worker_count
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.pipeline.request import Request
 
 
@@ -28,6 +27,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``recognise_words`` and ``write_words``; print the words or the paths that were written."""
+    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.pipeline.analysis.language import (
         check_word_outputs,
         describe_word,
@@ -35,6 +35,7 @@ def run(options: argparse.Namespace) -> None:
         recognise_words,
         write_words,
     )
+    from lipmotion.pipeline.request import Request
 
     with report_progress(options) as report:
         check_word_outputs(options.output, options.speech)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from lipmotion.extensions import Registry, load_provided
 from lipmotion.formats.label_files import LABEL_SUFFIXES, write_labels
 from lipmotion.formats.sound import SOUND_CODECS, write_sound
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Outputs
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
@@ -33,6 +32,10 @@ from lipmotion.speech.sound.resampling import decimated
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
+
+if TYPE_CHECKING:
+    from lipmotion.meshes.model.scene import Scene
+    from lipmotion.pipeline.model import Model
 
 Made = TypeVar("Made")
 
