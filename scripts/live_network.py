@@ -67,7 +67,7 @@ VOICES = [
     ),
 ]
 SOUNDS = (".flac", ".wav", ".opus", ".mp3")
-HINTS, HINT_LAG, HINT_SHARE = COMPONENTS, 6, 0.5
+HINTS, HINT_LAG, HINT_SHARE = COMPONENTS, 6, 0.25
 """In training it also says what the speech encoder makes of the sound, so many steps ago, with this share of the error:
 who learns what the encoder knows learns the motion of unseen voices from fewer of them."""
 SILENCE_S, LEAST_S, LONGEST_S = 0.8, 1.2, 20.0
@@ -152,7 +152,7 @@ def learn(lessons: list[Lesson], typical: Array, steps: int) -> ConvolutionalNet
         if step % 100 == 0:
             print(step, round(error, 4), flush=True)
 
-    plan = TrainingPlan(steps, batch_size=16, rate=2e-3, dropout=0.3, seed=0)
+    plan = TrainingPlan(steps, batch_size=16, rate=2e-3, dropout=0.15, seed=0)
     network = SHAPE.initial(len(LAGS) * OUTPUTS + HINTS, 0)
     network = fit_network(network, draw, len(sequences), weights, plan, report)
     return network.with_parameters(

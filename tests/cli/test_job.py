@@ -57,7 +57,7 @@ seed = 3
 OTHERS = {
     *("words --recogniser", "cues --fps", "evaluate --speaker", "train --units", "train --speaker", "face --speaker"),
     *("corpus --offset-ms", "studio --model", "studio --character", "studio --face"),
-    *("live --model", "live --rate", "live --to"),
+    *("live --model", "live --pauses", "live --rate", "live --to"),
 }
 """Options of other verbs that have such a name, and another meaning or another default."""
 needs_toml = pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 reads no TOML")

@@ -34,7 +34,7 @@ HEARD_S = (STEP_FRAMES - 1) / FRAME_RATE_HZ + WINDOW / 2 / SPEECH_RATE_HZ
 """So much after its time the sound of a step has come."""
 OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)
 """Values of an answer: articulators, and how probable each viseme is."""
-SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 192, (1, 2, 4, 8, 16, 1, 2, 4))
+SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 256, (1, 2, 4, 8, 16, 1, 2, 4))
 """It hears the last 1.5 s."""
 START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
 """Natural logarithm of the power of loud speech that is assumed before anything is heard, and the least: sound that is
