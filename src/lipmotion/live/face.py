@@ -59,7 +59,10 @@ class LiveFrame:
 
 
 class ModelFace:
-    """The face of a model, which follows articulators in standard deviations."""
+    """The face of a model, which follows articulators in standard deviations.
+
+    names, opening : its channels, and the place of the lips' opening among them
+    """
 
     def __init__(self, model: Model) -> None:
         learned = model.learned
@@ -74,7 +77,7 @@ class ModelFace:
         row = ARTICULATORS.index(OPENING)
         column = self._closure.column
         self._closed = (self._closure.closed - self._prior.centre[column]) / self._prior.matrix[row, column]
-        self._opening = row
+        self._opening, self.opening = row, self.names.index(OPENING)
 
     @cached_property
     def resting(self) -> tuple[Array, Array]:

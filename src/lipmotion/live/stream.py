@@ -50,6 +50,8 @@ CLOSED = (0.07, 0.18)
 """Probabilities of p, b and m from which on the lips begin to close, and are closed."""
 CLOSING_STEPS, OPENING_STEPS = 2, 4
 """Steps in which they close, also where it is seen late, and in which they open again: 40 and 80 ms."""
+LARGEST_MOVE = 0.08
+"""The opening changes by at most so much in a step, eye distances: GRID's s1 is faster in one of 10,000 steps."""
 TIMED_SHARE = 0.5
 """Weight of phones that are given with their times in the articulators; the rest is what is heard."""
 CORRELATED_STEPS = 0.02
@@ -253,7 +255,9 @@ class Stream:
         resting = self._resting if self._pauses == "rest" else 0.0
         shown = between(spoken, self._face.resting, (1 - np.cos(np.pi * resting)) / 2)
         self._leaving = max(self._leaving - 1 / REST_STEPS, 0.0)
-        return between(shown, self._last, self._leaving)
+        shown, before = between(shown, self._last, self._leaving), self._shown[-1]
+        moved = abs(shown[0][self._face.opening] - before[0][self._face.opening])
+        return between(before, shown, LARGEST_MOVE / moved) if moved > LARGEST_MOVE else shown
 
     def _frame(self, shown: tuple[Array, Array], known_s: float) -> LiveFrame:
         self._shown.append(shown)
