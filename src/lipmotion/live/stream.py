@@ -218,7 +218,8 @@ class Stream:
         self._answers = deque([self._smoother.silent] * KEPT_STEPS, KEPT_STEPS)
         self._heard = 0  # steps
         self._before = [self._smoother.rest] * 2
-        self._closing, self._resting, self._opening, self._timed = 0.0, 1.0, 0.0, 0.0
+        self._closing, self._resting, self._opening = 0.0, 1.0, 0.0
+        self._told, self._timed = self._smoother.rest, 0.0  # the phones that were given last, and how far they count
         self._last, self._leaving = self._shown[-1], 1.0  # the pose from which the mouth goes on
 
     def _hear(self, samples: NDArray[np.float32]) -> list[LiveFrame]:
@@ -240,11 +241,13 @@ class Stream:
         smooth, said = self._smoother.solve(self._answers, self._before)
         self._before = [smooth, self._before[0]]
         given = self._given.row(self._next)
-        self._timed = min(self._timed + 1 / START_STEPS, 1.0) if given is not None else 0.0
+        share = 0.0
         if given is not None:
-            said = given[len(ARTICULATORS) :]
-            share = TIMED_SHARE * self._timed * (1 - said[VISEMES_15.index("sil")])
-            smooth = smooth + share * (given[: len(ARTICULATORS)] - smooth)
+            self._told, said = np.split(given, [len(ARTICULATORS)])
+            share = TIMED_SHARE * (1 - float(said[VISEMES_15.index("sil")]))
+        step = TIMED_SHARE / START_STEPS
+        self._timed += float(np.clip(share - self._timed, -step, step))
+        smooth = smooth + self._timed * (self._told - smooth)
         silent = float(said[VISEMES_15.index("sil")])
         change = 1 / REST_STEPS if silent > SILENT else -1 / START_STEPS if silent < SPOKEN else 0.0
         self._resting = float(np.clip(self._resting + change, 0, 1))
