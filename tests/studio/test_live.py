@@ -9,6 +9,7 @@ import sys
 from contextlib import ExitStack, contextmanager
 from queue import Queue
 from threading import Thread
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,8 +25,10 @@ pytest.importorskip("websockets", reason="the extra 'live' is not installed")
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.sync.server import serve
+from websockets.typing import Origin
 
 from lipmotion_studio.live import servers, vtube
+from lipmotion_studio.live.talking_head import TalkingHead
 from lipmotion_studio.live.window import LiveWindow, head_weights
 
 RATE_HZ = 16_000
@@ -44,20 +47,25 @@ def frame(number=0, **weights):
 def opened(to, capsys):
     """Give a consumer that serves, and its address."""
     with open_consumer(f"{to}:0", print, LiveSound(RATE_HZ)) as consumer:
-        yield consumer, re.search(r"ws://\S+", capsys.readouterr().err)[0]
+        yield consumer, next(word for word in capsys.readouterr().err.split() if "://" in word)
 
 
 def port_of(address):
     return int(address.rpartition(":")[2].rstrip("/"))
 
 
+def repeat_until_any(act, received):
+    """Do something again and again until a queue has anything."""
+    wait_until(lambda: (act(), not received.empty())[1], 60)
+
+
 @contextmanager
 def client_of(consumer, address):
     """Give a client that is connected, and has got a frame."""
     with connect(address, proxy=None) as client:
-        received = Queue()
+        received: Queue[str | bytes] = Queue()
         Thread(target=lambda: received.put(client.recv()), daemon=True).start()
-        wait_until(lambda: consumer(frame()) or not received.empty(), 60)
+        repeat_until_any(lambda: consumer(frame()), received)
         yield client
 
 
@@ -87,23 +95,23 @@ def test_a_client_that_hangs_holds_nobody_up(monkeypatch):
     monkeypatch.setattr(servers, "QUEUED", 5)
     monkeypatch.setattr(servers, "CLOSE_S", 0.05)
     with servers.open_server("websocket:0", 0) as server:
-        port, received = port_of(server.address), Queue()
+        port, received = port_of(server.address), Queue[bool]()
         with socket.create_connection(("127.0.0.1", port)) as hung, connect(f"ws://{server.address}") as good:
             hung.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n{UPGRADE}\r\n\r\n".encode())
             assert hung.recv(1)
             for _ in range(100):
                 server.send(200_000 * "x")
             Thread(target=lambda: received.put(gets(good, "last")), daemon=True).start()
-            wait_until(lambda: server.send("last") or not received.empty(), 60)
+            repeat_until_any(lambda: server.send("last"), received)
             assert received.get()
 
 
 def test_pages_of_other_sites_may_not_listen(capsys):
     with opened("websocket", capsys) as (_, address):
         for origin in ("https://example.org", "null", "http://localhost.example.org"):
-            with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin, proxy=None):
+            with pytest.raises(InvalidStatus, match="403"), connect(address, origin=Origin(origin), proxy=None):
                 pass
-        with connect(address, origin="http://localhost:8000", proxy=None):
+        with connect(address, origin=Origin("http://localhost:8000"), proxy=None):
             pass
 
 
@@ -132,6 +140,7 @@ def test_talking_head_gets_sound_with_its_blendshapes(capsys):
             head(frame(number, **weights))
 
     with opened("talkinghead", capsys) as (head, address):
+        assert isinstance(head, TalkingHead)
         assert isinstance(head, Listener)
         with connect(address, proxy=None) as client:
             assert calls(client, 1) == [("streamStart", {"sampleRate": RATE_HZ, "lipsyncType": "blendshapes"})]
@@ -158,7 +167,7 @@ def studio(monkeypatch, tmp_path):
     """Give a stand-in for VTube Studio: its address, and the requests that it gets."""
     monkeypatch.setattr(vtube, "AGAIN_S", 0.01)
     monkeypatch.setattr(vtube, "cache_folder", lambda: tmp_path / "cache")
-    requests = Queue()
+    requests: Queue[dict[str, Any]] = Queue()
     injections = []
 
     def reply(request):
@@ -204,9 +213,9 @@ def test_vtube_studio_is_asked_once_and_gets_the_newest_frame(studio, tmp_path):
     port, requests = studio
 
     def kinds_until_injected(take, shown):
-        kinds = []
+        kinds: list[str] = []
         while not kinds or kinds[-1] != "InjectParameterDataRequest":
-            wait_until(lambda: take(shown) or not requests.empty(), 60)
+            repeat_until_any(lambda: take(shown), requests)
             request = requests.get()
             kinds.append(request["messageType"])
         return kinds, {each["id"]: each["value"] for each in request["data"]["parameterValues"]}
@@ -233,13 +242,13 @@ def test_the_window_sends_sound_with_its_time_and_lips_that_close():
         window = LiveWindow(RATE_HZ, server)
         assert isinstance(window, Listener)
         with connect(f"ws://{server.address}/", proxy=None) as client:
-            received = Queue()
-            Thread(target=lambda: [received.put(message) for message in client], daemon=True).start()
-            wait_until(lambda: window(frame()) or not received.empty(), 60)
+            received: Queue[str | bytes] = Queue()
+            Thread(target=lambda: list(map(received.put, client)), daemon=True).start()
+            repeat_until_any(lambda: window(frame()), received)
             for value in (0.5, -0.25):
                 window.hear(np.full(FRAME, value, np.float32))
             window(frame(3, headYaw=0.2))
-            messages = []
+            messages: list[str | bytes] = []
             while not messages or 'time_s":0.06' not in str(messages[-1]):
                 messages.append(received.get(timeout=60))
     pieces = [message for message in messages if isinstance(message, bytes)]

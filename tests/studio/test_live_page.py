@@ -1,9 +1,9 @@
 """Live frames in a real browser: the page of the window, and TalkingHead's own module."""
 
 import csv
-import re
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from io import TextIOWrapper
 from pathlib import Path
 from threading import Thread
 
@@ -20,29 +20,37 @@ from study.firefox import BOTH
 
 pytest.importorskip("websockets", reason="the extra 'live' is not installed")
 
+from lipmotion_studio.live.talking_head import TalkingHead
+
 pytestmark = pytest.mark.long
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SCREENS = ((1200, 800, "light"), (900, 700, "dark"), (320, 560, "light"))
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required")
 LIMIT_S = 240.0
+SPOKEN_S = 3
 CONNECTED = "return Boolean(globalThis.live?.state.isConnected)"
-WATCH = """const { playback, head } = live, { schedule } = playback, pose = head.pose.bind(head);
-const mesh = head.meshes.find((each) => "jawOpen" in each.morphTargetDictionary);
-const place = mesh.morphTargetDictionary.jawOpen;
-const clock = Object.getOwnPropertyDescriptor(Object.getPrototypeOf(playback), "time_s").get;
-let read_s = 0; // the time that was read last
-Object.defineProperty(playback, "time_s", { get() { return (read_s = clock.call(this)); } });
-globalThis.shown = [];
+HOLD = """const { playback } = live, { schedule } = playback, held_s = playback.clock_s;
+document.querySelector("canvas").style.display = "none"; // nothing more is drawn: processors would take seconds for it
+Object.defineProperty(playback, "clock_s", { value: held_s, writable: true });
 globalThis.heard = [];
-head.pose = (...given) => {
-  pose(...given);
-  shown.push([read_s, mesh.morphTargetInfluences[place]]);
-};
 playback.schedule = (begin_s, samples) => {
   heard.push((begin_s + playback.anchor_s - playback.shift_s) * playback.rate_hz);
   schedule.call(playback, begin_s, samples);
 };"""
-"""From now on it is noted when in the stream the jaw has which weight, and when which sound is to be played."""
+"""From now on the test moves the clock, and it is noted when which sound is to be played, in samples."""
+SHOW = """const { playback, head } = live, [steps] = arguments;
+const mesh = head.meshes.find((each) => "jawOpen" in each.morphTargetDictionary);
+return steps.map((step_s) => {
+  playback.clock_s += step_s - playback.time_s;
+  live.draw();
+  return mesh.morphTargetInfluences[mesh.morphTargetDictionary.jawOpen];
+});"""
+"""Return which weight the jaw has at times of the stream, seconds."""
+
+
+def address_in(text):
+    """Return the address that a line names."""
+    return next(word for word in text.split() if "://" in word)
 
 
 def is_connected(window):
@@ -58,33 +66,36 @@ def is_connected(window):
 @pytest.mark.parametrize("opens", BOTH)
 def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
     command = [*LIPMOTION, "live", "-i", "-", "--rate", 16000, "--to", "window:0", "--to", tmp_path / "a.csv"]
-    sound = (read_audio(WELCOME).samples * 32767).astype("<i2").tobytes()
+    sound = (read_audio(WELCOME).samples[: 16000 * SPOKEN_S] * 32767).astype("<i2").tobytes()
     (tmp_path / "home").mkdir()
     with opens(tmp_path / "home", *WEBGL) as window:
         with child(command, stdin=PIPE, stderr=PIPE) as process:
-            window.open(re.search(r"http://\S+", process.stderr.readline())[0])
+            assert isinstance(process.stderr, TextIOWrapper)
+            assert isinstance(process.stdin, TextIOWrapper)
+            window.open(address_in(process.stderr.readline()))
             wait_until(lambda: is_connected(window), LIMIT_S)
             check_screens(window, "live", SCREENS)
-            window.show_as(320, 240)  # processors draw here, and they are slow
             window.click("#sound")
-            wait_until(lambda: window.run("return live.playback.isHeard"), LIMIT_S)
-            window.run(WATCH)
+            wait_until(lambda: window.run("return live.playback.isHeard && live.playback.context.currentTime"), LIMIT_S)
+            window.run(HOLD)
             process.stdin.buffer.write(sound)
+            process.stdin.buffer.flush()
+            wait_until(lambda: window.run("return heard.length") == 50 * SPOKEN_S, LIMIT_S)
             process.stdin.close()
             assert process.wait() == 0
         wait_until(lambda: "No connection" in window.text("#state"), LIMIT_S)
-        wait_until(lambda: window.run("return shown.length > 0 && !live.drawing"), LIMIT_S)
-        shown, heard = np.array(window.run("return shown")), np.array(window.run("return heard"))
+        rows = list(csv.DictReader((tmp_path / "a.csv").read_text("utf-8").splitlines()))
+        times, sent = (np.array([float(row[name]) for row in rows]) for name in ("time_s", "jawOpen"))
+        steps = np.arange(0, times[-1], 0.0125)  # at frames, and between them
+        shown, heard = window.run(SHOW, steps.tolist()), window.run("return heard")
+        rested = window.run(SHOW, [times[-1] + 1])
+        assert window.run("return live.drawing") is False
         problems = [each for each in window.problems() if "SEVERE" in each and "WebSocket" not in each]
-    rows = list(csv.DictReader((tmp_path / "a.csv").read_text("utf-8").splitlines()))
-    times, sent = (np.array([float(row[name]) for row in rows]) for name in ("time_s", "jawOpen"))
-    during = shown[(shown[:, 0] > 0) & (shown[:, 0] < times[-1])]
-    assert len(during) > 2  # processors draw here
-    assert np.median(np.abs(during[:, 1] - np.interp(during[:, 0], times, sent))) < 1e-3
-    assert during[:, 1].max() > 0.02
-    assert shown[-1, 1] == 0  # nothing comes: it rests
-    assert len(heard) == len(sound) // 640
-    assert heard == pytest.approx(np.rint(heard), abs=1e-3)  # pieces begin at whole samples: no seams
+    assert shown == pytest.approx(np.interp(steps, times, sent), abs=1e-3)
+    assert max(shown) > 0.02
+    assert rested == [0]  # nothing comes
+    assert np.diff(heard) == pytest.approx(320, abs=1e-3)  # no seams
+    assert heard == pytest.approx(np.rint(heard), abs=1e-3)
     assert problems == []
 
 
@@ -106,10 +117,14 @@ def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
         pytest.skip("no TalkingHead: npm install @met4citizen/talkinghead, LIPMOTION_NODE_MODULES")
     audio = read_audio(WELCOME)
     stream, about = Stream(audio.rate_hz), LiveSound(audio.rate_hz)
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Modules, directory=str(Path(package).parents[1])))
-    Thread(target=server.serve_forever, daemon=True).start()
-    with open_consumer("talkinghead:0", print, about) as head, opens(tmp_path, *WEBGL) as window:
-        place = re.search(r"ws://(\S+)", capsys.readouterr().err)[1]
+    with (
+        ThreadingHTTPServer(("127.0.0.1", 0), partial(Modules, directory=str(Path(package).parents[1]))) as server,
+        open_consumer("talkinghead:0", print, about) as head,
+        opens(tmp_path, *WEBGL) as window,
+    ):
+        Thread(target=server.serve_forever, daemon=True).start()
+        assert isinstance(head, TalkingHead)
+        place = address_in(capsys.readouterr().err).removeprefix("ws://")
         window.open(f"http://127.0.0.1:{server.server_address[1]}/talking_head.html?{place}")
         wait_until(lambda: window.run("return globalThis.called?.includes('streamStart')"), LIMIT_S)
         frames = []
@@ -118,17 +133,13 @@ def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
             for frame in stream.push(audio.samples[first : first + 320]):
                 frames.append(frame)
                 head(frame)
-        wait_until(lambda: window.run("return head.streamAudioStartTime && called.at(-1) === 'streamAudio'"), LIMIT_S)
-        window.run_until_done("setTimeout(arguments[0], 1000)")
-        queued = window.run(
-            """return head.animQueue.filter(({ template }) => template.name === "blendshapes")
-                .map(({ ts, vs }) => [ts[1] - head.streamAudioStartTime, vs.jawOpen[1]])"""
-        )
+        wait_until(lambda: window.run("return head.streamAudioStartTime"), LIMIT_S)
         head.interrupt()
         wait_until(lambda: window.run("return called.at(-1) === 'streamInterrupt'"), LIMIT_S)
+        queued = window.run("return queued")
         assert window.run("return head.isSpeaking") is False
         problems = [each for each in window.problems() if "SEVERE" in each and "favicon" not in each]
-    server.shutdown()
+        server.shutdown()
     first = len(frames) - len(queued)
     assert len(queued) > 100
     assert [time for time, _ in queued] == pytest.approx([20.0 * number for number in range(len(queued))], abs=0.2)
