@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import random
 from collections import deque
 from collections.abc import AsyncIterator
 
@@ -12,9 +11,12 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.live.conversation import LOOK_AHEAD_MS, Conversation
-from lipmotion.live.face import LiveFrame
+from lipmotion.live.face import WEIGHT_NAMES, LiveFrame
+from lipmotion.live.idling import Idling
+from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.types import Channel, Motion, Timeline
+from lipmotion.types.motion import RADIAN, WEIGHT
 from lipmotion_faces.base import DrawsSingly, Face, Staging
 from lipmotion_faces.registry import make_face, stage_face
 
@@ -31,21 +33,19 @@ FPS = 25
 PICTURES_WAITING = 3
 """The runner shows a picture when those before it were shown, and gives sound to the room at once: so sound waits."""
 PICTURES_AHEAD = 100
-BLINK = (0.5, 1.0, 1.0, 0.7, 0.35)
-"""How far the lids are shut in the pictures of a blink."""
-BLINKS_S = (2.0, 5.0)
-"""Least and longest time between two."""
+TURNING_PICTURES = 10
+"""In so many pictures eyes and head go over from what they do in silence to what they do with speech, and back."""
 Item = tuple[int, LiveFrame, "rtc.AudioFrame | AudioSegmentEnd | None"]
 
 
 class AvatarVideo(VideoGenerator):
     """Pictures of a face that speaks, 25 a second, in step with the sound.
 
-    face                 : a drawn one, or its name: portrait (woman), man, cartoon, head
-    size                 : height of the pictures
-    sample_rate          : of the sound, Hz
-    look_ahead_ms, model : of ``lipmotion.Stream``
-    The face blinks; what else moves beside the mouth stays still. An interruption rests within 120 ms.
+    face                       : a drawn one, or its name: portrait (woman), man, cartoon, head
+    size                       : height of the pictures
+    sample_rate                : of the sound, Hz
+    look_ahead_ms, model, seed : of ``lipmotion.Stream``
+    Eyes, brows and head move with the speech, and in silence. An interruption rests within 120 ms.
     Raises InputError: no such face, or one that does not draw single pictures.
     """
 
@@ -57,9 +57,10 @@ class AvatarVideo(VideoGenerator):
         sample_rate: int = 24_000,
         look_ahead_ms: float = LOOK_AHEAD_MS,
         model: Model | None = None,
+        seed: int | None = 0,
     ) -> None:
         model = model or load_model()
-        self._conversation = Conversation(look_ahead_ms, model)
+        self._conversation, self._idling = Conversation(look_ahead_ms, model, seed), Idling(seed or 0)
         still = Staging(size=size, blinks=False, gaze=False, brows=False, head=False)
         drawn = stage_face(make_face(face) if isinstance(face, str) else face, still)
         if not isinstance(drawn, DrawsSingly):
@@ -67,9 +68,11 @@ class AvatarVideo(VideoGenerator):
                 f"the face {type(drawn).__name__!r} does not draw single pictures; choose portrait or head"
             )
         self._face: DrawsSingly = drawn
-        self._channels = (*model.learned.space.channels, Channel("eyeBlinkLeft", ""), Channel("eyeBlinkRight", ""))
         self._rest = self._shown = self._conversation.rest(0.0, None)[0]
-        self._chance, self._blink, self._open_s = random.Random(0), 0, BLINKS_S[0]  # noqa: S311
+        living = [name for name in self._rest.weights if name not in WEIGHT_NAMES]
+        channels = [Channel(name, RADIAN if name in ANGLES else WEIGHT) for name in living]
+        self._channels = (*model.learned.space.channels, *channels)
+        self._living, self._pictures, self._speech = living, 0, 0.0  # the share of speech in what eyes and head do
         self._sound = AudioByteStream(sample_rate, 1, sample_rate // FPS)
         self._sample_rate = sample_rate
         self._chunks: deque[rtc.AudioFrame] = deque()  # sound that waits for its motion
@@ -78,7 +81,7 @@ class AvatarVideo(VideoGenerator):
         self._number = 0  # of the interruption
         self._waiting: asyncio.Queue[Item] = asyncio.Queue(PICTURES_AHEAD)
         self._delayed: deque[rtc.AudioFrame | AudioSegmentEnd | None] = deque([None] * PICTURES_WAITING)
-        self._height, self._width = self._draw(self._rest, 0.0).shape[:2]
+        self._height, self._width = self._draw(self._rest, [0.0] * len(living)).shape[:2]
 
     @property
     def options(self) -> AvatarOptions:
@@ -133,12 +136,13 @@ class AvatarVideo(VideoGenerator):
         """Yield a picture, and the sound that is heard with it, if any."""
         while True:
             sound: rtc.AudioFrame | AudioSegmentEnd | None = None
-            if not self._waiting.empty():
+            silent = self._waiting.empty()
+            if not silent:
                 number, pose, sound = self._waiting.get_nowait()
                 if number != self._number:
                     continue
                 self._shown = pose
-            picture = await asyncio.to_thread(self._draw, self._shown, self._next_blink())
+            picture = await asyncio.to_thread(self._draw, self._shown, self._move_beside(silent))
             number = self._number
             yield rtc.VideoFrame(self._width, self._height, rtc.VideoBufferType.RGB24, picture.tobytes())
             if number == self._number:
@@ -147,19 +151,15 @@ class AvatarVideo(VideoGenerator):
                 if heard is not None:
                     yield heard
 
-    def _next_blink(self) -> float:
-        """Return how far the lids are shut in the next picture."""
-        self._open_s -= 1 / FPS
-        if self._open_s > 0:
-            return 0.0
-        shut = BLINK[self._blink]
-        self._blink = (self._blink + 1) % len(BLINK)
-        if not self._blink:
-            self._open_s = self._chance.uniform(*BLINKS_S)
-        return shut
+    def _move_beside(self, silent: bool) -> list[float]:
+        """Return eyes, brows and head of the next picture."""
+        self._pictures += 1
+        self._speech = min(max(self._speech + (-1 if silent else 1) / TURNING_PICTURES, 0.0), 1.0)
+        idle = self._idling.step(self._pictures / FPS, 0.0, False)
+        return [idle[name] + self._speech * (self._shown.weights[name] - idle[name]) for name in self._living]
 
-    def _draw(self, pose: LiveFrame, blink: float) -> NDArray[np.uint8]:
+    def _draw(self, pose: LiveFrame, beside: list[float]) -> NDArray[np.uint8]:
         # faces measure the mouth at rest in the motion itself: so it begins with rest
-        rows = [[*frame.motion, blink, blink] for frame in (self._rest, pose)]
+        rows = [[*frame.motion, *beside] for frame in (self._rest, pose)]
         motion = Motion(np.array(rows), float(FPS), self._channels)
         return self._face.draw(motion, Timeline(()), fps=FPS).picture(1)

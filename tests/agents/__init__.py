@@ -13,6 +13,8 @@ import numpy as np
 from lipmotion.speech.sound.audio_files import read_audio
 
 STEP_S = 0.02
+MAMA_S, CLOSED_S = (0.5, 1.1), (0.56, 0.86)
+"""When the tests say "mama", and when the lips are closed in it."""
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 
@@ -21,6 +23,13 @@ def read_speech(rate_hz: int = 16_000, channels: int = 1) -> np.ndarray:
     samples = np.round(read_audio(WELCOME).samples * 32_767).astype("<i2")
     places = np.arange(0, len(samples) - 1, 16_000 / rate_hz).astype(int)
     return np.repeat(samples[places, None], channels, axis=1)
+
+
+def make_vowel(duration_s: float) -> np.ndarray:
+    """Return a sound at 16 kHz in which the lips never close [shape=(N, 1)]."""
+    time_s = np.arange(round(16_000 * duration_s)) / 16_000
+    waves = sum(np.sin(2 * np.pi * 120 * number * time_s) / number for number in range(1, 20))
+    return np.round(4_000 * np.asarray(waves)).astype("<i2")[:, None]
 
 
 class _Hurry(selectors.DefaultSelector):  # type: ignore[misc, valid-type]

@@ -16,16 +16,18 @@ pytest.importorskip("livekit.agents", exc_type=ImportError)
 
 from livekit import rtc
 from livekit.agents import Agent, AgentSession
-from livekit.agents.voice.io import AudioOutput, AudioOutputCapabilities
+from livekit.agents.types import USERDATA_TIMED_TRANSCRIPT
+from livekit.agents.voice.io import AudioOutput, AudioOutputCapabilities, TimedString
 
-from agents import Client, read_speech, run
+from agents import CLOSED_S, MAMA_S, Client, make_vowel, read_speech, run
 from lipmotion import LiveFrame
 from lipmotion.errors import InputError
 from lipmotion.live.livekit import LipSync
 
 
 def frames_of(sound: np.ndarray, sizes: list[int], rate_hz: int = 16_000) -> list[rtc.AudioFrame]:
-    frames, place = [], 0
+    frames: list[rtc.AudioFrame] = []
+    place = 0
     while place < len(sound):
         piece = sound[place : place + sizes[len(frames) % len(sizes)]]
         frames.append(rtc.AudioFrame(piece.tobytes(), rate_hz, sound.shape[1], len(piece)))
@@ -163,6 +165,25 @@ def test_motion_goes_to_the_room() -> None:
     run(work())
     with pytest.raises(InputError, match="where should motion go"):
         LipSync(Loudspeaker())
+
+
+def test_words_that_come_with_their_times_are_said() -> None:
+    async def work() -> None:
+        words = [TimedString("mama ", start_time=MAMA_S[0]), TimedString("oh", *MAMA_S[1:], end_time=1.4)]
+        for given in ([], words):
+            viewer = Viewer()
+            lips = LipSync(Loudspeaker(), on_frames=viewer.take)
+            frames = frames_of(make_vowel(1.6), [4_000])
+            frames[0].userdata[USERDATA_TIMED_TRANSCRIPT] = given
+            for frame in frames:
+                await lips.capture_frame(frame)
+            lips.flush()
+            await lips.wait_for_playout()
+            closed = {round(frame.time_s, 2): frame["viseme_PP"] > 0.8 for _, _, came in viewer.came for frame in came}
+            assert [closed[time_s] for time_s in CLOSED_S] == [bool(given)] * 2
+            await lips.aclose()
+
+    run(work())
 
 
 def test_a_pause_rests_and_goes_on() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 from collections.abc import Iterator
 from typing import Any
@@ -23,13 +24,14 @@ from pipecat.frames.frames import (
     TTSAudioRawFrame,
     TTSStartedFrame,
     TTSStoppedFrame,
+    TTSTextFrame,
 )
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.tests.utils import SleepFrame, run_test
 from pipecat.transports.base_output import BaseOutputTransport
 from pipecat.transports.base_transport import TransportParams
 
-from agents import Client, read_speech, run
+from agents import CLOSED_S, MAMA_S, Client, make_vowel, read_speech, run
 from lipmotion import LiveFrame
 from lipmotion.live.pipecat import LipSync
 
@@ -58,6 +60,12 @@ def data_of(frame: Frame) -> dict[str, Any]:
     return data
 
 
+def motion_of(frames: list[Any]) -> list[dict[str, Any]]:
+    """Return the frames of motion in the messages before anything else."""
+    messages = itertools.takewhile(lambda frame: isinstance(frame, OutputTransportMessageFrame), frames)
+    return [frame for message in messages for frame in data_of(message)["frames"]]
+
+
 def check_rest(frames: list[dict[str, Any]]) -> None:
     """The mouth is at rest after 100 ms."""
     assert len(frames) == 5
@@ -68,15 +76,17 @@ def check_rest(frames: list[dict[str, Any]]) -> None:
 def check_conversation(frames: list[Frame]) -> None:
     """All motion of sound comes before it, nothing of it twice, and none of what was interrupted."""
     client, heard_s, context = Client(), 0.0, ""
-    for before, frame in zip([Frame(), *frames], frames, strict=False):
+    rest: list[dict[str, Any]] = []
+    for number, (before, frame) in enumerate(zip([Frame(), *frames], frames, strict=False)):
         if isinstance(frame, OutputTransportMessageFrame):
             data = data_of(frame)
             client.receive(data["frames"])
             if isinstance(before, InterruptionFrame):
-                check_rest(data["frames"])
+                rest = motion_of(frames[number:])[:5]
+                check_rest(rest)
                 assert data["now"]
-                heard_s = data["frames"][0]["time_s"] + 0.1
-            else:
+                heard_s = rest[0]["time_s"] + 0.1
+            elif data["frames"][0] not in rest:
                 assert data["frames"][0]["time_s"] >= heard_s - 0.002
                 context = data["context_id"]
         elif isinstance(frame, TTSAudioRawFrame):
@@ -103,6 +113,21 @@ def test_sound_is_unchanged_and_its_motion_comes_before_it(rate_hz: int, channel
             for frame in data_of(each)["frames"]
         ]
         assert max(opened) > 0.2
+
+    run(work())
+
+
+def test_words_that_come_with_their_times_are_said() -> None:
+    async def work() -> None:
+        sent, words = cut(make_vowel(1.6), [4_000], 16_000, "a"), []
+        for text, start_s in (("oh", 0.0), ("mama", MAMA_S[0]), ("oh", MAMA_S[1])):
+            words.append(TTSTextFrame(text, "word", context_id="a"))
+            words[-1].pts = round(1e6 + start_s * 1e9)
+        for given in ([], words):
+            down, _ = await run_test(LipSync(), frames_to_send=[*given, *sent])
+            motion = motion_of([frame for frame in down if isinstance(frame, OutputTransportMessageFrame)])
+            closed = {round(frame["time_s"], 2): frame["weights"].get("viseme_PP", 0) > 0.8 for frame in motion}
+            assert [closed[time_s] for time_s in CLOSED_S] == [bool(given)] * 2
 
     run(work())
 
@@ -201,14 +226,14 @@ def test_a_transport_sends_motion_before_its_sound_and_drops_it_when_interrupted
 
         await run_test(Pipeline([LipSync(), transport]), frames_to_send=conversation())  # type: ignore[arg-type]
         client, heard_s, rested = Client(), 0.0, False
-        for frame in transport.sent:
+        for number, frame in enumerate(transport.sent):
             if not isinstance(frame, OutputTransportMessageFrame):
                 assert rested or client.covers(heard_s, heard_s + duration_s(frame))
                 heard_s += duration_s(frame)
                 continue
             data = data_of(frame)
             if data["now"] and heard_s and not rested:
-                check_rest(data["frames"])
+                check_rest(motion_of(transport.sent[number:])[:5])
                 assert data["frames"][0]["time_s"] == pytest.approx(heard_s, abs=0.05)
                 assert 1.4 < heard_s < 1.6
                 rested, heard_s, client = True, data["frames"][0]["time_s"], Client()

@@ -6,14 +6,17 @@ import asyncio
 import copy
 from collections import deque
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from lipmotion.errors import InputError
 from lipmotion.live.face import LiveFrame
 from lipmotion.live.network import STEP_S
 from lipmotion.live.stream import REST_STEPS, Stream
+from lipmotion.live.timings import LONGEST_S
 from lipmotion.pipeline.model import Model, load_model
 
 LOOK_AHEAD_MS = 320.0
@@ -21,23 +24,27 @@ LOOK_AHEAD_MS = 320.0
 PIECE_S = 0.04
 """Between pieces of so many seconds of sound, each some milliseconds of work, other tasks of the event loop run."""
 REST_S = REST_STEPS * STEP_S
-FRAMES_IN_MESSAGE = 5
+FRAMES_IN_MESSAGE = 3
 """Keeps messages under 4 kB, which the data channels of all transports carry."""
 LEAST_WEIGHT = 0.002
+WORD_S, LETTER_S = 0.2, 0.1
+"""A word whose end is not known lasts at most so long, and so much longer with each letter."""
 
 
 class Conversation:
     """The motion of utterances, each a stream of sound, on one time: seconds of sound since the first one.
 
-    look_ahead_ms, model : of ``Stream``
-    sound_s              : where the sound that was pushed ends
-    known_s              : the motion of the sound before this time is known
+    look_ahead_ms, model, seed : of ``Stream``
+    sound_s                    : where the sound that was pushed ends
+    known_s                    : the motion of the sound before this time is known
     A pause between utterances takes no time here, and an interruption the 100 ms in which the mouth comes to rest.
     """
 
-    def __init__(self, look_ahead_ms: float = LOOK_AHEAD_MS, model: Model | None = None) -> None:
-        self._model, self.look_ahead_s = model or load_model(), look_ahead_ms / 1000
-        self._stream = Stream(look_ahead_ms=look_ahead_ms, model=self._model)
+    def __init__(self, look_ahead_ms: float = LOOK_AHEAD_MS, model: Model | None = None, seed: int | None = 0) -> None:
+        self._model, self._seed, self.look_ahead_s = model or load_model(), seed, look_ahead_ms / 1000
+        self._stream = Stream(look_ahead_ms=look_ahead_ms, model=self._model, seed=seed)
+        self._words: deque[tuple[str, float, float | None]] = deque()  # that the stream was not given yet
+        self._said_s = 0.0  # where the last one ends that it was given
         self._shift = 0.0  # from our time to the stream's
         self._began_s, self._samples = 0.0, 0  # of the utterance
         self._number = 0  # of the utterance
@@ -68,6 +75,16 @@ class Conversation:
                 return []
         return frames
 
+    def add_words(self, words: Iterable[tuple[str, float, float | None]]) -> None:
+        """Take words with their start and end, in order, on the time of ``sound_s``, perhaps before their sound.
+
+        The mouth then says them. An end of None: where the next word begins, but soon. As services send odd times, a
+        start moves up to the end of the word before; what is empty then, too long or no single word is left out.
+        """
+        self._words.extend(words)
+        if self.speaking:
+            self._give_words()
+
     def finish(self) -> list[LiveFrame]:
         """Return the last frames of the utterance, and those in which the mouth rests where nothing follows."""
         if not self.speaking:
@@ -76,8 +93,11 @@ class Conversation:
 
     def interrupt(self, time_s: float, shown: LiveFrame | None) -> list[LiveFrame]:
         """Return the frames of ``rest``; all sound after them is void, and the next sound follows them."""
-        self._stream_s, self.speaking = self._stream.interrupt()[-1].time_s + STEP_S, False
+        self._goal = self._stream.interrupt()[-1]
+        self._stream_s, self.speaking = self._goal.time_s + STEP_S, False
         self._number += 1
+        self._words.clear()
+        self._said_s = 0.0
         self.sound_s = self.known_s = time_s + REST_S
         return self.rest(time_s, shown)
 
@@ -89,19 +109,37 @@ class Conversation:
         goal = [replace(self._goal, time_s=time_s + number * STEP_S, known_s=time_s) for number in range(REST_STEPS)]
         return blend(goal, shown or self._goal)
 
+    def _give_words(self, *, last: bool = False) -> None:
+        """Give the stream the words; one without an end waits for the next one, unless there is none any more."""
+        given = []
+        while self._words and (last or len(self._words) > 1 or self._words[0][2] is not None):
+            text, start_s, end_s = self._words.popleft()
+            if end_s is None:
+                longest_s = start_s + WORD_S + LETTER_S * len(text)
+                end_s = min(self._words[0][1], longest_s) if self._words else longest_s
+            start_s = max(start_s, self._said_s)
+            if len(text.split()) == 1 and start_s < end_s < start_s + LONGEST_S:
+                given.append((text, start_s + self._shift, end_s + self._shift))
+                self._said_s = end_s
+        with suppress(InputError):  # words that nobody can pronounce: what is heard is shown
+            self._stream.add_words(given)
+
     def _flush(self) -> list[LiveFrame]:
+        self._give_words(last=True)
         frames, self.speaking = self._place(self._stream.flush()), False
         self.known_s = self.sound_s
         return frames
 
     def _begin(self, rate_hz: int, at_rest: bool) -> None:
         if rate_hz != self._stream.sample_rate:
-            self._stream, self._stream_s = Stream(rate_hz, self.look_ahead_s * 1000, self._model), 0.0
+            self._stream = Stream(rate_hz, self.look_ahead_s * 1000, self._model, seed=self._seed)
+            self._stream_s = 0.0
         elif at_rest:
             self._stream_s = self._stream.interrupt()[-1].time_s + STEP_S
         self._shift = self._stream_s - self.sound_s
         self._began_s, self._samples, self.speaking = self.sound_s, 0, True
         self._number += 1
+        self._give_words()
 
     def _place(self, frames: list[LiveFrame]) -> list[LiveFrame]:
         """Return frames of the stream at our times."""
@@ -176,7 +214,7 @@ def list_messages(frames: list[LiveFrame], now: bool, **more: Any) -> Iterator[d
         shown = [
             {
                 "time_s": round(frame.time_s, 4),
-                "weights": {name: round(value, 3) for name, value in frame.weights.items() if value >= LEAST_WEIGHT},
+                "weights": {n: round(value, 3) for n, value in frame.weights.items() if abs(value) >= LEAST_WEIGHT},
             }
             for frame in frames[first : first + FRAMES_IN_MESSAGE]
         ]

@@ -25,7 +25,9 @@ from lipmotion.live.stream import REST_STEPS
 from lipmotion.pipeline.model import Model
 
 try:
-    from livekit.agents.voice.io import AudioOutput, AudioOutputCapabilities
+    from livekit.agents.types import USERDATA_TIMED_TRANSCRIPT
+    from livekit.agents.utils import is_given
+    from livekit.agents.voice.io import AudioOutput, AudioOutputCapabilities, TimedString
 except ImportError as error:
     raise MissingDependencyError(
         f"livekit-agents is not installed ({error}): pip install 'lipmotion[livekit]'"
@@ -83,6 +85,7 @@ class LipSync(AudioOutput):
         self._known: deque[LiveFrame] = deque()  # motion that was not sent yet
         self._now = True  # the next frame is to be shown when it comes
         self._open = self._void = False  # an utterance is coming; the rest of it is not heard
+        self._begins_s = 0.0  # where it does
         self._given_s, self._passed = 0.0, False  # of it the sink was given so much; and took some
         self._started = False  # the sink said that it is heard
         self._paused_s: float | None = None
@@ -101,8 +104,10 @@ class LipSync(AudioOutput):
         await super().capture_frame(frame)
         if not self._open:
             self._open, self._void, self._given_s, self._passed, self._started = True, False, 0.0, False, False
+            self._begins_s = self._conversation.sound_s
         if self._void:
             return
+        self._conversation.add_words(self._read_words(frame))
         at_rest = self._playout.is_silent(self._clock_s())
         sound = bytes(frame.data)
         self._add(await self._conversation.push(sound, frame.sample_rate, frame.num_channels, at_rest=at_rest))
@@ -172,6 +177,18 @@ class LipSync(AudioOutput):
             if task is not None:
                 task.cancel()
                 await asyncio.wait({task})
+
+    def _read_words(self, frame: rtc.AudioFrame) -> list[tuple[str, float, float | None]]:
+        """Return the words that a service sends with the sound, if it does."""
+        return [
+            (
+                word,
+                self._begins_s + word.start_time,
+                self._begins_s + word.end_time if is_given(word.end_time) else None,
+            )
+            for word in frame.userdata.get(USERDATA_TIMED_TRANSCRIPT, ())
+            if isinstance(word, TimedString) and is_given(word.start_time)
+        ]
 
     def _add(self, frames: list[LiveFrame]) -> None:
         """Take motion that is known now, in the place of what was to be shown from then on."""

@@ -25,6 +25,7 @@ try:
         SystemFrame,
         TTSAudioRawFrame,
         TTSStoppedFrame,
+        TTSTextFrame,
     )
     from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 except ImportError as error:
@@ -65,6 +66,8 @@ class LipSync(FrameProcessor):
         self._held: deque[tuple[float, Frame]] = deque()  # what waits for motion up to a time
         self._known: deque[LiveFrame] = deque()  # the motion that waits for its sound
         self._sound: TTSAudioRawFrame | None = None  # the last one that came
+        self._context: str | None = ""  # the utterance; "": none
+        self._begins_s, self._begins_ns, self._word_ns = 0.0, 0, 0  # where it does; and the last word
         self._timer: asyncio.TimerHandle | None = None
         self._due_s = 0.0  # when what is held must go on
 
@@ -84,8 +87,11 @@ class LipSync(FrameProcessor):
             if self._held and self._now_s() >= self._due_s:
                 await self._finish()
         else:
-            if isinstance(frame, TTSStoppedFrame | EndFrame | StopFrame):
+            if isinstance(frame, TTSTextFrame) and frame.pts:
+                await self._read(frame.text, frame.pts, frame.context_id)
+            elif isinstance(frame, TTSStoppedFrame | EndFrame | StopFrame):
                 await self._finish()
+                self._context = ""
             self._held.append((self._conversation.sound_s, frame))
             await self._pass_on()
 
@@ -94,9 +100,22 @@ class LipSync(FrameProcessor):
         self._stop_waiting()
         await super().cleanup()
 
-    async def _hear(self, sound: TTSAudioRawFrame) -> None:
-        if self._sound is not None and sound.context_id != self._sound.context_id:
+    async def _begin(self, context: str | None) -> None:
+        """Begin an utterance, unless it began: its words are timed from its first sound, or the last word before it."""
+        if context != self._context:
             await self._finish()
+            self._context, self._begins_s = context, self._conversation.sound_s
+            self._begins_ns = max(self._word_ns, self.get_clock().get_time())
+
+    async def _read(self, word: str, begin_ns: int, context: str | None) -> None:
+        """Take a word; it ends where the next one begins."""
+        await self._begin(context)
+        self._begins_ns = min(self._begins_ns, begin_ns)  # the service's clock is a little ahead of ours
+        self._word_ns = begin_ns
+        self._conversation.add_words([(word, self._begins_s + (begin_ns - self._begins_ns) / 1e9, None)])
+
+    async def _hear(self, sound: TTSAudioRawFrame) -> None:
+        await self._begin(sound.context_id)
         self._sound = sound
         at_rest = self._playout.is_silent(self._now_s())
         frames = await self._conversation.push(sound.audio, sound.sample_rate, sound.num_channels, at_rest=at_rest)
@@ -139,6 +158,7 @@ class LipSync(FrameProcessor):
         if self._sound is None or not self._sound.interruptible:
             return
         self._stop_waiting()
+        self._context, self._word_ns = "", 0
         kept = [frame for _, frame in self._held if not frame.interruptible]
         self._held.clear()
         self._known.clear()
