@@ -18,7 +18,7 @@ from lipmotion.pipeline.model import Model
 
 Array = NDArray[np.float64]
 PARTING = np.array([name.startswith(("mouthLowerDown", "mouthUpperUp")) for name in ARKIT_MOUTH])
-"""Of the weights of the mouth, those that part the lips: closed lips have none of them."""
+"""Which weights of the mouth part the lips: where these are closed, they are 0."""
 WEIGHT_NAMES = (*ARKIT_MOUTH, *VISEME_CHANNELS)
 
 

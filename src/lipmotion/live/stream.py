@@ -52,7 +52,7 @@ CLOSING_STEPS, OPENING_STEPS = 2, 4
 """Steps in which they close, also where it is seen late, and in which they open again: 40 and 80 ms."""
 LARGEST_MOVE = 0.08
 """The opening changes by at most so much in a step, eye distances: GRID's s1 is faster in one of 10,000 steps."""
-TIMED_SHARE = 0.5
+TIMED_SHARE = 0.3
 """Weight of phones that are given with their times in the articulators; the rest is what is heard."""
 CORRELATED_STEPS = 0.02
 """The network's errors are alike for about so many steps."""
