@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from types import SimpleNamespace
 from typing import Any
 
@@ -78,6 +79,14 @@ def test_an_interruption_rests_and_its_sound_is_forgotten() -> None:
         await video.push_audio(AudioSegmentEnd())
         items = await read(video, 20)
         assert bytes_of([item for item in items if isinstance(item, rtc.AudioFrame)]) == sound.tobytes()
+
+    run(work())
+
+
+def test_eyes_and_head_move_in_silence() -> None:
+    async def work() -> None:
+        pictures = [picture_of(item) for item in await read(AvatarVideo("cartoon", size=96, sample_rate=16_000), 40)]
+        assert sum(not np.array_equal(*pair) for pair in itertools.pairwise(pictures)) > 20
 
     run(work())
 

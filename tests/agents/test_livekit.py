@@ -169,7 +169,7 @@ def test_motion_goes_to_the_room() -> None:
 
 def test_words_that_come_with_their_times_are_said() -> None:
     async def work() -> None:
-        words = [TimedString("mama ", start_time=MAMA_S[0]), TimedString("oh", *MAMA_S[1:], end_time=1.4)]
+        words = [TimedString("mama ", start_time=MAMA_S[0]), TimedString("oh", start_time=MAMA_S[1], end_time=1.4)]
         for given in ([], words):
             viewer = Viewer()
             lips = LipSync(Loudspeaker(), on_frames=viewer.take)

@@ -111,7 +111,7 @@ class Conversation:
 
     def _give_words(self, *, last: bool = False) -> None:
         """Give the stream the words; one without an end waits for the next one, unless there is none any more."""
-        given = []
+        given: list[tuple[str, float, float]] = []
         while self._words and (last or len(self._words) > 1 or self._words[0][2] is not None):
             text, start_s, end_s = self._words.popleft()
             if end_s is None:
@@ -121,8 +121,12 @@ class Conversation:
             if len(text.split()) == 1 and start_s < end_s < start_s + LONGEST_S:
                 given.append((text, start_s + self._shift, end_s + self._shift))
                 self._said_s = end_s
-        with suppress(InputError):  # words that nobody can pronounce: what is heard is shown
+        try:
             self._stream.add_words(given)
+        except InputError:  # nobody can pronounce one of them: in its place, what is heard is shown
+            for word in given:
+                with suppress(InputError):
+                    self._stream.add_words([word])
 
     def _flush(self) -> list[LiveFrame]:
         self._give_words(last=True)
