@@ -84,6 +84,9 @@ EXTRAS = {
     "cluster": "'batch --cluster'",
     "study": "the page of 'study serve'",
     "studio": "the page of 'studio'",
+    "live": "a microphone for 'live', its pages, VTube Studio",
+    "pipecat": "lip motion in Pipecat's voice agents",
+    "livekit": "lip motion in LiveKit's voice agents",
 }
 """What each extra of the package brings."""
 PHONES = (("sil", 0.3), ("m", 0.09), ("aa", 0.16), ("m", 0.09), ("ax", 0.1), ("sil", 0.3))
