@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import copy
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -19,6 +19,8 @@ from lipmotion.live.stream import REST_STEPS, Stream
 from lipmotion.live.timings import LONGEST_S
 from lipmotion.pipeline.model import Model, load_model
 
+OnFrames = Callable[[list[LiveFrame], bool], Awaitable[None] | None]
+"""Takes frames, and whether the first one is to be shown now; perhaps a coroutine function."""
 LOOK_AHEAD_MS = 320.0
 """Synthesised sound comes faster than it is spoken: so much look-ahead costs it little."""
 PIECE_S = 0.04

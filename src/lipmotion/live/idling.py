@@ -91,10 +91,8 @@ class Idling:
         """Return the slow turning of the head [shape=(3,)], which is computed for some seconds at a time."""
         number, place = divmod(round(time_s / STEP_S), SWAY_STEPS)
         if number != self._swayed[0]:
-            rng, ahead_s = (
-                np.random.default_rng([self._seed, 1]),
-                (number * SWAY_STEPS + np.arange(SWAY_STEPS, dtype=float)) * STEP_S,
-            )
+            rng = np.random.default_rng([self._seed, 1])
+            ahead_s = (number * SWAY_STEPS + np.arange(SWAY_STEPS, dtype=float)) * STEP_S
             rows = np.stack([size * sway(ahead_s, rng, *SWAY_HZ) for size in SWAY], axis=1)
             self._swayed = number, rows
         turn: Array = self._swayed[1][place]

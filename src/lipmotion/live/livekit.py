@@ -6,7 +6,6 @@ import asyncio
 import json
 import logging
 from collections import deque
-from collections.abc import Awaitable, Callable
 from inspect import isawaitable
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from lipmotion.live.conversation import (
     LOOK_AHEAD_MS,
     REST_S,
     Conversation,
+    OnFrames,
     Playout,
     blend,
     list_messages,
@@ -35,7 +35,6 @@ except ImportError as error:
 if TYPE_CHECKING:
     from livekit import rtc
 
-OnFrames = Callable[[list[LiveFrame], bool], Awaitable[None] | None]
 LOG = logging.getLogger("lipmotion")
 TOPIC = "lipmotion"
 LEAD_S = 0.1

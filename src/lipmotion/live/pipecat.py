@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from inspect import isawaitable
 from typing import Any
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.live.conversation import LOOK_AHEAD_MS, REST_S, Conversation, Playout, list_messages
+from lipmotion.live.conversation import LOOK_AHEAD_MS, REST_S, Conversation, OnFrames, Playout, list_messages
 from lipmotion.live.face import LiveFrame
 from lipmotion.pipeline.model import Model
 
@@ -30,8 +29,6 @@ try:
     from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 except ImportError as error:
     raise MissingDependencyError(f"Pipecat is not installed ({error}): pip install 'lipmotion[pipecat]'") from error
-
-OnFrames = Callable[[list[LiveFrame], bool], Awaitable[None] | None]
 
 
 class LipSync(FrameProcessor):
