@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.live.network import LAGS, STEP_S, answer_silence, live_network
-from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS
+from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS, cancel_opposed
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.closure import OPENING, is_never_negative
@@ -99,6 +99,7 @@ class ModelFace:
         values[self._bounded] = np.maximum(values[self._bounded], 0)
         arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
         arkit[PARTING] *= 1 - closing
+        arkit = cancel_opposed(arkit, ARKIT_MOUTH)
         return values, np.concatenate([arkit, said / max(float(said.sum()), 1.0)])
 
 
