@@ -22,11 +22,11 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Curve = NDArray[np.float64]
 
-TUCKED_GAP = (0.04, 0.072)
+TUCKED_GAP = (0.05, 0.072)
 """Range of the gap while the lower lip is on the upper teeth, which are seen."""
 TONGUE_GAP = (0.05, 0.1)
 """Range of the gap while the tongue is between the teeth."""
-PURSED_GAP = (0.03, 0.043)
+PURSED_GAP = (0.04, 0.05)
 """Range of the gap of w: a small hole."""
 ROUND_GAP, TEETH_GAP = 0.06, 0.045
 """Least gap of protruded lips, and where both rows of teeth are seen."""
