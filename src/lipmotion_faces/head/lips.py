@@ -44,7 +44,7 @@ ROUND_DROP = 0.025
 REST_SMILE, SMILE_GAP = 0.027, 0.05
 """How far the corners rise at rest; parted, pressed and round lips do not smile, from this gap on. Tucked ones do: with
 lower corners, teeth on the lip look like contempt."""
-BITTEN_EDGE_Y = TEETH_EDGE + 0.014
+BITTEN_EDGE_Y = TEETH_EDGE + 0.017
 """Height of the edge of the lower lip on the upper teeth."""
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])

@@ -19,6 +19,7 @@ from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.meshes.model.shape_names import SIDES, VISEMES_15
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
+Array = NDArray[np.float64]
 VISEME_PHONES = {
     "sil": "sil sp",
     "PP": "p b m em",
@@ -44,6 +45,14 @@ NEAREST_VOWEL = {
     **{"aa": "aa", "ih": "ih", "oh": "oh", "ou": "ou"},
 }
 """The vowel of VRM for each viseme that opens the mouth."""
+VISEME_POSES = {
+    **{"FF": (0.05, 0.0), "TH": (0.1, 0.0), "DD": (0.12, 0.0), "kk": (0.14, 0.0), "CH": (0.14, 0.45)},
+    **{"SS": (0.13, 0.0), "nn": (0.13, 0.0), "RR": (0.13, 0.35), "aa": (0.22, 0.0), "E": (0.18, 0.0)},
+    **{"ih": (0.14, 0.0), "oh": (0.15, 0.75), "ou": (0.1, 1.0)},
+}
+"""The gap, in eye distances, and the protrusion of each open viseme at weight 1: about those of distinct speech."""
+LARGEST_ADDED = 0.4
+"""A viseme gives up at most this share to ``aa`` where the lips are further apart."""
 LAX = "E"
 """The viseme of parted lips in a pause."""
 MAX_CLOSED_WEIGHT = 0.85
@@ -53,12 +62,14 @@ CLOSED_GAPS, PARTED_GAPS = (0.0, 0.04), (0.06, 0.16)
 MIN_WEIGHT = 1e-6
 
 
-def weigh_visemes(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
+def weigh_visemes(units: Timeline[Unit], mouth: SpokenMouth, *, held: bool = False) -> Motion:
     """Return the weights of the 15 visemes over time, channels ``viseme_sil``, ``viseme_PP``, ...; 0 to 1.
 
     units : phones in time;  mouth : that they move
-    At every time the weights add up to 1. The visemes of closed lips, ``viseme_sil`` and ``viseme_PP``, add up to 1
-    where the lips of the mouth touch, and to at most ``MAX_CLOSED_WEIGHT`` where they do not.
+    held  : every viseme is wholly there, whatever the mouth does, and is cross-faded with the next one
+    At every time the weights add up to 1, or to less, where lips are parted less than in the viseme. The visemes of
+    closed lips, ``viseme_sil`` and ``viseme_PP``, add up to 1 where the lips of the mouth touch, and to at most
+    ``MAX_CLOSED_WEIGHT`` where they do not.
     """
     phones = viseme_curves(units, np.arange(len(mouth.gap)) / mouth.rate_hz)
     wanted = phones["sil"] + phones["PP"]
@@ -72,7 +83,29 @@ def weigh_visemes(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
     curves |= {"sil": closed * silent, "PP": closed * (1 - silent)}
     curves[LAX] += np.where(wanted < 1 - MIN_WEIGHT, 0.0, 1 - closed)
     values = np.stack([np.clip(curves[name], 0, 1) for name in VISEMES_15], axis=1)
+    if not held:
+        values = blend_visemes(values, mouth.gap, mouth.protrusion)
     return Motion(values, mouth.rate_hz, tuple(Channel(name, WEIGHT) for name in VISEME_CHANNELS))
+
+
+def blend_visemes(held: Array, gap: Array, protrusion: Array) -> Array:
+    """Return weights of visemes that follow the lips, where held ones are 1 however far these part [shape=(T, 15)].
+
+    held : weights that add up to 1 [shape=(T, 15)];  gap, protrusion : of the mouth [each shape=(T,)]
+    Of open visemes, part becomes ``ou`` where the lips are rounder, and ``aa`` where they are further apart; what is
+    left is as strong as their gap.
+    """
+    gaps, roundness = np.array([VISEME_POSES.get(name, (0.0, 0.0)) for name in VISEMES_15]).T
+    ou, aa, named = VISEMES_15.index("ou"), VISEMES_15.index("aa"), gaps > 0
+    total = held[:, named].sum(axis=1)
+    mix = held * named / np.maximum(total, MIN_WEIGHT)[:, None]
+    rounder = np.clip((protrusion - mix @ roundness) / np.maximum(1 - mix @ roundness, MIN_WEIGHT), 0, 1)
+    mix = (1 - rounder)[:, None] * mix + np.outer(rounder, np.eye(len(gaps))[ou])
+    wider = np.clip((gap - mix @ gaps) / np.maximum(gaps[aa] - mix @ gaps, 0.04), 0, LARGEST_ADDED)
+    wider = wider * (1 - protrusion)
+    mix = (1 - wider)[:, None] * mix + np.outer(wider, np.eye(len(gaps))[aa])
+    size = np.clip(gap / np.maximum(mix @ gaps, MIN_WEIGHT), 0, 1)
+    return np.where(named, (total * size)[:, None] * mix, held)
 
 
 def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -84,7 +117,6 @@ def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[st
     return {name: np.clip(weights.get(name, np.zeros(len(time_s))), 0.0, 1.0) for name in VISEMES_15}
 
 
-Array = NDArray[np.float64]
 Limits = tuple[Array | float, Array | float]
 
 LARGEST_EIGENVALUE = 16.0
