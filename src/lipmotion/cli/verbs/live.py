@@ -52,6 +52,7 @@ def run(options: argparse.Namespace) -> None:
 
     with ExitStack() as stack:
         rate_hz, sound = _open_sound(options)
+        options.stopper.check()  # a signal that a package swallowed: a page would be waited for without an end
         seed = None if options.still else 0
         stream = Stream(rate_hz, options.look_ahead, load_model(options.model), pauses=options.pauses, seed=seed)
         about = LiveSound(rate_hz, options.look_ahead, is_microphone=_is_microphone(options.input))
