@@ -54,6 +54,8 @@ MIN_INSERTED = 2
 """Fewer phones between words than this belong to them: recognition errs by one."""
 ALIKE_SHARE = 0.34
 """Words are said all the same where recognition finds their phones, but for so small a share."""
+MOST_REPLACED = 2
+"""So few words are said in place of others; more are of another sentence, which may have words of this one."""
 
 
 class Transcription(NamedTuple):
@@ -149,7 +151,7 @@ def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Transc
     """Return evidence of a transcript that is wrong somewhere, compared with what is recognised.
 
     Words are said, and there, where recognition finds most of their phones; words that were doubted together, if it
-    finds all of them. Where it finds nothing, nothing is missing.
+    finds all of them, or before and after one or two of which it does not. Where it finds nothing, nothing is missing.
     Short words that are left out go unnoticed by themselves, for their neighbours are stretched over them: once a
     transcript is known to leave out something, recognised phones between those of its words are more of it.
     """
@@ -185,7 +187,10 @@ def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
     for other in evidence.others:
         left_out = range(other.first, other.stop)
         shares = [len(matched.get(number, ())) / len(words[number].phones) for number in left_out]
-        doubted.update(left_out if min(shares, default=1.0) < 1 - ALIKE_SHARE else ())
+        unlike = [number for number, share in zip(left_out, shares, strict=True) if share < 1]
+        if min(shares, default=1.0) < 1 - ALIKE_SHARE:
+            few = unlike[-1] - unlike[0] < MOST_REPLACED
+            doubted.update(range(unlike[0], unlike[-1] + 1) if few else left_out)
     taken, end = set[int](), 0
     for number, word in enumerate(words):
         stop = next((matched[later][0] for later in range(number + 1, len(words)) if later in matched), len(spans))
