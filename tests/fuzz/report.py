@@ -1,4 +1,4 @@
-"""The findings of a fuzzing run: reduced, stored, and with all figures as a table and as JSON."""
+"""The findings of a fuzzing run: reduced, stored, and with all figures as JSON."""
 
 import json
 import re
