@@ -1,7 +1,7 @@
 """F0 compared with peers: errors and speed where the frequency is known, or agreement on recordings.
 
-    PYTHONPATH=tests python benchmarks/f0.py [--repeats 5]
-    PYTHONPATH=tests python benchmarks/f0.py RECORDING ...
+    python benchmarks/f0.py [--repeats 5]
+    python benchmarks/f0.py RECORDING ...
 
 Peers take part if they can be imported: RAPT (pysptk), DIO and Harvest with StoneMask (pyworld). All search from 60 to
 400 Hz, every 10 ms. One JSON object per line. Gross: errors of more than 20 %; fine: mean error of all others; missed:
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Callable, Iterator
 from itertools import combinations
@@ -26,6 +27,8 @@ from scipy.signal import lfilter
 from lipmotion.speech.features.f0 import HIGHEST_HZ, LOWEST_HZ, log_f0
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from testing.formant_synthesiser import PHONE_TARGETS, synthesise
 
 Array = np.ndarray[Any, Any]

@@ -37,7 +37,6 @@ sys.path.append(sys.argv[2])
 from testing.toy import write_toy_recordings
 write_toy_recordings(Path(sys.argv[1]))
 """
-TESTS = Path(__file__).parents[1] / "tests"
 VERB = "import sys; from lipmotion.cli.main import main; sys.exit(main())"
 Hashes = dict[str, str]
 TEXTS = ("header.json", "document.npy")
@@ -69,7 +68,7 @@ def _all(work: Path, *, quick: bool) -> Iterator[tuple[str, str]]:
     yield from _kinds(work)
     run(work, "adapt", WELCOME, "-o", work / "adapted.lipmotion")
     yield "shipped: adapted", of_archive(work / "adapted.lipmotion")
-    python(TINY, work / "tiny", TESTS)
+    python(TINY, work / "tiny", HERE / "tests")
     yield from _of_corpus("tiny", work / "tiny", ENGINES, work)
     if GRID.is_dir() and not quick:
         yield from _of_corpus("grid", twenty_clips(work / "grid"), ON_GRID, work)
