@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Callable, Iterator
 from itertools import combinations
@@ -25,8 +26,10 @@ from scipy.signal import lfilter
 
 from lipmotion.speech.features.f0 import HIGHEST_HZ, LOWEST_HZ, log_f0
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.testing.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.types import Audio
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from testing.formant_synthesiser import PHONE_TARGETS, synthesise
 
 Array = np.ndarray[Any, Any]
 Tracker = Callable[[Array], Array]

@@ -33,10 +33,8 @@ ON_GRID = ("trajectory", "trajectory both", "joint", "ph-MSHMM", "ph-vi-FHMM", "
 TINY = """
 import sys
 from pathlib import Path
-try:
-    from lipmotion_faces.testing import write_toy_recordings
-except ImportError:
-    from lipmotion.testing.toy import write_toy_recordings
+sys.path.append(sys.argv[2])
+from testing.toy import write_toy_recordings
 write_toy_recordings(Path(sys.argv[1]))
 """
 VERB = "import sys; from lipmotion.cli.main import main; sys.exit(main())"
@@ -70,7 +68,7 @@ def _all(work: Path, *, quick: bool) -> Iterator[tuple[str, str]]:
     yield from _kinds(work)
     run(work, "adapt", WELCOME, "-o", work / "adapted.lipmotion")
     yield "shipped: adapted", of_archive(work / "adapted.lipmotion")
-    python(TINY, work / "tiny")
+    python(TINY, work / "tiny", HERE / "tests")
     yield from _of_corpus("tiny", work / "tiny", ENGINES, work)
     if GRID.is_dir() and not quick:
         yield from _of_corpus("grid", twenty_clips(work / "grid"), ON_GRID, work)
@@ -108,8 +106,8 @@ def _outputs(name: str, model: Path | None, work: Path) -> Iterator[tuple[str, s
                 yield f"{name}: {way}: cues {kind}", of_bytes(run(work, "cues", WELCOME, *arguments, "-f", kind))
     shipped = HERE / "src" / "lipmotion" / "models" / "grid-s1.lipmotion"
     arguments = ("--transcript", WELCOME_WORDS, "--at", "0.5", "--at", "1.0", "--json")
-    yield f"{name}: explanation", of_bytes(run(work, "explain", model or shipped, WELCOME, *arguments))
-    yield f"{name}: trees", of_bytes(run(work, "info", *(() if model is None else (model,)), "--trees"))
+    yield f"{name}: explanation", of_bytes(run(work, "explain", WELCOME, "--model", model or shipped, *arguments))
+    yield f"{name}: trees", of_bytes(run(work, "info", *(() if model is None else (model,)), "--structure"))
 
 
 def _kinds(work: Path) -> Iterator[tuple[str, str]]:

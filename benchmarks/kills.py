@@ -1,11 +1,11 @@
 """Kill verbs at random moments, run them again, and compare every byte with an undisturbed run.
 
-    python benchmarks/kills.py [--kills 500] [--seed 0] [--job NAME ...] [--at-once 2] [-o docs/results/kills.txt]
+    PYTHONPATH=tests python benchmarks/kills.py [--kills 500] [--seed 0] [--job NAME ...] [--at-once 2] [-o FILE]
 
 Ctrl-C (SIGINT), ``kill`` (SIGTERM) and ``kill -9`` (SIGKILL) are sent to the first process alone or to all of them, at
 moments spread over the whole duration of an undisturbed run, some of them close to its end. Up to ``CHAIN`` kills hit
 the same folder before a run may finish there. A run that ends before its signal is compared, but counts as no kill.
-The recordings are the package's own toy recordings. POSIX only.
+The recordings are the toy recordings of the tests. POSIX only.
 """
 
 from __future__ import annotations
@@ -70,8 +70,7 @@ class Job:
 def make_inputs(folder: Path, command: Sequence[str], names: Sequence[str]) -> Path:
     """Write what jobs of these names use: recordings, sounds with motion, corpora and a model; return the folder."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion.testing.toy import toy_utterances
-    from lipmotion_faces.testing import write_toy_recordings
+    from testing.toy import toy_utterances, write_toy_recordings
 
     write_toy_recordings(folder / "recordings", sentences=CLIPS)
     counts = {"corpus": TRAINING_CLIPS} | ({"large": BATCH_LINES} if "train-share" in names else {})

@@ -48,7 +48,6 @@ from lipmotion.pipeline.model import load_model  # noqa: E402
 from lipmotion.pipeline.request import Request  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
 from lipmotion.storage.json_text import as_json  # noqa: E402
-from lipmotion.testing.toy import toy_sentences  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
 from lipmotion_faces.mesh import MeshFace  # noqa: E402
 from lipmotion_faces.outputs.shown_faces import ShownFace, shown_face  # noqa: E402
@@ -59,6 +58,7 @@ from meshes.heads import head, write_glb  # noqa: E402
 from studio.attack import attacked  # noqa: E402
 from studio.served import Served, lost_edits, random_edit, served, undone_edits  # noqa: E402
 from studio.two_clients import walk  # noqa: E402
+from testing.toy import toy_sentences  # noqa: E402
 
 RECOGNISED_S = 100.0
 """In longer recordings phones are repeated, not recognised."""

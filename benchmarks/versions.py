@@ -1,4 +1,4 @@
-"""``python benchmarks/versions.py OLD NEW [--repeats 7]``: start-up and ``animate`` of two checkouts of this project.
+"""``PYTHONPATH=tests python benchmarks/versions.py OLD NEW [--repeats 7]``: start-up and ``animate`` of two checkouts.
 
 Each job runs in a process of its own with the tree's ``src`` first on the path, old and new in turn, so that a noisy
 machine slows both. Printed are medians of wall-clock seconds, and the ratio of new to old.
@@ -59,7 +59,7 @@ def _long_recording(folder: Path) -> Path:
 
     import numpy as np
 
-    from lipmotion.testing import toy_sentences
+    from testing.toy import toy_sentences
 
     samples = np.concatenate([sentence.audio.samples for sentence in toy_sentences(30)])[: LONG_S * 16_000]
     path = folder / "long.wav"

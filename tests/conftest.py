@@ -11,9 +11,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import signal
 import wave
 from collections import Counter
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,8 +26,8 @@ from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
 from lipmotion.speech.recognition.network.posteriors import Hama
-from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion_faces.filmed.face import FilmedFace, save_face
+from testing.toy import ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
 
 SENTENCES = 12
@@ -155,34 +156,48 @@ def toy_sentence() -> ToySentence:
     return toy_sentences(3)[0]
 
 
+def quickly(corpus: Corpus, engine: str = "trajectory", visual: str = "geometry", **options: Any) -> Model:
+    """Return a model, trained in a second; its mouth does not move as English ones do."""
+    small = HmmConfig(mixtures=1, iterations=2)
+    return train(corpus, recogniser=small, engine=engine_named(engine, options), visual=visual)[0]
+
+
 @pytest.fixture(scope="session")
 def toy_model(toy_corpus: Corpus) -> Model:
-    """Trained in a second on the toy corpus, whose mouth does not move as English ones do."""
-    engine = engine_named("trajectory", {"articulation": False})
-    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)[0]
-
-
-@pytest.fixture(scope="session")
-def toy_model_file(toy_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The toy model as it is saved."""
-    path = tmp_path_factory.mktemp("model") / "toy.lipmotion"
-    save_model(toy_model, path)
-    return path
+    return quickly(toy_corpus, articulation=False)
 
 
 @pytest.fixture(scope="session")
 def coupled_model(toy_corpus: Corpus) -> Model:
-    """A small coupled model of the toy corpus."""
-    engine = engine_named("coupled", {"chains": "sVis 2vis", "mixtures": 2, "articulation": False})
-    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)[0]
+    return quickly(toy_corpus, "coupled", chains="sVis 2vis", mixtures=2, articulation=False)
 
 
 @pytest.fixture(scope="session")
-def coupled_model_file(coupled_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The coupled model as it is saved."""
-    path = tmp_path_factory.mktemp("coupled") / "coupled.lipmotion"
-    save_model(coupled_model, path)
-    return path
+def joint_model(toy_corpus: Corpus) -> Model:
+    return quickly(toy_corpus, "joint")
+
+
+@pytest.fixture(scope="session")
+def pictured_model(toy_corpus: Corpus) -> Model:
+    """A model of lip distances and eigenlips."""
+    return quickly(toy_corpus, visual="both")
+
+
+def as_file(name: str, suffix: str, save: Callable[[Any, Path], object]) -> Any:
+    """Return a fixture: what another one has, as it is saved."""
+
+    def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+        path = tmp_path_factory.mktemp(name) / f"toy{suffix}"
+        save(request.getfixturevalue(name), path)
+        return path
+
+    return pytest.fixture(scope="session", name=f"{name}_file")(file)
+
+
+toy_model_file = as_file("toy_model", ".lipmotion", save_model)
+coupled_model_file = as_file("coupled_model", ".lipmotion", save_model)
+pictured_model_file = as_file("pictured_model", ".lipmotion", save_model)
+filmed_face_file = as_file("filmed_face", ".face", save_face)
 
 
 @pytest.fixture(scope="session")
@@ -207,34 +222,6 @@ def recordings() -> Path:
 
 
 @pytest.fixture(scope="session")
-def joint_model(toy_corpus: Corpus) -> Model:
-    """A joint model of the toy corpus."""
-    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine_named("joint", {}))[0]
-
-
-@pytest.fixture(scope="session")
-def pictured_model(toy_corpus: Corpus) -> Model:
-    """A model of lip distances and eigenlips."""
-    return train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), visual="both")[0]
-
-
-@pytest.fixture(scope="session")
-def pictured_model_file(pictured_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The model of lip distances and eigenlips as it is saved."""
-    path = tmp_path_factory.mktemp("pictured") / "pictured.lipmotion"
-    save_model(pictured_model, path)
-    return path
-
-
-@pytest.fixture(scope="session")
 def filmed_face() -> FilmedFace:
     """The face of the drawn person, learned in two seconds; the toy model is of the same person."""
     return toy_face()
-
-
-@pytest.fixture(scope="session")
-def filmed_face_file(filmed_face: FilmedFace, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The face of the drawn person as it is saved."""
-    path = tmp_path_factory.mktemp("face") / "toy.face"
-    save_face(filmed_face, path)
-    return path

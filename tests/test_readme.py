@@ -83,7 +83,7 @@ def test_python_example(page: str, checkout: Path) -> None:
 @pytest.mark.video
 def test_training_on_own_recordings(checkout: Path) -> None:
     pytest.importorskip("mediapipe")
-    from lipmotion_faces.testing import write_toy_recordings
+    from testing.toy import write_toy_recordings
 
     (checkout / "my-recordings").mkdir()
     write_toy_recordings(checkout / "my-recordings")

@@ -1,27 +1,19 @@
-"""Tools for tests of faces: the check of their contract, and the toy corpus as videos."""
+"""The check of the contract of faces."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.testing.check_engine import require, require_error
 from lipmotion.testing.examples import example
-from lipmotion.testing.toy import CAMERA_HZ, MOTION_HZ, toy_motion, toy_sentences
 from lipmotion.types import Timeline, Unit
-from lipmotion.units import is_silent
 from lipmotion_faces.base import TRANSPARENT, Face, Stageable, Staging
-from lipmotion_faces.portrait import Woman
-from lipmotion_faces.video.mp4 import write_mp4
-
-FACE_HEIGHT = 256
 
 
 def check_face(face: Face) -> None:
@@ -60,29 +52,3 @@ def check_face(face: Face) -> None:
         require(clear.shape == (*small.shape[:2], 4), f"transparent frames of shape {clear.shape}, required RGBA")
         require(bool(np.any(clear[..., 3] == 0)), "no pixel is transparent")
         require(isinstance(face.with_staging(Staging()), Face), "a staged face is no face")
-
-
-def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0, fps: float = CAMERA_HZ) -> list[Path]:
-    """Write the toy corpus as recordings: ``toy00.mp4``, ``toy00.txt``, ..., and the three lists; return the videos.
-
-    directory : made if it does not exist; files of the same names are replaced
-    Each video takes about half a second.
-    Raises InputError: fewer than three sentences, or fps not positive; ExportError: a file cannot be written.
-    """
-    spoken = toy_sentences(sentences, seed)
-    make_folder(directory)
-    videos = [directory / f"{sentence.name}.mp4" for sentence in spoken]
-    face = Woman(Staging(size=FACE_HEIGHT, blinks=False, gaze=False, brows=False, head=False))
-    for sentence, video in zip(spoken, videos, strict=True):
-        motion = toy_motion(sentence.units, MOTION_HZ)
-        silence = Timeline(tuple(span for span in sentence.units if is_silent(span.label.phone)))  # no shapes of phones
-        write_mp4(video, face.render(motion, silence, fps=fps), fps=fps, audio=sentence.audio)
-        _write_lines(video.with_suffix(".txt"), [" ".join(sentence.words)])
-    for split in ("train", "val", "test"):
-        _write_lines(directory / f"{split}.txt", [sentence.name for sentence in spoken if sentence.split == split])
-    return videos
-
-
-def _write_lines(path: Path, lines: list[str]) -> None:
-    with atomic_file(path) as temporary:
-        temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")

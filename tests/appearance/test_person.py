@@ -6,13 +6,13 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
 from lipmotion_faces.appearance import person
 from lipmotion_faces.appearance.candidates import CANDIDATES, STEADY
 from lipmotion_faces.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relight, replaced_part
 from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
 from lipmotion_faces.filmed.face import FilmedFace
+from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
 
 MOUTH = (slice(None), *mouth_part(1))

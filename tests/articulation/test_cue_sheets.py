@@ -19,10 +19,10 @@ from lipmotion.articulation.cue_sheets import (
     lay_out_cues,
     shapes_of_phone,
 )
-from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
 from lipmotion.units.phones import OPTIONAL, SHAPES, choose_drawn_shape
+from testing.toy import ToySentence, toy_sentences
 
 FRAME_RATES = [12.0, 24.0, 25.0, 30.0, 60.0]
 

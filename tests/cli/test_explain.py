@@ -22,11 +22,11 @@ def test_for_machines(run, coupled_model_file, toy_speech):
 
 def test_what_cannot_be_explained(run, coupled_model_file, toy_speech):
     for options, code, words in (
-        ([coupled_model_file, toy_speech, "--at=-1"], 3, "-1.0 s lies outside the recording (0 to "),
-        ([coupled_model_file, toy_speech, "--at", "nan"], 3, "nan s lies outside the recording"),
-        (["missing", toy_speech, "--at", "1"], 3, "missing: no such model"),
-        ([coupled_model_file, "missing.wav", "--at", "1"], 3, "missing.wav: no such file"),
-        ([toy_speech, coupled_model_file, "--at", "1"], 6, "not a lipmotion model"),
+        ([toy_speech, "--model", coupled_model_file, "--at=-1"], 3, "-1.0 s lies outside the recording (0 to "),
+        ([toy_speech, "--model", coupled_model_file, "--at", "nan"], 3, "nan s lies outside the recording"),
+        ([toy_speech, "--model", "missing", "--at", "1"], 3, "missing: no such model"),
+        (["missing.wav", "--model", coupled_model_file, "--at", "1"], 3, "missing.wav: no such file"),
+        ([coupled_model_file, "--model", toy_speech, "--at", "1"], 6, "not a lipmotion model"),
     ):
         check_refused(run("explain", *options), code, words)
 

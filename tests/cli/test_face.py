@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from cli.conftest import check_refused
-from lipmotion.testing.toy import toy_sentences
 from lipmotion_faces.film import build
 from lipmotion_faces.filmed.face import load_face, save_face
 from pipeline.film.toy_footage import ToyVideo, install, write_video
 from speech import stand_in_voice
+from testing.toy import toy_sentences
 
 SENTENCES = 3
 

@@ -103,7 +103,7 @@ animate a.wav --model m.lipmotion -o a.json --lexicon lexicon.txt
 animate a.wav --model m.lipmotion -o a.json --units none-EVIL.json
 animate a.wav --model m.lipmotion -o a.json --rate EVIL
 animate a.wav --model m.lipmotion -o a.json --posteriors EVIL
-explain m.lipmotion EVIL.mp4 --at 0
+explain EVIL.mp4 --model m.lipmotion --at 0
 cues EVIL.wav --model m.lipmotion --recogniser own -f xml
 cues EVIL.wav --model m.lipmotion --recogniser own -f json
 cues a.wav --model m.lipmotion --shapes EVIL

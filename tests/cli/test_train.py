@@ -9,8 +9,8 @@ from lipmotion import Corpus, Model, adapt, load_model, read_motion, save_model
 from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
 from lipmotion.pipeline.training.train import TrainReport
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.units import load_unit_set
+from testing.toy import toy_sentences
 
 
 def test_a_model_and_what_it_was_made_of(run, toy_corpus, here):

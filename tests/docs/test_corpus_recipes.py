@@ -19,10 +19,10 @@ from lipmotion.cli.main import main
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.pipeline.training import train as train_module
-from lipmotion.testing import toy_utterances
 from lipmotion.types import Track, Utterance
 from lipmotion_faces.corpus import prepare as prepare_module
 from lipmotion_lab.evaluation import evaluate as evaluation_figures
+from testing.toy import toy_utterances
 
 FOLDER = Path(__file__).parents[2] / "recipes"
 INDEX = FOLDER / "README.md"

@@ -1,7 +1,8 @@
-"""The examples in docstrings run from the root of the repository, with the shipped model and examples/welcome.flac."""
+"""The examples in docstrings run where ``examples`` and a corpus, ``my-corpus``, are."""
 
 import doctest
 import inspect
+import shutil
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -35,8 +36,10 @@ EXAMPLES = documented()
 
 @pytest.mark.usefixtures("recognised_once")
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
-def test_the_examples_of_a_docstring_run(name, monkeypatch):
-    monkeypatch.chdir(ROOT)
+def test_the_examples_of_a_docstring_run(name, toy_corpus, tmp_path, monkeypatch):
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    shutil.copytree(toy_corpus.path, tmp_path / "my-corpus")
+    monkeypatch.chdir(tmp_path)
     reports: list[str] = []
     result = doctest.DocTestRunner(verbose=False).run(EXAMPLES[name], out=reports.append)
     assert result.failed == 0, "".join(reports)

@@ -73,8 +73,8 @@ def test_an_installed_engine_trains_saves_loads_and_animates(toy_corpus, toy_spe
     package.lipmotion("animate", toy_speech, "--model", model, "-o", tmp_path / "a.csv")
     lines = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0].startswith("time_s,opening,width,outer")
-    package.lipmotion("explain", model, toy_speech, "--at", "1.0")
-    missing = run_child([*LIPMOTION, "info", "--trees", model])
+    package.lipmotion("explain", toy_speech, "--model", model, "--at", "1.0")
+    missing = run_child([*LIPMOTION, "info", "--structure", model])
     assert missing.returncode == 6
     assert "no engine 'ridge'; there are: trajectory, coupled, joint, selection; install the package" in missing.stderr
 

@@ -10,7 +10,6 @@ from lipmotion.types import Channel, Example, Utterance
 
 
 def copied(corpus: Corpus, folder: Path, change: Callable[[Utterance], Utterance]) -> Corpus:
-    """Return a copy of the corpus with every utterance changed by ``change``."""
     result = Corpus.create(folder / "copy")
     for name in corpus.names():
         result.add(change(corpus.utterance(name)))

@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.formats import write_motion
-from lipmotion.testing.toy import toy_motion
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from testing.toy import toy_motion
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())
 
 
 def of_motion(motion: Motion, units: Timeline[Unit] = NOTHING_SAID, stepped: tuple[str, ...] = ()) -> Generation:
-    """Return a generation with this motion."""
     trace = StateTrace(("a",), np.zeros(len(motion.values), np.intp))
     return Generation(motion, np.ones_like(motion.values), units, trace, stepped=stepped)
 

@@ -16,9 +16,9 @@ from lipmotion.articulation.cue_sheets import choose_cues
 from lipmotion.errors import ExportError
 from lipmotion.formats.cues import CUE_FORMATS, format_of, write_cue_file
 from lipmotion.formats.papagayo import UNKNOWN
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units.phones import SHAPES
+from testing.toy import ToySentence
 
 NAMES = ["hi.wav", "C:\\av\\hi.wav", 'Größe & <"tea\'s"> 茶 😀.wav', "line\nbreak\ttab.wav", "bell\x07\x00.wav", ""]
 OPENTOONZ = {"ai", "e", "o", "u", "fv", "l", "mbp", "wq", "other", "etc", "rest"}

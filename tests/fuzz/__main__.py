@@ -24,7 +24,7 @@ from fuzz.good import good_in, make_good
 from fuzz.inputs import Good, picked_up
 from fuzz.judge import READ, REFUSED
 from fuzz.readers import READERS
-from fuzz.report import keep, table, write_json
+from fuzz.report import keep, row, write_json
 from fuzz.worker import Worker
 
 
@@ -72,7 +72,7 @@ def fuzz(options: argparse.Namespace, good: Good) -> int:
         except KeyboardInterrupt:
             stopped.set()
         records = [run.result() for run in runs]
-    print(table(records))
+    print(*map(row, records), sep="\n")
     if options.json:
         write_json(options.json, records, options.seed, options.minutes)
     return int(any(record.findings for record in records))

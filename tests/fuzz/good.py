@@ -6,7 +6,7 @@ from fuzz.inputs import Good
 from lipmotion import Corpus, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.testing.toy import toy_utterances
+from testing.toy import toy_utterances
 
 SENTENCES = 6
 ENGINES: dict[str, dict[str, object]] = {

@@ -54,6 +54,5 @@ def lay_out(files: Files, folder: Path) -> None:
 
 
 def picked_up(folder: Path) -> Files:
-    """Return all files of a folder."""
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}

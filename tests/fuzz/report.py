@@ -1,4 +1,4 @@
-"""The findings of a fuzzing run: reduced, stored, and with all figures as a table and as JSON."""
+"""The findings of a fuzzing run: reduced, stored, and with all figures as JSON."""
 
 import json
 import re
@@ -67,19 +67,6 @@ def row(record: CampaignRecord) -> dict[str, Any]:
         **{"errors": sum(record.kinds[kind] for kind in OTHERS), "defects": len(record.findings)},
         **{"kept": record.kept, "lines": len(record.lines), "per_s": rate, "slowest_s": round(record.slowest_s, 1)},
     }
-
-
-def table(records: Sequence[CampaignRecord]) -> str:
-    rows = [row(record) for record in records]
-    whole = {key: sum(one[key] for one in rows) for key in rows[0] if key != "reader"} if rows else {}
-    whole |= {
-        "slowest_s": max((one["slowest_s"] for one in rows), default=0.0),
-        "per_s": round(whole.get("per_s", 0.0), 1),
-    }
-    rows.append({"reader": "all", **whole})
-    texts = [list(rows[0]), *([str(value) for value in one.values()] for one in rows)]
-    widths = [max(len(line[i]) for line in texts) for i in range(len(texts[0]))]
-    return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in texts)
 
 
 def write_json(path: Path, records: Sequence[CampaignRecord], seed: int, minutes: float) -> None:

@@ -1,20 +1,17 @@
-import io
 import json
 import zipfile
 from random import Random
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fuzz.inputs import digest
-from fuzz.mutators import arrays, boxes, documents, json_text, mutated, raw, riff, text, zips
+from fuzz.mutators import documents, mutated, raw, zips
 from meshes.gltf import document, glb
 from robustness.case import npy
 from robustness.motion_cases import GOOD
 
-COUNT, ROUNDS = 200, 40
+ROUNDS = 40
 DOCUMENT = json.dumps(GOOD).encode()
 ARRAY = npy(np.arange(12.0).reshape(4, 3))
 ZIP = zips.zipped([("header.json", DOCUMENT), ("a.npy", ARRAY)], zipfile.ZIP_DEFLATED)
@@ -43,20 +40,6 @@ def test_changes_are_many_and_the_same_again(name):
     assert found == made(1) != made(2)
 
 
-def test_documents_stay_documents():
-    found = [json_text.change(Random(seed), DOCUMENT) for seed in range(COUNT)]
-    assert sum(map(_is_json, found)) > 0.8 * COUNT
-    assert any(content.count(b'"version"') > 1 and _is_json(content) for content in found)
-
-
-def _is_json(content: bytes) -> bool:
-    try:
-        json.loads(content)
-    except (ValueError, RecursionError):
-        return False
-    return True
-
-
 def test_every_hostile_value_comes_to_every_place():
     small = b'{"a": [1, {"b": 2}]}'
     places = ('{"a": %s}', '{"a": [%s, {"b": 2}]}', '{"a": [1, %s]}', '{"a": [1, {"b": %s}]}')
@@ -79,38 +62,3 @@ def test_documents_inside_of_other_files_are_changed_in_their_place():
     sizes = [documents.change(Random(seed), whole) for seed in range(40)]
     right = [int.from_bytes(made[8:12], "little") == len(made) for made in sizes if len(made) >= 12]
     assert sum(right) > 30
-
-
-def test_archives_stay_archives():
-    for seed in range(COUNT):
-        with zipfile.ZipFile(io.BytesIO(zips.change(Random(seed), ZIP))) as file:
-            assert file.testzip() is None
-
-
-def test_arrays_of_other_types_and_values():
-    found = [array for seed in range(3 * COUNT) if (array := _array(arrays.change(Random(seed), ARRAY))) is not None]
-    assert {array.dtype.kind for array in found} >= set("fciM")
-    assert {bool(np.isfinite(array).all()) for array in found if array.dtype.kind == "f"} == {True, False}
-
-
-def _array(content: bytes) -> NDArray[Any] | None:
-    """Return an array, None where its header was changed."""
-    try:
-        return np.load(io.BytesIO(content), allow_pickle=False)
-    except Exception:
-        return None
-
-
-def test_chunks_and_boxes_are_found():
-    assert boxes.change(Random(0), b"no boxes") != b"no boxes"
-    rates = {riff.change(Random(seed), SOUND)[24:28] for seed in range(COUNT)}
-    assert len(rates) > 10
-    sizes = {boxes.change(Random(seed), MOVIE)[16:24] for seed in range(COUNT)}
-    assert {b"\0\0\0\x1cmoov", b"\0\0\0\x08moov"} <= sizes  # the size around a box that was left out is right
-
-
-def test_texts_with_control_characters_numbers_and_floods():
-    found = [text.change(Random(seed), b"0.5 1.5 p\n") for seed in range(2 * COUNT)]
-    assert any(b"\x1b" in content for content in found)
-    assert any(b"1e308" in content for content in found)
-    assert max(map(len, found)) > 100_000

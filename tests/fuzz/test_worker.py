@@ -13,7 +13,7 @@ from fuzz.campaign import CampaignRecord, campaign
 from fuzz.inputs import Files, Good, Reader, picked_up
 from fuzz.judge import CRASH, ERROR, HANG, IMPLAUSIBLE, LEFT, MEMORY, READ, REFUSED, Result, read_result
 from fuzz.planted import MEGABYTES, readers, seeds
-from fuzz.report import keep, smallest, table, write_json
+from fuzz.report import keep, smallest, write_json
 from fuzz.worker import Worker
 from lipmotion.errors import InputError
 
@@ -129,14 +129,6 @@ def records() -> list[CampaignRecord]:
         first.add(Result(kind, "somewhere", "a trace"), {"a": b""})
     second.add(Result(READ), {"a": b""})
     return [first, second]
-
-
-def test_a_table_with_a_sum():
-    head, *rows = (line.split() for line in table(records()).splitlines())
-    by_name = {row[0]: dict(zip(head, row, strict=True)) for row in rows}
-    assert list(by_name) == ["audio", "labels", "all"]
-    assert [by_name["all"][key] for key in ("tried", "distinct", "read", "crashes", "hangs")] == "7 5 2 1 1".split()
-    assert (by_name["audio"]["per_s"], by_name["audio"]["errors"], by_name["audio"]["defects"]) == ("2.0", "1", "3")
 
 
 def test_the_same_as_json(tmp_path):

@@ -59,7 +59,6 @@ class Worker:
         self._folder.cleanup()
 
     def read_input(self, reader: str, files: Files) -> Result:
-        """Return the result of reading an input."""
         if self._process is None:
             self._start()
         try:

@@ -22,8 +22,8 @@ from lipmotion.motion.speaker_maps import (
     weigh_visemes,
 )
 from lipmotion.motion.transfer_map import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map, select_channels
-from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
+from testing.toy import toy_motion, toy_sentences
 
 GAIN, OFFSET, PARTED = np.array([0.5, 1.4, 0.8]), np.array([0.03, -0.2, 0.1]), np.array([0.05, 0.0, 0.05])
 """How ben's opening, width and outer differ from anna's, and by how much the lips part at rest."""

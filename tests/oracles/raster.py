@@ -145,7 +145,6 @@ def _mark(
     solid: Colours,
     blended: bool,
 ) -> None:
-    """Mark the samples of which a triangle is the nearest one."""
     a, c, b = surface.triangles[number].tolist()  # clockwise on the screen, whose rows go down
     (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = points[[a, b, c]].tolist()
     x0, x1 = max(samples[0], int(np.floor(min(xa, xb, xc)))), min(samples[2], int(np.ceil(max(xa, xb, xc))))

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.io import wavfile
 
 from lipmotion import Corpus
-from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Timeline, Unit, Utterance
+from testing.toy import toy_sentences, toy_utterances
 
 
 def corpus_of(folder: Path, utterances: Iterable[Utterance]) -> Corpus:

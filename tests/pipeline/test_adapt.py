@@ -7,8 +7,8 @@ from lipmotion import Model, adapt, animate, load_model, save_model
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import read_header
 from lipmotion.pipeline.request import Request
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
+from testing.toy import toy_sentences
 
 
 @pytest.fixture(scope="module")

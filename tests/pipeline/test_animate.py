@@ -11,9 +11,9 @@ from lipmotion import Model, animate, write
 from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
 from lipmotion.units import Lexicon
+from testing.toy import ToySentence, toy_motion
 
 Animate = Callable[..., Generation]
 

@@ -8,8 +8,8 @@ from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.pipeline.outputs.cues import cue_text
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio, Timeline
+from testing.toy import toy_sentences
 
 
 def test_several_files_at_once(result, tmp_path):

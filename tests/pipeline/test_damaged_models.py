@@ -13,8 +13,8 @@ from lipmotion.motion.eigenlips import eigenlips_to_arrays
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
-from lipmotion.testing.toy import ToySentence
 from pipeline.damage import DAMAGES, LARGEST_DIFFERENCE, QUICK, UNREADABLE, animated, damaged, distance, refused
+from testing.toy import ToySentence
 
 ENGINES = ("toy_model", "joint_model", "coupled_model", "pictured_model")
 

@@ -14,10 +14,10 @@ from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.explain import chain_posteriors
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.session import Session
-from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
 from pipeline import made
 from pipeline.made import GAIN, OFFSET, corpus_of
+from testing.toy import ToySentence, toy_utterances
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
 

@@ -17,8 +17,8 @@ from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Span, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
+from testing.toy import ToySentence
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,6 @@ def test_the_name_of_a_file_is_no_transcript(toy_model, toy_sentence, tmp_path):
 
 
 def group_words(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
-    """Return each word of a sentence as a line in time."""
     lines = []
     for word, spans in groupby(sentence.units, key=lambda span: span.label.word):
         inside = list(spans)

@@ -18,10 +18,10 @@ from lipmotion.speech.recognition.network.posteriors import installed_phone_reco
 from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon, is_silent, lexicon, split_words
 from lipmotion.units.phones import count_phone_edits
+from testing.toy import ToySentence
 
 
 @pytest.fixture

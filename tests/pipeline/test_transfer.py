@@ -12,10 +12,10 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.request import Onto, Request
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
 from lipmotion.types import Audio, Channel, Constraints, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
 from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
+from testing.toy import ToySentence, toy_motion, toy_utterances
 
 
 @pytest.fixture(scope="module")

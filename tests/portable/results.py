@@ -15,8 +15,8 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import mfcc
-from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Audio, Generation
+from testing.toy import toy_sentences, toy_utterances
 
 RATE_HZ = 16_000
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"

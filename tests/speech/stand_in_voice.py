@@ -9,10 +9,10 @@ import pytest
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, SynthesisedSentence, Synthesiser, SyntheticVoice
-from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Span, Timeline
 from lipmotion.units import Lexicon, split_words
 from speech.sounds import write_wave
+from testing.formant_synthesiser import synthesise
 
 RATE_HZ, EACH_S = 22_050, 0.09
 VOICES = (SyntheticVoice("one", "stand-in", "nobody"), SyntheticVoice("two", "stand-in", "nobody"))

@@ -16,9 +16,9 @@ from lipmotion.speech.recognition.adaptation import (
 from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.stats.constrained_mllr import log_determinant
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 from lipmotion.units.phones import count_phone_edits
+from testing.toy import toy_sentences
 
 
 @pytest.fixture(scope="module")

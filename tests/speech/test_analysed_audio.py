@@ -18,9 +18,9 @@ from lipmotion.speech.recognition.agreement import agreement_score
 from lipmotion.speech.recognition.general import general_features
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.voice_activity import find_passages
-from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon
+from testing.toy import ToySentence, toy_sentences
 
 
 @pytest.fixture(scope="module")

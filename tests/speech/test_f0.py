@@ -6,9 +6,9 @@ from scipy.signal import butter, lfilter
 from lipmotion.speech.features import f0 as module
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import candidates, correlations, lags, log_f0, prosody_of
-from lipmotion.testing.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.types import Audio
 from speech import f0_oracle
+from testing.formant_synthesiser import PHONE_TARGETS, synthesise
 
 RATE_HZ = 16_000
 VOWELS = {"a": (730, 1090, 2440), "i": (290, 2200, 2950), "u": (320, 900, 2250)}

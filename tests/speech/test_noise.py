@@ -20,10 +20,10 @@ from lipmotion.speech.sound.acoustic_conditions import (
     white_noise,
 )
 from lipmotion.speech.sound.resampling import REACH_S, decimated, overlapped
-from lipmotion.testing.formant_synthesiser import synthesise
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import SPECTRUM_BANDS, Audio
 from oracles.noise import ratio_db
+from testing.formant_synthesiser import synthesise
+from testing.toy import toy_sentences
 
 RATE_HZ = 16_000
 WORDS = [[("m", 0.1), ("aa", 0.2)], [("s", 0.15), ("iy", 0.2)], [("b", 0.08), ("ow", 0.25)], [("f", 0.1), ("ay", 0.3)]]

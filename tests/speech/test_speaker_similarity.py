@@ -13,8 +13,8 @@ from lipmotion.speech.features.speaker_similarity import (
     voice_knowledge,
 )
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
+from testing.toy import toy_sentences
 
 
 def test_a_warped_voice_is_warped_back(toy_model: Model) -> None:

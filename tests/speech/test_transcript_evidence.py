@@ -31,9 +31,9 @@ from lipmotion.speech.recognition.transcript_evidence import (
 )
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentences
-from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon, split_words
+from testing.toy import ToySentence, toy_sentences
 
 FRAME_S = 0.02
 SAID = {"papa": "p aa p aa", "sees": "s iy z", "a": "ax", "fish": "f ih sh"}

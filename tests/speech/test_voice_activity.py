@@ -25,9 +25,9 @@ from lipmotion.speech.sound.voice_activity import (
     passage_gain,
     stretches_of_sound,
 )
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 from lipmotion.units import is_silent
+from testing.toy import toy_sentences
 
 QUIET_ENERGY, CLOSURE_ENERGY, LOUD_ENERGY = -8.0, -5.0, 2.0
 RATE_HZ = 16_000

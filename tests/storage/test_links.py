@@ -25,13 +25,13 @@ from lipmotion.storage.files import (
     temporary_folder,
     unfinished_work,
 )
-from lipmotion.testing import toy_utterances
 from lipmotion_faces.corpus.sync import sync
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST
 from lipmotion_studio.study.store import ANSWERS, StudyStore
 from lipmotion_studio.training import VOICE, TrainingOrder, TrainingRecording, VoiceOptions, run_training
 from lipmotion_studio.votes import Side, Vote
+from testing.toy import toy_utterances
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
 Verb = Callable[[Path], object]

@@ -13,7 +13,7 @@ import pytest
 from children import wait_until
 from lipmotion import Corpus, Model, load_model
 from lipmotion.errors import InputError
-from lipmotion.testing.toy import ToySentence
+from testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 

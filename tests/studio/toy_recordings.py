@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.formats.sound import write_sound
-from lipmotion.testing.toy import toy_motion, toy_sentences
+from testing.toy import toy_motion, toy_sentences
 
 SENTENCES = 4
 

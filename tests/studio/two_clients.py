@@ -20,7 +20,6 @@ from lipmotion import Model
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.storage.files import sha256_of
-from lipmotion.testing.toy import ToySentence
 from lipmotion_studio.application import studio_application
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.project import digest_of
@@ -28,6 +27,7 @@ from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from studio.open_studio import HOST, TOKEN, OpenStudio, toy
 from study.asgi import Reply
+from testing.toy import ToySentence
 
 EDITS = ("phone 2 is p", "pin opening 0.1 at 0.2", "set intensity 1.1", "remove phone 3", "phone 99 is p")
 """The last one is refused: there is no such phone."""

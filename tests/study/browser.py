@@ -41,7 +41,6 @@ class Browser:
         self.command("POST", "/url", {"url": address})
 
     def run(self, script: str, *arguments: Any) -> Any:
-        """Return what a script returns."""
         return self.command("POST", "/execute/sync", {"script": script, "args": arguments})
 
     def run_until_done(self, script: str, *arguments: Any) -> Any:

@@ -78,7 +78,6 @@ class Connection:
         raise AssertionError(f"{path}: no answer within {PATIENCE_S} s")
 
     def close(self) -> None:
-        """Close the connection."""
         self._connection.close()
 
 

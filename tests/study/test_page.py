@@ -42,7 +42,6 @@ def shown_study(folder: Path, kind: str) -> Study:
 
 @contextmanager
 def at_work(opens: Opens, tmp_path: Path, kind: str) -> Iterator[tuple[Browser, Server, Study]]:
-    """Give a browser, and the server of a study."""
     study = shown_study(tmp_path / "study", kind)
     (tmp_path / "home").mkdir()
     with served(tmp_path / "study", tmp_path / "errors.txt") as server, opens(tmp_path / "home") as window:

@@ -120,7 +120,6 @@ def test_a_wrong_result_is_noticed(change, check):
 
 
 def broken(**methods: Any) -> TrainedEngine:
-    """Return the engine with other methods."""
     return TrainedEngine(type("Changed", (MeanPoses,), methods)(Settings()))
 
 

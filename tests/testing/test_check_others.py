@@ -24,8 +24,6 @@ class Bars(Face):
 
 
 def draw(frames: Callable[[list[Any]], list[Any]], *, checked: bool = True) -> Face:
-    """Return the face with other frames."""
-
     class Changed(Bars):
         def render(self, motion: Any, units: Any, *, fps: float = 25.0) -> Iterator[Any]:
             if not checked:

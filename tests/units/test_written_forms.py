@@ -3,10 +3,10 @@ import pytest
 from lipmotion import load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.units import Lexicon, find_words, group_words, split_words
 from lipmotion.units.text_normalisation import tokenise
 from lipmotion.units.written_forms import MAX_READINGS, list_readings
+from testing.formant_synthesiser import synthesise
 
 USUAL = (
     ("1 000 000 of 12 345 678",

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from packaging import requirements
 from packaging.markers import Marker
@@ -19,6 +19,9 @@ from packaging.specifiers import SpecifierSet
 
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
 from lipmotion.extensions import install_command, installed_version, load_provided
+
+if TYPE_CHECKING:
+    from lipmotion.types import Audio
 
 EXTRA = re.compile(r'\s*(?:\band\b)?\s*extra == "([\w-]+)"')
 
@@ -89,9 +92,11 @@ EXTRAS = {
     "livekit": "lip motion in LiveKit's voice agents",
 }
 """What each extra of the package brings."""
-PHONES = (("sil", 0.3), ("m", 0.09), ("aa", 0.16), ("m", 0.09), ("ax", 0.1), ("sil", 0.3))
 WORDS = "mama"
-"""A made-up second of speech: its phones with their durations in seconds, and its word."""
+LOUDNESS = ((0.3, 0.0), (0.09, 0.25), (0.16, 1.0), (0.09, 0.25), (0.1, 1.0), (0.3, 0.0))
+"""Durations in seconds, and levels, of a made-up second of speech: silence, m, a, m, a, silence."""
+CLOSED, OPEN = ((260, 70),), ((730, 70), (1090, 100), (2440, 160))
+"""Resonances of the mouth in m and in a: their frequencies and widths, Hz (Klatt 1980)."""
 MIN_OPENING = 0.03
 """Opening of the lips that *mama* has at least, in distances between the outer eye corners."""
 OPENCV = "opencv-python-headless"
@@ -250,18 +255,39 @@ def _current_folder() -> str:
     return str(folder)
 
 
+def _say_mama() -> Audio:
+    """Return a second of made-up speech: the pulses of a voice, through the mouth as it opens and closes."""
+    import numpy as np
+    from scipy.signal import lfilter
+
+    from lipmotion.types import Audio
+
+    rate_hz, parts = 16_000, []
+    level = np.repeat([level for _, level in LOUDNESS], [round(length_s * rate_hz) for length_s, _ in LOUDNESS])
+    level = np.convolve(level, np.hanning(320) / np.hanning(320).sum(), "same")
+    opened, pulses = np.clip((level - 0.25) / 0.75, 0, 1), np.arange(len(level)) * 120 / rate_hz % 1 < 0.02
+    for resonances, share in ((CLOSED, level - opened * 0.75), (OPEN, opened)):
+        sound = pulses - 0.02
+        for centre_hz, width_hz in resonances:
+            radius = np.exp(-np.pi * width_hz / rate_hz)
+            poles = [1, -2 * radius * np.cos(2 * np.pi * centre_hz / rate_hz), radius**2]
+            sound = lfilter([sum(poles)], poles, sound)
+        parts.append(share * sound / np.abs(sound).max())
+    noise = np.random.default_rng(0).normal(0, 3e-4, len(level))
+    return Audio((0.3 * sum(parts) + noise).astype(np.float32), rate_hz)
+
+
 def _main_path() -> str:
     """Animate the made-up speech, and write motion, cues and video; return what came out."""
     from lipmotion.formats.sound import write_sound
     from lipmotion.pipeline.job import Job
     from lipmotion.pipeline.request import Outputs, Request
     from lipmotion.storage.files import temporary_folder
-    from lipmotion.testing.formant_synthesiser import synthesise
     from lipmotion.types.delivery import Staging
 
     with temporary_folder() as folder:
         sound = folder / "mama.wav"
-        write_sound(sound, synthesise(PHONES)[0])
+        write_sound(sound, _say_mama())
         files = tuple(str(folder / name) for name in ("mama.json", "mama.cues.tsv", "mama.mp4"))
         job = Job(Request(sound, transcript=WORDS), Outputs(files), staging=Staging(size=128))
         motion = job.run().motion

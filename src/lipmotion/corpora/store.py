@@ -207,15 +207,9 @@ class Corpus:
     path : the folder
     Open one with ``Corpus.open``, make or extend one with ``Corpus.create``.
 
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from lipmotion.testing import toy_utterances
-    >>> folder = tempfile.TemporaryDirectory()
-    >>> corpus = Corpus.create(Path(folder.name) / "toy")
-    >>> corpus.add(toy_utterances(3)[0])
-    >>> Corpus.open(corpus.path).names("train"), corpus.utterance("toy00").features.values.shape[1]
-    (('toy00',), 39)
-    >>> folder.cleanup()
+    >>> corpus = Corpus.open("my-corpus")
+    >>> corpus.utterance(corpus.names("train")[0]).features.values.shape[1]
+    39
     """
 
     def __init__(self, path: Path, index: dict[str, dict[str, Any]]) -> None:

@@ -49,7 +49,6 @@ def test_a_word_whose_edge_is_suppressed_keeps_it() -> None:
 
 
 def joined(units: RecordedUnits, text: str, config: SelectionConfig = PRINTED) -> tuple[Target, np.ndarray]:
-    """Return the target of a text, and the motion that is selected for it."""
     costs = costs_of(units.without(config.suppressed_phones), config)
     target = costs.target(costs.shown(phone_windows([timeline(text)])), None, None)
     pieces = pieces_of(costs, target, select(costs, target).units)

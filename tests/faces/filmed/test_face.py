@@ -39,7 +39,6 @@ def small(filmed_face: FilmedFace) -> FilmedFace:
 
 @pytest.fixture(scope="module")
 def arrays(small: FilmedFace, tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
-    """The arrays of the small face."""
     path = tmp_path_factory.mktemp("small") / "small.face"
     save_face(small, path)
     return read_archive(path)
@@ -229,7 +228,6 @@ HEADERS: list[tuple[dict[str, object], str]] = [
 
 
 def files(face: Path) -> Iterator[tuple[str, bytes]]:
-    """Files that are no faces."""
     content = face.read_bytes()
     yield "text", b"a face\n" * 100
     yield "truncated", content[: len(content) // 2]

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
 from lipmotion_faces.appearance.candidates import STEADY
 from lipmotion_faces.appearance.lower_face import mouth_ellipse, mouth_part, moved_part, region_map, relight
@@ -14,6 +13,7 @@ from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.filmed import renderer
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import BATCH, Background, Stitcher, StitchingOptions
+from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 
 FRAMES = 24

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from lipmotion import Corpus
-from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon, find_similar_lips
 from lipmotion_faces.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
+from testing.toy import toy_utterances
 
 WORDS = Lexicon({"pab": (("p", "aa", "b"),), "tib": (("t", "iy", "b"),), "zog": (("zh", "oy", "g"),)})
 

@@ -18,13 +18,13 @@ from lipmotion.pipeline.generation import generate_for
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.speaker_similarity import voice_knowledge
 from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
 from lipmotion_lab.evaluation.evaluate import _was_trained_on, figures_of
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, load_held_out, make_speech
 from pipeline import made
+from testing.toy import toy_motion, toy_sentences
 
 evaluate = partial(evaluated, recogniser="own")
 """The toy's voice is that of its model."""

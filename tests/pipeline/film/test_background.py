@@ -5,7 +5,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Motion, Track
 from lipmotion_faces.film import background
 from lipmotion_faces.film.background import (
@@ -21,6 +20,7 @@ from lipmotion_faces.filmed.renderer import Background
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
+from testing.toy import toy_sentences
 from testing.toy_face import SCALE, toy_chin_px, toy_frames, toy_places
 
 

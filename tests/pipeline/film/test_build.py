@@ -6,7 +6,6 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.pauses import QUIETEST_DB
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
 from lipmotion_faces.film import build
 from lipmotion_faces.film.build import Take, build_face
@@ -14,6 +13,7 @@ from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
+from testing.toy import toy_sentences
 from testing.toy_face import toy_chin_px
 
 SENTENCES = 3

@@ -11,7 +11,6 @@ from lipmotion import animate, write
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.pipeline.outputs.output import OutputSettings
 from lipmotion.pipeline.request import Outputs, Request
-from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.film import filmed_video as module
@@ -22,6 +21,7 @@ from lipmotion_faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptio
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE
 from speech.sounds import tone, write_sound
+from testing.toy import ToySentence, toy_motion
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
 
 MIDDLE = (slice(150, 230), slice(70, 154))

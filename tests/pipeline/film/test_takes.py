@@ -7,10 +7,10 @@ import pytest
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.storage.files import sha256_of
-from lipmotion.testing.toy import toy_utterances
 from lipmotion_faces.film import build as takes
 from lipmotion_faces.film.build import MOST_FOOTAGE_S, choose_takes
 from speech.sounds import tone, write_sound
+from testing.toy import toy_utterances
 
 MakeVideos = Callable[..., Path]
 

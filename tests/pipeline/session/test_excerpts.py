@@ -10,8 +10,8 @@ from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
 from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, find_excerpt
 from lipmotion.pipeline.generation import generate_motion
 from lipmotion.pipeline.request import Request
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Generation, Pin, Span, Timeline, Unit
+from testing.toy import ToySentence
 
 TIMES = 12
 """How often the sentence is said in the long recording."""

@@ -15,12 +15,12 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, measure_prosody
 from lipmotion.pipeline.request import Request
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion_faces.outputs.drawn_video import sound_track
 from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.registry import stage_face
+from testing.toy import ToySentence
 
 
 @pytest.fixture

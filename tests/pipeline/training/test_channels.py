@@ -15,9 +15,9 @@ from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import BOTH, EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Utterance
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
+from testing.toy import toy_utterances
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
 ENGINE = engine_named("trajectory", {"articulation": False})

@@ -22,10 +22,10 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.testing.formant_synthesiser import synthesise
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio, Item, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
+from testing.formant_synthesiser import synthesise
+from testing.toy import toy_sentences
 
 VOICES = [SyntheticVoice("low", "flite", "anna"), SyntheticVoice("high", "flite", "bert")]
 TEXTS = ["Blue baby.", "Five tea."]

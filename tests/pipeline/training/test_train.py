@@ -15,10 +15,10 @@ from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.train import describe_training, label_phones
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Channel, Motion, Track, Utterance
 from lipmotion.units import Lexicon
 from pipeline import made
+from testing.toy import toy_sentences
 
 SMALL, JOINT = HmmConfig(mixtures=1, iterations=2), engine_named("joint", {})
 TRAINED = tuple(f"toy0{number}" for number in range(8))

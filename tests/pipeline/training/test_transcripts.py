@@ -14,8 +14,8 @@ from lipmotion.pipeline.training.labels import (
     warn_of_missing_transcripts,
 )
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
-from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Timeline, Unit, Utterance
+from testing.toy import toy_sentences, toy_utterances
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
 Labelled = list[tuple[Utterance, Timeline[Unit]]]

@@ -13,10 +13,10 @@ from lipmotion.speech.recognition.general import (
     general_features,
     general_model,
 )
-from lipmotion.testing.formant_synthesiser import synthesise
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio
 from lipmotion.units import PHONES as OURS
+from testing.formant_synthesiser import synthesise
+from testing.toy import ToySentence
 
 
 def vowels() -> Audio:

@@ -4,26 +4,14 @@ import pytest
 from lipmotion_studio.study.analysis.paired import deviations, fit_strengths, link_groups
 
 TEAMS = ("Milwaukee", "Detroit", "Toronto", "New York", "Boston", "Cleveland", "Baltimore")
-HOME_WINS = [
-    [0, 4, 4, 4, 6, 4, 6],
-    [3, 0, 4, 4, 6, 6, 4],
-    [2, 4, 0, 2, 4, 4, 6],
-    [3, 5, 2, 0, 4, 4, 6],
-    [5, 2, 3, 4, 0, 5, 6],
-    [2, 3, 3, 4, 4, 0, 2],
-    [2, 1, 1, 2, 1, 3, 0],
-]
-AWAY_WINS = [
-    [0, 3, 2, 3, 1, 2, 0],
-    [3, 0, 2, 3, 0, 1, 3],
-    [5, 3, 0, 4, 3, 2, 0],
-    [3, 1, 5, 0, 3, 2, 1],
-    [1, 5, 3, 2, 0, 2, 0],
-    [5, 3, 4, 3, 2, 0, 4],
-    [5, 5, 6, 4, 6, 4, 0],
-]
+HOME, AWAY = (
+    np.array([row.split() for row in wins.split(";")], float)
+    for wins in (
+        "0 4 4 4 6 4 6; 3 0 4 4 6 6 4; 2 4 0 2 4 4 6; 3 5 2 0 4 4 6; 5 2 3 4 0 5 6; 2 3 3 4 4 0 2; 2 1 1 2 1 3 0",
+        "0 3 2 3 1 2 0; 3 0 2 3 0 1 3; 5 3 0 4 3 2 0; 3 1 5 0 3 2 1; 1 5 3 2 0 2 0; 5 3 4 3 2 0 4; 5 5 6 4 6 4 0",
+    )
+)
 """Games of the American League, East, 1987; a row for each team at home. Source: Agresti 2002, Table 10.10, p. 438."""
-HOME, AWAY = np.array(HOME_WINS, float), np.array(AWAY_WINS, float)
 
 
 def test_baseball_as_published():
@@ -67,8 +55,8 @@ def test_errors_are_those_of_a_statistics_package():
 
 def test_deviations_of_the_answers_sum_to_nothing():
     model = fit_strengths(HOME, AWAY)
-    games = [((i, j), True) for i, j in np.ndindex(7, 7) for _ in range(HOME_WINS[i][j])]
-    games += [((i, j), False) for i, j in np.ndindex(7, 7) for _ in range(AWAY_WINS[i][j])]
+    games = [((i, j), True) for i, j in np.ndindex(7, 7) for _ in range(int(HOME[i, j]))]
+    games += [((i, j), False) for i, j in np.ndindex(7, 7) for _ in range(int(AWAY[i, j]))]
     pairs, is_first = np.array([pair for pair, _ in games]), np.array([won for _, won in games])
     moved = deviations(model, pairs, is_first)
     assert np.abs(moved).max() > 0.01

@@ -1,24 +1,21 @@
-"""The toy corpus: sentences of a speech synthesiser, and a drawn face whose mouth follows known motion.
-
-It is small enough for every test, it shows no person's face or voice, and everything that a model should learn from it
-is known: the words, the time of every phone, and the motion.
-"""
+"""The toy corpus: sentences of a synthesiser, and a drawn face; words, times of phones and motion are known exactly."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
+from lipmotion.units import is_silent
 from lipmotion.units.spelling import parse_table
+from testing.formant_synthesiser import synthesise
 
 SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)
 """Colours, RGB."""
@@ -38,37 +35,20 @@ WORDS = {
 }
 """The vocabulary, pronounced as in the CMU dictionary."""
 
-_LIP_TARGETS: tuple[tuple[str, tuple[tuple[float, float], ...]], ...] = (
-    # phones, then opening and width (eye distances) at their start and, where they differ, at their end
-    ("sil sp", ((0.00, 0.55),)),
-    ("p b m", ((0.00, 0.54),)),
-    ("f v", ((0.03, 0.55),)),
-    ("w", ((0.05, 0.42),)),
-    ("uw", ((0.07, 0.42),)),
-    ("uh", ((0.10, 0.46),)),
-    ("ow", ((0.16, 0.46), (0.08, 0.42))),
-    ("ao", ((0.20, 0.48),)),
-    ("oy", ((0.18, 0.46), (0.11, 0.59))),
-    ("aa", ((0.30, 0.55),)),
-    ("aw", ((0.28, 0.56), (0.08, 0.43))),
-    ("ay", ((0.28, 0.56), (0.11, 0.60))),
-    ("ae", ((0.26, 0.59),)),
-    ("ah", ((0.20, 0.55),)),
-    ("eh", ((0.20, 0.58),)),
-    ("ey", ((0.18, 0.58), (0.10, 0.61))),
-    ("ih ix", ((0.13, 0.58),)),
-    ("iy", ((0.09, 0.62),)),
-    ("ax axr er hh", ((0.13, 0.54),)),
-    ("l el", ((0.12, 0.55),)),
-    ("k g ng", ((0.10, 0.55),)),
-    ("y", ((0.08, 0.60),)),
-    ("r", ((0.08, 0.50),)),
-    ("sh zh ch jh", ((0.08, 0.47),)),
-    ("t d n en s z th dh", ((0.06, 0.57),)),
-    ("em", ((0.10, 0.54), (0.00, 0.54))),
-)
-LIP_TARGETS = {phone: shapes for phones, shapes in _LIP_TARGETS for phone in phones.split()}
-"""Target opening and width of the lips in each phone of the inventory."""
+_LIP_TARGETS = """
+sil sp: 0.00 0.55, p b m: 0.00 0.54, f v: 0.03 0.55, w: 0.05 0.42, uw: 0.07 0.42, uh: 0.10 0.46,
+ow: 0.16 0.46 0.08 0.42, ao: 0.20 0.48, oy: 0.18 0.46 0.11 0.59, aa: 0.30 0.55, aw: 0.28 0.56 0.08 0.43,
+ay: 0.28 0.56 0.11 0.60, ae: 0.26 0.59, ah: 0.20 0.55, eh: 0.20 0.58, ey: 0.18 0.58 0.10 0.61, ih ix: 0.13 0.58,
+iy: 0.09 0.62, ax axr er hh: 0.13 0.54, l el: 0.12 0.55, k g ng: 0.10 0.55, y: 0.08 0.60, r: 0.08 0.50,
+sh zh ch jh: 0.08 0.47, t d n en s z th dh: 0.06 0.57, em: 0.10 0.54 0.00 0.54
+"""
+LIP_TARGETS = {
+    phone: tuple(zip(numbers[::2], numbers[1::2], strict=True))
+    for phones, _, shape in (row.partition(":") for row in _LIP_TARGETS.split(","))
+    for numbers in [tuple(map(float, shape.split()))]
+    for phone in phones.split()
+}
+"""Opening and width (eye distances) of the lips at the start of each phone and, where they differ, at its end."""
 LIPS_TOUCH = frozenset({"p", "b", "m"})
 
 CHANNELS = (Channel("opening"), Channel("width"), Channel("outer"))
@@ -86,6 +66,7 @@ SPEECH_S = 1.27
 SILENCE_S, PITCH_HZ = (0.4, 0.6), (105.0, 135.0)  # ranges
 
 CAMERA_HZ = 25.0
+FACE_HEIGHT = 256
 _GRID_HZ = 1000
 MOTION_HZ = 100.0
 
@@ -109,12 +90,8 @@ def toy_sentences(count: int, seed: int = 0) -> list[ToySentence]:
     """Return ``count`` sentences of two to three seconds, with 0.4–0.6 s of silence at both ends of each.
 
     All words are used before any is used again. The last sixth (at least one) is ``test``, the sixth before it ``val``;
-    from six sentences on, ``train`` has every word. The same seed gives the same sentences, and a larger count the
-    same ones first.
-    Raises InputError: fewer than three, so that a split would be empty.
+    from six sentences on, ``train`` has every word. A larger count gives the same ones first.
     """
-    if count < 3:
-        raise InputError(f"{count} toy sentences asked for, required at least 3: one each to train, validate and test")
     return list(_speak_sentences(count, seed))
 
 
@@ -136,17 +113,8 @@ def toy_motion(units: Timeline[Unit], rate_hz: float) -> Motion:
     """Return the lip motion of the toy face: ``opening``, ``width`` and ``outer``, frame n at ``n / rate_hz`` seconds.
 
     units : phones of the inventory from 0 s on; gaps between them count as silence
-    Returns Motion with T = floor(end of the last unit · rate_hz) + 1 frames; the opening is exactly 0 in p, b and m
-    (``LIP_LEAD_S`` early) and in silence more than 0.1 s away from speech.
-    Raises InputError: no units, a phone that is not in the inventory, or a rate that is not positive.
+    The opening is exactly 0 in p, b and m (``LIP_LEAD_S`` early) and in silence more than 0.1 s away from speech.
     """
-    if not len(units):
-        raise InputError("there are no phones to move the lips to; give at least one")
-    if not rate_hz > 0:
-        raise InputError(f"motion rate is {rate_hz} Hz, required more than 0")
-    for span in units:
-        if span.label.phone not in LIP_TARGETS:
-            raise InputError(f"phone {span.label.phone!r} is not in the inventory: {' '.join(sorted(LIP_TARGETS))}")
     end_s = units.spans[-1].end_s
     margin_s = BLEND_S + LIP_LEAD_S
     grid_s = np.arange(-margin_s, end_s + 2 * margin_s, 1 / _GRID_HZ)
@@ -167,7 +135,6 @@ def toy_utterances(count: int, seed: int = 0) -> list[Utterance]:
     """Return the toy corpus with exact motion, as if every video had been tracked without error at 25 frames a second.
 
     Calls share their arrays: copy what is to be changed.
-    Raises InputError: fewer than three.
     """
     return [_utterance(sentence) for sentence in toy_sentences(count, seed)]
 
@@ -219,3 +186,24 @@ def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.f
         for shape, start_s, end_s in zip(shapes, edges_s, edges_s[1:], strict=False):
             targets[:, (grid_s >= start_s) & (grid_s < end_s)] = np.array(shape)[:, None]
     return targets
+
+
+def write_toy_recordings(directory: Path, *, sentences: int = 12, fps: float = CAMERA_HZ) -> list[Path]:
+    """Write the toy corpus as recordings: ``toy00.mp4``, ``toy00.txt``, ..., and the three lists; return the videos."""
+    from lipmotion_faces.base import Staging
+    from lipmotion_faces.portrait import Woman
+    from lipmotion_faces.video.mp4 import write_mp4
+
+    spoken = toy_sentences(sentences)
+    directory.mkdir(exist_ok=True)
+    face = Woman(Staging(size=FACE_HEIGHT, blinks=False, gaze=False, brows=False, head=False))
+    for sentence in spoken:
+        motion = toy_motion(sentence.units, MOTION_HZ)
+        silence = Timeline(tuple(span for span in sentence.units if is_silent(span.label.phone)))  # no shapes of phones
+        video = directory / f"{sentence.name}.mp4"
+        write_mp4(video, face.render(motion, silence, fps=fps), fps=fps, audio=sentence.audio)
+        video.with_suffix(".txt").write_text(" ".join(sentence.words) + "\n")
+    for split in ("train", "val", "test"):
+        names = [sentence.name for sentence in spoken if sentence.split == split]
+        (directory / f"{split}.txt").write_text("".join(f"{name}\n" for name in names))
+    return [directory / f"{sentence.name}.mp4" for sentence in spoken]
