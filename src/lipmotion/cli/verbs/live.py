@@ -36,6 +36,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         default="rest",
         help="lips close in pauses (default), or stay as people's",
     )
+    told = "a character, or a rig's table (.csv), whose own curves the frames have, too"
+    add("--character", type=Path, metavar="FILE", help=told)
     add("--still", action="store_true", help="only the mouth moves: no blinks, glances, brows, head")
     add("--as-fast-as-possible", action="store_true", help="do not wait for a file's own time")
     parser.set_defaults(run=run)
@@ -45,6 +47,7 @@ def run(options: argparse.Namespace) -> None:
     """Push sound into a ``lipmotion.Stream`` and give its frames to all consumers."""
     from contextlib import ExitStack
 
+    from lipmotion.live.character import LiveCharacter
     from lipmotion.live.consumers import Listener, LiveSound, open_consumer
     from lipmotion.live.stream import Stream
     from lipmotion.pipeline.model import load_model
@@ -53,7 +56,9 @@ def run(options: argparse.Namespace) -> None:
         rate_hz, sound = _open_sound(options)
         seed = None if options.still else 0
         stream = Stream(rate_hz, options.look_ahead, load_model(options.model), pauses=options.pauses, seed=seed)
-        about = LiveSound(rate_hz, options.look_ahead, is_microphone=_is_microphone(options.input))
+        dress = LiveCharacter(options.character) if options.character else None
+        is_microphone = options.input != "-" and not Path(options.input).is_file()
+        about = LiveSound(rate_hz, options.look_ahead, is_microphone)
         consumers = [stack.enter_context(open_consumer(to, print_line, about)) for to in options.to or ["-"]]
         listeners = [each for each in consumers if isinstance(each, Listener)]
         pieces = iter(sound)
@@ -65,7 +70,7 @@ def run(options: argparse.Namespace) -> None:
                 frames, ended = stream.push(piece), False
             except StopIteration:
                 frames, ended = stream.flush(), True
-            for frame in frames:
+            for frame in map(dress, frames) if dress else frames:
                 for take in consumers:
                     take(frame)
             flush_output()
@@ -85,10 +90,6 @@ def _open_sound(options: argparse.Namespace) -> tuple[int, Iterator[Any]]:
         pieces = (audio.samples[first : first + step] for first in range(0, len(audio.samples), step))
         return audio.rate_hz, pieces if options.as_fast_as_possible else _in_time(pieces)
     return options.rate, _listen(options.input, options.rate)
-
-
-def _is_microphone(source: str) -> bool:
-    return source != "-" and not Path(source).is_file()
 
 
 def _read_pipe(rate_hz: int) -> Iterator[bytes]:
