@@ -30,12 +30,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add("--look-ahead", type=float, default=160.0, metavar="MS", help=told)
     add("--rate", type=int, default=16_000, metavar="HZ", help="of sound on standard input (default: 16000)")
     add("--model", help="a trained model (default: the one that ships)")
-    add(
-        "--pauses",
-        choices=("rest", "natural"),
-        default="rest",
-        help="lips close in pauses (default), or stay as people's",
-    )
+    told = "lips close in pauses (default), or stay as people's"
+    add("--pauses", choices=("rest", "natural"), default="rest", help=told)
     told = "a character, or a rig's table (.csv), whose own curves the frames have, too"
     add("--character", type=Path, metavar="FILE", help=told)
     add("--still", action="store_true", help="only the mouth moves: no blinks, glances, brows, head")
