@@ -11,7 +11,6 @@ import argparse
 import itertools
 import json
 import subprocess
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,19 +27,20 @@ from lipmotion.units import VOWELS
 
 RATE_HZ = 48_000
 HERE = Path(__file__).parent
-LOOK_AHEADS, BACK_MS, STEP_MS = (0, 80, 160, 320), -100, 20
+LOOK_AHEADS, BACK_MS, STEP_MS = (80, 160), -60, 20
+LOUD, LOUD_SHARE, WINDOW = 0.1, 95, RATE_HZ // 50
+"""Rivals have thresholds: the root mean square of the loudest twentieth of each recording is brought to this."""
 RIDGE = 1e-3
 DRAWS = 2_000
 LIMITS_S = {"s1": 0.0, "strangers": 0.06, "open": 0.12}
 SHUT, NEAR_S = 0.012, 0.04
-model = cache(load_model)
 TOLD = ("openfacefx",)
 """Rivals that hear nothing, and are told phones; ours is told them, too."""
 SETTINGS = {
     "headaudio": {
-        "mends_aa": (False, True), "speakerMeanHz": (100, 150, 200),
+        "mends_aa": (False, True), "speakerMeanHz": (150, 200),
         ("vadMode", "vadGateActiveDb", "vadGateInactiveDb"):
-            ((1, -40, -50), (1, -50, -60), (1, -60, -70), (0, -40, -50)),
+            ((1, -40, -50), (1, -50, -60), (1, -60, -70)),
     },
     "wlipsync": {
         ("minVolume", "maxVolume"): ((-2.5, -1.5), (-3.0, -1.5), (-3.5, -1.5), (-2.5, -1.0), (-3.0, -1.0)),
@@ -61,18 +61,23 @@ def main() -> None:
     sets = collect(options)
     everything = tuple(each for group in sets.values() for each in group)
     told = tuple(each for each in everything if each.phones)
-    for rival, ahead_ms in itertools.product(options.only, LOOK_AHEADS):
-        settings, lag_s, coefficients, found = choose(rival, sets["val"], ahead_ms, options)
-        show(rival=rival, ahead_ms=ahead_ms, settings=settings, lag_ms=round(1000 * lag_s), val=found)
-        answers = ask(rival, everything if rival not in TOLD else told, settings, options.work, options.openfacefx)
-        theirs = {each: (times - lag_s, weights @ coefficients) for each, (times, weights) in answers.items()}
-        groups = {name: group for name, group in sets.items() if rival not in TOLD or group[0].phones}
-        ours = {each: stream(each, ahead_ms, rival in TOLD) for group in groups.values() for each in group}
-        for name, group in groups.items():
-            limit_s = LIMITS_S.get(name, 0.0)
-            both = [round(score(pairs(group, each, limit_s), not limit_s), 3) for each in (ours, theirs)]
-            show(group=name, ours=both[0], theirs=both[1], more=interval(group, ours, theirs, limit_s))
-        show(closures=closures(sets, ours, theirs))
+    for rival in options.only:
+        heard = told if rival in TOLD else everything
+        groups = {name: group for name, group in sets.items() if group[0] in heard}
+        tried = [
+            (settings, ask(rival, sets["val"], settings, options)) for settings in list_settings(rival, options.profile)
+        ]
+        for ahead_ms in LOOK_AHEADS:
+            settings, lag_s, coefficients, found = choose(tried, sets["val"], ahead_ms)
+            show(rival=rival, ahead_ms=ahead_ms, settings=settings, lag_ms=round(1000 * lag_s), val=found)
+            answers = ask(rival, heard, settings, options)
+            theirs = {each: (times - lag_s, weights @ coefficients) for each, (times, weights) in answers.items()}
+            ours = {each: stream(each, ahead_ms, rival in TOLD, options.work) for each in heard}
+            for name, group in groups.items():
+                limit_s = LIMITS_S.get(name, 0.0)
+                both = [round(score(pairs(group, each, limit_s), not limit_s), 3) for each in (ours, theirs)]
+                show(group=name, ours=both[0], theirs=both[1], more=interval(group, ours, theirs, limit_s))
+            show(closures=closures(sets, ours, theirs))
 
 
 class Recording:
@@ -108,29 +113,31 @@ def collect(options) -> dict[str, list[Recording]]:
 
 
 def list_phones(name: str, audio: Audio, words: str | None, work: Path) -> list[tuple[str, float, float]]:
-    """Return the phones in time, aligned; "" is silence. None where the words are not known."""
+    """Return the phones in time, aligned; "" is silence. None of them where the words are not known."""
     if words is None:
         return []
     kept = work / f"{name}.phones.json"
     if not kept.exists():
-        units = animate(Request(audio, transcript=words), model=model()).units
+        units = animate(Request(audio, transcript=words), model=load_model()).units
         rows = [(each.label.phone.replace("sil", "").replace("sp", ""), each.start_s, each.end_s) for each in units]
         kept.write_text(json.dumps(rows), encoding="utf-8")
     return json.loads(kept.read_text(encoding="utf-8"))
 
 
-def ask(rival, recordings, settings, work, openfacefx):
+def ask(rival, recordings, settings, options):
     """Return times and weights, with a constant, of each recording, by an adapter in its own environment."""
     rows = []
     for each in recordings:
-        sound = work / f"{each.name}.wav"
+        sound = options.work / f"{each.name}.wav"
         if not sound.exists():
             samples = resample_poly(each.audio.samples, RATE_HZ, each.audio.rate_hz)
+            powers = np.square(samples[: len(samples) // WINDOW * WINDOW]).reshape(-1, WINDOW).mean(axis=1)
+            samples *= LOUD / np.sqrt(np.percentile(powers, LOUD_SHARE))
             wavfile.write(sound, RATE_HZ, np.rint(np.clip(samples, -1, 1) * 32767).astype(np.int16))
         rows.append({"name": each.name, "sound": str(sound), "phones": each.phones})
-    job, answer = (work / f"{rival}-{part}.json" for part in ("job", "answer"))
+    job, answer = (options.work / f"{rival}-{part}.json" for part in ("job", "answer"))
     job.write_text(json.dumps({"rate_hz": RATE_HZ, "recordings": rows, "settings": settings}), encoding="utf-8")
-    program = [openfacefx, HERE / "openfacefx_stream.py"] if rival in TOLD else ["node", HERE / f"{rival}.mjs"]
+    program = [options.openfacefx, HERE / "openfacefx_stream.py"] if rival in TOLD else ["node", HERE / f"{rival}.mjs"]
     subprocess.run([*program, job, answer], check=True)
     found = json.loads(answer.read_text(encoding="utf-8"))
 
@@ -142,15 +149,13 @@ def ask(rival, recordings, settings, work, openfacefx):
     }
 
 
-def choose(rival, recordings, ahead_ms, options, tried={}):  # noqa: B006
-    """Return the settings, lag and coefficients with the highest correlation on recordings, and that correlation."""
-    if rival not in tried:
-        tried[rival] = [
-            (settings, ask(rival, recordings, settings, options.work, options.openfacefx))
-            for settings in list_settings(rival, options.profile)
-        ]
+def choose(tried, recordings, ahead_ms):
+    """Return the settings, lag and coefficients with the highest correlation on recordings, and that correlation.
+
+    tried : settings, and what ``ask`` returned with them
+    """
     best = ({}, 0.0, np.zeros(0), -1.0)
-    for settings, answers in tried[rival]:
+    for settings, answers in tried:
         for lag_ms in range(BACK_MS, ahead_ms + 1, STEP_MS):
             coefficients = fit(recordings, answers, lag_ms / 1000)
             moved = {each: (times - lag_ms / 1000, rows @ coefficients) for each, (times, rows) in answers.items()}
@@ -188,14 +193,16 @@ def at(time_s, times, weights):
     return np.stack([np.interp(time_s, times, column) for column in weights.T], axis=1)
 
 
-@cache
-def stream(recording, ahead_ms, told):
-    """Return times and opening of our stream; ``told``: it is given the phones."""
-    live = Stream(recording.audio.rate_hz, ahead_ms, model(), pauses="natural", seed=None)
-    if told:
-        live.add_phones(recording.phones)
-    frames = live.push(recording.audio.samples) + live.flush()
-    return np.array([frame.time_s for frame in frames]), np.array([frame["opening"] for frame in frames])
+def stream(recording, ahead_ms, told, work):
+    """Return times and opening of our stream, which are kept; ``told``: it is given the phones."""
+    kept = work / f"{recording.name}-{ahead_ms}-{'told' if told else 'heard'}.npy"
+    if not kept.exists():
+        live = Stream(recording.audio.rate_hz, ahead_ms, load_model(), pauses="natural", seed=None)
+        if told:
+            live.add_phones(recording.phones)
+        frames = live.push(recording.audio.samples) + live.flush()
+        np.save(kept, [[frame.time_s for frame in frames], [frame["opening"] for frame in frames]])
+    return np.load(kept)
 
 
 def pairs(group, openings, limit_s):
