@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import re
+import signal
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import pytest
 from children import LIPMOTION, child
 from cli.conftest import RunCommand
 from lipmotion.meshes.fitting.driven import load_character
+from lipmotion.speech.sound import audio_files
 from lipmotion.speech.sound.audio_files import read_audio
 from meshes.heads import head, write_glb
 
@@ -21,9 +24,7 @@ WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 
 def test_a_file_becomes_frames_on_the_command_line(run: RunCommand, tmp_path: Path) -> None:
-    ran = run(
-        "live", "-i", WELCOME, "--to", tmp_path / "a.csv", "--to", "-", "--look-ahead", 80, "--as-fast-as-possible"
-    )
+    ran = run("live", WELCOME, "--to", tmp_path / "a.csv", "--to", "-", "--look-ahead", 80, "--as-fast-as-possible")
     assert ran.code == 0
     rows = list(csv.DictReader((tmp_path / "a.csv").read_text("utf-8").splitlines()))
     lines = [json.loads(line) for line in ran.out]
@@ -42,6 +43,19 @@ def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
         assert process.communicate()[0] == ""
         assert process.returncode == 0
     assert len((tmp_path / "a.csv").read_text("utf-8").splitlines()) == 101
+    (tmp_path / "a.wav").write_bytes(b"RIFF" + bytes(1_000))
+    with (tmp_path / "a.wav").open("rb") as sound, child([*LIPMOTION, "live", "-i", "-"], stdin=sound) as process:
+        assert (process.communicate()[0], process.returncode) == ("", 3)
+
+
+def test_a_signal_that_a_package_swallows_ends_it(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+    def read(path: Path) -> object:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        return read_audio(path)
+
+    monkeypatch.setattr(audio_files, "read_audio", read)
+    assert run("live", WELCOME, "--as-fast-as-possible")[:2] == (143, [])
 
 
 def test_a_character_and_a_rig_get_their_own_curves(run: RunCommand, tmp_path: Path) -> None:
@@ -75,6 +89,7 @@ def test_what_is_wrong_is_said(run: RunCommand) -> None:
         (("-i", WELCOME, "--look-ahead", "-5"), "-5"),
         (("-i", WELCOME, "--character", "nothing.glb"), "no such file"),
         (("-i", "no such microphone"), "sounddevice|microphone"),
+        (("no such file.wav",), "no such file.wav"),
     ):
         ran = run("live", *arguments)
         assert ran.code in (3, 8)
