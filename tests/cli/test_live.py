@@ -7,14 +7,18 @@ import json
 import re
 import signal
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from children import LIPMOTION, child
 from cli.conftest import RunCommand
+from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.speech.sound import audio_files
 from lipmotion.speech.sound.audio_files import read_audio
+from meshes.heads import head, write_glb
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
@@ -54,10 +58,37 @@ def test_a_signal_that_a_package_swallows_ends_it(run: RunCommand, monkeypatch: 
     assert run("live", WELCOME, "--as-fast-as-possible")[:2] == (143, [])
 
 
+def test_a_character_and_a_rig_get_their_own_curves(run: RunCommand, tmp_path: Path) -> None:
+    """Lips that touch in the frames touch on a character of visemes."""
+    mesh = head()
+    spoken = {"jawOpen": "aa", "mouthPucker": "U", "mouthFunnel": "O", "mouthSmileLeft": "E", "mouthStretchLeft": "I"}
+    spoken |= {"mouthRollLower": "FF", "mouthPressLeft": "PP", "mouthLowerDownLeft": "DD", "mouthUpperUpLeft": "SS"}
+    shapes = (replace(each, name=f"V_{spoken[each.name]}") for each in mesh.shapes if each.name in spoken)
+    write_glb(tmp_path / "head.glb", replace(mesh, shapes=tuple(shapes)))
+    (tmp_path / "rig.csv").write_text("control,source,gain\nChin.rotateX,jawOpen,-20\n")
+
+    def curves(character: str) -> dict[str, np.ndarray]:
+        basics = ("live", "-i", WELCOME, "--as-fast-as-possible", "--to", tmp_path / "a.csv")
+        assert run(*basics, "--character", tmp_path / character).code == 0
+        names, *rows = csv.reader((tmp_path / "a.csv").read_text("utf-8").splitlines())
+        return dict(zip(names, np.array(rows, float).T, strict=True))
+
+    mouth = load_character(tmp_path / "head.glb").shapes
+    assert mouth is not None
+    said = curves("head.glb")
+    parted = sum(said[name] * gap for name, gap in zip(mouth.names, mouth.gap, strict=True))
+    assert parted[said["opening"] < 0.001].max() < 0.003
+    assert np.corrcoef(parted, said["opening"])[0, 1] > 0.5
+    turned = curves("rig.csv")
+    assert turned["Chin.rotateX"] == pytest.approx(-20 * turned["jawOpen"], abs=1e-3)
+
+
 def test_what_is_wrong_is_said(run: RunCommand) -> None:
     for arguments, message in (
         (("-i", WELCOME, "--to", "nowhere"), "--to nowhere"),
         (("-i", WELCOME, "--look-ahead", "-5"), "-5"),
+        (("-i", WELCOME, "--character", "nothing.glb"), "no such file"),
+        (("-i", "no such microphone"), "sounddevice|microphone"),
         (("no such file.wav",), "no such file.wav"),
     ):
         ran = run("live", *arguments)

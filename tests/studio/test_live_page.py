@@ -32,7 +32,7 @@ CONNECTED = "return Boolean(globalThis.live?.state.isConnected)"
 HOLD = """const { playback } = live, { schedule } = playback, held_s = playback.clock_s;
 document.querySelector("canvas").style.display = "none"; // nothing more is drawn: processors would take seconds for it
 Object.defineProperty(playback, "clock_s", { value: held_s, writable: true });
-globalThis.heard = [];
+window.heard = []; // the global object of Marionette is not the page's
 playback.schedule = (begin_s, samples) => {
   heard.push((begin_s + playback.anchor_s - playback.shift_s) * playback.rate_hz);
   schedule.call(playback, begin_s, samples);

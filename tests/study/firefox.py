@@ -36,9 +36,9 @@ PREFERENCES = {
     "app.update.disabledForTesting": True, "browser.shell.checkDefaultBrowser": False,
     "browser.startup.homepage_override.mstone": "ignore", "browser.tabs.remote.unloadOnLowMemory": False,
     "datareporting.policy.dataSubmissionEnabled": False, "marionette.port": 0, "media.autoplay.blocking_policy": 0,
-    "media.autoplay.default": 0, "network.captive-portal-service.enabled": False,
-    "network.connectivity-service.enabled": False, "toolkit.telemetry.reportingpolicy.firstRun": False,
-    "webgl.force-enabled": True,
+    "media.autoplay.default": 0, "media.cubeb.force_mock_context": True,
+    "network.captive-portal-service.enabled": False, "network.connectivity-service.enabled": False,
+    "toolkit.telemetry.reportingpolicy.firstRun": False, "webgl.force-enabled": True,
 }  # fmt: skip
 SCHEMES = {"dark": 0, "light": 1}
 SHOW_AS = """const [width, height, scheme] = arguments, { style } = gBrowser.selectedBrowser;

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TextIO, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from lipmotion.errors import InputError
 from lipmotion.extensions import Registry
@@ -27,7 +27,7 @@ from lipmotion.meshes.model.shape_names import ARKIT_52
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import atomic_file
 
-Consumer = Callable[[LiveFrame], None]
+Consumer = Callable[[LiveFrame], object]
 
 
 @runtime_checkable
@@ -87,7 +87,7 @@ def open_consumer(to: str, print_line: Callable[[str], None], sound: LiveSound |
         yield lambda frame: print_line(json_line(frame))
     elif to.lower().endswith(".csv"):
         with atomic_file(Path(to)) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-            yield lambda frame: _write(file, csv_lines(frame))
+            yield lambda frame: file.write(csv_lines(frame))
     elif kind in PORTS:
         place = read_address(to, PORTS[kind])
         try:
@@ -116,10 +116,6 @@ def read_address(to: str, port: int) -> tuple[str, int]:
     if not 0 <= number <= LARGEST_PORT:
         raise InputError(f"--to {to}: no such address; required {kind}:PORT or {kind}:HOST:PORT")
     return host.strip("[]") or "127.0.0.1", number
-
-
-def _write(file: TextIO, lines: str) -> None:
-    file.write(lines)
 
 
 def _send(channel: socket.socket, packet: bytes, place: tuple[str, int]) -> None:

@@ -28,8 +28,7 @@ from lipmotion.live.network import (
 )
 from lipmotion.live.sound import BLOCK, Resampler, mono_samples
 from lipmotion.live.timings import GivenPhones
-from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
-from lipmotion.meshes.model.shape_names import VISEMES_15
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model, load_model
@@ -279,17 +278,17 @@ class Stream:
             return []
         result = animate(Request(Audio(sound, self.sample_rate), pauses=self._pauses), model=self._face.model)
         end_s = self._first * STEP_S + len(sound) / self.sample_rate
-        motion = result.motion.resampled(1 / STEP_S)
-        arkit, visemes = (
-            make_curves(result.motion, result.units, name).resampled(1 / STEP_S).values for name in ("arkit", "visemes")
+        curves = (
+            make_curves(result.motion, result.units, name, staging=Staging(seed=self._seed or 0))
+            for name in ("arkit" if self._seed is None else "face", "visemes")
         )
-        count = min(len(motion.values), len(arkit), len(visemes))
-        weights = np.concatenate([arkit[:count], visemes[:count]], axis=1)
-        frames = [self._frame((motion.values[n], weights[n]), end_s) for n in range(count)]
-        if self._seed is not None:
-            lively = compute_living_curves(motion, result.units, Staging(seed=self._seed))
-            rows = (dict(zip(lively.names, values, strict=True)) for values in lively.values.tolist())
-            frames = [replace(frame, weights=frame.weights | row) for frame, row in zip(frames, rows, strict=False)]
+        motion, face, visemes = (each.resampled(1 / STEP_S) for each in (result.motion, *curves))
+        frames = []
+        for pose, row, said in zip(motion.values, face.values, visemes.values, strict=False):
+            mouth, living = np.split(row, [len(ARKIT_MOUTH)])
+            frame = self._frame((pose, np.concatenate([mouth, said])), end_s)
+            named = dict(zip(face.names[len(ARKIT_MOUTH) :], living.tolist(), strict=True))
+            frames.append(replace(frame, weights=frame.weights | named))
         self._first = self._next
         return frames
 

@@ -39,9 +39,6 @@ FIRST = "live/live.html"
 HEAD_FILE = "head.glb"
 READY = "ready"
 """What the page says when it shows what comes."""
-PARTING = ("mouthLowerDownLeft", "mouthLowerDownRight", "mouthUpperUpLeft", "mouthUpperUpRight", "mouthFunnel")
-NEARLY_CLOSED = 0.02
-"""Opening, in eye distances, under which the lips of the head come together more than ARKit's weights say."""
 TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")
 """Names of the quaternion that turns the head, as the page knows them."""
 REJOIN_S = 1.5
@@ -72,16 +69,9 @@ class LiveWindow:
 
     def __call__(self, frame: LiveFrame) -> None:
         """Take a frame."""
-        self._server.send(json_line(replace(frame, weights=head_weights(frame))))
-
-
-def head_weights(frame: LiveFrame) -> dict[str, float]:
-    """Return the weights of a frame for the 3D head, whose closed lips only jaw and ``mouthClose`` may move apart."""
-    closing = max(1 - frame["opening"] / NEARLY_CLOSED, 0.0)
-    weights = {name: value * (1 - closing * (name in PARTING)) for name, value in frame.weights.items()}
-    weights["mouthClose"] += closing * max(weights["jawOpen"] - weights["mouthClose"], 0.0)
-    (turn,) = head_quaternions(np.array([[frame.weights.get(name, 0.0) for name in ANGLES]])).tolist()
-    return weights | dict(zip(TURN, turn, strict=True))
+        (turn,) = head_quaternions(np.array([[frame.weights.get(name, 0.0) for name in ANGLES]])).tolist()
+        turned = frame.weights | dict(zip(TURN, turn, strict=True))
+        self._server.send(json_line(replace(frame, weights=turned)))
 
 
 @contextmanager

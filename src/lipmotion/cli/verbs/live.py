@@ -31,12 +31,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add("--look-ahead", type=float, default=160.0, metavar="MS", help=told)
     add("--rate", type=int, default=16_000, metavar="HZ", help="of sound on standard input (default: 16000)")
     add("--model", help="a trained model (default: the one that ships)")
-    add(
-        "--pauses",
-        choices=("rest", "natural"),
-        default="rest",
-        help="lips close in pauses (default), or stay as people's",
-    )
+    told = "lips close in pauses (default), or stay as people's"
+    add("--pauses", choices=("rest", "natural"), default="rest", help=told)
+    told = "a character, or a rig's table (.csv), whose own curves the frames have, too"
+    add("--character", type=Path, metavar="FILE", help=told)
     add("--still", action="store_true", help="only the mouth moves: no blinks, glances, brows, head")
     add("--as-fast-as-possible", action="store_true", help="do not wait for a file's own time")
     parser.set_defaults(run=run)
@@ -46,6 +44,7 @@ def run(options: argparse.Namespace) -> None:
     """Push sound into a ``lipmotion.Stream`` and give its frames to all consumers."""
     from contextlib import ExitStack
 
+    from lipmotion.live.character import LiveCharacter
     from lipmotion.live.consumers import Listener, LiveSound, open_consumer
     from lipmotion.live.stream import Stream
     from lipmotion.pipeline.model import load_model
@@ -55,7 +54,9 @@ def run(options: argparse.Namespace) -> None:
         options.stopper.check()  # a signal that a package swallowed: a page would be waited for without an end
         seed = None if options.still else 0
         stream = Stream(rate_hz, options.look_ahead, load_model(options.model), pauses=options.pauses, seed=seed)
-        about = LiveSound(rate_hz, options.look_ahead, is_microphone=_is_microphone(options.input))
+        dress = LiveCharacter(options.character) if options.character else None
+        is_microphone = options.input != "-" and not Path(options.input).is_file()
+        about = LiveSound(rate_hz, options.look_ahead, is_microphone)
         consumers = [stack.enter_context(open_consumer(to, print_line, about)) for to in options.to or ["-"]]
         listeners = [each for each in consumers if isinstance(each, Listener)]
         pieces = iter(sound)
@@ -67,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
                 frames, ended = stream.push(piece), False
             except StopIteration:
                 frames, ended = stream.flush(), True
-            for frame in frames:
+            for frame in map(dress, frames) if dress else frames:
                 for take in consumers:
                     take(frame)
             flush_output()
@@ -87,10 +88,6 @@ def _open_sound(options: argparse.Namespace) -> tuple[int, Iterator[Any]]:
         pieces = (audio.samples[first : first + step] for first in range(0, len(audio.samples), step))
         return audio.rate_hz, pieces if options.as_fast_as_possible else _in_time(pieces)
     return options.rate, _listen(options.input, options.rate)
-
-
-def _is_microphone(source: str) -> bool:
-    return source != "-" and not Path(source).is_file()
 
 
 def _read_pipe(rate_hz: int) -> Iterator[bytes]:

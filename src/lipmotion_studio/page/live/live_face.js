@@ -85,7 +85,7 @@ export class LiveFace {
     this.head.pose(this.weights, 0);
     this.drawn_ms.push(now_ms);
     if (now_ms - this.told_ms > COUNTED_MS || !this.drawing) {
-      const behind_s = this.playback.behind_s, seconds = (now_ms - this.told_ms) / 1000;
+      const behind_s = this.drawing ? this.playback.behind_s : null, seconds = (now_ms - this.told_ms) / 1000;
       this.tell({ delay_ms: behind_s === null ? null : 1000 * behind_s, frames_s: this.drawing ? this.drawn_ms.length / seconds : 0 });
       this.drawn_ms = [];
       this.told_ms = now_ms;
