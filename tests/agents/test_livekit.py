@@ -195,7 +195,6 @@ def test_an_output_that_does_not_tell_when_it_is_heard_is_named(caplog: pytest.L
             await lips.capture_frame(frame)
         lips.flush()
         await lips.wait_for_playout()
-        await lips.aclose()
 
     run(work())
     assert "on_playback_started" in caplog.text
