@@ -66,7 +66,7 @@ def test_lips_touch_once_in_every_p_b_and_m_for_longer_than_a_picture(phone, sta
     assert gap[gap > 0].min() >= LEAST_GAP
     assert np.abs(np.diff(gap)).max() < 0.04
     for fps in RATES:
-        assert show_contact(gap == 0, 100.0, np.arange(int(fps)) / fps).any()
+        assert show_contact(gap == 0, 100.0, np.arange(int(fps)) / fps).sum() >= 2
 
 
 def test_a_contact_that_the_motion_has_is_neither_longer_nor_shorter():

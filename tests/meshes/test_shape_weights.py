@@ -9,7 +9,6 @@ from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
 from lipmotion.meshes.fitting.shape_weights import (
     OPPOSED,
     CurveCosts,
-    SolverOptions,
     cancel_opposed,
     fit_bounded_curves,
     round_lips,
@@ -84,11 +83,8 @@ def test_the_jaw_stays_open_behind_closed_lips(shapes):
     assert weights["mouthClose"][95] > 0.05
 
 
-def test_gestures_can_be_left_out(shapes):
-    plain = solve_shape_weights(motion(), units(), shapes, SolverOptions(gestures=False))
-    pressed = solve_shape_weights(motion(), units(), shapes)
-    assert np.abs(plain["mouthPressLeft"]).max() < 1e-9
-    assert pressed["mouthPressLeft"][95] > 0.35  # captures have 0.2 to 0.66
+def test_lips_are_pressed_in_p_as_captures_press_them(shapes):
+    assert 0.35 < solve_shape_weights(motion(), units(), shapes)["mouthPressLeft"][95] < 0.66
 
 
 def test_known_weights_come_back():
@@ -121,7 +117,7 @@ def test_visemes_are_used_where_there_is_no_jaw_shape():
     assert gap[[55, 95]].max() < 1e-6
 
 
-_EXACT = SolverOptions(CurveCosts(ridge=1e-7, smooth=0.0), gestures=False)
+_EXACT = CurveCosts(ridge=1e-7, smooth=0.0)
 
 
 def _of(displacements, gap):

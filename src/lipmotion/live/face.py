@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.errors import InputError
 from lipmotion.live.network import LAGS, STEP_S, answer_silence, live_network
-from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS, blend_visemes, cancel_opposed
+from lipmotion.meshes.fitting.shape_weights import PRESS_WEIGHT, VISEME_CHANNELS, blend_visemes, cancel_opposed
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.closure import OPENING, is_never_negative
@@ -20,6 +20,8 @@ from lipmotion.pipeline.model import Model
 Array = NDArray[np.float64]
 PARTING = np.array([name.startswith(("mouthLowerDown", "mouthUpperUp")) for name in ARKIT_MOUTH])
 """Which weights of the mouth part the lips: where these are closed, they are 0."""
+PRESSING = np.array([name.startswith("mouthPress") for name in ARKIT_MOUTH])
+"""Those of lips that are pressed together, as far as they close in speech."""
 WEIGHT_NAMES = (*ARKIT_MOUTH, *VISEME_CHANNELS)
 
 
@@ -100,6 +102,7 @@ class ModelFace:
         values[self._bounded] = np.maximum(values[self._bounded], 0)
         arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
         arkit[PARTING] *= 1 - closing
+        arkit[PRESSING] = PRESS_WEIGHT * closing * (1 - min(float(said[VISEMES_15.index("sil")]), 1.0))
         arkit = cancel_opposed(arkit, ARKIT_MOUTH)
         held = said[None] / max(float(said.sum()), 1.0)
         visemes = blend_visemes(held, opening_to_gap(values[[self.opening]]), np.zeros(1))[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,20 +186,8 @@ class CurveCosts:
     smooth: float = 1e-1
 
 
-@dataclass(frozen=True)
-class SolverOptions:
-    """How weights are solved.
-
-    costs    : of large and of sudden weights
-    gestures : whether phones add what points do not show (pressed lips, a tucked lip, the tongue, round lips)
-    """
-
-    costs: CurveCosts = field(default_factory=CurveCosts)
-    gestures: bool = True
-
-
 def solve_shape_weights(
-    motion: Motion, units: Timeline[Unit], shapes: FaceShapes, options: SolverOptions | None = None
+    motion: Motion, units: Timeline[Unit], shapes: FaceShapes, costs: CurveCosts | None = None
 ) -> Motion:
     """Return the weights of blendshapes over time: one channel a blendshape, by the mesh's names, 0 to 1.
 
@@ -211,7 +199,7 @@ def solve_shape_weights(
     weights.
     Raises InputError: as ``move_points``.
     """
-    options = options or SolverOptions()
+    costs = costs or CurveCosts()
     points = move_points(motion, units)
     mouth, channels = points.mouth, tuple(Channel(name, WEIGHT) for name in shapes.names)
     own_weights, mood = find_own_weights(motion, shapes), mood_weights(mouth, shapes)
@@ -228,12 +216,12 @@ def solve_shape_weights(
                 spoken[:, row] += curve
         targets = np.concatenate([_weigh_rows(points.displacements, mouth.gap), VISEME_WEIGHT * spoken], axis=1)
         matrix = np.concatenate([matrix, VISEME_WEIGHT * np.eye(len(shapes.names))], axis=1)
-        weights = fit_bounded_curves(matrix, targets, options.costs)
+        weights = fit_bounded_curves(matrix, targets, costs)
     else:
         displacements = points.displacements.copy()
         if mood is not None:  # what the shapes of a mood do to the width of the mouth is theirs
             displacements[..., 0] -= mood @ shapes.moved[..., 0]
-        weights = _solve_free_weights(_weigh_rows(displacements, mouth.gap), matrix, mouth, shapes, options)
+        weights = _solve_free_weights(_weigh_rows(displacements, mouth.gap), matrix, mouth, shapes, costs)
         weights = _add_mood(weights, mood)
     weights = with_gap(weights, shapes, mouth.gap - PRESS_DEPTH * mouth.closing)
     return Motion(weights, motion.rate_hz, channels)
@@ -320,29 +308,27 @@ def _weigh_rows(displacements: Array, gap: Array) -> Array:
 
 
 def _solve_free_weights(
-    targets: Array, matrix: Array, mouth: SpokenMouth, shapes: FaceShapes, options: SolverOptions
+    targets: Array, matrix: Array, mouth: SpokenMouth, shapes: FaceShapes, costs: CurveCosts
 ) -> Array:
     """Return the weights of ARKit's or a mesh's own shapes [shape=(T, S)]; some follow the phones, not the points."""
     fixed = np.zeros((len(mouth.gap), len(shapes.names)))
-    if options.gestures:
-        for name, curve in {
-            **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS_WEIGHT * mouth.closing),
-            "mouthRollUpper": UPPER_ROLL_WEIGHT * mouth.closing,
-            "mouthRollLower": LOWER_ROLL_WEIGHT * mouth.tuck,
-            "tongueOut": TONGUE_WEIGHT * mouth.between_teeth,
-        }.items():
-            if name in shapes.known:
-                fixed[:, shapes.known.index(name)] = curve
+    for name, curve in {
+        **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS_WEIGHT * mouth.closing),
+        "mouthRollUpper": UPPER_ROLL_WEIGHT * mouth.closing,
+        "mouthRollLower": LOWER_ROLL_WEIGHT * mouth.tuck,
+        "tongueOut": TONGUE_WEIGHT * mouth.between_teeth,
+    }.items():
+        if name in shapes.known:
+            fixed[:, shapes.known.index(name)] = curve
     free = np.array([name not in NOT_FROM_POINTS for name in shapes.known])
     jaw, close = shapes.row("jawOpen"), shapes.row("mouthClose")
     if jaw is not None and close is not None:
         matrix[close] += matrix[jaw]  # as one: the jaw opens behind closed lips
     ties, weights = PAIR_WEIGHT * shapes.pairs(), fixed.copy()
-    weights[:, free] += fit_bounded_curves(matrix[free], targets - fixed @ matrix, options.costs, ties[:, free])
-    if options.gestures:
-        weights = round_lips(np.clip(weights, 0.0, 1.0), shapes, mouth.protrusion)
+    weights[:, free] += fit_bounded_curves(matrix[free], targets - fixed @ matrix, costs, ties[:, free])
+    weights = round_lips(np.clip(weights, 0.0, 1.0), shapes, mouth.protrusion)
     limits = (fixed, np.where(free, 1.0, fixed))
-    weights = part_opposed(weights, matrix, shapes.known, options.costs, limits, ties)
+    weights = part_opposed(weights, matrix, shapes.known, costs, limits, ties)
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
     return np.clip(weights, 0.0, 1.0)
