@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import CLOSED_OPENING, find_closures, smooth_step
+from lipmotion.articulation.contact import CLOSED_OPENING, EDITED, find_closures, smooth_step
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
@@ -170,7 +170,7 @@ def intensify(generation: Generation, intensity: float, opening: Curve | None = 
     return replace(generation, motion=replace(motion, values=larger), spread=spread)
 
 
-ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", *GROWING)
+ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", "oval", *GROWING, *EDITED.values())
 """Channels that are not movements away from a rest pose (docs/articulation.md)."""
 
 
