@@ -156,7 +156,9 @@ def mark_edited(motion: Motion, edits: Sequence[CurveEdit]) -> Motion:
         share = edited_share(motion.time_s, decided)
         if share.any():
             motion = with_gestures(motion, Timeline(()), [name])
-            motion.values[:, motion.column(name)] = np.maximum(motion[name], share)
+            values = motion.values.copy()
+            values[:, motion.column(name)] = np.maximum(motion[name], share)
+            motion = replace(motion, values=values)
     return motion
 
 

@@ -29,7 +29,7 @@ from lipmotion.meshes.fitting.shape_weights import (
 )
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, arkit_name
-from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Span, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Hold, Motion, Prosody, Span, Timeline, Unit
 from lipmotion.types.delivery import Staging
 from lipmotion.types.generation import Locked
 
@@ -131,18 +131,25 @@ def edit_weights(
     known = known_names(character.mesh) if character else {}
     named = {other: name for other, name in known.items() if name in weights.names}
     named |= {name: name for name in weights.names}
+    return apply_curve_edits(weights, units, rename_edits(edits, named), held=weights.names if character else ())
 
-    def rename(edits: Sequence[CurveEdit]) -> list[CurveEdit]:
-        inner = [replace(edit, edits=tuple(rename(edit.edits))) if isinstance(edit, Locked) else edit for edit in edits]
-        return [replace(edit, channel=named[edit.channel]) if edit.channel in named else edit for edit in inner]
 
-    return apply_curve_edits(weights, units, rename(edits), held=weights.names if character else ())
+def rename_edits(edits: Sequence[CurveEdit], named: Mapping[str, str]) -> tuple[CurveEdit, ...]:
+    """Return edits of curves by other names: those of ``named`` by their values."""
+    renamed: list[CurveEdit] = []
+    for edit in edits:
+        if isinstance(edit, Locked):
+            renamed.append(replace(edit, edits=rename_edits(edit.edits, named)))
+        else:
+            renamed.append(
+                edit if isinstance(edit, Hold) else replace(edit, channel=named.get(edit.channel, edit.channel))
+            )
+    return tuple(renamed)
 
 
 def edit_curves(curves: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
     """Return curves of one of ``SHAPE_SETS`` with edits; those that phones make stay where the mouth is held."""
-    named = [replace(edit, channel=FAPS[edit.channel]) if edit.channel in FAPS else edit for edit in edits]
-    return apply_curve_edits(curves, units, named, held=PHONETIC)
+    return apply_curve_edits(curves, units, rename_edits(edits, FAPS), held=PHONETIC)
 
 
 def known_names(mesh: Mesh) -> dict[str, str]:

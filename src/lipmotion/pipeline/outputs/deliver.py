@@ -103,17 +103,17 @@ def deliver_to_face(
     staging, prosody : as of ``show_edited_curves``, which all other edits of curves go through
     """
     moved = with_drawn_channels(deliver(generation, delivery))
-    has_curves = character is not None and character.shapes is not None
-    moved = show_edited_curves(moved, staging, prosody, mouth=not has_curves)
-    if moved.curve_edits and has_curves:
-        moved = with_curves(moved, character)[0]
+    solved = character if character is not None and character.shapes is not None else None
+    moved = show_edited_curves(moved, staging, prosody, mouth=solved is None)
+    if moved.curve_edits and solved is not None:
+        moved = with_curves(moved, solved)[0]
     frames = delivery.hold_frames(fps)
     if not frames:
         return moved
     moved = moved.with_motion(with_gestures(moved.motion, moved.units))
     closed_s, moved = find_closed_times(moved), close_on_frame_grid(moved, fps)
-    if has_curves:
-        moved = with_curves(moved, character)[0]
+    if solved is not None:
+        moved = with_curves(moved, solved)[0]
     return hold_mouth(moved.resampled(fps), frames, closed_s)
 
 
