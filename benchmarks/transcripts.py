@@ -268,7 +268,7 @@ def _print_hints(corpora: Path, every: int) -> None:
                 sums.setdefault(kind, Counter()).update(
                     count=1,
                     warned=bool([text for text in warnings if "dictionary" not in text]),
-                    phones=1 - count_phone_edits(said, found) / len(said),  # type: ignore[arg-type]
+                    phones=1 - count_phone_edits(said, found) / max(len(said), 1),  # type: ignore[arg-type]
                     visemes=float(np.mean(_visemes(wanted) == _visemes(units))),  # type: ignore[arg-type]
                 )
         for kind, total in sums.items():

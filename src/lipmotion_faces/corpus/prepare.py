@@ -8,10 +8,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording, add_separate_sounds
@@ -35,8 +37,9 @@ from lipmotion_faces.corpus.supplied import (
     source_digests,
     trim_to_shared,
 )
+from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
 from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.track import UNSEEN_LIMIT, track
 from lipmotion_faces.tracking.trackers import MEDIAPIPE, make_tracker
 
 LOG = logging.getLogger("lipmotion")
@@ -55,7 +58,7 @@ class PrepareReport:
     kept     : names of the utterances that were prepared before, from the same source with the same settings
     failed   : reason for every recording that cannot be used, by name
     unseen   : number of frames without a face of every utterance that has any, by name
-    notes    : remarks on videos (cuts, damage, a covered mouth), by name
+    notes    : remarks on videos (cuts, damage and its times, a covered mouth), by name
     """
 
     corpus: Path
@@ -156,6 +159,7 @@ def prepare(
         with _refresh_at_end(corpus), worker_pool(min(processes, len(jobs))) as team:
             results = team.unordered_map(_process, jobs)
             outcomes = _collect(folder, results, len(jobs), monitor, DIVIDING_SHARE if parts else 0.0)
+        outcomes = _leave_out_damaged(corpus, outcomes, monitor)
         _warn_of_older(corpus, collection, outcomes)
     report = _make_report(corpus, folder, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
@@ -342,6 +346,45 @@ def _collect(
         monitor(Item(outcome.name, kind, outcome.problem or "; ".join((*outcome.notes, *unseen))))
         monitor(Progress(_STAGE, len(collected), count, done + (1 - done) * len(collected) / count))
     return collected
+
+
+def _leave_out_damaged(corpus: Corpus, outcomes: list[_Outcome], monitor: Monitor) -> list[_Outcome]:
+    """Find damaged pictures beside all others of the same speaker, and return the outcomes with them.
+
+    Their motion is interpolated, as where no face is seen; utterances with too many are removed.
+    """
+    if all(outcome.kept or outcome.problem for outcome in outcomes):
+        return outcomes
+    changed = {outcome.name: outcome for outcome in outcomes}
+    for speaker in corpus.speakers:
+        utterances = [corpus.utterance(name) for name in corpus.names(speakers=(speaker,))]
+        utterances = [each for each in utterances if each.track.crops is not None]
+        clips = [partial(np.asarray, each.track.crops) for each in utterances]
+        rates = [each.track.motion.rate_hz for each in utterances]
+        seen = [each.track.seen for each in utterances]
+        for each, damage in zip(utterances, find_damaged(clips, seen, rates, is_one=bool(speaker)), strict=True):
+            motion, wrong = each.track.motion, np.any(list(damage.values()), axis=0)
+            if not wrong.any():
+                continue
+            notes = describe_damage(damage, np.arange(len(wrong)) / motion.rate_hz)
+            right, folder = each.track.seen & ~wrong, corpus.folder(each.name)
+            before = changed.get(each.name, _Outcome(each.name))
+            if wrong.mean() > UNSEEN_LIMIT:
+                shutil.rmtree(folder)
+                problem = f"{'; '.join(notes)}; required: at least {1 - UNSEEN_LIMIT:.0%} of the pictures undamaged"
+                changed[each.name] = _Outcome(each.name, problem=problem)
+                monitor(Item(each.name, "skipped", problem))
+                continue
+            known, frames = np.flatnonzero(right), np.arange(len(right))
+            curves = np.stack([np.interp(frames, known, curve[known]) for curve in motion.values.T], axis=1)
+            track = replace(
+                each.track, motion=replace(motion, values=curves), seen=right, notes=(*each.track.notes, *notes)
+            )
+            write_utterance(folder, replace(each, track=track), read_entry(folder)["settings"])
+            changed[each.name] = replace(before, unseen=int((~right).sum()), notes=track.notes)
+            monitor(Item(each.name, "prepared", "; ".join((*notes, "interpolated"))))
+    corpus.refresh()
+    return list(changed.values())
 
 
 @contextmanager

@@ -216,12 +216,12 @@ def _duration_s(part: _Part) -> float:
 
 
 def _usable(footage: Footage) -> NDArray[np.bool_]:
-    """Return the frames that show the face, and those of gaps of at most ``LONGEST_GAP_S`` [shape=(T,)]."""
+    """Return the frames that show the face undamaged, and those of gaps up to ``LONGEST_GAP_S`` [shape=(T,)]."""
     usable = np.array(footage.track.seen)
     for start, stop in scenes_of(~usable, ()):
         if start > 0 and stop < len(usable) and stop - start <= LONGEST_GAP_S * footage.rate_hz:
             usable[start:stop] = True
-    return usable
+    return usable if footage.damaged is None else usable & ~footage.damaged
 
 
 def open_stored_background(background: StoredBackground) -> BackgroundSequence:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -31,14 +32,17 @@ from lipmotion_faces.appearance.lower_face import (
     best_scale,
     face_shape,
     face_signature,
+    mouth_part,
     region_map,
 )
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import best_background, chin_px
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
+from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
 from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
 from lipmotion_faces.tracking.frames import VideoSpan
+from lipmotion_faces.tracking.track import UNSEEN_LIMIT
 
 MOST_FOOTAGE_S = 240.0
 """Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""
@@ -289,10 +293,36 @@ def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Fi
             continue
         reason = f"shows another face than most recordings (likeness {value:.2f}, required {SAME_PERSON_LIKENESS})"
         monitor(Item(take.footage.path.name, "skipped", reason))
+    of_person = _leave_out_damaged(of_person, monitor)
     sizes = sorted({take.footage.size for take in of_person})
     if len(sizes) > 1:
         LOG.warning("the recordings have pictures of %d sizes; the background is one of them", len(sizes))
     return of_person
+
+
+def _leave_out_damaged(filmed: Sequence[_Filmed], monitor: Monitor) -> list[_Filmed]:
+    """Return takes without damaged pictures; those with too many are reported. Raises InputError: none is left."""
+    seen, (rows, columns) = [np.ones(len(take.used), bool) for take in filmed], mouth_part(1)
+    mouths = [partial(np.asarray, take.pictures[:, rows, columns]) for take in filmed]
+    result = []
+    rates = [take.footage.rate_hz / _step(take.footage) for take in filmed]
+    for take, damage in zip(filmed, find_damaged(mouths, seen, rates), strict=True):
+        footage, wrong = take.footage, np.any(list(damage.values()), axis=0)
+        if not wrong.any():
+            result.append(take)
+            continue
+        noted = "; ".join(describe_damage(damage, take.used / footage.rate_hz))
+        right, step = np.array(footage.track.seen), _step(footage)
+        for frame in take.used[wrong]:
+            right[frame : frame + step] = False
+        is_left_out = wrong.mean() > UNSEEN_LIMIT
+        monitor(Item(footage.path.name, "skipped" if is_left_out else "prepared", noted))
+        if not is_left_out:
+            without = replace(footage, track=replace(footage.track, seen=right), damaged=footage.track.seen & ~right)
+            result.append(replace(take, footage=without, used=take.used[~wrong], pictures=take.pictures[~wrong]))
+    if not result:
+        raise InputError(f"all {len(filmed)} recordings are damaged; give others")
+    return result
 
 
 def _film(take: Take) -> _Filmed | str:

@@ -40,6 +40,7 @@ class Footage:
     cuts          : the frames before which the camera changes, or the picture changes to or from somebody else, rising
     size          : height and width of the pictures, px
     rate_hz       : the video's nominal frame rate
+    damaged       : frames that were found to be damaged, of those seen at first [shape=(T,)]; None: none
     """
 
     path: Path
@@ -50,6 +51,7 @@ class Footage:
     cuts: tuple[int, ...]
     size: tuple[int, int]
     rate_hz: float
+    damaged: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.pictures_s)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Track
+from lipmotion_faces.tracking import damaged_pictures
 from lipmotion_faces.tracking.face_follower import FaceFollower
 from lipmotion_faces.tracking.frames import (
     WHOLE,
@@ -37,6 +38,8 @@ USABLE_SHARE = 0.5
 SMALL_EYES_PX = 35.0
 """A smaller median distance between the eyes is reported. GRID clips made small and tracked have a correlation of the
 opening with the clip as it was of 0.99 at 65 px, 0.98 at 40, 0.90 at 25."""
+COMPARED_PX = 360
+"""Every so many columns and rows of a picture are compared with the one before that fewer than this are left."""
 STRETCH_LIMIT = 2.0
 """A clip is refused when its time stamps span more than this many times the frames that it holds."""
 
@@ -141,11 +144,17 @@ class _Pictures:
     points: list[Array] = field(default_factory=list)
     mouths: list[NDArray[np.uint8]] = field(default_factory=list)
     sizes: set[tuple[int, int]] = field(default_factory=set)
+    changes: list[float] = field(default_factory=list)
+    before: NDArray[np.int16] | None = None
 
     def add(self, time_s: float, image: NDArray[np.uint8], points: Array | None) -> None:
         self.times_s.append(time_s)
         self.seen.append(points is not None)
         self.sizes.add((image.shape[0], image.shape[1]))
+        step = 1 + max(image.shape) // COMPARED_PX
+        before, self.before = self.before, image[::step, ::step].astype(np.int16)
+        is_same_size = before is not None and before.shape == self.before.shape
+        self.changes.append(float(np.abs(self.before - before).mean()) if is_same_size else np.inf)
         if points is not None:
             self.points.append(points)
             self.mouths.append(mouth_thumbnail(crop_mouth(image, eyes_to_image(points[_EYES, :2]))))
@@ -172,18 +181,23 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
     covered = pictures.mark_unseen(find_occluded_mouths(np.stack(pictures.mouths))) if pictures.mouths else 0
     times_s, cuts = np.array(pictures.times_s), tuple(follower.cuts())
     rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
+    repeated, frozen = damaged_pictures.find_repeated(pictures.changes, rate_hz)
+    found = np.array(pictures.seen)
+    pictures.mark_unseen(repeated[found])
     notes = (
         *damage_notes(video, times_s, rate_hz),
         *(f"cut at {times_s[index]:.2f} s" for index in cuts),
         *([f"another face, or one that is not recognised, in {others} frames"] if others else []),
         *([f"the mouth is covered, or the picture damaged, in {covered} frames"] if covered else []),
+        *damaged_pictures.describe_damage({"frozen": frozen}, times_s),
+        *([f"{doubled} pictures are doubled"] if (doubled := int((repeated & ~frozen).sum())) else []),
     )
     if pictures.points:
         unit_px = float(np.median(distance_px(np.stack(pictures.points), EYE_CORNERS)))
         if unit_px < SMALL_EYES_PX:
             wanted = f"{SMALL_EYES_PX:.0f} give a good track; film closer"
             notes = (*notes, f"the face is small: {unit_px:.0f} px between the eyes, {wanted}")
-    _check(path, times_s, np.array(pictures.seen), video, rate_hz, notes)
+    _check(path, times_s, found & ~frozen, video, rate_hz, notes)
     return TrackedFrames(
         times_s, np.array(pictures.seen), np.stack(pictures.points), frozenset(pictures.sizes), cuts, rate_hz, notes
     )

@@ -173,7 +173,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             constraints,
             close=self.config.closures,
             reliability=experts.reliability,
-            articulators=hear_articulators(speech),
+            articulators=None if model.prior is None else hear_articulators(speech),
             voice=speech.voice,
         )
         return Generation(

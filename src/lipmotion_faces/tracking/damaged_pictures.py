@@ -1,0 +1,162 @@
+"""Damaged pictures: repeated ones, and dark, blurred and smeared mouths beside all others of the same person.
+
+Video that lost data is predicted from pictures that are not there: the mouth smears, until the next key picture repairs
+it at once. Such a mouth is unlike any other of the person, as a rare one is too, but a rare one comes and goes slowly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.stats.pca import choose_evenly
+from lipmotion_faces.tracking.packages import import_opencv
+
+Pictures = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
+Floats = NDArray[np.float32]
+Damage = dict[str, Mask]
+"""Masks of pictures [shape=(T,)] by the kind of damage."""
+
+REPEATED_SHARE = 0.12
+"""A picture repeats the one before if it differs less than this share of how much most pictures (75 %) do: decoders add
+noise to repeated ones (up to 0.1 in H.264; GRID: 1 picture of 6,882 is below)."""
+FROZEN_S = 0.2
+"""Pictures that repeat one another for so long are frozen; single ones are doubled, as where frame rates were changed.
+"""
+MOST_COMPARED = 4000
+"""Mouths of a person that each one is compared with, spread evenly."""
+LEAST_COMPARED = 500
+"""With fewer mouths, no one can say what is unlike the others."""
+APART_S = 10.0
+"""A mouth is compared with those of other clips, and with those of its own that are so far away: smears last seconds.
+"""
+SIZE, FINE_PX, COARSE_PX = (24, 18), 1.0, 5.0
+"""Size of a compared mouth, and the details in it: between these two standard deviations, px of the mouth region."""
+LEAST_CONTRAST = 20.0
+"""Mouths with less contrast than this have none: of noise nothing can be compared."""
+UNLIKE, REPAIR = 2.5, 4.5
+"""A mouth is unlike all others at this multiple of the median of one less the best correlation; it is smeared, if the
+next one is not, and is lower by the second multiple (GRID s1: 7 clips of 524, each repaired at a key picture of the
+original)."""
+LEAST_USUAL = 0.01
+"""Smallest median that counts: in footage of a still mouth it is 0."""
+LEAST_SMEARED = 2
+"""Pictures that are smeared, at least: a mouth may be unlike others for one."""
+SHARPNESS, BLUR_FRAMES = 0.7, 5
+"""Mouths are blurred if the median of so many in a row has less than this share of the person's sharpness (GRID s1:
+0.68 in one damaged clip, at least 0.8 in the others)."""
+DARKNESS = 0.4
+"""Mouths are dark below this share of the person's light (GRID s1: 0.85 and more)."""
+
+
+def find_repeated(changes: Sequence[float], rate_hz: float) -> tuple[Mask, Mask]:
+    """Return which pictures repeat the one before, and which are frozen, among them [both shape=(T,)].
+
+    changes : mean difference of each picture from the one before, grey levels; of the first, infinity
+    """
+    known = [change for change in changes if np.isfinite(change)] or [0.0]
+    repeated = np.array(changes) < REPEATED_SHARE * np.percentile(known, 75)
+    frozen = np.zeros(len(repeated), bool)
+    for start, stop in spans(repeated):
+        frozen[start:stop] = stop - start >= FROZEN_S * rate_hz
+    return repeated, frozen
+
+
+def spans(mask: Mask) -> list[tuple[int, int]]:
+    """Return the parts in which a mask holds: first index, and the one after the last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def describe_damage(damage: Damage, times_s: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return notes on damaged pictures at some times: what is damaged, from when to when."""
+    parts = {
+        kind: [(times_s[start], times_s[stop - 1]) for start, stop in spans(mask)] for kind, mask in damage.items()
+    }
+    texts = {kind: ", ".join(f"{start:.2f} to {stop:.2f} s" for start, stop in spans) for kind, spans in parts.items()}
+    return tuple(f"{kind} pictures: {text}" for kind, text in texts.items() if text)
+
+
+def find_damaged(
+    clips: Sequence[Callable[[], Pictures]], seen: Sequence[Mask], rate_hz: Sequence[float], *, is_one: bool = True
+) -> list[Damage]:
+    """Return, for each clip of one person, which mouths are dark, blurred and smeared.
+
+    clips   : each returns the mouth pictures of a clip [shape=(T, 56, 72, 3)]; it is called twice, one after the other
+    seen    : in which frames of each clip the mouth is seen [shape=(T,)]
+    rate_hz : frame rate of each clip
+    is_one  : False: who is in them is not known; light and sharpness are compared within each clip
+    Returns masks [shape=(T,)] by the kind of damage. Where there is too little to compare with, nothing is smeared.
+    """
+    if not clips:
+        return []
+    places = np.array([(n, frame) for n, mask in enumerate(seen) for frame in np.flatnonzero(mask)]).reshape(-1, 2)
+    places = places[choose_evenly(MOST_COMPARED, len(places))]
+    looks, bank = [], []
+    for number, clip in enumerate(clips):
+        *look, details = _describe(clip())
+        looks.append(look)
+        bank.append(details[places[places[:, 0] == number, 1]])
+    unlike = []
+    for number, (clip, rate) in enumerate(zip(clips, rate_hz, strict=True)):
+        own = np.where(places[:, 0] == number, places[:, 1], -(10**9))
+        unlike.append(_unlikeness(_describe(clip())[2], np.concatenate(bank), own, APART_S * rate))
+    usual = max(_median(unlike, seen), LEAST_USUAL)
+    result = []
+    for number, (mask, values) in enumerate(zip(seen, unlike, strict=True)):
+        others = slice(None) if is_one else slice(number, number + 1)
+        light, sharpness = (_median([look[part] for look in looks[others]], seen[others]) for part in (0, 1))
+        lights, sharp = looks[number]
+        dark, blurred = lights < DARKNESS * light, _median_of_neighbours(sharp) < SHARPNESS * sharpness
+        found = {"dark": dark, "blurred": blurred, "smeared": _find_smeared(values / usual)}
+        result.append({kind: mask & which for kind, which in found.items()})
+    return result
+
+
+def _median(values: Sequence[Floats], masks: Sequence[Mask]) -> float:
+    some = np.concatenate([each[mask] for each, mask in zip(values, masks, strict=True)])
+    return float(np.median(some)) if len(some) else 0.0
+
+
+def _find_smeared(unlike: Floats) -> Mask:
+    """Return which mouths are unlike all others until they are repaired at once."""
+    result = np.zeros(len(unlike), bool)
+    for start, stop in spans(unlike > UNLIKE):
+        if stop < len(unlike) and stop - start >= LEAST_SMEARED and unlike[stop - 1] - unlike[stop] >= REPAIR:
+            result[start:stop] = True
+    return result
+
+
+def _unlikeness(mouths: Floats, bank: Floats, frames: NDArray[np.intp], apart: float) -> Floats:
+    """Return one less the best correlation of each mouth with those of a bank that are not near it in its own clip.
+
+    frames : where in its own clip they are; of others, far away
+    Returns zeros [shape=(T,)] where some mouth has too few to be compared with.
+    """
+    is_near = np.abs(np.arange(len(mouths))[:, None] - frames) < apart
+    if not len(mouths) or (~is_near).sum(axis=1).min() < LEAST_COMPARED:
+        return np.zeros(len(mouths), np.float32)
+    return np.asarray(1 - np.where(is_near, -1, mouths @ bank.T).max(axis=1))
+
+
+def _describe(mouths: Pictures) -> tuple[Floats, Floats, Floats]:
+    """Return light, sharpness [shape=(T,)] and details [shape=(T, 432), of length 1] of mouths."""
+    cv2 = import_opencv()
+    light, sharpness, details = [], [], []
+    for mouth in mouths:
+        grey = mouth.mean(axis=-1, dtype=np.float32)
+        fine, coarse = (cv2.GaussianBlur(grey, (0, 0), width) for width in (FINE_PX, COARSE_PX))
+        detail = cv2.resize(fine - coarse, SIZE, interpolation=cv2.INTER_AREA).ravel()
+        detail -= detail.mean()
+        light.append(grey.mean())
+        sharpness.append(np.abs(cv2.Laplacian(grey, cv2.CV_32F)).mean() / max(float(grey.mean()), 1.0))
+        details.append(detail / max(float(np.linalg.norm(detail)), LEAST_CONTRAST))
+    return np.array(light), np.array(sharpness), np.array(details, np.float32)
+
+
+def _median_of_neighbours(values: Floats) -> Floats:
+    half = BLUR_FRAMES // 2
+    return np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, half, "edge"), BLUR_FRAMES), axis=-1)
