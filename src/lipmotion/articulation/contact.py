@@ -31,6 +31,8 @@ than a picture at 24 a second), and for no longer than the second one."""
 CONTACT_SHARE: Final = 0.6
 FADE_S: Final = 0.04
 """Lips that are made to touch come together, and part, within this time."""
+EDITED: Final = {"opening": "edited_opening", "width": "edited_width"}
+"""By channels that edits have decided, the channels that say how far, 0 to 1: as far, phones change nothing of them."""
 EDITED_GAP: Final = 0.15
 """Lips that are further apart than this in all of a p, b or m are left so: somebody edited or pinned them."""
 GAP: Final = "lip_gap"
@@ -67,6 +69,12 @@ def read_gap(motion: Motion) -> Curve:
     return opening_to_gap(motion["opening"].astype(np.float64))
 
 
+def read_edited(motion: Motion, channel: str) -> Curve:
+    """Return how far an edit has decided a channel of ``EDITED`` in every frame, 0 to 1 [shape=(T,)]."""
+    name = EDITED[channel]
+    return np.clip(motion[name].astype(np.float64), 0, 1) if name in motion.names else np.zeros(len(motion.values))
+
+
 class ClosedPhone(NamedTuple):
     """A p, b or m: the frame in which the lips are closest together, and when the phone begins and ends, in seconds."""
 
@@ -97,7 +105,7 @@ def close_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
     """Return a gap with the lips in contact in every p, b and m, for ``CONTACT_S`` or longer [shape=(T,)].
 
     gap : of the frames of the motion, with all that phones but p, b and m ask of it [shape=(T,)]
-    It is 0 where the lips touch, and at least ``LEAST_GAP`` where not.
+    It is 0 where the lips touch, and at least ``LEAST_GAP`` where not. What edits have decided stays (``EDITED``).
     """
     time_s, open_share = motion.time_s, np.ones(len(gap))
     parted = np.concatenate([[-1], np.flatnonzero(gap >= LEAST_GAP / 2), [len(gap)]])
@@ -112,7 +120,7 @@ def close_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
         near = slice(*np.searchsorted(time_s, (at_s - 0.2, at_s + 0.2)))
         outside = np.abs(time_s[near] - at_s) - length_s / 2 - 1e-9
         open_share[near] = np.minimum(open_share[near], smooth_step(outside / FADE_S))
-    gap = gap * open_share
+    gap = gap * np.maximum(open_share, read_edited(motion, "opening"))
     return np.where(gap < LEAST_GAP / 2, 0.0, np.maximum(gap, LEAST_GAP))
 
 

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.paths import best_segments
-from lipmotion.types import Generation, Motion, Span, Timeline, Unit
+from lipmotion.types import CurveEdit, Generation, Hold, Motion, Span, Timeline, Unit
+from lipmotion.types.generation import Locked
 from lipmotion.types.values import parse_clock, parse_number
 from lipmotion.units import SILENCE, VISEMES, group_words, is_silent, mark_closing_phones
 from lipmotion.units.phones import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choose_drawn_shape
@@ -224,7 +225,19 @@ def frame_costs(generation: Generation, frames: int, fps: float, intensity: floa
             frame = min(int(_find_least_open_s(span, generation.motion) * fps), frames - 1)
             cost[frame] += penalty
             cost[frame, _NAMES.index(shape)] -= penalty
-    return cost
+    return _hold_costs(cost, generation.curve_edits, fps)
+
+
+def _hold_costs(cost: Array, edits: Sequence[CurveEdit], fps: float) -> Array:
+    """Return costs of frames that stay where the mouth is held, whatever is said."""
+    held = cost.copy()
+    for edit in edits:
+        if isinstance(edit, Hold | Locked):
+            ends = np.array([edit.start_s, edit.end_s]) * fps
+            first, last = np.clip(np.floor(ends + 1e-6), 0, len(cost) - 1).astype(int)
+            inside = slice(first, last + 1)
+            held[inside] = cost[first] if isinstance(edit, Hold) else _hold_costs(cost, edit.edits, fps)[inside]
+    return held
 
 
 def _find_least_open_s(span: Span[Unit], motion: Motion) -> float:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import EDITED, gap_to_opening, read_gap
 from lipmotion.articulation.delivery import intensify
+from lipmotion.articulation.phone_targets import SAID, with_gestures
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.types import WEIGHT, CurveEdit, DrawnCurve, Gain, Generation, Hold, Motion, Pin, Timeline, Unit, frame_of
+from lipmotion.types.generation import Locked
 
 Curve = NDArray[np.float64]
 
@@ -21,25 +24,37 @@ PIN_REACH_S = 0.1
 """A pin bends a curve within this time before and after it."""
 GAIN_EDGE_S = 0.1
 """A gain grows and fades in this time."""
+SAME_GAP = 1e-6
 LOCK_EDGE_S = 0.05
 """Motion goes over into a locked span, or one that is held, and out of it, in this time."""
 
 
-def apply_curve_edits(motion: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
+def apply_curve_edits(
+    motion: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit], *, held: Collection[str] = ()
+) -> Motion:
     """Return motion with edits of its channels; those of other channels change nothing.
 
     A pinned value holds exactly in the frame nearest to its time, also where a gain acts; the curve bends towards it
     within ``PIN_REACH_S``. A gain multiplies weights, and the distance of other channels to their rest pose. What is
     drawn replaces the curve, and what the gains before it did there. Weights stay between 0 and 1.
     units : phones in time, whose silences show the rest pose
+    held  : channels that phones make, and that stay where the mouth is held (``hold_mouth``)
     Raises InputError: a pin outside the motion, or a weight that is to be less than 0 or more than 1.
     """
-    edits = [edit for edit in edits if edit.channel in motion.names]
-    if not edits:
+    locked = [edit for edit in edits if isinstance(edit, Locked)]
+    edits = [edit for edit in edits if edit.channel in motion.names or isinstance(edit, Hold | Locked)]
+    phonetic = np.isin(motion.names, list(held))
+    if not any(edit.channel or (phonetic.any() and isinstance(edit, Hold)) for edit in edits):
         return motion
     time_s, values, rest = motion.time_s, motion.values.astype(np.float64), find_rest_frames(motion, units)
     pins = []
     for edit in edits:
+        if isinstance(edit, Hold):
+            frame = min(round(edit.start_s * motion.rate_hz), len(values) - 1)
+            share = span_weight(time_s, edit.start_s, edit.end_s, LOCK_EDGE_S)[:, None] * phonetic
+            values += share * (values[frame] - values)
+        if isinstance(edit, Hold | Locked):
+            continue
         column = motion.column(edit.channel)
         is_weight = motion.channels[column].unit == WEIGHT
         if isinstance(edit, Pin):
@@ -66,6 +81,9 @@ def apply_curve_edits(motion: Motion, units: Timeline[Unit], edits: Sequence[Cur
     edited = {edit.channel for edit in edits}
     weights = [each.unit == WEIGHT and each.name in edited for each in motion.channels]
     values[:, weights] = np.clip(values[:, weights], 0, 1)
+    for lock in locked:
+        before = apply_curve_edits(motion, units, lock.edits, held=held).values
+        values += span_weight(time_s, lock.start_s, lock.end_s, LOCK_EDGE_S)[:, None] * (before - values)
     return replace(motion, values=values)
 
 
@@ -106,12 +124,49 @@ def apply_gain(generation: Generation, gain: Gain) -> Generation:
 
 
 def hold_mouth(generation: Generation, hold: Hold) -> Generation:
-    """Return a generation whose mouth stays for a time as it is at the start of it, and goes over into that."""
+    """Return a generation whose mouth stays for a time as it is at the start of it, and goes over into that.
+
+    All that phones ask of lips and tongue becomes channels (``SAID``), which stay, too; the opening alone decides how
+    far the lips are apart (``EDITED``). They leave the hold no faster than ``LIP_SPEED``.
+    """
+    from lipmotion.articulation.mouth import LIP_SPEED, spoken_mouth
+
+    units = generation.units
+    generation = generation.with_motion(with_gestures(generation.motion, units, (*SAID, EDITED[OPENING])))
     motion = generation.motion
-    frame = min(round(hold.start_s * motion.rate_hz), len(motion.values) - 1)
-    still = replace(motion, values=np.broadcast_to(motion.values[frame], motion.values.shape))
-    weight = span_weight(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S)
+    frame, after_s = min(round(hold.start_s * motion.rate_hz), len(motion.values) - 1), LOCK_EDGE_S
+    pose = motion.values[frame].copy()
+    if OPENING in motion.names:
+        column, gap = motion.column(OPENING), spoken_mouth(motion, units).gap[frame]
+        if abs(gap - read_gap(motion)[frame]) > SAME_GAP:
+            further = gap_to_opening(gap) - pose[column]
+            pose[[motion.column(name) for name in (OPENING, "outer") if name in motion.names]] += further
+        leaving = motion.values[slice(*np.searchsorted(motion.time_s, (hold.end_s, hold.end_s + PIN_REACH_S))), column]
+        after_s = max(after_s, np.pi / 2 * np.abs(leaving - pose[column]).max(initial=0.0) / LIP_SPEED)
+    pose[motion.column(EDITED[OPENING])] = 1.0
+    still = replace(motion, values=np.broadcast_to(pose, motion.values.shape))
+    weight = span_weight(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S, after_s)
     return apply_stretch(generation, _cut_stretch(replace(generation, motion=still), weight))
+
+
+def mark_edited(motion: Motion, edits: Sequence[CurveEdit]) -> Motion:
+    """Return motion that says where pins and what is drawn have decided its channels (``EDITED``)."""
+    for channel, name in EDITED.items():
+        decided = [edit for edit in edits if edit.channel == channel and isinstance(edit, Pin | DrawnCurve)]
+        share = edited_share(motion.time_s, decided)
+        if share.any():
+            motion = with_gestures(motion, Timeline(()), [name])
+            values = motion.values.copy()
+            values[:, motion.column(name)] = np.maximum(motion[name], share)
+            motion = replace(motion, values=values)
+    return motion
+
+
+def edited_share(time_s: Curve, edits: Sequence[CurveEdit]) -> Curve:
+    """Return how far some of the edits act at each time, 0 to 1 [shape=(T,)]."""
+    ends = [(edit.time_s,) * 2 if isinstance(edit, Pin) else (edit.start_s, edit.end_s) for edit in edits]
+    none = np.zeros(len(time_s))
+    return np.max([none, *(span_weight(time_s, *each, PIN_REACH_S) for each in ends)], axis=0)
 
 
 class MotionStretch(NamedTuple):
@@ -151,9 +206,11 @@ def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
     return replace(first, motion=replace(first.motion, values=values), spread=variance)
 
 
-def span_weight(time_s: Curve, start_s: float, end_s: float, edge_s: float) -> Curve:
-    """Return 1 within a span, falling to 0 within ``edge_s`` before and after it [shape=(T,)]."""
-    outside = np.maximum(np.maximum(start_s - time_s, time_s - end_s), 0)
-    outside[outside < 1e-9] = 0.0  # the time of a frame is rounded
-    weight: Curve = (1 + np.cos(np.pi * np.clip(outside / edge_s, 0, 1))) / 2
+def span_weight(time_s: Curve, start_s: float, end_s: float, edge_s: float, after_s: float | None = None) -> Curve:
+    """Return 1 within a span, falling to 0 within ``edge_s`` before it and ``after_s`` (None: the same) after it
+    [shape=(T,)].
+    """
+    outside = np.maximum(np.maximum((start_s - time_s) / edge_s, (time_s - end_s) / (after_s or edge_s)), 0)
+    outside[outside < 1e-6] = 0.0  # the time of a frame is rounded
+    weight: Curve = (1 + np.cos(np.pi * np.clip(outside, 0, 1))) / 2
     return weight

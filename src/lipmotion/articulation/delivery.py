@@ -11,12 +11,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import CLOSED_OPENING, find_closures, smooth_step
+from lipmotion.articulation.contact import CLOSED_OPENING, EDITED, find_closures, smooth_step
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.types import EYE_DISTANCE, WEIGHT, CurveEdit, Generation, Motion, Pin, Span, StateTrace, Timeline, Unit
 from lipmotion.types.delivery import Delivery as Delivery  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.generation import Locked
 from lipmotion.units import is_silent
 
 
@@ -100,12 +101,6 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
                 values[at] = motion.values[frame]
-    edits: list[CurveEdit] = []
-    for edit in generation.curve_edits:  # without pins that are then outside
-        if not isinstance(edit, Pin):
-            edits.append(replace(edit, start_s=edit.start_s + by_s, end_s=edit.end_s + by_s))
-        elif 0 <= edit.time_s + by_s <= duration_s:
-            edits.append(replace(edit, time_s=edit.time_s + by_s))
     return replace(
         generation,
         motion=Motion(values, rate_hz, motion.channels),
@@ -114,8 +109,22 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
             generation.units, by_s, max(duration_s, _end_s(generation.units) + delivery.offset_ms / 1000)
         ),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
-        curve_edits=tuple(edits),
+        curve_edits=_shift_edits(generation.curve_edits, by_s, duration_s),
     )
+
+
+def _shift_edits(edits: Sequence[CurveEdit], by_s: float, duration_s: float) -> tuple[CurveEdit, ...]:
+    """Return edits later by ``by_s``, without pins that are then outside."""
+    shifted: list[CurveEdit] = []
+    for edit in edits:
+        if not isinstance(edit, Pin):
+            later = replace(edit, start_s=edit.start_s + by_s, end_s=edit.end_s + by_s)
+            if isinstance(later, Locked):
+                later = replace(later, edits=_shift_edits(later.edits, by_s, duration_s))
+            shifted.append(later)
+        elif 0 <= edit.time_s + by_s <= duration_s:
+            shifted.append(replace(edit, time_s=edit.time_s + by_s))
+    return tuple(shifted)
 
 
 def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Unit]:
@@ -170,7 +179,7 @@ def intensify(generation: Generation, intensity: float, opening: Curve | None = 
     return replace(generation, motion=replace(motion, values=larger), spread=spread)
 
 
-ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", *GROWING)
+ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", "oval", *GROWING, *EDITED.values())
 """Channels that are not movements away from a rest pose (docs/articulation.md)."""
 
 

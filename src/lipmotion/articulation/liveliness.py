@@ -24,12 +24,16 @@ from numpy.typing import NDArray
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.expression import action_units
 from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
-from lipmotion.units import is_silent
+from lipmotion.units import group_words, is_silent
 
 Curve = NDArray[np.float64]
 
-BLINK_S, MEAN_BLINK_S, MIN_BLINK_S = 0.24, 3.3, 1.1
+BLINK_S, MEAN_BLINK_S, MIN_BLINK_S = 0.24, 4.1, 1.1
 """Duration of a blink; mean and least time between two."""
+FIRST_BLINK_S, SHUT_S = (1.0, 2.6), 0.08
+"""Between these times the first blink comes; the eyes are shut so long after one begins."""
+NEAR_BORDER_S = 0.06
+"""Eyes are shut within this time of the border of a word, or in a pause."""
 PHRASE_PAUSE_S = 0.15
 """A pause of at least this duration ends a phrase."""
 SACCADE_S = 0.05
@@ -153,7 +157,8 @@ def compute_liveliness(  # noqa: PLR0913
     turn = np.zeros((len(time_s), 3))
     if head:
         turn = _turn_head(time_s, accent, _find_talking(spoken, time_s), spoken, _generator(seed, 1))
-    lids = lid_closure(time_s, blink_times(end_s, spoken, _generator(seed, 2))) if blinks else still
+    words = [(span.start_s, span.end_s) for span in group_words(units) if span.label]
+    lids = lid_closure(time_s, blink_times(end_s, spoken, words, _generator(seed, 2))) if blinks else still
     aim = _aim_eyes(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
     raised = _raise_brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
     mood, eyes = action_units(motion, time_s), aim - GAZE_COUNTER_SHARE * turn[:, :2]
@@ -186,18 +191,32 @@ def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list
     return phrases
 
 
-def blink_times(end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> list[float]:
-    """Return when blinks begin, in seconds: at random, but rather at the end of a phrase where one is near."""
+def blink_times(
+    end_s: float, spoken: list[tuple[float, float]], words: list[tuple[float, float]], rng: np.random.Generator
+) -> list[float]:
+    """Return when blinks begin, in seconds: at random, but rather at the end of a phrase where one is near.
+
+    spoken, words : starts and ends of phrases, and of words where they are known: no blink is in the middle of one
+    """
     ends = np.array([end for _, end in spoken] or [-np.inf])
+    starts_s, ends_s = np.array(words).reshape(-1, 2).T
+
+    def is_in_word(begin: float) -> bool:
+        shut = begin + SHUT_S
+        return bool(np.any((starts_s + NEAR_BORDER_S < shut) & (shut < ends_s - NEAR_BORDER_S)))
+
     begins: list[float] = []
-    at = float(rng.uniform(0.6, 2.2))
+    at = float(rng.uniform(*FIRST_BLINK_S))
     while at < end_s:
         near = ends[np.abs(ends - at) < 0.7]
         chosen = float(near[0]) - 0.05 if len(near) and rng.random() < 0.7 else at
-        if not begins or chosen > begins[-1] + MIN_BLINK_S:
-            begins.append(max(chosen, 0.0))
-            if rng.random() < 0.1:  # a double blink
-                begins.append(begins[-1] + 0.34)
+        if is_in_word(chosen):
+            borders = np.concatenate([starts_s, ends_s])
+            chosen = float(borders[np.abs(borders - chosen - SHUT_S).argmin()]) - SHUT_S
+        if chosen >= FIRST_BLINK_S[0] and (not begins or chosen > begins[-1] + MIN_BLINK_S):
+            begins.append(chosen)
+            if rng.random() < 0.1 and not is_in_word(chosen + 0.34):  # a double blink
+                begins.append(chosen + 0.34)
         at += MIN_BLINK_S + float(rng.gamma(2.0, (MEAN_BLINK_S - MIN_BLINK_S) / 2))
     return begins
 

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import GAP, close_lips, read_gap, sample_pictures
+from lipmotion.articulation.contact import GAP, close_lips, read_edited, read_gap, sample_pictures
 from lipmotion.articulation.expression import action_units
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
-from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, TIP_OUT, TIP_UP, gesture_curves
+from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, SAID, TIP_OUT, TIP_UP, gesture_curves
 from lipmotion.articulation.rest import find_rest_frames, measure_at_rest
 from lipmotion.errors import InputError
 from lipmotion.types import Motion, Timeline, Unit
@@ -211,8 +211,8 @@ def spoken_mouth(
     """
     check_spoken(motion, motion.rate_hz if fps is None else fps)
     rest, opening = at_rest or measure_mouth_at_rest(motion, units), motion["opening"].astype(np.float64)
-    weights = gesture_curves(units, motion.time_s, [name for name in (*GESTURES, OVAL) if name not in motion.names])
-    weights |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*GESTURES} & {*motion.names}}
+    weights = gesture_curves(units, motion.time_s, [name for name in SAID if name not in motion.names])
+    weights |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*SAID} & {*motion.names}}
     # w has half the press of p, with protruded lips: a hole that is almost closed
     weights["pursed"] = np.clip(weights["lip_press"] / (0.8 * PURSED_PRESS), 0, 1) * weights["protrusion"]
     weights["pursed"] *= np.clip((0.75 - weights["lip_press"]) / 0.15, 0, 1)
@@ -223,7 +223,7 @@ def spoken_mouth(
         free = np.clip(1 - 2 * weights["lip_press"], 0, 1) * (1 - PARTED_ROUND_SHARE * weights["protrusion"])
         gap = gap + free * wanted * np.clip(1 - gap / (2 * DROPPED_GAP), 0, 1)
     if GAP not in motion.names:
-        gap = _articulate(gap, weights, motion.time_s)
+        gap += (1 - read_edited(motion, "opening")) * (_articulate(gap, weights, motion.time_s) - gap)
     gap = close_lips(gap, motion, units)
     expressed = _express(mood, weights)
     weights[OVAL] = weights[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
@@ -316,7 +316,9 @@ def _widen(motion: Motion, rest: MouthAtRest, weights: dict[str, Curve]) -> Curv
     width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)
     for name, wider in (("smile", SMILE_WIDTH), ("stretched", STRETCH_WIDTH), ("dropped", DROPPED_WIDTH)):
         width = width + wider * weights[name]
+    free = width
     for name, limit in (("protrusion", ROUND_WIDTH), ("pursed", PURSED_WIDTH), (OVAL, OVAL_WIDTH)):
         width = width + weights[name] * (np.minimum(width, limit) - width)
     spread = weights["spread"] * (1 - weights["protrusion"])
-    return np.asarray(width + spread * (np.maximum(width, SPREAD_WIDTH) - width))
+    width = width + spread * (np.maximum(width, SPREAD_WIDTH) - width)
+    return np.asarray(width + read_edited(motion, "width") * (free - width))

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import EDITED
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, mark_closing_phones
 
@@ -28,7 +29,9 @@ Curve = NDArray[np.float64]
 GESTURES = ("tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth")
 """The articulatory channels; each is a weight from 0 to 1 (docs/articulation.md)."""
 OVAL = "oval"
-"""How far the opening is tall and narrow instead of wide: for aa. It is drawn, but is no channel of motion files."""
+"""How far the opening is tall and narrow instead of wide: for aa. Motion has it as a channel where edits hold it."""
+SAID = (*GESTURES, OVAL)
+"""All that phones ask of lips and tongue: a motion that has these channels asks its phones for nothing of it."""
 TIP_UP, TIP_OUT = 0.6, 1.0
 """Values of ``tongue``: the tip is at the ridge behind the upper teeth; the tip is between the teeth."""
 PURSED_PRESS = 0.5
@@ -154,9 +157,10 @@ def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] 
 
 
 def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] = GESTURES) -> Motion:
-    """Return the motion with the articulatory channels that it lacks, after its own channels."""
-    missing = [name for name in names if name in GESTURES and name not in motion.names]
-    curves = gesture_curves(units, motion.time_s, missing)
+    """Return the motion with the channels of ``SAID`` that it lacks, after its own channels; ``EDITED`` are 0."""
+    missing = [name for name in names if name not in motion.names]
+    curves = gesture_curves(units, motion.time_s, [name for name in missing if name in SAID])
+    curves |= {name: np.zeros(len(motion.values)) for name in missing if name in EDITED.values()}
     if not curves:
         return motion
     values = np.hstack([motion.values, np.stack(list(curves.values()), axis=1).astype(motion.values.dtype)])

@@ -15,6 +15,7 @@ from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.liveliness import (
     BLINK_S,
     BROW_RAISE,
+    FIRST_BLINK_S,
     GAZE_COUNTER_SHARE,
     MEAN_BLINK_S,
     MIN_BLINK_S,
@@ -43,6 +44,10 @@ SWAY_STEPS = 250
 """The sway of so many steps is computed at once."""
 PHRASE_END_SHARE = 0.5
 """Share of the ends of phrases at which a blink comes."""
+LONGEST_WAIT_S = 0.5
+"""A blink waits so long for a pause: where words end is not known."""
+BORDER_S = 0.8
+"""For so long after a phrase begins the eyes rather leave the listener."""
 
 
 class Idling:
@@ -50,10 +55,10 @@ class Idling:
 
     def __init__(self, seed: int = 0) -> None:
         self._seed, self._rng = seed, np.random.default_rng([seed, 2])
-        self._blinks = deque([float(self._rng.uniform(0.6, 2.2))], 3)
+        self._blinks, self._waited_s = deque([float(self._rng.uniform(*FIRST_BLINK_S))], 3), 0.0
         self._fixations = deque([(-1.0, (0.0, 0.0)), (0.0, (0.0, 0.0))], 2)
         self._until_s = float(self._rng.uniform(0.4, 1.2))
-        self._accent, self._talking, self._spoke = 0.0, 0.0, False
+        self._accent, self._talking, self._spoke, self._began_s = 0.0, 0.0, False, -BORDER_S
         self._turn = np.zeros(2)
         self._swayed = -1, np.zeros((0, 3))
         self.target = np.zeros(2)
@@ -65,14 +70,16 @@ class Idling:
         opening : of the mouth, in standard deviations of the speaker
         speaks  : whether it speaks now
         """
-        ended, self._spoke = self._spoke and not speaks, speaks
+        ended = self._spoke and not speaks
+        self._began_s = time_s if speaks and not self._spoke else self._began_s
+        self._spoke = speaks
         accent = min(max(opening / ACCENT_OPENING - 1, 0.0), 1.0) if speaks else 0.0
         self._accent += STEP_S / ACCENT_S * (accent - self._accent)
         self._talking += STEP_S / TALKING_S * (speaks - self._talking)
         self._turn += STEP_S / TURNING_S * (HEAD_SHARE * self.target - self._turn)
         self._draw_blink(time_s, ended)
         if time_s >= self._until_s:
-            target, stay_s = draw_fixation(self._rng, self._fixations[-1][1], ended)
+            target, stay_s = draw_fixation(self._rng, self._fixations[-1][1], time_s - self._began_s < BORDER_S)
             self._fixations.append((time_s, target))
             self._until_s = time_s + stay_s
         turn = (STILL_SHARE + (1 - STILL_SHARE) * self._talking) * self._sway_at(time_s)
@@ -102,7 +109,10 @@ class Idling:
         """Decide when the lids fall next: at random, and rather where a phrase ends."""
         last = self._blinks[-1]
         if ended and time_s < last and self._rng.random() < PHRASE_END_SHARE:
-            before = self._blinks[-2] if len(self._blinks) > 1 else -np.inf
-            self._blinks[-1] = max(time_s, before + MIN_BLINK_S)
-        elif time_s > last:
+            before = self._blinks[-2] + MIN_BLINK_S if len(self._blinks) > 1 else FIRST_BLINK_S[0]
+            self._blinks[-1] = max(time_s, before)
+        elif time_s >= last and self._spoke and self._waited_s < LONGEST_WAIT_S:
+            self._blinks[-1], self._waited_s = time_s + STEP_S, self._waited_s + STEP_S
+        elif time_s >= last:
+            self._waited_s = 0.0
             self._blinks.append(last + MIN_BLINK_S + float(self._rng.gamma(2.0, (MEAN_BLINK_S - MIN_BLINK_S) / 2)))

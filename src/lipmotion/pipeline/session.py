@@ -26,8 +26,9 @@ from lipmotion.articulation.curve_edits import (
     cut_locked_stretch,
     find_pinned_frame,
     hold_mouth,
+    mark_edited,
 )
-from lipmotion.articulation.phone_targets import GESTURES, with_gestures
+from lipmotion.articulation.phone_targets import GESTURES, SAID, with_gestures
 from lipmotion.errors import AlignmentError, InputError, shorten
 from lipmotion.kernels.compiler import numba_works, one_thread
 from lipmotion.motion.speaker_maps import SpeakerMap
@@ -80,6 +81,7 @@ from lipmotion.types import (
     Unit,
     silent_monitor,
 )
+from lipmotion.types.generation import Locked
 from lipmotion.units import Pronunciation, group_words, split_words
 
 ResultT = TypeVar("ResultT")
@@ -316,11 +318,20 @@ class Session:
         """Return the motion after some edits, with locked spans as they were when they were locked."""
         self._edited_units(steps)  # refuses phones that change what is locked
         generation = self._with_curves(tuple(step for step in steps if not isinstance(step, LockStep | UnlockStep)))
-        for place, lock in find_locks(steps).items():
+        locks = find_locks(steps)
+        if locks:  # what phones beside a lock ask must not reach into it
+            said = with_gestures(generation.motion, generation.units, SAID)
+            generation = generation.with_motion(said)
+        for place, lock in locks.items():
             for later in steps[place + 1 :]:
                 if isinstance(later, CurveStep) and lock.holds(later.edit):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
             generation = apply_stretch(generation, self._locked(steps[:place], lock, generation.motion.names))
+            earlier = [step.edit for step in steps[:place] if isinstance(step, CurveStep)]
+            before = tuple(edit for edit in generation.curve_edits if edit in earlier)
+            if len(before) < len(generation.curve_edits):
+                kept = Locked(lock.start_s, lock.end_s, before)
+                generation = replace(generation, curve_edits=(*generation.curve_edits, kept))
         return generation
 
     def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
@@ -359,11 +370,11 @@ class Session:
             curves = [*modelled, *curves]  # a gain or a held pose has changed their values
         if gestures := [edit.channel for edit in curves if edit.channel in GESTURES]:
             generation = generation.with_motion(with_gestures(generation.motion, generation.units, gestures))
-        motion = apply_curve_edits(generation.motion, generation.units, curves)
+        motion = mark_edited(apply_curve_edits(generation.motion, generation.units, curves), [*modelled, *curves])
         for edit in edits:
             self._check_edit(edit, motion)
-        others = tuple(edit for edit in curves if edit.channel not in motion.names)
-        return replace(generation, motion=motion, curve_edits=others)
+        others = tuple(e for e in edits if isinstance(e, Hold) or (e in curves and e.channel not in motion.names))
+        return replace(generation.with_motion(motion), curve_edits=others)
 
     def _check_edit(self, edit: CurveEdit | Hold, motion: Motion) -> None:
         """Raise InputError if an edit is of no curve that is known, or of no time of the recording."""

@@ -255,7 +255,17 @@ class Hold:
         _check_stretch(self.start_s, self.end_s)
 
 
-CurveEdit = Pin | Gain | DrawnCurve
+@dataclass(frozen=True)
+class Locked:
+    """Curves stay for a time as these edits alone make them, whatever other edits there are."""
+
+    start_s: float
+    end_s: float
+    edits: tuple[CurveEdit, ...]
+    channel: ClassVar[str] = ""
+
+
+CurveEdit = Pin | Gain | DrawnCurve | Hold | Locked
 """Changes of one curve, or of all curves of the mouth."""
 
 
@@ -371,7 +381,7 @@ class Generation:
     trace  : the state of the model in every frame
     outlook : how well the model knew words and voice (None: not from ``animate``)
     stepped : channels of held poses, which change at once: formats that can say so do
-    curve_edits : edits of curves that follow from the motion, as ``jawOpen``, wherever these are made
+    curve_edits : edits of curves that follow from the motion, as ``jawOpen``, wherever these are made; and what is held
     moods  : what the words say of the mood, over time, in the order of their times
     events : what is detected in the voice beside words; manners and moods of them are shown where none is asked for
     about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``

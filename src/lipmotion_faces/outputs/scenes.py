@@ -22,7 +22,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.mesh import Blendshape, head_quaternions
 from lipmotion.meshes.model.scene import HeadTurn, Scene, Thinning
-from lipmotion.pipeline.outputs.curve_sets import edit_weights, known_names
+from lipmotion.pipeline.outputs.curve_sets import edit_weights
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import sound_reference
@@ -173,8 +173,7 @@ def character_scene(
     solved, mouth = character.weights(part, phones), spoken_mouth(with_mouth(part), phones)
     table = np.zeros((len(motion.values), len(solved.names)))
     table[around] = solved.values[there]
-    known = known_names(character.mesh)
-    weights = edit_weights(replace(solved, values=table), units, generation.curve_edits, known)
+    weights = edit_weights(replace(solved, values=table), units, generation.curve_edits, character)
     living = compute_living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
     extra = character.weigh_others(others, len(living.values))

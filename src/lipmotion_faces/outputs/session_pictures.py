@@ -52,7 +52,9 @@ class SessionPictures:
             return drawing
 
         def draw() -> DrawnMotion[Any]:
-            seen = deliver_to_face(self._session.generate(edits), delivery, fps)
+            generation = self._session.generate(edits)
+            prosody = shift_prosody(self._prosody, delivery) if generation.curve_edits else None
+            seen = deliver_to_face(generation, delivery, fps, None, staging, prosody)
             return self._cache.cached("face", (face, staging, delivery), make_drawing).draw(
                 seen.motion, seen.units, fps=fps
             )

@@ -11,6 +11,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
+from lipmotion.pipeline.outputs.curve_sets import WEIGHTS
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace, measure_prosody, shift_prosody
 from lipmotion.storage.sources import check_kind, is_file
@@ -78,9 +79,10 @@ class ShownDrawing(_WithHead):
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, played = performance.settings, performance.cached(sound_track)
-        if performance.generation.curve_edits and self.character is None:
-            named = ", ".join(dict.fromkeys(edit.channel for edit in performance.generation.curve_edits))
-            LOG.warning("%s: this face has no curve %s, so the edit does not show; pin the opening", path, named)
+        others = {edit.channel for edit in performance.generation.curve_edits} - {*WEIGHTS, ""}
+        if others and self.character is None:
+            named = ", ".join(sorted(others))
+            LOG.warning("%s: %s is of a rig that this face has not, and does not show; pin jawOpen", path, named)
         seen, prosody = performance.cached(_seen), performance.cached(_played_prosody)
         monitor, hertz = performance.monitor, _frame_rate(settings)
         write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
@@ -224,7 +226,9 @@ def _seen(performance: Performance) -> Generation:
     character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
     if performance.generation.curve_edits:
         character = character or settings.face.character
-    return deliver_to_face(performance.generation, settings.delivery, _frame_rate(settings), character)
+    prosody = performance.cached(_played_prosody) if performance.generation.curve_edits else None
+    hertz, staging = _frame_rate(settings), settings.staging
+    return deliver_to_face(performance.generation, settings.delivery, hertz, character, staging, prosody)
 
 
 def _played_prosody(performance: Performance) -> Prosody:

@@ -14,6 +14,7 @@ from lipmotion.articulation.delivery import Delivery, shift_in_time
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.cues import CUE_FORMATS, format_of, write_cue_file
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.pipeline.outputs.curve_sets import show_edited_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
@@ -57,7 +58,7 @@ def cues(
     chosen = delivery or Delivery()
     if chosen.hold_ms:
         hold_frames = max(hold_frames or 1, chosen.hold_frames(fps))
-    generation = replace(generation, motion=with_mouth(generation.motion))
+    generation = show_edited_curves(replace(generation, motion=with_mouth(generation.motion)))
     return choose_cues(shift_in_time(generation, chosen), fps, hold_frames, shapes.upper(), intensity=chosen.intensity)
 
 

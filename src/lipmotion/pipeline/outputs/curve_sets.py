@@ -9,16 +9,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.curve_edits import apply_curve_edits
-from lipmotion.articulation.expression import read_moods
+from lipmotion.articulation.contact import EDITED, GAP, gap_to_opening, read_edited, read_gap
+from lipmotion.articulation.curve_edits import apply_curve_edits, edited_share
+from lipmotion.articulation.expression import is_mood, read_moods
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.fap import PARAMETERS, move_faps
+from lipmotion.formats.fap import NAMES, PARAMETERS, move_faps
 from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_rig_table, suggest_names
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
+from lipmotion.meshes.fitting.eyes_and_brows import GROUPS, compute_living_curves
 from lipmotion.meshes.fitting.shape_weights import (
     VISEME_CHANNELS,
     expression_weights,
@@ -26,17 +28,25 @@ from lipmotion.meshes.fitting.shape_weights import (
     weigh_visemes,
 )
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, arkit_name
-from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Span, Timeline, Unit
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, arkit_name
+from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Hold, Motion, Prosody, Span, Timeline, Unit
 from lipmotion.types.delivery import Staging
+from lipmotion.types.generation import Locked
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 VISEMES, HELD_VISEMES = "visemes", "held-visemes"
 LIVING_SETS = (WHOLE_FACE, VOWELS)
 """Sets of curves with eyes, brows and head, which move on their own."""
-WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS)
-KNOWN_CURVES = (*WEIGHTS, *(row[1] for row in PARAMETERS))
+WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *VRM_VOWELS)
+FAPS = {name: NAMES[number] for number, name, *_ in PARAMETERS}
+KNOWN_CURVES = (*WEIGHTS, *FAPS)
 """Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
+SETS_OF = {WHOLE_FACE: (*ARKIT_MOUTH, *ARKIT_OTHERS), VISEMES: VISEME_CHANNELS, VOWELS: VRM_VOWELS}
+"""The curves that are edited in each set (``show_edited_curves``)."""
+GAP_CHANNELS = ("opening", "outer", GAP, EDITED["opening"])
+"""Channels that say how far the lips are apart."""
+PHONETIC = (*VISEME_CHANNELS, *VRM_VOWELS, CLOSED)
+"""Curves that phones make, beside what they ask of the mouth (``articulation.phone_targets.SAID``)."""
 SHAPE_SETS = (ARKIT, WHOLE_FACE, VISEMES, HELD_VISEMES, VOWELS, "fap")
 """Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the same with eyes, brows and head (which move on
 their own), the 15 visemes of Oculus and OpenXR as far as the mouth moves, the same one after another, the five vowels
@@ -76,10 +86,10 @@ def make_curves(
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
     if isinstance(curves, DrivenCharacter):
-        return edit_weights(curves.weights(motion, units), units, edits, known_names(curves.mesh))
+        return edit_weights(curves.weights(motion, units), units, edits, curves)
     check_curve_set(curves)
     if curves in SHAPE_SETS:
-        return apply_curve_edits(_make_set(motion, units, str(curves), staging, prosody), units, edits)
+        return edit_curves(_make_set(motion, units, str(curves), staging, prosody), units, edits)
     rows = read_rig_table(Path(curves))
     sources = make_rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
     own = [edit for edit in edits if edit.channel not in sources]
@@ -102,7 +112,7 @@ def make_rig_sources(
     """
 
     def plain(name: str) -> Motion:
-        return apply_curve_edits(_make_set(motion, units, name, staging, prosody), units, edits)
+        return edit_curves(_make_set(motion, units, name, staging, prosody), units, edits)
 
     sets = [with_mouth(motion), plain(ARKIT), plain(VISEMES)]
     if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
@@ -112,16 +122,34 @@ def make_rig_sources(
 
 
 def edit_weights(
-    weights: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit], known: Mapping[str, str] | None = None
+    weights: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit], character: DrivenCharacter | None = None
 ) -> Motion:
-    """Return weights of a character with pins and gains, which name its blendshapes as it does or as ``known``.
+    """Return weights of a character with pins and gains, which name its blendshapes as it does or as others do.
 
-    known : its blendshapes by other names
+    character : whose weights of the mouth these are, which stay where it is held; None: of the 3D head
     """
-    named = {other: name for other, name in (known or {}).items() if name in weights.names}
+    known = known_names(character.mesh) if character else {}
+    named = {other: name for other, name in known.items() if name in weights.names}
     named |= {name: name for name in weights.names}
-    ours = [replace(edit, channel=named[edit.channel]) for edit in edits if edit.channel in named]
-    return apply_curve_edits(weights, units, ours)
+    return apply_curve_edits(weights, units, rename_edits(edits, named), held=weights.names if character else ())
+
+
+def rename_edits(edits: Sequence[CurveEdit], named: Mapping[str, str]) -> tuple[CurveEdit, ...]:
+    """Return edits of curves by other names: those of ``named`` by their values."""
+    renamed: list[CurveEdit] = []
+    for edit in edits:
+        if isinstance(edit, Locked):
+            renamed.append(replace(edit, edits=rename_edits(edit.edits, named)))
+        else:
+            renamed.append(
+                edit if isinstance(edit, Hold) else replace(edit, channel=named.get(edit.channel, edit.channel))
+            )
+    return tuple(renamed)
+
+
+def edit_curves(curves: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
+    """Return curves of one of ``SHAPE_SETS`` with edits; those that phones make stay where the mouth is held."""
+    return apply_curve_edits(curves, units, rename_edits(edits, FAPS), held=PHONETIC)
 
 
 def known_names(mesh: Mesh) -> dict[str, str]:
@@ -152,6 +180,57 @@ def _make_set(
     if name in (VISEMES, HELD_VISEMES):
         return weigh_visemes(units, spoken_mouth(motion, units), held=name == HELD_VISEMES)
     return move_faps(motion, units)
+
+
+def show_edited_curves(
+    generation: Generation,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+    *,
+    mouth: bool = True,
+) -> Generation:
+    """Return a generation whose motion shows its edits of curves, for faces that have no such curves.
+
+    What edits change of blendshapes, visemes or vowels moves the mouth as it moves ARKit's (``arkit_mouth``). Edited
+    eyes and brows take the place of what they would do by themselves, with staging and prosody.
+    mouth : False: the face has curves of the mouth, and shows these itself
+    """
+    edits = generation.curve_edits
+    names, motion = {edit.channel for edit in edits if edit.channel}, generation.motion
+    calm = motion.selected([name for name in motion.names if not is_mood(name)])
+    for name in (WHOLE_FACE, "visemes", VOWELS):
+        if not names & {*SETS_OF[name]}:
+            continue
+        plain = _make_set(calm, generation.units, name, staging, prosody)
+        edited = edit_curves(plain, generation.units, edits)
+        if mouth and names & {*SETS_OF[name]} - {*ARKIT_OTHERS}:
+            motion = _move_mouth(motion, calm, generation.units, (plain, edited), edits)
+        given = [each for group in GROUPS if names & {*group} for each in group if each in edited.names]
+        if name == WHOLE_FACE and given:
+            motion = join_channels(motion, edited.selected([each for each in given if each not in motion.names]))
+    return generation if motion is generation.motion else generation.with_motion(motion)
+
+
+def _move_mouth(
+    motion: Motion, calm: Motion, units: Timeline[Unit], curves: tuple[Motion, Motion], edits: Sequence[CurveEdit]
+) -> Motion:
+    """Return motion whose mouth changes as that of curves without and with edits; ``calm``: the motion in no mood."""
+    before, after = map(with_mouth, curves)
+    share = edited_share(motion.time_s, [edit for edit in edits if edit.channel in curves[0].names])
+    motion = with_gestures(motion, units, (*GESTURES, EDITED["opening"]))
+    values, gap = motion.values.astype(np.float64), spoken_mouth(calm, units).gap
+    for column, channel in enumerate(motion.channels):
+        if channel.name in after.names and channel.name not in (*curves[0].names, *GAP_CHANNELS):
+            changed = values[:, column] + after[channel.name] - before[channel.name]
+            values[:, column] = np.clip(changed, 0, 1) if channel.unit == WEIGHT else changed
+    gap = np.maximum(gap + after[GAP] - before[GAP], 0)
+    further = share * (gap_to_opening(gap) - motion["opening"])
+    thicker = (after["outer"] - after["opening"]) - (before["outer"] - before["opening"])
+    changes = further, further + thicker, share * (gap - read_gap(motion)), share * (1 - read_edited(motion, "opening"))
+    for name, change in zip(GAP_CHANNELS, changes, strict=True):
+        if name in motion.names:
+            values[:, motion.column(name)] += change
+    return replace(motion, values=values)
 
 
 def join_channels(first: Motion, second: Motion) -> Motion:

@@ -23,10 +23,10 @@ from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
-from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.types import Gain, Generation, VoiceEvent
+from lipmotion.pipeline.outputs.curve_sets import show_edited_curves, with_curves
+from lipmotion.types import Gain, Generation, Prosody, VoiceEvent
 from lipmotion.types.audio import LAUGHTER, SHOUT, WHISPER
-from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, sort_moods
+from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, Staging, sort_moods
 from lipmotion.types.motion import RADIAN
 
 FACTORS: Final = {PLAIN: 1.0, "whisper": 0.65, "shout": 1.5, "mumble": 0.5}
@@ -90,22 +90,30 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
 
 
 def deliver_to_face(
-    generation: Generation, delivery: Delivery, fps: float, character: DrivenCharacter | None = None
+    generation: Generation,
+    delivery: Delivery,
+    fps: float,
+    character: DrivenCharacter | None = None,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
 ) -> Generation:
     """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
 
     character : whose weights are deliver_to_face, if the face is a character with blendshapes
+    staging, prosody : as of ``show_edited_curves``, which all other edits of curves go through
     """
     moved = with_drawn_channels(deliver(generation, delivery))
-    if moved.curve_edits and character is not None and character.shapes is not None:
-        moved = with_curves(moved, character)[0]
+    solved = character if character is not None and character.shapes is not None else None
+    moved = show_edited_curves(moved, staging, prosody, mouth=solved is None)
+    if moved.curve_edits and solved is not None:
+        moved = with_curves(moved, solved)[0]
     frames = delivery.hold_frames(fps)
     if not frames:
         return moved
     moved = moved.with_motion(with_gestures(moved.motion, moved.units))
     closed_s, moved = find_closed_times(moved), close_on_frame_grid(moved, fps)
-    if character is not None and character.shapes is not None:
-        moved = with_curves(moved, character)[0]
+    if solved is not None:
+        moved = with_curves(moved, solved)[0]
     return hold_mouth(moved.resampled(fps), frames, closed_s)
 
 

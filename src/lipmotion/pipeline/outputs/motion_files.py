@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.articulation.contact import sample_pictures
-from lipmotion.articulation.curve_edits import apply_curve_edits
 from lipmotion.articulation.delivery import close_on_frame_grid, find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.mouth import spoken_mouth
@@ -39,6 +38,7 @@ from lipmotion.pipeline.outputs.curve_sets import (
     ARKIT,
     LIVING_SETS,
     WHOLE_FACE,
+    edit_curves,
     join_channels,
     make_curves,
     with_curves,
@@ -191,7 +191,7 @@ def fit_to_format(
     others = form.other_curves and not is_all and all(channel.unit in CURVES for channel in held.motion.channels)
     if form.curves and not others:
         curves = _make_curves(generation, form.curves, staging, prosody)
-        curves = apply_curve_edits(curves, generation.units, generation.curve_edits)
+        curves = edit_curves(curves, generation.units, generation.curve_edits)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
         named = [name for name in channels or () if name in curves.names]
         held = held.selected(named) if named else held
