@@ -1,4 +1,4 @@
-"""Makes the network of live speech, ``models/live.npz``: taught by what ``animate`` makes of whole recordings.
+"""Makes two networks that ``animate`` teaches: of live speech, ``models/live.npz``, and ``models/general-motion.npz``.
 
     python scripts/live_network.py CORPUS TEXT VOICES...
 
@@ -21,6 +21,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,9 @@ from lipmotion.live.network import (
 )
 from lipmotion.meshes.fitting.shape_weights import viseme_curves
 from lipmotion.meshes.model.shape_names import VISEMES_15
+from lipmotion.motion import general_motion
 from lipmotion.motion.articulation import ARTICULATORS, measure_articulators
+from lipmotion.motion.network_steps import cut_random_piece
 from lipmotion.motion.space import resample_track
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import make_curves
@@ -82,9 +85,21 @@ PIECE_STEPS, HELD_OUT = 250, 20
 """Steps of a piece for training; and one in so many recordings measures the errors instead."""
 WEIGHTS_OF = dict.fromkeys(ARTICULATORS, 1.0) | {"opening": 4.0, "width": 3.0, "outer": 2.0}
 Array = NDArray[np.float32]
-Lesson = tuple[Array, list[Array]]
-"""Targets of every step, and its encoding [shape=(N, 23 + 64)], and what is heard in several versions [each
-shape=(N, 82)]."""
+GENERAL_STEPS, GENERAL_EVERY = 3500, 2
+"""Of the optimiser for the general network, and steps of lessons from one of its own steps to the next."""
+
+
+class Lesson(NamedTuple):
+    """What is learned from a recording, in steps of 20 ms.
+
+    targets   : articulators, visemes and the encoding in quiet [shape=(N, 23 + 64)]
+    versions  : what is heard in several versions [each shape=(N, 82)]
+    encodings : of those versions that are in a condition [each shape=(N, 64)]
+    """
+
+    targets: Array
+    versions: list[Array]
+    encodings: list[Array]
 
 
 def main() -> None:
@@ -99,6 +114,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=4000, help="of the optimiser")
     parser.add_argument("--keep", type=Path, help="a file that keeps what was prepared")
     parser.add_argument("--output", type=Path, default=OUTPUT)
+    parser.add_argument("--general", type=Path, default=OUTPUT.with_name(general_motion.WEIGHTS))
     options = parser.parse_args()
     if options.keep is not None and options.keep.exists():
         lessons = pickle.loads(options.keep.read_bytes())  # noqa: S301 - what a run before wrote
@@ -106,18 +122,19 @@ def main() -> None:
         lessons = list(prepare(options))
         if options.keep is not None:
             options.keep.write_bytes(pickle.dumps(lessons))
-    print(f"{len(lessons)} recordings, {sum(len(targets) for targets, _ in lessons) * STEP_S / 60:.1f} minutes")
+    print(f"{len(lessons)} recordings, {sum(len(targets) for targets, *_ in lessons) * STEP_S / 60:.1f} minutes")
     typical = measure_bands(lessons)
+    np.savez_compressed(options.general, **learn_general(lessons))
     network = learn(lessons, typical, options.steps)
     arrays = {name: array.astype(np.float16) for name, array in SHAPE.arrays(network).items()}
     rounded = SHAPE.from_arrays(arrays, len(LAGS) * OUTPUTS)
     count, predicted, wanted = len(ARTICULATORS), [], []
-    for number, (targets, versions) in enumerate(lessons[::HELD_OUT]):
+    for number, (targets, versions, _) in enumerate(lessons[::HELD_OUT]):
         sequence = shift(hear(versions[number % VERSIONS], typical, ()), targets, typical)
         known = sequence.targets[:, :-HINTS] / output_scale()
         for rows, kept in ((rounded(sequence.inputs), predicted), (known, wanted)):
             kept.append(rows[: len(targets)].reshape(-1, len(LAGS), OUTPUTS)[:, :, :count])
-    people = np.concatenate([np.diff(targets[:, :count], 2, axis=0) for targets, _ in lessons])
+    people = np.concatenate([np.diff(targets[:, :count], 2, axis=0) for targets, *_ in lessons])
     guesses, truth = np.concatenate(predicted), np.concatenate(wanted)
     arrays["variances"] = np.square(guesses - truth).mean(axis=0)
     arrays["acceleration"] = np.square(people).mean(axis=0)
@@ -138,7 +155,7 @@ def learn(lessons: list[Lesson], typical: Array, steps: int) -> ConvolutionalNet
     """Return a network that is trained with all lessons but those that measure its errors, without its hints."""
     sequences = [
         [shift(hear(levels, typical, (number, version)), targets, typical) for version, levels in enumerate(versions)]
-        for number, (targets, versions) in enumerate(lessons)
+        for number, (targets, versions, _) in enumerate(lessons)
         if number % HELD_OUT
     ]
     weights = np.tile([*(WEIGHTS_OF[name] for name in ARTICULATORS), *np.ones(len(VISEMES_15))], len(LAGS))
@@ -148,16 +165,43 @@ def learn(lessons: list[Lesson], typical: Array, steps: int) -> ConvolutionalNet
         whole = sequences[number][int(rng.integers(len(sequences[number])))]
         return cut(whole, int(rng.integers(max(len(whole.inputs) - PIECE_STEPS, 0) + 1)))
 
-    def report(step: int, error: float) -> None:
-        if step % 100 == 0:
-            print(step, round(error, 4), flush=True)
-
     plan = TrainingPlan(steps, batch_size=16, rate=2e-3, dropout=0.15, seed=0)
     network = SHAPE.initial(len(LAGS) * OUTPUTS + HINTS, 0)
     network = fit_network(network, draw, len(sequences), weights, plan, report)
     return network.with_parameters(
         [*network.parameters[:-2], *(array[..., :-HINTS] / output_scale() for array in network.parameters[-2:])]
     )
+
+
+def learn_general(lessons: list[Lesson]) -> dict[str, NDArray[np.float16]]:
+    """Return the arrays of the general network, from the encoding in quiet and in conditions to articulators."""
+    shape, every = general_motion.SHAPE, GENERAL_EVERY
+    sequences = [
+        [
+            TrainingSequence(
+                encoding[::every] * general_motion.ENCODING_SCALE,
+                targets[::every, : len(ARTICULATORS)],
+                np.ones(-(-len(targets) // every), bool),
+            )
+            for encoding in (*[targets[:, OUTPUTS:]] * len(encodings or "1"), *encodings)
+        ]
+        for targets, _, encodings in lessons
+    ]
+
+    def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
+        versions = sequences[number]
+        return cut_random_piece(versions[int(rng.integers(len(versions)))], rng)
+
+    weights = np.array([WEIGHTS_OF[name] for name in ARTICULATORS])
+    plan = TrainingPlan(GENERAL_STEPS, batch_size=24, rate=2e-3, dropout=0.2, seed=0)
+    network = fit_network(shape.initial(len(ARTICULATORS), 0), draw, len(sequences), weights, plan, report)
+    return {name: array.astype(np.float16) for name, array in shape.arrays(network).items()}
+
+
+def report(step: int, error: float) -> None:
+    """Print how training goes on."""
+    if step % 100 == 0:
+        print(step, round(error, 4), flush=True)
 
 
 def fit_curves(model: Model, corpus: Corpus) -> NDArray[np.float64]:
@@ -181,7 +225,9 @@ def output_scale() -> Array:
 
 def measure_bands(lessons: list[Lesson]) -> Array:
     """Return the mean of every band in speech, relative to the level [shape=(40,)]."""
-    rows = np.concatenate([versions[0] for _, versions in lessons]).astype(np.float32).reshape(-1, SPECTRUM_BANDS + 1)
+    rows = (
+        np.concatenate([versions[0] for _, versions, _ in lessons]).astype(np.float32).reshape(-1, SPECTRUM_BANDS + 1)
+    )
     mean: Array = rows[rows[:, -1] > -SPEECH_RANGE, :-1].mean(axis=0)
     return mean
 
@@ -280,14 +326,14 @@ def make_lesson(
     inside = np.stack([np.interp(time_s, motion.time_s, column) for column in articulators.T], axis=1)
     visemes = np.stack([viseme_curves(units, time_s)[name] for name in VISEMES_15], axis=1)
     visemes[time_s > audio.duration_s] = np.eye(len(VISEMES_15))[0]
-    encoding = np.zeros((steps, HINTS), np.float32)
-    known = analysed(audio).encoding[::STEP_FRAMES][:steps]
-    encoding[: len(known)] = known
-    targets = np.concatenate([inside, visemes, encoding], axis=1).astype(np.float32)
-    versions = []
+    targets = np.concatenate([inside, visemes, encode(audio, steps)], axis=1).astype(np.float32)
+    versions, encodings = [], []
     for number in range(VERSIONS):
         rng = np.random.default_rng([seed, number])
-        heard = longer if number < VERSIONS // 2 else in_condition(longer, babble, rng)[0]
+        heard = longer
+        if number >= VERSIONS // 2:
+            heard, _ = in_condition(longer, babble, rng)
+            encodings.append(encode(heard, steps))
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if number else 1.0
         gain = np.float32(10 ** (rng.uniform(*GAIN_DB) / 20))
         samples = np.pad(heard.samples * gain, (0, WINDOW))
@@ -295,7 +341,15 @@ def make_lesson(
             : steps * STEP_FRAMES
         ]
         versions.append(rows.reshape(steps, -1).astype(np.float16))
-    return targets, versions
+    return Lesson(targets, versions, encodings)
+
+
+def encode(audio: Audio, steps: int) -> Array:
+    """Return what the speech encoder makes of a recording [shape=(steps, 64)]; beyond its end there are zeros."""
+    result = np.zeros((steps, HINTS), np.float32)
+    known = analysed(audio).encoding[::STEP_FRAMES][:steps]
+    result[: len(known)] = known
+    return result
 
 
 def standard_articulators(model: Model, motion: Motion) -> NDArray[np.float64]:

@@ -47,8 +47,8 @@ class Console(BaseOutputTransport):
         await self.set_transport_ready(frame)
 
     async def send_message(self, frame):
-        """Print what a page would be sent."""
-        for each in frame.message["data"]["frames"]:
+        """Print what a page would be sent, among messages of Pipecat's own."""
+        for each in frame.message.get("data", {}).get("frames", []):
             print(f"{each['time_s']:6.2f} s", "#" * round(60 * each["weights"].get("jawOpen", 0)))
 
     async def write_audio_frame(self, frame):

@@ -186,6 +186,21 @@ def test_words_that_come_with_their_times_are_said() -> None:
     run(work())
 
 
+def test_an_output_that_does_not_tell_when_it_is_heard_is_named(caplog: pytest.LogCaptureFixture) -> None:
+    async def work() -> None:
+        sink = Loudspeaker()
+        sink.on_playback_started = lambda **_: None  # type: ignore[method-assign]
+        lips = LipSync(sink, on_frames=lambda *_: None)
+        for frame in frames_of(read_speech()[:16_000], [1_600]):
+            await lips.capture_frame(frame)
+        lips.flush()
+        await lips.wait_for_playout()
+        await lips.aclose()
+
+    run(work())
+    assert "on_playback_started" in caplog.text
+
+
 def test_a_pause_rests_and_goes_on() -> None:
     async def work() -> None:
         viewer, sink = Viewer(), Loudspeaker()

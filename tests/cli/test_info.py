@@ -38,11 +38,6 @@ def test_its_trees_can_be_printed(run, toy_model_file):
     assert sum("leaf (" in line for line in done.out) >= 18
 
 
-def test_the_former_name_of_the_option_still_works(run, toy_model_file):
-    assert run("info", toy_model_file, "--trees") == run("info", toy_model_file, "--structure")
-    assert not any("--trees" in line for line in run("info", "--help").out)
-
-
 def test_the_chains_of_a_coupled_model(run, coupled_model_file):
     done = run("info", coupled_model_file, "--structure")
     assert (done.code, done.err) == (0, [])

@@ -5,21 +5,23 @@ from __future__ import annotations
 import csv
 import json
 import re
+import signal
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from children import LIPMOTION, child
 from cli.conftest import RunCommand
+from lipmotion.speech.sound import audio_files
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types.audio import Audio
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 
 def test_a_file_becomes_frames_on_the_command_line(run: RunCommand, tmp_path: Path) -> None:
-    ran = run(
-        "live", "-i", WELCOME, "--to", tmp_path / "a.csv", "--to", "-", "--look-ahead", 80, "--as-fast-as-possible"
-    )
+    ran = run("live", WELCOME, "--to", tmp_path / "a.csv", "--to", "-", "--look-ahead", 80, "--as-fast-as-possible")
     assert ran.code == 0
     rows = list(csv.DictReader((tmp_path / "a.csv").read_text("utf-8").splitlines()))
     lines = [json.loads(line) for line in ran.out]
@@ -40,11 +42,29 @@ def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
     assert len((tmp_path / "a.csv").read_text("utf-8").splitlines()) == 101
 
 
+def test_a_signal_that_a_package_swallows_ends_it(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+    def read(path: Path) -> Audio:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        return read_audio(path)
+
+    monkeypatch.setattr(audio_files, "read_audio", read)
+    ran = run("live", WELCOME, "--as-fast-as-possible")
+    assert (ran.code, ran.out) == (143, [])
+
+
+def test_a_wav_file_on_a_pipe_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.wav").write_bytes(b"RIFF" + bytes(1_000))
+    with (tmp_path / "a.wav").open("rb") as sound, child([*LIPMOTION, "live", "-i", "-"], stdin=sound) as process:
+        assert process.communicate()[0] == ""
+        assert process.returncode == 3
+
+
 def test_what_is_wrong_is_said(run: RunCommand) -> None:
     for arguments, message in (
         (("-i", WELCOME, "--to", "nowhere"), "--to nowhere"),
         (("-i", WELCOME, "--look-ahead", "-5"), "-5"),
-        (("-i", "no such microphone"), "sounddevice|microphone"),
+        (("no such file.wav",), "no such file.wav"),
     ):
         ran = run("live", *arguments)
         assert ran.code in (3, 8)

@@ -192,7 +192,7 @@ def test_sounds_choose_their_mouths():
     poses = [MouthPose(key.gap, teeth=0)] * 5
     for name in ("fv", "aa", "oo", "th", "ee", "mbp"):
         k = MOUTHS[name]
-        poses += [MouthPose(k.gap, k.width, tongue=k.tongue, tuck=k.tuck, protrusion=k.protrusion, teeth=k.teeth)] * 5
+        poses += [MouthPose(k.gap, k.width, **{name: getattr(k, name) for name in k._fields[2:]})] * 5
     shown = choose_mouths(poses, list(MOUTHS), 25.0)
     assert shown[2::5] == ["rest", "fv", "aa", "oo", "th", "ee", "mbp"]
 

@@ -147,7 +147,7 @@ def test_contexts_get_densities_where_there_are_frames_enough():
 
     def in_context(context_frames):
         given = replace(hmm, config=replace(hmm.config, context_frames=context_frames))
-        result = adapt_contexts(add_contexts(given, data, said), data, said, hmm.config.iterations)
+        result = baum_welch(add_contexts(given, data, said), data, said, hmm.config.iterations, adapt_contexts)
         return result.model, result.log_likelihoods
 
     better, log = in_context(40)

@@ -167,8 +167,8 @@ def test_every_phone_has_a_viseme_and_silence_and_closures_have_theirs():
     found = weigh_visemes(units(), spoken_mouth(motion(), units()))
     assert found["viseme_sil"][[0, 20, 160, 200]] == pytest.approx([1, 1, 1, 1])
     assert found["viseme_PP"][[55, 95]] == pytest.approx([1, 1])
-    assert found["viseme_aa"][75] == pytest.approx(1)
-    assert found["viseme_ou"][115] == pytest.approx(1)
+    assert found["viseme_aa"][75] > 0.9
+    assert found["viseme_ou"][115] > 0.6
     nothing, closed = Timeline(()), Motion(np.zeros((5, 1)), 25.0, (Channel("opening"),))
     assert weigh_visemes(nothing, spoken_mouth(closed, nothing))["viseme_sil"] == pytest.approx(np.ones(5))
 
@@ -179,7 +179,7 @@ def test_every_phone_has_a_viseme_and_silence_and_closures_have_theirs():
     st.floats(10, 120),
     st.sampled_from([0.0, 0.03, 0.1, 0.2]),
 )
-def test_weights_add_up_to_1_and_are_never_negative(phones, rate_hz, opening):
+def test_visemes_add_up_to_1_or_less_and_held_ones_to_1(phones, rate_hz, opening):
     spans, end = [], 0.0
     for phone, duration, gap in phones:
         spans.append(Span(end + gap, end + gap + duration, Unit(phone)))
@@ -188,12 +188,27 @@ def test_weights_add_up_to_1_and_are_never_negative(phones, rate_hz, opening):
     still = Motion(np.full((frames, 1), opening), rate_hz, (Channel("opening"),))
     said = Timeline(tuple(spans))
     motion = weigh_visemes(said, spoken_mouth(still, said))
-    np.testing.assert_allclose(motion.values.sum(axis=1), 1, atol=1e-9)
+    held = weigh_visemes(said, spoken_mouth(still, said), held=True)
+    np.testing.assert_allclose(held.values.sum(axis=1), 1, atol=1e-9)
+    assert motion.values.sum(axis=1).max() <= 1 + 1e-9
     assert motion.values.min() >= 0
     closed = motion["viseme_sil"] + motion["viseme_PP"]
     contact = spoken_mouth(still, said).contact
     assert closed[contact] == pytest.approx(1)
     assert closed[~contact].max(initial=0) <= MAX_CLOSED_WEIGHT + 1e-9
+
+
+def test_visemes_follow_how_open_and_how_round_the_mouth_is():
+    said = Timeline((Span(0, 1, Unit("s")), Span(1, 1.5, Unit("uw"))))
+    found = {}
+    for opening in (0.03, 0.1, 0.25):
+        still = Motion(np.full((150, 1), opening), 100.0, (Channel("opening"),))
+        found[opening] = weigh_visemes(said, spoken_mouth(still, said))
+    hissed = [found[opening]["viseme_SS"][50] for opening in (0.03, 0.1)]
+    assert 0.2 < hissed[0] < hissed[1] - 0.2
+    assert found[0.25]["viseme_aa"][50] > found[0.1]["viseme_aa"][50] + 0.2
+    assert found[0.1]["viseme_ou"][95] > 0.1  # the lips round before the vowel
+    assert found[0.1]["viseme_ou"][50] < 0.02
 
 
 def test_phones_fade_around_their_border():

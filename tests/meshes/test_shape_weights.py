@@ -7,8 +7,10 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, move_points
 from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
 from lipmotion.meshes.fitting.shape_weights import (
+    OPPOSED,
     CurveCosts,
     SolverOptions,
+    cancel_opposed,
     fit_bounded_curves,
     round_lips,
     solve_shape_weights,
@@ -48,6 +50,18 @@ def test_weights_are_between_0_and_1_and_smooth_and_pucker_in_oo(weights):
     assert of_reference[75] < 0.3
 
 
+def test_shapes_that_undo_each_other_are_not_there_at_once(weights):
+    for one, other in OPPOSED:
+        sides = [
+            np.max([weights[name] for name in names if name in weights.names], axis=0)
+            for names in (one, other)
+            if {*names} & {*weights.names}
+        ]
+        assert len(sides) < 2 or np.minimum(*sides).max() < 0.1
+    live = cancel_opposed(weights.values[115] + 0.1, weights.names)
+    assert not np.minimum(live[weights.names.index("mouthPucker")], live[weights.names.index("mouthStretchLeft")])
+
+
 def test_the_gap_is_that_of_the_motion(weights, shapes):
     gap = weights.values @ shapes.gap
     wanted = move_points(motion(), units()).mouth.gap
@@ -74,7 +88,7 @@ def test_gestures_can_be_left_out(shapes):
     plain = solve_shape_weights(motion(), units(), shapes, SolverOptions(gestures=False))
     pressed = solve_shape_weights(motion(), units(), shapes)
     assert np.abs(plain["mouthPressLeft"]).max() < 1e-9
-    assert pressed["mouthPressLeft"][95] > 0.15
+    assert pressed["mouthPressLeft"][95] > 0.35  # captures have 0.2 to 0.66
 
 
 def test_known_weights_come_back():
@@ -87,7 +101,7 @@ def test_known_weights_come_back():
     found = solve_shape_weights(_of(placed, known @ shapes.gap), Timeline(()), shapes, _EXACT)
     found = Motion(found.values[30:], 100.0, found.channels)  # before: the rest pose
     assert np.abs(found["jawOpen"] - known[:, shapes.row("jawOpen")]).max() < 0.08
-    assert np.abs(found["mouthPucker"] - known[:, shapes.row("mouthPucker")]).max() < 0.08
+    assert np.abs(found["mouthPucker"] - known[:, shapes.row("mouthPucker")]).max() < 0.12
 
 
 def test_visemes_are_used_where_there_is_no_jaw_shape():

@@ -120,7 +120,8 @@ def show_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
     """Return in which pictures the lips touch [shape=(len(time_s),), bool].
 
     contact : of frames at ``rate_hz`` [shape=(T,), bool]
-    A picture shows contact if the frame nearest to it has it. Contact between two pictures is shown by the nearer one.
+    A picture shows contact if the frame nearest to it has it. Contact between two pictures is shown by the nearer one;
+    contact that lasts as long as a picture is shown by the two that are nearest to its middle, so that it is seen.
     """
     frames = np.clip(np.rint(time_s * rate_hz).astype(int), 0, max(len(contact) - 1, 0))
     shown = contact[frames].copy()
@@ -128,10 +129,12 @@ def show_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], contact, [False]]))).reshape(-1, 2)
         step_s = float(time_s[1] - time_s[0])
         for first, stop in edges.tolist():
-            nearest = round(((first + stop - 1) / 2 / rate_hz - float(time_s[0])) / step_s)
-            if 0 <= nearest < len(shown):
-                begin, end = np.searchsorted(frames, (first, stop))
-                shown[nearest] |= begin == end
+            middle = ((first + stop - 1) / 2 / rate_hz - float(time_s[0])) / step_s
+            count = 2 if stop - first >= max(0.95 * step_s * rate_hz, 2) else 1
+            start = max(int(np.ceil(middle - count / 2)), 0)
+            begin, end = np.searchsorted(frames, (first, stop))
+            if end - begin < count and middle < len(shown) - 0.5:
+                shown[start : start + count] = True
     return shown
 
 

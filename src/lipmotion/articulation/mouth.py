@@ -22,11 +22,11 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Curve = NDArray[np.float64]
 
-TUCKED_GAP = (0.04, 0.072)
+TUCKED_GAP = (0.05, 0.072)
 """Range of the gap while the lower lip is on the upper teeth, which are seen."""
 TONGUE_GAP = (0.05, 0.1)
 """Range of the gap while the tongue is between the teeth."""
-PURSED_GAP = (0.03, 0.043)
+PURSED_GAP = (0.04, 0.05)
 """Range of the gap of w: a small hole."""
 ROUND_GAP, TEETH_GAP = 0.06, 0.045
 """Least gap of protruded lips, and where both rows of teeth are seen."""
@@ -34,10 +34,15 @@ ROUND_WIDTH, PURSED_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.89, 0.82, 1.05, 0.97
 """Protruded lips and those of w are at most so wide, spread ones at least, those of an oval mouth at most."""
 OVAL_GAPS = (0.08, 0.18)
 """The gap at which an opening begins to be an oval, and at which it is one, where the phone asks for it."""
+SPREAD_GAP, SPREAD_FROM = 0.1, 0.55
+"""Wholly spread lips are apart by this gap and a third of what was measured beyond it: ee is not aa. Lips count as
+spread from the second value on."""
 WIDTH_REACH = 0.3
 """Changes of width approach this."""
-LIP_SPEED = 3.0
+LIP_SPEED = 2.0
 """The gap changes no faster than this beside f and v, in eye distances a second (27 cm/s on a face)."""
+PRESS_S = 0.03
+"""Within this time from the first contact the lips are wholly pressed together."""
 TUCKED_CHIN_SHARE = 0.6
 """Share of its drop by which the chin rises while the lower lip is on the teeth."""
 LARGEST_UPPER_RISE, UPPER_RATE = 0.058, 5.2
@@ -112,8 +117,12 @@ class SpokenMouth:
 
     @property
     def closing(self) -> Curve:
-        """How far the lips are pressed together in p, b and m, 0 to 1 [shape=(F,)]."""
-        return np.clip(2 * self.press - 1, 0, 1) * self.contact
+        """How far the lips are pressed together in p, b and m, 0 to 1 [shape=(F,)]; less where contact begins."""
+        frames = np.arange(len(self.gap))
+        before = np.maximum.accumulate(np.where(self.contact, -np.inf, frames))
+        after = np.minimum.accumulate(np.where(self.contact, np.inf, frames)[::-1])[::-1]
+        inside_s = np.minimum(frames - before, after - frames) / self.rate_hz
+        return np.asarray(np.clip(2 * self.press - 1, 0, 1) * np.clip(inside_s / PRESS_S, 0, 1))
 
     @property
     def between_teeth(self) -> Curve:
@@ -286,6 +295,8 @@ def _articulate(gap: Curve, weights: dict[str, Curve], time_s: Curve) -> Curve:
     shown = np.maximum(2 * weights["teeth"] - 1, 0)
     for weight, low in ((shown, TEETH_GAP), (weights["protrusion"] ** 2 * (1 - pursed), ROUND_GAP)):
         gap = gap + free * weight * (np.maximum(gap, low) - gap)
+    spread = np.clip((weights["spread"] - SPREAD_FROM) / (1 - SPREAD_FROM), 0, 1) * (1 - weights["protrusion"])
+    gap = gap - spread * np.maximum(gap - SPREAD_GAP, 0) * 2 / 3
     between = np.clip((weights["tongue"] - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
     apart = np.clip((0.75 - press) / 0.15, 0, 1)  # also where they were tracked as closed
     for weight, (low, high) in ((pursed, PURSED_GAP), (between * apart, TONGUE_GAP), (tuck * apart, TUCKED_GAP)):

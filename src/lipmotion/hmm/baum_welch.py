@@ -25,6 +25,22 @@ LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES = 200.0, 12.0
 the closure of a stop that begins every other sentence absorbs the silence before it."""
 AfterStep = Callable[[int, UnitHmm, "UnitStatistics"], None]
 """Called after every EM step with its number, the new models, and the statistics that they were estimated from."""
+Maximise = Callable[[UnitHmm, "UnitStatistics", Sequence[NDArray[np.float32]]], UnitHmm]
+
+
+def reestimate_states(model: UnitHmm, statistics: UnitStatistics, data: Sequence[NDArray[np.float32]]) -> UnitHmm:
+    """Return models with all densities, and the durations of all states, re-estimated from statistics (M-step)."""
+    return replace(model, mixtures=reestimate_mixtures(model, statistics, data), log_stay=statistics.log_stay())
+
+
+def adapt_contexts(model: UnitHmm, statistics: UnitStatistics, _: Sequence[NDArray[np.float32]]) -> UnitHmm:
+    """Return models whose states in context are adapted (M-step), with those without, which stay, as their prior."""
+    plain, parents = len(model.log_stay), model.table.parents()
+    mixtures = model.mixtures.copy()
+    for density, x, weights in statistics.by_density():
+        if density >= plain:
+            mixtures.map_update(density, x, weights, int(parents[density]), model.config.relevance)
+    return replace(model, mixtures=mixtures)
 
 
 def baum_welch(
@@ -32,47 +48,25 @@ def baum_welch(
     data: Sequence[NDArray[np.float32]],
     sequences: Sequence[tuple[str, ...]],
     steps: int = 1,
+    maximise: Maximise = reestimate_states,
     after_step: AfterStep = no_report,
     parallel_map: ParallelMap = map,
 ) -> EmResult[UnitHmm, UnitStatistics]:
-    """Take some steps of embedded Baum–Welch: re-estimate all densities, and the durations of all states.
+    """Take some steps of embedded Baum–Welch.
 
     data      : features of every utterance [shape=(T, D)]
     sequences : the units spoken in each
+    maximise  : the M-step: ``reestimate_states`` or ``adapt_contexts``
     parallel_map : distributes the work; the result is the same to the bit
     Returns the re-estimated models, and the mean log likelihood per frame before every step.
     An utterance too short for its units is left out.
     """
-
-    def maximise(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
-        mixtures = reestimate_mixtures(model, statistics, data)
-        return replace(model, mixtures=mixtures, log_stay=statistics.log_stay())
-
     return run_em(
-        hmm, lambda model: accumulate_statistics(model, data, sequences, parallel_map), maximise, steps, after_step
-    )
-
-
-def adapt_contexts(
-    hmm: UnitHmm,
-    data: Sequence[NDArray[np.float32]],
-    sequences: Sequence[tuple[str, ...]],
-    steps: int = 1,
-    after_step: AfterStep = no_report,
-    parallel_map: ParallelMap = map,
-) -> EmResult[UnitHmm, UnitStatistics]:
-    """Adapt states in context by EM, with those without as their prior, which stay; parameters as of ``baum_welch``."""
-
-    def maximise(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
-        plain, parents = len(model.log_stay), model.table.parents()
-        mixtures = model.mixtures.copy()
-        for density, x, weights in statistics.by_density():
-            if density >= plain:
-                mixtures.map_update(density, x, weights, int(parents[density]), model.config.relevance)
-        return replace(model, mixtures=mixtures)
-
-    return run_em(
-        hmm, lambda model: accumulate_statistics(model, data, sequences, parallel_map), maximise, steps, after_step
+        hmm,
+        lambda model: accumulate_statistics(model, data, sequences, parallel_map),
+        lambda model, statistics: maximise(model, statistics, data),
+        steps,
+        after_step,
     )
 
 

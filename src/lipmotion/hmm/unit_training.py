@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.hmm.align import align_states, choose_pronunciations, expand_states
 from lipmotion.hmm.baum_welch import (
+    Maximise,
     UnitStatistics,
     adapt_contexts,
     baum_welch,
     collect_statistics,
     max_mean_durations,
     reestimate_mixtures,
+    reestimate_states,
 )
 from lipmotion.hmm.loudness import smooth_level
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays, make_plain_states
@@ -94,12 +96,12 @@ class _Stage(NamedTuple):
     """One stage of training.
 
     prepare : one step before those of EM, which returns a figure for the monitor; None: nothing to prepare
-    em      : ``baum_welch`` or ``adapt_contexts``;  em_steps : how often
+    maximise : the M-step of ``baum_welch``;  em_steps : how often
     """
 
     name: str
     prepare: Callable[[], float | None] | None
-    em: Callable[..., object]
+    maximise: Maximise
     em_steps: int
 
     @property
@@ -134,17 +136,17 @@ class _Training:
             self._hmm = hmm_from_arrays(stored, config)
         steps = config.iterations
         stages = [
-            _Stage("flat start", None, baum_welch, 2 * steps),
-            _Stage("pronunciations", self._add_pause, baum_welch, steps),
+            _Stage("flat start", None, reestimate_states, 2 * steps),
+            _Stage("pronunciations", self._add_pause, reestimate_states, steps),
         ]
         count, frames = 1, sum(map(len, self._data))
         units = {unit for utterance in self._utterances for word in utterance.words for unit in word[0]}
         while count < config.mixtures and frames >= 2 * count * FRAMES_A_GAUSSIAN * config.states * len(units):
             count *= 2
-            stages.append(_Stage(f"{count} Gaussians", self._split, baum_welch, steps))
+            stages.append(_Stage(f"{count} Gaussians", self._split, reestimate_states, steps))
         self._stages = [
             *stages,
-            _Stage("pronunciations again", self._choose_pronunciations, baum_welch, steps),
+            _Stage("pronunciations again", self._choose_pronunciations, reestimate_states, steps),
             _Stage("states in context", self._add_contexts, adapt_contexts, 0),
             _Stage("contexts", None, adapt_contexts, steps),
         ]
@@ -163,7 +165,7 @@ class _Training:
         return self._hmm
 
     def _run_em(self, stage: _Stage, steps: int) -> None:
-        if stage.em is adapt_contexts and len(self._hmm.table.names) == len(self._hmm.log_stay):
+        if stage.maximise is adapt_contexts and len(self._hmm.table.names) == len(self._hmm.log_stay):
             for _ in range(steps):  # there are no states in context
                 self._report(stage, None)
         elif steps:
@@ -172,7 +174,7 @@ class _Training:
                 self._hmm = hmm
                 self._report(stage, statistics.mean_log_likelihood)
 
-            stage.em(self._hmm, self._data, self._sequences, steps, after_step, self._map)
+            baum_welch(self._hmm, self._data, self._sequences, steps, stage.maximise, after_step, self._map)
 
     def _report(self, stage: _Stage, figure: float | None) -> None:
         self._done += 1

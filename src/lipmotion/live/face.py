@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.errors import InputError
 from lipmotion.live.network import LAGS, STEP_S, answer_silence, live_network
-from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS
+from lipmotion.meshes.fitting.shape_weights import VISEME_CHANNELS, blend_visemes, cancel_opposed
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.closure import OPENING, is_never_negative
@@ -99,7 +100,10 @@ class ModelFace:
         values[self._bounded] = np.maximum(values[self._bounded], 0)
         arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)
         arkit[PARTING] *= 1 - closing
-        return values, np.concatenate([arkit, said / max(float(said.sum()), 1.0)])
+        arkit = cancel_opposed(arkit, ARKIT_MOUTH)
+        held = said[None] / max(float(said.sum()), 1.0)
+        visemes = blend_visemes(held, opening_to_gap(values[[self.opening]]), np.zeros(1))[0]
+        return values, np.concatenate([arkit, visemes])
 
 
 def between(shown: tuple[Array, Array], goal: tuple[Array, Array], share: float) -> tuple[Array, Array]:

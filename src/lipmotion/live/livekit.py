@@ -46,7 +46,7 @@ DISCARDED_S = 0.2
 class LipSync(AudioOutput):
     """Sends lip motion in time with sound: ``session.output.audio = LipSync(session.output.audio, room=ctx.room)``.
 
-    next_in_chain        : takes the sound, unchanged
+    next_in_chain        : takes the sound, unchanged, and calls ``on_playback_started``, as outputs of LiveKit do
     room                 : to whose participants motion goes, as data packets of topic ``lipmotion``
     on_frames            : takes frames instead, and whether the first is to be shown now; perhaps a coroutine function
     look_ahead_ms, model : of ``lipmotion.Stream``
@@ -169,6 +169,18 @@ class LipSync(AudioOutput):
         super().on_playback_started(created_at=created_at)
         self._playout.until_s, self._started = self._clock_s() + self._given_s, True
         self._send_motion()
+
+    def on_playback_finished(
+        self, *, playback_position: float, interrupted: bool, synchronized_transcript: str | None = None
+    ) -> None:
+        """Pass on that the utterance is over."""
+        if self._passed and not self._started and not interrupted:
+            LOG.warning("no lip motion was sent: the audio output does not call on_playback_started")
+        super().on_playback_finished(
+            playback_position=playback_position,
+            interrupted=interrupted,
+            synchronized_transcript=synchronized_transcript,
+        )
 
     async def aclose(self) -> None:
         """End the tasks."""

@@ -126,16 +126,10 @@ class AcousticNetwork(Predictor):
             fitting = sure + (1 - strange) * np.maximum(rate_clearness(distortion) - sure, 0)
             share = (fitting * (known + strange * (unknown - known)))[:, None]
             motion = motion + share * (network.predict(speech)[0] - motion)
-        encoded = self.predict_encoded(speech)
-        if encoded is not None:
-            motion = motion + ENCODING_SHARE * encoded[1] * (encoded[0] - motion)
+        if self.encoding is not None and speech.encoding is not None and strange:
+            share = ENCODING_SHARE * min(2 * strange, 1.0) * _rate_sureness(speech)
+            motion = motion + share * (self.encoding.predict(speech)[0] - motion)
         return motion, distortion
-
-    def predict_encoded(self, speech: Speech) -> tuple[Array, float] | None:
-        """Return motion from the encoding alone, and how far it applies: to unknown voices, where phones are sure."""
-        if self.encoding is None or speech.encoding is None or speech.voice >= 1:
-            return None
-        return self.encoding.predict(speech)[0], min(2 * unseen_share(speech.voice), 1.0) * _rate_sureness(speech)
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""

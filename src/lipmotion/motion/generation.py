@@ -12,7 +12,6 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior, unseen_share
 from lipmotion.motion.closure import (
-    REACH_S,
     Closure,
     choose_closed_frames,
     find_closable_ranges,
@@ -92,14 +91,14 @@ class LearnedMotion:
         closing_units: Container[str] = (),
         reliability: NDArray[np.float64] | float = 1.0,
         voice: float = 1.0,
-        encoded: tuple[NDArray[np.float64], float] | None = None,
+        articulators: NDArray[np.float64] | None = None,
     ) -> tuple[Motion, ReducedVariance]:
         """Return the motion of all channels at 100 Hz, and its variance, by parameter generation.
 
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
-        Voices that training does not know part their lips to speak, follow the encoding of the sound, and have typical
-        talkers' range (``motion.unseen_speaker``).
+        Voices that training does not know part their lips to speak, follow what the general network hears, and have
+        typical talkers' range (``motion.unseen_speaker``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
@@ -108,23 +107,25 @@ class LearnedMotion:
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
-        encoded       : as of ``Predictor.predict_encoded``
+        articulators  : what the general network hears in the sound [shape=(T, 8)], for voices not known to training
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
         pins = resolve_pins(constraints, self.space, frames)
-        scaling, reach_s = self.scaling, REACH_S
+        scaling, ranges = self.scaling, find_closable_ranges(units, frames, closing_units)
         if self.prior is not None:
             statistics = self.prior.blend(statistics, units, frames, reliability, voice)
             if voice < 1 and scaling is not None and self.closure is not None:
                 speaker = UnseenSpeaker(self.prior, units, frames, reliability, voice)
                 statistics = speaker.raise_contrast(statistics)
                 statistics = speaker.open_before_speech(statistics)
-                if encoded is not None:
-                    statistics = speaker.follow_encoding(statistics, *encoded)
+                ranges = find_closable_ranges(units, frames, closing_units, choose_closing_reach(voice))
+                if articulators is not None:
+                    statistics = speaker.follow_sound(statistics, articulators)
+                    ranges = speaker.confirm_closures(ranges, articulators)
                 gain = widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
-                scaling, reach_s = scaling._replace(factors=scaling.factors * gain), choose_closing_reach(voice)
-        ranges = find_closable_ranges(units, frames, closing_units, reach_s) if close else []
+                scaling = scaling._replace(factors=scaling.factors * gain)
+        ranges = ranges if close else []
         space, precision = self.space, np.float32 if frames > DOUBLE_FRAMES else np.float64
         motion = np.empty((frames, len(space.channels)), precision)
         spread = np.empty((frames, space.dimensions), precision)

@@ -106,13 +106,6 @@ class Predictor(ABC):
         """Return whether speech has what ``predict`` needs of it: a spectrum, for instance."""
         return True
 
-    def predict_encoded(self, speech: Speech) -> tuple[Array, float] | None:  # noqa: ARG002
-        """Return motion from the encoding of the sound alone [shape=(T, Q)], and how far it applies, 0 to 1.
-
-        None: there is no such prediction, or training knows the voice.
-        """
-        return None
-
     def hidden(self, speech: Speech) -> tuple[NDArray[np.float32], Array] | None:  # noqa: ARG002
         """Return features on which models of other people can stand, and the distortion; None: there are none.
 

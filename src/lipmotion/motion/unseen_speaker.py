@@ -3,7 +3,7 @@ duration, and movements as large as people's."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,9 +26,12 @@ from lipmotion.units import VOWELS, is_silent
 
 Array = NDArray[np.float64]
 Predict = Callable[[slice], Statistics]
-LATE_ENCODING_SHARE = 0.2
-"""Share of the motion from the encoding alone after all that is done for such a voice, where training knows it half or
-less: what the sound says of the lips corrects what is only usual (docs/results/voices.md)."""
+SOUND_SHARES = (0.75, 0.35)
+"""Share of the motion that the general network hears, after all that is done for such a voice, where training knows it
+half or less: where phones cannot be relied on at all, and where they can (docs/results/voices.md)."""
+CONFIRMED = -0.5
+"""A p, b or m that cannot be relied on closes the lips where the general network hears them less open than this, in
+standard deviations."""
 NEAR_FRAMES = 20
 """Frames before and after speech in which that holds: elsewhere the mouth rests."""
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
@@ -46,9 +49,9 @@ voice for 0.85 of a known one (docs/results/jerk.md), no more than the large mod
 INSET_S = 0.03
 """The lips of such a voice close in p, b and m further than this from both ends of the phone, or in its middle, so that
 short vowels beside it stay open."""
-RETAINED = (0.52, 0.62)
-"""Standard deviation of what a model generates for voices that it does not know, as a share of that of its speaker:
-where phones cannot be relied on at all, and where they can. The more there is doubt, the closer motion is to a mean."""
+RETAINED = (1.0, 0.85)
+"""Standard deviation of what is generated for voices that training does not know, as a share of that of its speaker:
+where phones cannot be relied on at all, and where they can. The general network moves a mouth as far as people do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,23 +71,35 @@ class UnseenSpeaker:
     reliability: Array | float
     voice: float
 
-    def follow_encoding(self, statistics: Predict, encoded: Array, applies: float) -> Predict:
-        """Draw the motion in and near speech towards that from the encoding of the sound alone [shape=(T, Q)].
+    def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
+        """Draw the motion in and near speech towards what the general network hears in the sound.
 
-        applies : how far, 0 to 1 (``Predictor.predict_encoded``)
+        articulators : of ``motion.general_motion`` [shape=(T, 8)]
         """
         spoken = np.zeros((self.frames, 1))
         for span in self.units:
             if not is_silent(span.label.phone):
                 first, stop = frames_of(span, self.frames)
                 spoken[max(first - NEAR_FRAMES, 0) : stop + NEAR_FRAMES] = 1
-        share = LATE_ENCODING_SHARE * applies * smooth_steps(spoken)[:, :, None]
+        unsure, sure = SOUND_SHARES
+        reliability = np.broadcast_to(self.reliability, self.frames)[:, None, None]
+        share = unseen_share(self.voice) * (unsure + reliability * (sure - unsure))
+        share = share * smooth_steps(spoken)[:, :, None]
+        heard = self.prior.centre + articulators @ self.prior.matrix
 
         def predict(chosen: slice) -> Statistics:
             means, precisions = statistics(chosen)
-            return means + share[chosen] * (slice_dynamics(encoded, chosen) - means), precisions
+            return means + share[chosen] * (slice_dynamics(heard, chosen) - means), precisions
 
         return predict
+
+    def confirm_closures(self, ranges: Sequence[slice], articulators: Array) -> list[slice]:
+        """Return the ranges of frames in which a p, b or m can be relied on, or the general network hears one.
+
+        articulators : of ``motion.general_motion`` [shape=(T, 8)]
+        """
+        reliability, opening = np.broadcast_to(self.reliability, self.frames), articulators[:, 0]
+        return [r for r in ranges if reliability[r].mean() > 0.5 or opening[r].min() < CONFIRMED]
 
     def raise_contrast(self, statistics: Predict) -> Predict:
         """Open consonants less, and vowels by their duration.

@@ -241,14 +241,15 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
 def with_prior(prior: Model | None, speech: Speech) -> Speech:
     """Return speech with what another model makes of it; the same speech if there is no other model.
 
-    The closures that the other engine would force are left to the engine that stands on it.
+    The closures that the other engine would force are left to the engine that stands on it. The other model takes
+    everybody for a stranger, in training as in use: if it knew the voice in one of them only, it would differ there.
     """
     if prior is None:
         return speech
     if speech.parts is not None:
         parts = tuple(part._replace(speech=with_prior(prior, part.speech)) for part in speech.parts)
         speech = replace(speech, parts=parts)
-    speech_arrays = speech.with_arrays()
+    speech_arrays = replace(speech.with_arrays(), voice=0.0)
     motion = prior.engine.without_closures().generate(prior.learned, speech_arrays).motion
     measured = measure_articulators(motion.values, motion.names)
     chosen = [measured[name][::STEP] for name in ARTICULATORS if name in measured]

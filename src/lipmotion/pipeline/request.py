@@ -298,8 +298,8 @@ class Outputs(Configuration):
     curves: str = option(
         "",
         metavar="SET",
-        help="what motion files hold: arkit, face, visemes, vowels, fap, or the controls of a rig (FILE.csv; "
-        "docs/meshes.md)",
+        help="what motion files hold: arkit, face, visemes, held-visemes, vowels, fap, or the controls of a rig "
+        "(FILE.csv; docs/meshes.md)",
     )
     posteriors: Path | None = option(
         None, kind=Path, writes=True, metavar="FILE.png", help="draw the posteriors of units over time (coupled)"

@@ -42,8 +42,9 @@ SEAM_GAP, SEAM_FORWARD = 0.03, 0.026
 ROUND_DROP = 0.025
 """How far the line between round lips sinks: the upper lip hides the teeth."""
 REST_SMILE, SMILE_GAP = 0.027, 0.05
-"""How far the corners rise at rest; parted, pressed, round and tucked lips do not smile, from this gap on."""
-BITTEN_EDGE_Y = TEETH_EDGE + 0.028
+"""How far the corners rise at rest; parted, pressed and round lips do not smile, from this gap on. Tucked ones do: with
+lower corners, teeth on the lip look like contempt."""
+BITTEN_EDGE_Y = TEETH_EDGE + 0.017
 """Height of the edge of the lower lip on the upper teeth."""
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
@@ -156,7 +157,8 @@ def _between(pose: CharacterPose) -> Real:
     """Return the height of the line between the lips, closed, at every column [shape=(..., COLUMNS)]."""
     line = (1 - pose.roundness - 0.6 * pose.spread) * _LINE
     lowered = 0.22 * pose.gap * (1 - 0.6 * pose.spread) * (1 - 0.75 * pose.roundness)
-    at_rest = REST_SMILE * closed_share(pose, SMILE_GAP) * (1 - pose.press) * (1 - pose.roundness) * (1 - pose.tuck)
+    still = np.maximum(closed_share(pose, SMILE_GAP), pose.tuck)
+    at_rest = REST_SMILE * still * (1 - pose.press) * (1 - pose.roundness)
     raised = (pose.smile + at_rest - lowered) * ACROSS**2
     bowed = ROUND_BOW * (1 - ACROSS**2) - ROUND_DROP - 0.2 * pose.gap
     return np.asarray(MOUTH_Y + line + raised + bowed * pose.roundness)

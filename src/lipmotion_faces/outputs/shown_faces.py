@@ -80,7 +80,7 @@ class ShownDrawing(_WithHead):
         settings, played = performance.settings, performance.cached(sound_track)
         if performance.generation.curve_edits and self.character is None:
             named = ", ".join(dict.fromkeys(edit.channel for edit in performance.generation.curve_edits))
-            LOG.warning("%s: the face has no curves, so changed %s does not show; pin the opening", path, named)
+            LOG.warning("%s: this face has no curve %s, so the edit does not show; pin the opening", path, named)
         seen, prosody = performance.cached(_seen), performance.cached(_played_prosody)
         monitor, hertz = performance.monitor, _frame_rate(settings)
         write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)

@@ -123,7 +123,7 @@ EYE_DISTANCE = 0.285
 
 
 class _Key(NamedTuple):
-    """What a mouth layer stands for: gap, width, and articulatory channels of its poses."""
+    """What a mouth layer stands for: gap, width, articulatory channels and ovalness of its poses."""
 
     gap: float
     width: float = 1.0
@@ -131,6 +131,7 @@ class _Key(NamedTuple):
     tuck: float = 0.0
     protrusion: float = 0.0
     teeth: float = 0.5
+    oval: float = 0.0
 
 
 MOOD_RISE, MOOD_FALL = 0.1, 0.08
@@ -142,14 +143,14 @@ MOUTHS = {
     "th": _Key(0.09, tongue=1.0),
     "l": _Key(0.09, tongue=0.58),
     "s": _Key(0.055, 1.04, teeth=0.95),
-    "ee": _Key(0.075, 1.1, teeth=0.8),
-    "eh": _Key(0.12, 1.03),
-    "aa": _Key(0.2, 0.94),
+    "ee": _Key(0.11, 1.1, teeth=0.8),
+    "eh": _Key(0.13, 1.03),
+    "aa": _Key(0.19, 0.94, oval=0.8),
     "oh": _Key(0.1, 0.82, protrusion=0.55, teeth=0.2),
     "oo": _Key(0.06, 0.7, protrusion=1.0, teeth=0.0),
 }
 """The mouths that a drawing may have, as layers ``mouth-NAME``; ``rest`` is required, what is missing is replaced."""
-_WEIGHTS = np.array([6.0, 1.6, 0.5, 0.9, 0.7, 0.3])
+_WEIGHTS = np.array([6.0, 1.6, 0.5, 0.9, 0.7, 0.6, 0.5])
 
 
 @final
@@ -199,7 +200,7 @@ def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float)
     is closed for a frame alone.
     """
     keys = np.array([MOUTHS[name] for name in mouths])
-    values = np.array([[p.gap, p.width, p.tongue, p.tuck, p.protrusion, p.teeth] for p in poses])
+    values = np.array([[p.gap, p.width, p.tongue, p.tuck, p.protrusion, p.teeth, p.oval] for p in poses])
     distance = np.square((values[:, None] - keys) * _WEIGHTS).sum(axis=2)
     shut = np.array([name in ("rest", "mbp") for name in mouths])
     closed = (values[:, 0] < 1e-6) & (values[:, 3] < 0.3)

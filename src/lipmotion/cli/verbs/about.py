@@ -121,7 +121,6 @@ def add_info(verbs: Verbs) -> None:
     shipped = "default: the model that ships with the package"
     add_input(parser, "model", what="model", nargs="?", help=shipped)
     parser.add_argument("--structure", action="store_true", help="print only its decision trees, or its chains")
-    parser.add_argument("--trees", action="store_true", dest="structure", help=argparse.SUPPRESS)  # its former name
     parser.set_defaults(run=run_info)
 
 

@@ -6,7 +6,6 @@ import argparse
 from dataclasses import asdict
 
 from lipmotion.cli.arguments.declared import add_options, part_of
-from lipmotion.cli.arguments.paths import add_input
 from lipmotion.cli.terminal.printing import print_json, print_lines
 from lipmotion.pipeline.request import Request
 
@@ -16,9 +15,6 @@ RUNS = 2000
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("explain", help="print which states and Gaussians the motion of a frame comes from")
-    add_input(
-        parser, "former_model", what="model", nargs="?", help=argparse.SUPPRESS
-    )  # explain MODEL SPEECH, before 0.2
     add_options(parser, Request, but=("edits",))
     times = "time of a frame (repeatable; default: list the states of the whole recording)"
     parser.add_argument("--at", type=float, action="append", metavar="SECONDS", help=times)
@@ -41,7 +37,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import load_model
 
     asked = part_of(options, Request())
-    request, model = read_request(asked), load_model(options.former_model or asked.model)
+    request, model = read_request(asked), load_model(asked.model)
     if options.at is not None:
         explanations = explain(request, at=options.at, model=model)
         documents, text = map(explanation_document, explanations), "\n\n".join(map(explanation_text, explanations))

@@ -23,6 +23,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add = parser.add_argument
     told = "a microphone by name or number (default: the usual one), a sound file, or - for raw sound of 16 bits"
     add("-i", "--input", default="", metavar="DEVICE|FILE|-", help=told)
+    add("input", nargs="?", default=argparse.SUPPRESS, metavar="DEVICE|FILE|-", help="the same")
     told = "what takes the frames, perhaps several (default: -, JSON lines); vmc:HOST:PORT, the others alike"
     metavar = "-|FILE.csv|window|vmc|osc|livelink|vtube|websocket|talkinghead"
     add("--to", action="append", metavar=metavar, help=told)
@@ -51,6 +52,7 @@ def run(options: argparse.Namespace) -> None:
 
     with ExitStack() as stack:
         rate_hz, sound = _open_sound(options)
+        options.stopper.check()  # a signal that a package swallowed: a page would be waited for without an end
         seed = None if options.still else 0
         stream = Stream(rate_hz, options.look_ahead, load_model(options.model), pauses=options.pauses, seed=seed)
         about = LiveSound(rate_hz, options.look_ahead, is_microphone=_is_microphone(options.input))
@@ -93,9 +95,11 @@ def _is_microphone(source: str) -> bool:
 
 def _read_pipe(rate_hz: int) -> Iterator[bytes]:
     """Yield what comes on standard input, as whole samples."""
-    rest = b""
+    rest, begins = b"", True
     while content := os.read(sys.stdin.fileno(), 2 * int(CHUNK_S * rate_hz)):
-        content = rest + content
+        if begins and content.startswith(b"RIFF"):
+            raise InputError("standard input is a .wav; required: samples without a header, or the name of the file")
+        content, begins = rest + content, False
         even = len(content) // 2 * 2
         rest = content[even:]
         yield content[:even]
@@ -118,7 +122,8 @@ def _listen(device: str, rate_hz: int) -> Iterator[Any]:
         import sounddevice
     except (ImportError, OSError) as error:
         raise MissingDependencyError(
-            f"a microphone needs sounddevice, and PortAudio ({error}); pip install sounddevice, or give a FILE or -"
+            f"{device + ' is no file, and ' if device else ''}a microphone needs sounddevice, and PortAudio ({error}); "
+            "pip install sounddevice, or give a FILE or -"
         ) from error
     chosen: str | int | None = int(device) if device.isdecimal() else device or None
     opened = False

@@ -18,9 +18,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     outputs: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "default": []}
     written = "FILE.txt, or FILE.json with times and confidences (default: text on standard output)"
     add_output(parser, "-o", "--output", force=True, help=written, **outputs)
-    kinds = "words: all; auto: those that fit the sound (default: words)"
-    parser.add_argument("--recogniser", default="words", metavar="KIND", help=kinds)
-    add_options(parser, Request, "model")
+    add_options(parser, Request, "recogniser", "model")
     add_execution(parser)
     parser.set_defaults(run=run)
 

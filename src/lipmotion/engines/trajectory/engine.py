@@ -14,6 +14,7 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.engines.trajectory.model import Experts, TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.trajectory_training import TrainingOptions, fit_trajectory
 from lipmotion.motion.frame_labels import StateLayout, label_full_context, with_unit_names
+from lipmotion.motion.general_motion import hear_articulators
 from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor, count_conditions
 from lipmotion.motion.rest import find_digital_silence
@@ -172,7 +173,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             constraints,
             close=self.config.closures,
             reliability=experts.reliability,
-            encoded=None if model.network is None else model.network.predict_encoded(speech),
+            articulators=hear_articulators(speech),
             voice=speech.voice,
         )
         return Generation(

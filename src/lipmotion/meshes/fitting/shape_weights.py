@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.meshes.model.shape_names import SIDES, VISEMES_15
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
+Array = NDArray[np.float64]
 VISEME_PHONES = {
     "sil": "sil sp",
     "PP": "p b m em",
@@ -44,6 +45,14 @@ NEAREST_VOWEL = {
     **{"aa": "aa", "ih": "ih", "oh": "oh", "ou": "ou"},
 }
 """The vowel of VRM for each viseme that opens the mouth."""
+VISEME_POSES = {
+    **{"FF": (0.05, 0.0), "TH": (0.1, 0.0), "DD": (0.12, 0.0), "kk": (0.14, 0.0), "CH": (0.14, 0.45)},
+    **{"SS": (0.13, 0.0), "nn": (0.13, 0.0), "RR": (0.13, 0.35), "aa": (0.22, 0.0), "E": (0.18, 0.0)},
+    **{"ih": (0.14, 0.0), "oh": (0.15, 0.75), "ou": (0.1, 1.0)},
+}
+"""The gap, in eye distances, and the protrusion of each open viseme at weight 1: about those of distinct speech."""
+LARGEST_ADDED = 0.4
+"""A viseme gives up at most this share to ``aa`` where the lips are further apart."""
 LAX = "E"
 """The viseme of parted lips in a pause."""
 MAX_CLOSED_WEIGHT = 0.85
@@ -53,12 +62,14 @@ CLOSED_GAPS, PARTED_GAPS = (0.0, 0.04), (0.06, 0.16)
 MIN_WEIGHT = 1e-6
 
 
-def weigh_visemes(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
+def weigh_visemes(units: Timeline[Unit], mouth: SpokenMouth, *, held: bool = False) -> Motion:
     """Return the weights of the 15 visemes over time, channels ``viseme_sil``, ``viseme_PP``, ...; 0 to 1.
 
     units : phones in time;  mouth : that they move
-    At every time the weights add up to 1. The visemes of closed lips, ``viseme_sil`` and ``viseme_PP``, add up to 1
-    where the lips of the mouth touch, and to at most ``MAX_CLOSED_WEIGHT`` where they do not.
+    held  : every viseme is wholly there, whatever the mouth does, and is cross-faded with the next one
+    At every time the weights add up to 1, or to less, where lips are parted less than in the viseme. The visemes of
+    closed lips, ``viseme_sil`` and ``viseme_PP``, add up to 1 where the lips of the mouth touch, and to at most
+    ``MAX_CLOSED_WEIGHT`` where they do not.
     """
     phones = viseme_curves(units, np.arange(len(mouth.gap)) / mouth.rate_hz)
     wanted = phones["sil"] + phones["PP"]
@@ -72,7 +83,29 @@ def weigh_visemes(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
     curves |= {"sil": closed * silent, "PP": closed * (1 - silent)}
     curves[LAX] += np.where(wanted < 1 - MIN_WEIGHT, 0.0, 1 - closed)
     values = np.stack([np.clip(curves[name], 0, 1) for name in VISEMES_15], axis=1)
+    if not held:
+        values = blend_visemes(values, mouth.gap, mouth.protrusion)
     return Motion(values, mouth.rate_hz, tuple(Channel(name, WEIGHT) for name in VISEME_CHANNELS))
+
+
+def blend_visemes(held: Array, gap: Array, protrusion: Array) -> Array:
+    """Return weights of visemes that follow the lips, where held ones are 1 however far these part [shape=(T, 15)].
+
+    held : weights that add up to 1 [shape=(T, 15)];  gap, protrusion : of the mouth [each shape=(T,)]
+    Of open visemes, part becomes ``ou`` where the lips are rounder, and ``aa`` where they are further apart; what is
+    left is as strong as their gap.
+    """
+    gaps, roundness = np.array([VISEME_POSES.get(name, (0.0, 0.0)) for name in VISEMES_15]).T
+    ou, aa, named = VISEMES_15.index("ou"), VISEMES_15.index("aa"), gaps > 0
+    total = held[:, named].sum(axis=1)
+    mix = held * named / np.maximum(total, MIN_WEIGHT)[:, None]
+    rounder = np.clip((protrusion - mix @ roundness) / np.maximum(1 - mix @ roundness, MIN_WEIGHT), 0, 1)
+    mix = (1 - rounder)[:, None] * mix + np.outer(rounder, np.eye(len(gaps))[ou])
+    wider = np.clip((gap - mix @ gaps) / np.maximum(gaps[aa] - mix @ gaps, 0.04), 0, LARGEST_ADDED)
+    wider = wider * (1 - protrusion)
+    mix = (1 - wider)[:, None] * mix + np.outer(wider, np.eye(len(gaps))[aa])
+    size = np.clip(gap / np.maximum(mix @ gaps, MIN_WEIGHT), 0, 1)
+    return np.where(named, (total * size)[:, None] * mix, held)
 
 
 def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -84,7 +117,7 @@ def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[st
     return {name: np.clip(weights.get(name, np.zeros(len(time_s))), 0.0, 1.0) for name in VISEMES_15}
 
 
-Array = NDArray[np.float64]
+Limits = tuple[Array | float, Array | float]
 
 LARGEST_EIGENVALUE = 16.0
 """The largest eigenvalue of the squared second difference."""
@@ -122,6 +155,14 @@ SPREADING = tuple(f"{name}{side}" for name in ("mouthSmile", "mouthStretch", "mo
 """Shapes that draw the corners apart: they vanish in round phones."""
 DEPTH_WEIGHT, JAW_WEIGHT, CORNER_WEIGHT, GAP_WEIGHT = 0.4, 0.5, 4.0, 2.0
 """Weights of depth, of the jaw, of the corners across, and of the gap between the lips, where lips have 1."""
+OPPOSED = (
+    (tuple(ROUNDING), SPREADING),
+    (("mouthRollUpper",), ("mouthUpperUpLeft", "mouthUpperUpRight")),
+    (("mouthRollLower", "mouthShrugLower"), ("mouthLowerDownLeft", "mouthLowerDownRight")),
+)
+"""Shapes of which each on one side undoes those on the other: a face has one side at a time."""
+OPPOSITION = 1.5
+"""Cost of the product of two such weights, where that of the square of either is 1: both at once are never best."""
 PAIR_WEIGHT = 0.15
 """Weight of the difference between the left and the right of a pair."""
 VISEME_WEIGHT = 0.2
@@ -130,7 +171,7 @@ PRESS_DEPTH = 0.01
 """In p, b and m the lips are closed this much further than to touch, in eye distances: no light between them."""
 MIN_PARTING = 0.004
 """Shapes that part the lips by less than this, in eye distances, are not used to part or to close them."""
-PRESS_WEIGHT, UPPER_ROLL_WEIGHT, LOWER_ROLL_WEIGHT, TONGUE_WEIGHT = 0.2, 0.1, 0.55, 0.3
+PRESS_WEIGHT, UPPER_ROLL_WEIGHT, LOWER_ROLL_WEIGHT, TONGUE_WEIGHT = 0.4, 0.1, 0.55, 0.3
 """Weights of ARKit's blendshapes for what lip points do not show: lips that are pressed together (``mouthPressLeft``,
 ``mouthPressRight``, ``mouthRollUpper``), a lower lip on the teeth, a tongue between the teeth."""
 
@@ -199,14 +240,25 @@ def solve_shape_weights(
 
 
 def fit_bounded_curves(
-    matrix: Array, targets: Array, costs: CurveCosts | None = None, ties: Array | None = None
+    matrix: Array,
+    targets: Array,
+    costs: CurveCosts | None = None,
+    ties: Array | None = None,
+    limits: Limits = (0.0, 1.0),
+    initial: Array | None = None,
+    opposed: NDArray[np.bool_] | None = None,
 ) -> Array:
-    """Return weights w between 0 and 1 that minimise the distance of ``w @ matrix`` from targets [shape=(T, S)].
+    """Return weights w within limits that minimise the distance of ``w @ matrix`` from targets [shape=(T, S)].
 
     matrix  : what each of S shapes adds at weight 1 [shape=(S, D)]
     targets : one row a frame [shape=(T, D)]
     ties    : further rows that should be 0, as left weight − right weight [shape=(R, S)]
-    Minimises Σ_t ‖w_t M − d_t‖² + ridge ‖w_t‖² + ‖ties w_t‖² + smooth ‖w_{t−1} − 2 w_t + w_{t+1}‖², 0 ≤ w ≤ 1.
+    limits  : the least and the largest weights [numbers, or shape=(T, S)]
+    initial : weights to begin from [shape=(T, S)]; None: any
+    opposed : which shapes exclude each other, symmetric [shape=(S, S)]; None: none
+    Minimises Σ_t ‖w_t M − d_t‖² + ridge ‖w_t‖² + ‖ties w_t‖² + smooth ‖w_{t−1} − 2 w_t + w_{t+1}‖².
+    Products of weights that exclude each other cost so much that one of both is 0 where smoothness lets it; then the
+    minimum is one near ``initial``.
     Raises InputError: shapes of arrays that do not fit, or values that are not finite.
     Source: Beck & Teboulle 2009 (FISTA), with the restart of O'Donoghue & Candès 2015 and a diagonal preconditioner.
     Cost: O(T·S²) a step; some hundred steps.
@@ -222,10 +274,12 @@ def fit_bounded_curves(
     scale = np.sqrt(np.diag(square))
     wanted = targets @ matrix.T / scale
     square = square / np.outer(scale, scale)
-    smooth = costs.smooth / scale**2
-    step = 1 / (np.linalg.eigvalsh(square)[-1] + LARGEST_EIGENVALUE * float(smooth.max(initial=0.0)))
+    if opposed is not None:
+        square = np.where(opposed, OPPOSITION, square)
+    smooth, low, high = costs.smooth / scale**2, limits[0] * scale, limits[1] * scale
+    step = 1 / (np.linalg.norm(square, 2) + LARGEST_EIGENVALUE * float(smooth.max(initial=0.0)))
     decay, pull, stiffness = np.eye(len(square)) - step * square, step * wanted, step * smooth
-    current = ahead = np.clip(wanted, 0, scale)
+    current = ahead = np.clip(wanted if initial is None else scale * initial, low, high)
     momentum, seconds = 1.0, np.zeros((len(targets) + 2, len(matrix)))  # its first and last two rows stay 0
     for _ in range(MAX_STEPS):
         following = ahead @ decay  # a step along the gradient, in place: most time goes into the calls of NumPy
@@ -240,7 +294,7 @@ def fit_bounded_curves(
         fourths += seconds[:-2]
         fourths *= stiffness
         following -= fourths
-        np.clip(following, 0, scale, out=following)
+        np.clip(following, low, high, out=following)
         change = following - current
         if np.vdot(ahead - following, change) > 0:
             momentum, ahead = 1.0, following
@@ -251,7 +305,7 @@ def fit_bounded_curves(
         current = following
         if np.abs(change / scale).max(initial=0.0) < TOLERANCE * step:
             break
-    return np.clip(current / scale, 0, 1)
+    return np.clip(current / scale, *limits)
 
 
 def _weigh_rows(displacements: Array, gap: Array) -> Array:
@@ -280,17 +334,43 @@ def _solve_free_weights(
             if name in shapes.known:
                 fixed[:, shapes.known.index(name)] = curve
     free = np.array([name not in NOT_FROM_POINTS for name in shapes.known])
-    targets = targets - fixed @ matrix
     jaw, close = shapes.row("jawOpen"), shapes.row("mouthClose")
     if jaw is not None and close is not None:
         matrix[close] += matrix[jaw]  # as one: the jaw opens behind closed lips
-    weights = fixed.copy()
-    weights[:, free] += fit_bounded_curves(matrix[free], targets, options.costs, PAIR_WEIGHT * shapes.pairs()[:, free])
+    ties, weights = PAIR_WEIGHT * shapes.pairs(), fixed.copy()
+    weights[:, free] += fit_bounded_curves(matrix[free], targets - fixed @ matrix, options.costs, ties[:, free])
+    if options.gestures:
+        weights = round_lips(np.clip(weights, 0.0, 1.0), shapes, mouth.protrusion)
+    limits = (fixed, np.where(free, 1.0, fixed))
+    weights = part_opposed(weights, matrix, shapes.known, options.costs, limits, ties)
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
-    if options.gestures:
-        weights = round_lips(weights, shapes, mouth.protrusion)
     return np.clip(weights, 0.0, 1.0)
+
+
+def part_opposed(
+    weights: Array, matrix: Array, known: Sequence[str], costs: CurveCosts, limits: Limits, ties: Array | None = None
+) -> Array:
+    """Return weights that look as others do, without shapes at once that undo each other [shape=(T, S)].
+
+    weights : 0 to 1 [shape=(T, S)]; known : names of the shapes as ARKit's; others : as of ``fit_bounded_curves``
+    """
+    sides = [[np.isin(known, names) for names in pair] for pair in OPPOSED]
+    opposed = np.any([np.outer(one, other) | np.outer(other, one) for one, other in sides], axis=0)
+    costs = replace(costs, ridge=costs.ridge / 10)  # they are as small as they should be
+    return fit_bounded_curves(matrix, weights @ matrix, costs, ties, limits, weights, opposed)
+
+
+def cancel_opposed(weights: Array, known: Sequence[str]) -> Array:
+    """Return the weights of one frame, of shapes that undo each other only the larger side, as far as it is larger
+    [shape=(S,)]. ``part_opposed`` keeps the look better, but needs many frames and some time.
+    """
+    left = weights.copy()
+    for one, other in (tuple(np.isin(known, names) for names in pair) for pair in OPPOSED):
+        strong, weak = weights[one].max(initial=0.0), weights[other].max(initial=0.0)
+        left[one] *= max(strong - weak, 0.0) / max(strong, 1e-9)
+        left[other] *= max(weak - strong, 0.0) / max(weak, 1e-9)
+    return left
 
 
 def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:

@@ -119,9 +119,9 @@ VOWEL_FORMS = {
     "oh": "jawOpen 0.2 mouthFunnel 0.4 mouthPucker 0.3",
 }
 """The vowels of VRM, which are the あ い う え お of MikuMikuDance, as blendshapes of ARKit."""
-VOWELS = _invert({**VOWEL_FORMS, CLOSED: "mouthPress 0.2"})
+VOWELS = _invert({**VOWEL_FORMS, CLOSED: "mouthPress 0.4"})
 VISEME_FORMS = {
-    "PP": "mouthPress 0.2",
+    "PP": "mouthPress 0.4",
     "FF": "jawOpen 0.1 mouthRollLower 0.6",
     "TH": "jawOpen 0.2 tongueOut 0.3",
     "DD": "jawOpen 0.15",

@@ -31,15 +31,16 @@ from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Pros
 from lipmotion.types.delivery import Staging
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
+VISEMES, HELD_VISEMES = "visemes", "held-visemes"
 LIVING_SETS = (WHOLE_FACE, VOWELS)
 """Sets of curves with eyes, brows and head, which move on their own."""
 WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS)
 KNOWN_CURVES = (*WEIGHTS, *(row[1] for row in PARAMETERS))
 """Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
-SHAPE_SETS = (ARKIT, WHOLE_FACE, "visemes", VOWELS, "fap")
+SHAPE_SETS = (ARKIT, WHOLE_FACE, VISEMES, HELD_VISEMES, VOWELS, "fap")
 """Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the same with eyes, brows and head (which move on
-their own), the 15 visemes of Oculus and OpenXR, the five vowels of VRM with pressed lips, moods, eyes, brows and head,
-and MPEG-4's facial animation parameters of lips and jaw."""
+their own), the 15 visemes of Oculus and OpenXR as far as the mouth moves, the same one after another, the five vowels
+of VRM with pressed lips, moods, eyes, brows and head, and MPEG-4's facial animation parameters of lips and jaw."""
 
 
 def check_curve_set(curves: str | Path) -> None:
@@ -69,8 +70,7 @@ def make_curves(
     """Return motion as curves that drive a character.
 
     Motion of blendshapes keeps its weights.
-    curves : ``arkit``, ``face``, ``visemes``, ``vowels``, ``fap``, a table of a rig's controls (``.csv``), or a
-             character with blendshapes
+    curves : one of ``SHAPE_SETS``, a table of a rig's controls (``.csv``), or a character with blendshapes
     staging, prosody : of the eyes, brows and head of ``face`` and ``vowels``, as of ``compute_living_curves``
     edits  : pins and gains of curves; controls of a rig also follow those of the curves that they are made of
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
@@ -104,7 +104,7 @@ def make_rig_sources(
     def plain(name: str) -> Motion:
         return apply_curve_edits(_make_set(motion, units, name, staging, prosody), units, edits)
 
-    sets = [with_mouth(motion), plain(ARKIT), plain("visemes")]
+    sets = [with_mouth(motion), plain(ARKIT), plain(VISEMES)]
     if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
         sets.append(plain(VOWELS))
     sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
@@ -149,7 +149,9 @@ def _make_set(
         pressed = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
         vowels = join_channels(solve_shape_weights(motion, units, vowel_mouth()), pressed)
         return join_channels(vowels, compute_living_curves(motion, units, staging, prosody))
-    return weigh_visemes(units, spoken_mouth(motion, units)) if name == "visemes" else move_faps(motion, units)
+    if name in (VISEMES, HELD_VISEMES):
+        return weigh_visemes(units, spoken_mouth(motion, units), held=name == HELD_VISEMES)
+    return move_faps(motion, units)
 
 
 def join_channels(first: Motion, second: Motion) -> Motion:

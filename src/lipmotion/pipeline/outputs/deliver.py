@@ -29,7 +29,7 @@ from lipmotion.types.audio import LAUGHTER, SHOUT, WHISPER
 from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, sort_moods
 from lipmotion.types.motion import RADIAN
 
-FACTORS: Final = {PLAIN: 1.0, "whisper": 0.85, "shout": 1.5, "mumble": 0.5}
+FACTORS: Final = {PLAIN: 1.0, "whisper": 0.65, "shout": 1.5, "mumble": 0.5}
 """How large the movements of the mouth are in each manner, beside those of plain speech."""
 
 LAUGHING: Final = "happy"
