@@ -261,6 +261,7 @@ class RecordingReplies:
             except RevisionError as error:
                 changed, status = {"error": str(error)}, 409
             state = {"media": self._media(number)} | recording.state()
+            state["misfits"] = self._workspace.misfits.get(number, [])
             with self._studio.folder.lock:
                 state |= self._studio.recording_document(number) | {"revision": recording.revision}
             state["transcript"] = state["transcript"] or recording.transcript

@@ -11,9 +11,9 @@ import logging
 import threading
 import time
 from collections import OrderedDict, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 from starlette.exceptions import HTTPException
@@ -42,6 +42,20 @@ class NotReadyError(HTTPException):
 
     def __init__(self) -> None:
         super().__init__(503, "the recording is still being analysed; ask again", {"retry-after": "1"})
+
+
+@contextmanager
+def _collect_warnings() -> Iterator[list[str]]:
+    """Give a list of what is warned of in this thread."""
+    texts: list[str] = []
+    handler = logging.Handler(logging.WARNING)
+    handler.addFilter(lambda record: record.thread == threading.get_ident())
+    handler.emit = lambda record: texts.append(record.getMessage())  # type: ignore[method-assign]
+    LOG.addHandler(handler)
+    try:
+        yield texts
+    finally:
+        LOG.removeHandler(handler)
 
 
 class StoppedError(LipMotionError):
@@ -89,6 +103,7 @@ class Workspace:
         self.folder, self.model = folder, model
         self._works: OrderedDict[int, Work] = OrderedDict()
         self._waiting: deque[Work] = deque()
+        self.misfits: dict[int, list[str]] = {}  # what the analysis of each recording warned of
         self._analysing = threading.Lock()
         self._background = ThreadPoolExecutor(1, "understand")
 
@@ -238,7 +253,8 @@ class Workspace:
             if summary is not NO_EDITS:
                 return None
             work.set_status(WORKING)
-            audio = analyse_recording(self.folder, recording, self.model, work.report)
+            with _collect_warnings() as self.misfits[work.number]:
+                audio = analyse_recording(self.folder, recording, self.model, work.report)
             if len(self._waiting) % SAVED_EACH == 0:
                 self.folder.save()
             return audio

@@ -205,7 +205,14 @@ def test_each_edit_by_pointer_and_keys(page):
     page.edit(lambda: window.click("#unlock"), r"unlock from \S+ to \S+")
     page.edit(lambda: window.click("#insert"), r"insert ah from \S+ to \S+")
     page.edit(lambda: window.click("#gain-apply"), r"gain \S+ from \S+ to \S+")
-    page.edit(lambda: window.click("#mood-set"), r"mood happy:0\.7 at \S+")
+    count, span = len(page.steps), page.of("studio.store.span")
+    window.click("#mood-set")  # of the selection, after which the one before is back
+    page.wait_for_steps(count + 2)
+    moods = [re.fullmatch(r"mood (\S+) at (\S+)", step) for step in page.steps[-2:]]
+    assert [(mood[1], float(mood[2])) for mood in moods if mood] == [
+        ("happy:0.7", pytest.approx(span["start_s"], abs=1e-3)),
+        ("neutral", pytest.approx(span["end_s"], abs=1e-3)),
+    ]
     window.press(ESCAPE, "d")
     x, y = page.middle('.curve[data-channel="opening"]')
     way = [(x + 10 * step, y - 2 * step) for step in range(1, 6)]

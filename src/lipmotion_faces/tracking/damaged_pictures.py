@@ -22,7 +22,8 @@ Damage = dict[str, Mask]
 
 REPEATED_SHARE = 0.12
 """A picture repeats the one before if it differs less than this share of how much most pictures (75 %) do: decoders add
-noise to repeated ones (up to 0.1 in H.264; GRID: 1 picture of 6,882 is below)."""
+noise to repeated ones (H.264: up to 0.1 where they are frozen, up to 0.4 where single ones are doubled, most of which
+are not found; 93 clips of GRID: at most 1 picture of 6,882 is below)."""
 FROZEN_S = 0.2
 """Pictures that repeat one another for so long are frozen; single ones are doubled, as where frame rates were changed.
 """

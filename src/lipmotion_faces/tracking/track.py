@@ -190,7 +190,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
         *([f"another face, or one that is not recognised, in {others} frames"] if others else []),
         *([f"the mouth is covered, or the picture damaged, in {covered} frames"] if covered else []),
         *damaged_pictures.describe_damage({"frozen": frozen}, times_s),
-        *([f"{doubled} pictures are doubled"] if (doubled := int((repeated & ~frozen).sum())) else []),
+        *([f"{doubled} pictures are doubled"] if (doubled := int((repeated & ~frozen).sum())) > 1 else []),
     )
     if pictures.points:
         unit_px = float(np.median(distance_px(np.stack(pictures.points), EYE_CORNERS)))

@@ -28,6 +28,7 @@ export class Store {
     /** @type {any} */ this.training = {}; // how far a voice or a face is
     this.tool = "select";
     this.channels = ["opening", "width", "outer"];
+    this.raw = false; // whether the coordinates of single points are offered
     this.saving = 0;
     this.unsaved = false;
     this.tab = "edit";

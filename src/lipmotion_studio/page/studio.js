@@ -73,6 +73,7 @@ export class Studio {
       this.message.className = store.message.kind;
     });
     store.on(["saving", "unsaved", "recording"], () => {
+      this.state.classList.toggle("busy", Boolean(store.saving));
       this.state.textContent = store.saving ? TEXT.saving : store.unsaved ? TEXT.notSaved : store.recording ? TEXT.saved : "";
     });
     store.on(["project", "recording"], () => {

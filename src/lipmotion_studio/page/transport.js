@@ -4,7 +4,15 @@ import { choice, icon, iconButton, make } from "./dom.js";
 import { clock } from "./timeline/sound_tracks.js";
 import { TEXT, fill } from "./strings.js";
 
-const LIP_POINT = /^[xyz]_\d+$/;
+const LIP_POINT = /^[xyz]_\d+$/, RAW = " raw";
+/** Parts of the face in the order in which people look for them. */
+const PARTS = ["jaw", "mouth", "tongue", "cheek", "nose", "brow", "eye"];
+
+/** Return names of blendshapes by the part of the face, in order of names within it; others come last. */
+function byPart(names) {
+  const place = (name) => (PARTS.findIndex((part) => name.startsWith(part)) + PARTS.length + 1) % (PARTS.length + 1);
+  return [...names].sort((a, b) => place(a) - place(b) || a.localeCompare(b));
+}
 
 export class Transport {
   /**
@@ -23,6 +31,7 @@ export class Transport {
     const undo = iconButton("undo", TEXT.undo, () => studio.undo(), { id: "undo" }), redo = iconButton("redo", TEXT.redo, () => studio.redo(), { id: "redo" });
     const draw = pressed("draw", TEXT.draw, () => store.set({ tool: store.tool === "draw" ? "select" : "draw" }), { id: "draw" });
     const add = choice([], "", (name) => {
+      if (name === RAW) return void store.set({ raw: !store.raw });
       const { channels } = store;
       studio.showCurves(channels.includes(name) ? channels.filter((each) => each !== name) : [...channels, name]);
     }, { id: "curves", "aria-label": TEXT.curvesShown });
@@ -48,13 +57,14 @@ export class Transport {
       undo.disabled = !store.recording?.undo;
       redo.disabled = !store.recording?.redo;
     });
-    store.on(["recording", "channels", "weights"], () => {
+    store.on(["recording", "channels", "weights", "raw"], () => {
       const channels = (store.recording?.channels ?? []).map(({ name }) => name), shapes = (store.weights?.names ?? []).filter((name) => !name.includes("."));
       const group = (label, names) => names.length && make("optgroup", { label }, ...names.map((name) => make("option", { value: name,
         textContent: `${store.channels.includes(name) ? "✓ " : ""}${name}` })));
       add.replaceChildren(...[make("option", { value: "", textContent: TEXT.curves, disabled: true, selected: true }),
-        group(TEXT.curveGroups.motion, channels.filter((name) => !LIP_POINT.test(name))), group(TEXT.curveGroups.shapes, shapes),
-        group(TEXT.curveGroups.points, channels.filter((name) => LIP_POINT.test(name)))].filter(Boolean));
+        group(TEXT.curveGroups.motion, channels.filter((name) => !LIP_POINT.test(name))), group(TEXT.curveGroups.shapes, byPart(shapes)),
+        store.raw && group(TEXT.curveGroups.points, channels.filter((name) => LIP_POINT.test(name))),
+        channels.some((name) => LIP_POINT.test(name)) && make("option", { value: RAW, textContent: store.raw ? TEXT.hideRaw : TEXT.showRaw })].filter(Boolean));
     });
     store.on(["time_s", "recording"], () => {
       time.textContent = `${clock(store.time_s)} / ${clock(player.duration_s)}`;

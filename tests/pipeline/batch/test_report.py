@@ -41,6 +41,7 @@ GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 
 def test_what_is_doubtful(worse, better):
     assert rate_doubt(GOOD | worse) > rate_doubt(GOOD | better)
     assert rate_doubt(GOOD) == pytest.approx(0)
+    assert rate_doubt(GOOD | {"words": "words", "confidence": 0.07}) > 60
 
 
 def rows_of(page: str) -> list[list]:

@@ -163,10 +163,10 @@ _TEXT, _NUMBER = text(LARGEST_RECORD_BYTES), number(-LARGEST_NUMBER, LARGEST_NUM
 _INPUT = {"path": _TEXT, "size": whole(0, 1 << 63), "changed_ns": whole(-(1 << 63), 1 << 63), "sha256": _TEXT}
 _CHECKED = members(
     {
-        **dict.fromkeys(("name", "recording", "run", "fingerprint", "words", "error", "redone"), _TEXT),
+        **dict.fromkeys(("name", "recording", "run", "fingerprint", "words", "heard", "error", "redone"), _TEXT),
         **dict.fromkeys(("warnings", "advice"), items(_TEXT)),
         **dict.fromkeys(("duration_s", "seconds", "confidence", "range_db", "widest", "motion"), _NUMBER),
-        **dict.fromkeys(("closures_heard", "closures_made", "least_sure_s"), _NUMBER),
+        **dict.fromkeys(("closures_heard", "closures_made", "least_sure_s", "width"), _NUMBER),
         "voice": optional(_NUMBER),
         "outcome": one_of((DONE, FAILED)),
         "inputs": items(members(_INPUT, _INPUT, alone=True)),

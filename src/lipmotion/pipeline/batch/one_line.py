@@ -55,6 +55,7 @@ from lipmotion.storage.files import (
 )
 from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
+from lipmotion.units.phone_timelines import group_words
 
 LOG = logging.getLogger("lipmotion")
 MAX_WARNINGS = 10
@@ -166,6 +167,7 @@ def _describe_motion(generation: Generation) -> Record:
     """Return what the report says of generated motion."""
     outlook, motion, confidence = generation.outlook, generation.motion, generation.confidence
     record: Record = {"duration_s": round(max(len(motion.values) - 1, 0) / motion.rate_hz, 3)}
+    record["heard"] = " ".join(word.label for word in group_words(generation.units) if word.label)
     if outlook is not None:
         record |= {
             "words": outlook.words,
@@ -190,6 +192,7 @@ def _describe_motion(generation: Generation) -> Record:
         ranges = find_closable_ranges(generation.units, len(opening))
         record |= {
             "widest": round(float(opening.max()), 4),
+            **({"width": round(float(motion["width"][opening.argmax()]), 4)} if "width" in motion.names else {}),
             "closures_heard": len(ranges),
             "closures_made": sum(bool(opening[frames].min() <= closed) for frames in ranges),
         }

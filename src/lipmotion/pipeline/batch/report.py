@@ -96,9 +96,11 @@ def is_due(mark: Mark, record: Record | None) -> bool:
 CSV_REPORT, HTML_REPORT = "report.csv", "report.html"
 COLUMNS = (
     "name outcome doubt duration_s words confidence voice motion least_sure_s closures_heard closures_made widest "
-    "range_db warnings advice error seconds recording outputs mark"
+    "range_db warnings advice error seconds recording outputs heard width mark"
 ).split()
 """Columns of the table, in order; docs/batch.md says what they mean."""
+UNSURE_WORDS, UNSURE_PHONES = 80.0, 25.0
+"""Doubt of words of which nothing is sure, and of sounds that were recognised without words."""
 ROWS, BETWEEN = "/*ROWS*/", " | "
 """Where the page has its rows; what stands between several texts in a field of the CSV file."""
 BASIS = "/*BASIS*/"
@@ -151,9 +153,10 @@ def rate_doubt(record: Record) -> float:
     doubt += 10 * len(record.get("warnings", ()))
     doubt += 5 * (record.get("range_db", NOISY_DB) < NOISY_DB)
     if words in ("words", "phones"):
-        doubt += 10 * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
+        most = UNSURE_WORDS if words == "words" else UNSURE_PHONES
+        doubt += most * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
     if words in ("transcript", "mapped transcript", "given units") and record["confidence"] < FULL_FIT_SHARE:
-        doubt += 10 * (1 - record["confidence"])
+        doubt += UNSURE_WORDS * (1 - record["confidence"])
     if (motion := record.get("motion")) is not None:
         doubt += 5 * (1 - motion)
     if closures:

@@ -9,7 +9,7 @@ const SLOW_MS = 40, REST_MS = 200, COARSE = 0.5;
 const TURN_PER_PX = 0.008, KEY_TURN = 0.12, FIELD_DEG = 22;
 /** Turn, tilt, distance in heights of the face, and height of what is looked at (0 chin, 1 crown). */
 const VIEWS = {
-  front: [0, 0.04, 1.12, 0.52], turned: [0.6, 0.05, 1.12, 0.52], side: [1.45, 0.03, 1.12, 0.52], mouth: [0.12, 0.03, 0.4, 0.28],
+  front: [0, 0.04, 1.3, 0.58], turned: [0.6, 0.05, 1.3, 0.58], side: [1.45, 0.03, 1.3, 0.58], mouth: [0.12, 0.03, 0.56, 0.25],
 };
 
 export class Head {

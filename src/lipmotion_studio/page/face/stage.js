@@ -1,6 +1,6 @@
 // The place of the face: a character in WebGL, or pictures of a drawn face, or a video of a span.
 
-import { choice, make, onDrag, textButton } from "../dom.js";
+import { choice, make, onDrag, replaced, textButton } from "../dom.js";
 import { TEXT, fill } from "../strings.js";
 import { Film } from "./film.js";
 import { Head } from "./head.js";
@@ -29,7 +29,8 @@ export class Stage {
     this.recorded = new Recorded(place, studio);
     place.append(this.solid, this.ghost, this.drawn);
     this.film = new Film(place, this);
-    place.append(this.note, make("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.film.button));
+    this.sides = make("div", { className: "sides", hidden: true });
+    place.append(this.note, this.sides, make("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.film.button));
     onDrag(this.solid, {
       start: (event) => { this.from = [event.clientX, event.clientY]; },
       move: (event) => {
@@ -103,6 +104,8 @@ export class Stage {
 
   show() {
     const { weights, other, comparing, heads, time_s, recording } = this.store;
+    this.sides.hidden = !(this.isSolid && heads === "sides" && other?.weights);
+    if (!this.sides.hidden) replaced(this.sides, ...[TEXT.now, other.name].map((textContent) => make("div", {}, make("span", { textContent }))));
     if (this.isSolid && this.head) {
       if (weights && !this.studio.weights.known(time_s)) return; // the pose before stays until it is known
       this.head.pose(comparing && other?.weights ? other.weights : weights, time_s, heads === "one" ? null : other?.weights, heads === "over");

@@ -18,12 +18,12 @@ export function editTab(studio) {
     selected?.kind === "curve" && curvePart(studio, selected.channel),
     span && spanPart(studio, span),
     !selected && !span && make("p", { className: "hint", textContent: TEXT.nothingSelected }),
-    moodPart(studio),
+    moodPart(studio, span),
     !selected && transcriptPart(studio),
   ].filter(Boolean);
 }
 
-const phoneChoices = ({ forms }) => forms.phones.map(({ name, example }) => [name, example ? `${name}   ${example}` : name]);
+const phoneChoices = ({ forms }) => forms.phones.map(({ name }) => [name, TEXT.examples[name] ? `${name} – ${TEXT.examples[name]}` : name]);
 
 function timeField(id, value, name, onchange) {
   return labelled(name, make("input", { id, type: "number", step: "0.01", min: "0", value: value.toFixed(3), onchange: (event) => onchange(Number(event.target.value)) }));
@@ -130,17 +130,25 @@ function spanPart(studio, { start_s, end_s }) {
     phone, textButton(TEXT.insert, insert, { id: "insert" })));
 }
 
-function moodPart(studio) {
+/** A mood of the selection, after which the one before is back; without a selection, from the playhead on. */
+function moodPart(studio, span) {
   const { project } = studio.store, strength = make("input", { id: "mood-strength", type: "range", min: "0.1", max: "1", step: "0.1", value: "0.7", "aria-label": TEXT.strength });
   const known = ["neutral", ...project.forms.moods, "plain", ...project.forms.manners].map((each) => [each, each]);
   const moods = choice(known, "happy", () => {}, { id: "mood", "aria-label": TEXT.mood });
-  const set = () => studio.edit([say.mood(PLAIN.includes(moods.value) ? moods.value : `${moods.value}:${strength.value}`, studio.store.time_s)]);
-  return section(TEXT.moodAt, row(moods, strength, textButton(TEXT.apply, set, { id: "mood-set" })));
+  const set = () => {
+    const { recording, time_s } = studio.store, mood = PLAIN.includes(moods.value) ? moods.value : `${moods.value}:${strength.value}`;
+    if (!span) return studio.edit([say.mood(mood, time_s)]);
+    const isManner = (name) => ["plain", ...project.forms.manners].includes(name.split(":")[0]), kind = isManner(mood);
+    const before = placed(recording.steps).moods.findLast((each) => each.time_s <= span.end_s && isManner(each.mood) === kind)?.mood ?? (kind ? "plain" : "neutral");
+    return studio.edit([say.mood(mood, span.start_s), say.mood(before, span.end_s)]);
+  };
+  return section(span ? TEXT.moodOver : TEXT.moodAt, row(moods, strength, textButton(TEXT.apply, set, { id: "mood-set" })));
 }
 
 function transcriptPart(studio) {
   const { recording } = studio.store, words = (!recording.steps.length && recording.transcript) || recording.words.map(({ label }) => label).join(" ");
   const field = make("textarea", { id: "transcript", rows: 3, value: studio.typed ?? words, "aria-label": TEXT.transcript });
+  const misfits = (recording.misfits ?? []).map((text) => make("p", { className: "bad", role: "alert", textContent: text }));
   const warnings = (recording.warnings ?? []).map((text) => make("p", { className: "hint", textContent: fill(TEXT.wouldHelp, { what: text }) }));
-  return section(TEXT.transcript, ...warnings, field, row(textButton(TEXT.align, () => studio.realign(field.value), { id: "align" })));
+  return section(TEXT.transcript, ...misfits, ...warnings, field, row(textButton(TEXT.align, () => studio.realign(field.value), { id: "align" })));
 }

@@ -4,6 +4,7 @@ import { make } from "../dom.js";
 import { placed, say } from "../sentences.js";
 import { cleared, colour } from "./canvas.js";
 
+const SCALE_STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10], SCALE_PX = 22;
 const PAD_PX = 6, STROKE_STEP_S = 0.02, ROOM = 0.2, OF_WEIGHTS = [-0.06, 1.06];
 
 export class CurveTracks {
@@ -43,7 +44,11 @@ export class CurveTracks {
   }
 
   /** Read heights before anything is changed: the page is laid out once. */
-  read() { for (const row of this.rows.values()) row.height = row.element.clientHeight; }
+  read() {
+    const { selected } = this.store;
+    for (const [name, row] of this.rows) row.element.classList.toggle("selected", selected?.kind === "curve" && selected.channel === name);
+    for (const row of this.rows.values()) row.height = row.element.clientHeight;
+  }
 
   /** The range of values that a row shows. */
   measure(row, curves, column) {
@@ -61,7 +66,6 @@ export class CurveTracks {
   drawRow(name, row, pins, locks) {
     const { timeline, store, store: { deviation, selected, other, blind } } = this, hidden = blind && !blind.result, comparing = store.comparing && !hidden, motion = store.curvesOf(name), its = other && !hidden && store.curvesOf(name, other), { height } = row;
     const pen = cleared(row.canvas, timeline.width, height), isSelected = selected?.kind === "curve" && selected.channel === name;
-    row.element.classList.toggle("selected", isSelected);
     row.label.setAttribute("aria-pressed", isSelected);
     for (const { start_s, end_s } of locks) this.hatch(pen, timeline.x(start_s), timeline.x(end_s), height, colour.line);
     const column = motion?.column(name) ?? -1;
@@ -69,6 +73,7 @@ export class CurveTracks {
     this.measure(row, motion, column);
     pen.fillStyle = colour.faint;
     pen.fillRect(0, Math.round(this.y(row, Math.max(row.range[0], 0))), timeline.width, 1);
+    this.scale(pen, row);
     const frames = this.frames(motion), place = (frame) => timeline.x(frame / motion.rate_hz);
     const spread = deviation?.column(name) ?? -1;
     if (spread >= 0) this.band(pen, row, frames, place, (frame) => [motion.value(frame, column), deviation.value(frame, spread)], colour.band);
@@ -91,6 +96,21 @@ export class CurveTracks {
     const first = Math.floor((Math.max(start_s * motion.rate_hz - 1, 0)) / step) * step;
     for (let frame = first; frame <= Math.min(end_s * motion.rate_hz + step, motion.frames - 1); frame += step) frames.push(frame);
     return frames;
+  }
+
+  /** Lines at round values, which are written at the right. */
+  scale(pen, row) {
+    const { range: [least, most], height } = row, px = (height - 2 * PAD_PX) / (most - least);
+    const step = SCALE_STEPS.find((each) => each * px >= SCALE_PX) ?? SCALE_STEPS.at(-1);
+    pen.font = "10px system-ui, sans-serif";
+    pen.textAlign = "right";
+    for (let n = Math.ceil(least / step); n * step <= most; n++) {
+      const y = Math.round(this.y(row, n * step));
+      pen.fillStyle = colour.faint;
+      pen.fillRect(0, y, this.timeline.width, 1);
+      pen.fillStyle = colour.quiet;
+      pen.fillText(String(Number((n * step).toFixed(2))), this.timeline.width - 4, y - 2);
+    }
   }
 
   trace(pen, row, frames, place, value, colour, width) {
