@@ -5,6 +5,8 @@ import pytest
 
 pytest.importorskip("cv2", reason="the extra 'video' is not installed")
 
+from functools import partial
+
 import cv2
 
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged, find_repeated, spans
@@ -32,7 +34,7 @@ def test_smeared_blurred_and_dark_mouths_are_found_and_a_rare_one_is_not():
     clips[3][30:48] = np.clip(clips[3][30:48] * 0.3 + 90 + smear, 0, 255)
     clips[5][10:40] = [cv2.GaussianBlur(picture, (0, 0), 1.2) for picture in clips[5][10:40]]
     clips[8][50:] //= 4
-    damage = find_damaged([lambda clip=clip: clip for clip in clips], [np.ones(FRAMES, bool)] * 13, [RATE_HZ] * 13)
+    damage = find_damaged([partial(np.copy, clip) for clip in clips], [np.ones(FRAMES, bool)] * 13, [RATE_HZ] * 13)
     found = {
         number: {kind: spans(mask) for kind, mask in each.items() if mask.any()} for number, each in enumerate(damage)
     }
@@ -49,7 +51,7 @@ def test_smeared_blurred_and_dark_mouths_are_found_and_a_rare_one_is_not():
 def test_little_footage_is_compared_with_nothing():
     clips = [mouths(0), mouths(1)]
     clips[0][30:48] = 255 - clips[0][30:48]
-    damage = find_damaged([lambda clip=clip: clip for clip in clips], [np.ones(FRAMES, bool)] * 2, [RATE_HZ] * 2)
+    damage = find_damaged([partial(np.copy, clip) for clip in clips], [np.ones(FRAMES, bool)] * 2, [RATE_HZ] * 2)
     assert not damage[0]["smeared"].any()
 
 

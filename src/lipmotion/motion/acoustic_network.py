@@ -127,8 +127,8 @@ class AcousticNetwork(Predictor):
             share = (fitting * (known + strange * (unknown - known)))[:, None]
             motion = motion + share * (network.predict(speech)[0] - motion)
         if self.encoding is not None and speech.encoding is not None and strange:
-            share = ENCODING_SHARE * min(2 * strange, 1.0) * _rate_sureness(speech)
-            motion = motion + share * (self.encoding.predict(speech)[0] - motion)
+            applies = min(2 * strange, 1.0) * _rate_sureness(speech)
+            motion = motion + ENCODING_SHARE * applies * (self.encoding.predict(speech)[0] - motion)
         return motion, distortion
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:

@@ -152,9 +152,11 @@ class _Pictures:
         self.seen.append(points is not None)
         self.sizes.add((image.shape[0], image.shape[1]))
         step = 1 + max(image.shape) // COMPARED_PX
-        before, self.before = self.before, image[::step, ::step].astype(np.int16)
-        is_same_size = before is not None and before.shape == self.before.shape
-        self.changes.append(float(np.abs(self.before - before).mean()) if is_same_size else np.inf)
+        before, now = self.before, image[::step, ::step].astype(np.int16)
+        self.changes.append(
+            np.inf if before is None or before.shape != now.shape else float(np.abs(now - before).mean())
+        )
+        self.before = now
         if points is not None:
             self.points.append(points)
             self.mouths.append(mouth_thumbnail(crop_mouth(image, eyes_to_image(points[_EYES, :2]))))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lipmotion.testing.toy import ToySentence
 from numpy.typing import NDArray
 
 from lipmotion import Edits, Model, Session, cues
@@ -14,7 +15,6 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.request import Request
-from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Delivery, Generation
 from lipmotion_faces.base import Staging
 from lipmotion_faces.head.pose import head_poses
