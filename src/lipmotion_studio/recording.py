@@ -300,11 +300,12 @@ class OpenRecording:
 
 
 def find_moved(before: Motion, after: Motion) -> dict[str, float] | None:
-    """Return from when to when two motions differ; None: nowhere."""
-    if before.values.shape != after.values.shape or before.names != after.names:
-        return {"start_s": 0.0, "end_s": float(max(len(before.values), len(after.values)) / after.rate_hz)}
-    other = np.flatnonzero((before.values != after.values).any(axis=1))
-    moved = other[(np.abs(before.values[other] - after.values[other]) > MIN_MOVE).any(axis=1)]
+    """Return from when to when two motions differ in their common channels; None: nowhere."""
+    names = [name for name in before.names if name in after.names]
+    was, now = before.selected(names).values, after.selected(names).values
+    if was.shape != now.shape or not names:
+        return {"start_s": 0.0, "end_s": float(max(len(was), len(now)) / after.rate_hz)}
+    moved = np.flatnonzero((np.abs(was - now) > MIN_MOVE).any(axis=1))
     if not len(moved):
         return None
     return {"start_s": float(moved[0] / after.rate_hz), "end_s": float(moved[-1] / after.rate_hz)}

@@ -55,9 +55,9 @@ head = false
 seed = 3
 """
 OTHERS = {
-    *("words --recogniser", "cues --fps", "evaluate --speaker", "train --units", "train --speaker", "face --speaker"),
+    *("cues --fps", "evaluate --speaker", "train --units", "train --speaker", "face --speaker"),
     *("corpus --offset-ms", "studio --model", "studio --character", "studio --face"),
-    *("live --model", "live --pauses", "live --rate", "live --to"),
+    *("live --model", "live --pauses", "live --rate", "live --to", "live --character"),
 }
 """Options of other verbs that have such a name, and another meaning or another default."""
 needs_toml = pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 reads no TOML")

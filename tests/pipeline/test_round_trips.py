@@ -147,4 +147,7 @@ def test_an_edited_opening_leaves_brows_alone_that_are_far_away(generation, tmp_
     before, after = (read_motion(tmp_path / name)[0] for name in ("a.livelink.csv", "b.livelink.csv"))
     far = before.time_s > 1.25
     assert far.any()
-    assert np.abs(before.values - after.values)[far].max() < 1e-4
+    moved = np.abs(before.values - after.values)[far].max(axis=0)
+    mouth = np.array([name.startswith(("mouth", "jaw")) for name in before.names])
+    assert moved[~mouth].max() < 1e-4
+    assert moved[mouth].max() < 2e-3  # all frames are solved at once, in steps

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lipmotion.testing.toy import ToySentence
+from testing.toy import ToySentence
 from numpy.typing import NDArray
 
 from lipmotion import Edits, Model, Session, cues

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from lipmotion.cli.arguments.paths import add_input
 from lipmotion.cli.terminal.printing import flush_output, print_line
 from lipmotion.errors import InputError, MissingDependencyError
 
@@ -34,7 +35,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     told = "lips close in pauses (default), or stay as people's"
     add("--pauses", choices=("rest", "natural"), default="rest", help=told)
     told = "a character, or a rig's table (.csv), whose own curves the frames have, too"
-    add("--character", type=Path, metavar="FILE", help=told)
+    add_input(parser, "--character", what="character", type=Path, metavar="FILE", help=told)
     add("--still", action="store_true", help="only the mouth moves: no blinks, glances, brows, head")
     add("--as-fast-as-possible", action="store_true", help="do not wait for a file's own time")
     parser.set_defaults(run=run)
