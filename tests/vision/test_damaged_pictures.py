@@ -56,9 +56,11 @@ def test_little_footage_is_compared_with_nothing():
 
 
 def test_frozen_pictures_and_doubled_ones_are_told_apart():
-    changes = [np.inf, *np.random.default_rng(2).uniform(0.6, 1.2, 40)]
+    changes = [np.inf, *np.random.default_rng(2).uniform(0.6, 1.2, 80)]
     changes[8] = changes[16] = 0.02
     changes[20:30] = [0.0] * 10
+    changes[30] = 3.0
+    changes[33:39] = [0.05] * 6  # somebody stands still
     repeated, frozen = find_repeated(changes, RATE_HZ)
     assert spans(frozen) == [(20, 30)]
     assert spans(repeated) == [(8, 9), (16, 17), (20, 30)]

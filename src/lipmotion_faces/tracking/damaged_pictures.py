@@ -24,11 +24,13 @@ REPEATED_SHARE = 0.12
 """A picture repeats the one before if it differs less than this share of how much most pictures (75 %) do: decoders add
 noise to repeated ones (H.264: up to 0.1 where they are frozen, up to 0.4 where single ones are doubled, most of which
 are not found; 93 clips of GRID: at most 1 picture of 6,882 is below)."""
-LEAST_NOISE = 0.25
-"""Nine in ten pictures of a camera differ from the one before by this share of the same (GRID: 0.51 to 0.82; five
-open recordings: 0.26 to 0.58; a drawn face: 0.2)."""
+LARGEST_SHARE = 1 / 3
+"""Where more pictures repeat the one before, they are drawn and may stay as they are (toy faces: half of them)."""
 FROZEN_S = 0.2
 """Pictures that repeat one another for so long are frozen; single ones are doubled, as where frame rates were changed.
+"""
+JUMP = 1.5
+"""The picture after frozen ones differs at least so much more than most do; after people who stand still it does not.
 """
 MOST_COMPARED = 4000
 """Mouths of a person that each one is compared with, spread evenly."""
@@ -60,16 +62,15 @@ def find_repeated(changes: Sequence[float], rate_hz: float) -> tuple[Mask, Mask]
     """Return which pictures repeat the one before, and which are frozen, among them [both shape=(T,)].
 
     changes : mean difference of each picture from the one before, grey levels; of the first, infinity
-    Without a camera's noise, as in drawn footage, pictures may well stay as they are: none is said to repeat another.
     """
-    known = np.array([change for change in changes if np.isfinite(change)] or [0.0])
-    usual = np.percentile(known, 75)
-    others = known[known >= REPEATED_SHARE * usual]
-    is_filmed = len(others) > 0 and np.percentile(others, 10) >= LEAST_NOISE * usual
-    repeated = (np.array(changes) < REPEATED_SHARE * usual) & is_filmed
+    known = [change for change in changes if np.isfinite(change)] or [0.0]
+    repeated = np.array(changes) < REPEATED_SHARE * np.percentile(known, 75)
+    repeated &= repeated.mean() < LARGEST_SHARE
     frozen = np.zeros(len(repeated), bool)
     for start, stop in spans(repeated):
-        frozen[start:stop] = stop - start >= FROZEN_S * rate_hz
+        jumps = stop < len(repeated) and changes[stop] >= JUMP * np.percentile(known, 75)
+        frozen[start:stop] = jumps and stop - start >= FROZEN_S * rate_hz
+        repeated[start:stop] = frozen[start:stop] | (stop - start == 1)
     return repeated, frozen
 
 
