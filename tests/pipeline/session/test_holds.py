@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from testing.toy import ToySentence
 from numpy.typing import NDArray
 
 from lipmotion import Edits, Model, Session, cues
@@ -22,6 +21,7 @@ from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths
 from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 from meshes.heads import head, write_glb
+from testing.toy import ToySentence
 
 Rows = NDArray[np.float64]
 STILL = Staging(blinks=False, gaze=False, brows=False, head=False)
