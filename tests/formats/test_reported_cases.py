@@ -207,7 +207,7 @@ def test_of_versions_of_a_text_the_first_is_read(write: Any, caplog: pytest.LogC
 
 
 NOISE = ["<breath>", "[laughs]", "(coughs)", "{sl}", "<eps>", "sil", "***", "=", "♪", "<SIL>", "&=laughs", "xxx", "spn"]
-NOISE += ["<unk>", "[unintelligible]", "+NOISE+"]
+NOISE += ["<unk>", "[unintelligible]", "+NOISE+", "*coughs*", "<|noise|>"]
 
 
 def test_no_form_of_words_speaks_what_is_no_word(write: Any) -> None:
@@ -274,6 +274,16 @@ OTHERS: dict[str, Any] = {
     "Hume": [{"text": w, "time": {"begin": a, "end": b}} for w, a, b in MS],
     "PlayHT": [{"type": "word", "word": w, "time": {"start": a, "end": b}} for w, a, b in W],
     "MiniMax": [{"timestamped_words": [{"word": w, "time_begin": a, "time_end": b} for w, a, b in MS]}],
+    "Gladia, version 1": {"prediction": [{"words": [{"word": w, "time_begin": a, "time_end": b} for w, a, b in W]}]},
+    "Qwen's lists": [list(row) for row in W],
+    "lists, times first": [[a, b, w] for w, a, b in W],
+    "Deepgram, live": [
+        {"channel_index": [0, 1], "is_final": final, "channel": {"alternatives": [{"words": [
+            {"word": w, "start": a, "end": b}]}]}}
+        for w, a, b in W for final in (False, True)
+    ],
+    "seconds in the names": [{"text": w, "start_sec": a, "end_sec": b} for w, a, b in W],
+    "a table in milliseconds": "start_ms,End (ms),word\n" + "".join(f"{a:.0f},{b:.0f},{w}\n" for w, a, b in MS),
     "Inworld": {"timestampInfo": {"wordAlignment": {
         "words": [w for w, *_ in W],
         "wordStartTimeSeconds": [a for _, a, _ in W],
@@ -297,6 +307,7 @@ TTML = '<tt xmlns="http://www.w3.org/ns/ttml" xmlns:p="http://www.w3.org/ns/ttml
 BODY = '<body><p begin="{}" {}="{}">hello<br/>big <span>moon</span></p></body>'
 RATES = 'p:frameRate="25" p:tickRate="10000000"'
 LINES = {
+    "aeneas' table": 'f000001,0.400,1.600,"hello big moon"\n',
     "SBV": "0:00:00.400,0:00:01.600\nhello big\nmoon\n",
     "TTML": TTML.format("", BODY.format("00:00:00.4", "end", "1600ms")),
     "TTML in ticks": TTML.format(RATES, BODY.format("4000000t", "dur", "12000000t")),

@@ -37,6 +37,8 @@ def test_unknown_tags_are_named_and_not_spoken(caplog):
         ("[wave]hey[/wave] you #line:0e12a", "hey you", "#line:0e12a"),
         ("See [[Go north|North]] <<set $y to 2>> (set: $x to 1)", "see go north", "<<set $y to 2>>"),
         ('<speak>hi<break time="1s"/>you</speak>', "hi you", '<break time="1s"/>'),
+        ("*coughs* hi (clears his throat) <|en|>you", "hi you", "*coughs*, (clears his throat), <|en|>"),
+        ("ANNA\uff1a hi\\nyou", "hi you", "ANNA\uff1a, \\n"),
         ("*really* so", "really so", ""),
         ("ANNA: Please speak.\nBEN: I will.", "please speak i will", "ANNA:, BEN:"),
         ("ZOË: Hi", "hi", "ZOË:"),

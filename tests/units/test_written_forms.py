@@ -78,6 +78,12 @@ USUAL = (
     ("you may, 5 of you, march 3 miles", "you may five of you march three miles"),
     ("2.5 kg, 1.000 m, 12,34", "two point five kilograms one point zero zero zero meters twelve thirty four"),
     ("Pages 3–7; 1995–2003", "pages three to seven nineteen ninety five to two thousand three"),
+    ("$3 bn or $2m", "three billion dollars or two million dollars"), ("1h 20m", "one hour twenty minutes"),
+    ("2h05, 2 min 30 s", "two hours five minutes two minutes thirty seconds"), ("100µs", "one hundred microseconds"),
+    ("1GB/s", "one gigabyte per second"), ("USD 20 or 20 EUR", "twenty dollars or twenty euros"),
+    ("the USDA", "the usda"), ("5%-10%", "five percent to ten percent"), ("$5-$10", "five dollars to ten dollars"),
+    ("18th–19th", "eighteenth to nineteenth"), ("in '05", "in oh five"), ("±5", "plus or minus five"),
+    ("WWII", "world war two"),
 )  # fmt: skip
 """What is said of a form where nothing else is known."""
 SAID = (
@@ -87,7 +93,8 @@ SAID = (
     ("$20M", "twenty million"), ("$1.5k", "one point five k"), ("$1.5k", "fifteen hundred dollars"),
     ("$1.5k", "one thousand five hundred dollars"), ("$5.50", "five fifty"), ("0", "oh"), ("101", "one oh one"),
     ("101", "one hundred and one"), ("2,000", "two thousand"), ("1/2", "half"), ("3/4", "three out of four"),
-    ("3.5", "three and a half"), ("3x", "three x"), ("007", "double oh seven"), ("St.", "saint"), ("Dr.", "drive"),
+    ("3.5", "three and a half"), ("3x", "three x"), ("007", "double oh seven"), ("St.", "saint"), ("05", "oh five"),
+    ("Dr.", "drive"),
     ("Henry VIII", "henry eight"), ("2021-05-03", "the third of may twenty twenty one"), ("b-b-but", "but"),
     ("noooo", "no"), ("boooom", "boom"), ("hahaha", "ha ha ha"),
 )  # fmt: skip

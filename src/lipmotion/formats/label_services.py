@@ -89,7 +89,10 @@ TIMES = (
     Times("offset", "", "duration", usual=TICKS_PER_S),  # Azure, speech recognition
     Times("startoffset", "endoffset", usual=0),  # Google, version 2 ("0.1s"); NeMo's are frames
     Times("timestart", "timeend"),  # PlayHT
-    Times("timebegin", "timeend", per_s=1000),  # MiniMax, Hume
+    Times("timebegin", "timeend", usual=1000),  # MiniMax, Hume; Gladia's first version in seconds
+    Times("startsec", "endsec", per_s=1),
+    Times("startseconds", "endseconds", per_s=1),
+    Times("starttimestamp", "endtimestamp"),
     Times("from", "to"),
     Times("timeseconds", per_s=1),  # Google, text to speech
     Times("", "resultendtime", per_s=1),  # Google, a result without words
@@ -143,6 +146,8 @@ COLUMNS = (
 COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps", "wordalignment")
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 """A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
+UNFINISHED = {"isfinal": False, "final": False, "endofturn": False, "ispartial": True}
+"""Members of what a service heard while somebody spoke, and says again when it is sure."""
 TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
 """Members of what a recogniser says without times."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
@@ -182,6 +187,8 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
     """
     numbered = [(f"line {line}", value) for line, value in _decode_documents(text, where)]
     if len(numbered) == 1 and isinstance(numbered[0][1], list):
+        if numbered[0][1] and all(map(_name_stamp, numbered[0][1])):
+            numbered = [("", [{"segments": numbered[0][1]}])]
         numbered = [(f"item {number}", value) for number, value in enumerate(numbered[0][1], 1)]
     objects = [(place, item) for place, item in numbered if isinstance(item, dict)]
     if not objects or any("mouthcues" in item or {"format", "channels"} <= item.keys() for _, item in objects):
@@ -328,12 +335,12 @@ def _find_rows(value: Any, place: str, where: str, name: str = "", depth: int = 
         return []
     if isinstance(value, dict):
         spoken = "chunks" in value or not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
+        spoken = spoken and not any(value.get(name) is state for name, state in UNFINISHED.items())
         return _read_object(value, place, where, name, depth) if spoken else []
     rows: list[Row] = []
     items = value if isinstance(value, list) else []
     for number, each in enumerate(items[:1] if name in ALTERNATIVES else items, 1):
-        is_stamp = isinstance(each, list) and len(each) == 3 and isinstance(each[0], str)  # IBM's
-        item = dict(zip(("word", "start", "end"), each, strict=True)) if is_stamp else each
+        item = dict(zip(_name_stamp(each), each, strict=True)) if _name_stamp(each) else each
         item_rows: list[Row] = []
         if isinstance(item, dict):
             item_rows = _find_rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
@@ -348,6 +355,13 @@ def _find_rows(value: Any, place: str, where: str, name: str = "", depth: int = 
                 rows.append(row)
         check_count(len(rows), where)
     return rows
+
+
+def _name_stamp(item: Any) -> tuple[str, ...]:
+    """Return what the members of a list are that is a word with its times (IBM's, Qwen's); none: it is no such list."""
+    if not isinstance(item, list) or len(item) != 3 or not (isinstance(item[0], str) or isinstance(item[2], str)):
+        return ()
+    return ("text", "start", "end") if isinstance(item[0], str) else ("start", "end", "text")
 
 
 def _read_object(item: dict[str, Any], place: str, where: str, name: str, depth: int) -> list[Row]:
@@ -382,7 +396,9 @@ def _read_object(item: dict[str, Any], place: str, where: str, name: str, depth:
 
 
 def _find_speaker(item: dict[str, Any]) -> str:
-    return next((str(item[name]) for name in SPEAKERS if item.get(name) not in (None, "")), "")
+    return next(
+        (str(item[name]) for name in SPEAKERS if isinstance(item.get(name), str | int) and item[name] != ""), ""
+    )
 
 
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:

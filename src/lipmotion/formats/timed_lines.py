@@ -55,6 +55,13 @@ COLUMNS = {
     "speaker": {"speaker", "speakerid", "participant"},
 }
 """Names of columns of tables: of the Montreal Forced Aligner, of Praat, of people."""
+UNIT_END = re.compile(r"(?:[\s_]+|[\s_]*[(\[])(?:m?s|m?secs?|(?:milli)?seconds?)[)\]]?$")
+"""A unit at the end of a name, which how long words last tells, too: ``start_ms``, ``Start (s)``."""
+HEADLESS = (
+    (re.compile(r"[^,]*,\d*\.\d+,\d*\.\d+,.*"), "name,start,end,text"),
+    (re.compile(r"\d*\.\d+,\d*\.\d+,.*"), "start,end,text"),
+)
+"""The first line of tables without a header, and theirs: of aeneas, of people."""
 TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
 LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
@@ -70,9 +77,12 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
     first = next((line for _, line in _lines(text)), "")
     if RTTM.match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
-    columns, spoken = _find_columns(first), LRS_TEXT.match(text)
+    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
+    columns, spoken = _find_columns(header or first), LRS_TEXT.match(text)
     if columns or spoken:
-        return _read_lrs(text, spoken[1], where) if spoken and not columns else _read_table(text, columns, where)
+        return (
+            _read_lrs(text, spoken[1], where) if spoken and not columns else _read_table(text, columns, where, header)
+        )
     span, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
     if SECONDS.fullmatch(first):
         return [_read_spans(text, SECONDS, where)]
@@ -173,18 +183,21 @@ def _find_columns(line: str) -> dict[str, int]:
     """Return the columns of a table whose first line names a start, an end or a duration, and a text; else none."""
     if len(line) > 1000 or "\ufeff" in line:
         return {}
-    names = [re.sub(r"[\s_]", "", name.strip(' "')).lower() for name in re.split(r"[,;\t]", line)]
+    names = [re.sub(r"[\s_]", "", UNIT_END.sub("", name.strip(' "').lower())) for name in re.split(r"[,;\t]", line)]
     columns = {kind: place for kind, known in COLUMNS.items() for place, name in enumerate(names) if name in known}
     return columns if {"start", "text"} <= columns.keys() and {"end", "duration"} & columns.keys() else {}
 
 
-def _read_table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
-    """Return the tiers of a table with a header: of the Montreal Forced Aligner, Praat, or anybody."""
-    header = next(line for _, line in _lines(text))
+def _read_table(text: str, columns: dict[str, int], where: str, given: str = "") -> list[LabelTier]:
+    """Return the tiers of a table: of the Montreal Forced Aligner, Praat, or anybody.
+
+    given : its header; empty: it is the first line
+    """
+    header = given or next(line for _, line in _lines(text))
     delimiter = max(",;\t", key=header.count)
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)
     named = re.split(r"[,;\t]", header)[columns["text"]].strip(' "')
-    for number, line in islice(_lines(text), 1, None):
+    for number, line in islice(_lines(text), 0 if given else 1, None):
         check_count(number, where)
         place = f"line {number}"
         try:

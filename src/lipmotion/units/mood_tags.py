@@ -11,13 +11,14 @@ from lipmotion.errors import shorten
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, sort_moods
 from lipmotion.units.phone_timelines import group_words
-from lipmotion.units.spoken_text import find_speaker_names, remove_speakers
+from lipmotion.units.spoken_text import DEED, find_speaker_names, remove_speakers
 from lipmotion.units.text_normalisation import find_words
 
 LOG = logging.getLogger("lipmotion")
 TAG = re.compile(
-    r"[\[<{](/?)([^\W\d_][^\[\]<>{}\n]{0,80})[\]>}]|\*(?P<did>[a-z]+s)\*"
-    r"|<<[^<>\n]{1,200}>>|<[/!#?][^<>\n]{0,80}>|\{[^{}\n]{0,200}\}|\[/?\]|\[\d{1,3}\]"
+    r"[\[<{](/?)([^\W\d_][^\[\]<>{}\n]{0,80})[\]>}]|\*(?P<did>[a-z]+s)\*|"
+    + DEED.pattern
+    + r"|<<[^<>\n]{1,200}>>|<[/!#?|][^<>\n]{0,80}>|\\[nN]|\{[^{}\n]{0,200}\}|\[/?\]|\[\d{1,3}\]"
     r"|\([a-z-]{2,20}: ?[$\"'][^()\n]{0,200}\)|#line:\w+|\[\[(?:slnc|rate|volm|pbas|emph|inpt|rset)\b[^\[\]\n]{0,80}]]"
 )
 """Tags of moods, and markup of games and voices (Ren'Py, Unity, Yarn, Twine, SSML): ``{w=0.5}``, ``<color=red>``."""
@@ -73,7 +74,7 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
     spoken, tags, last = "", [], 0
     for tag in TAG.finditer(text):
         meaning = _meaning(tag)
-        if tag["did"] and meaning is None:
+        if tag["did"] and meaning is None and not DEED.fullmatch(tag[0]):
             continue
         name = re.split(r"[\W_]", tag[2] or "", maxsplit=1)[0]
         spoken += text[last : tag.start()] + " " * (meaning is not None or name.lower() not in INSIDE_WORDS)

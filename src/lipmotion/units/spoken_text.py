@@ -13,13 +13,19 @@ from lipmotion.types import TimedWord
 from lipmotion.units.text_normalisation import tokenise
 from lipmotion.units.written_forms import list_readings
 
-TAG = re.compile(r"</?[a-zA-Z!][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
-"""Tags of SubRip and WebVTT (``<i>``, ``<v Anna>``, ``<00:01.500>``), of SubStation (``{\\an8}``), and ``<unk>``."""
+TAG = re.compile(r"</?[a-zA-Z!|][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
+"""Tags of SubRip (``<i>``), WebVTT (``<v Anna>``, ``<00:01.5>``), SubStation (``{\\an8}``), ``<unk>``, ``<|en|>``."""
 SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\((?!\d{3}\))[^()]{0,200}\)|（[^（）]{0,200}）")
 """Descriptions of sounds, as subtitles for the deaf and recognisers write them: ``[music]``, ``(laughs)``."""
+DEED = re.compile(
+    r"[*(](?i:(?:[a-z]+ly )?(?:clears?|clearing|(?:cough|laugh|giggle?|chuckle?|sigh|sniff|sneeze?|gasp|breathe?"
+    r"|inhale?|exhale?|sob|groan|grunt|moan|snort|yawn|whistle?|scream|burp|gulp)(?:e?s|ing)?)"
+    r"(?: (?:\w+ )?throat| \w+ly)?)[*)]"
+)
+"""What somebody does, as chats and texts for voices write it: ``*coughs*``, ``(clears throat)``."""
 SPEAKER = re.compile(
     r"^[ \t>\-–—*_]{0,8}(?:\[([^\[\]\n:]{1,31})\]|([^\W\d_][\w.'’&# -]{0,30}?))"
-    r"[ \t]*(\([^()\n]{1,30}\))?[ \t*_]*:[*_]*(?=\s|$)",
+    r"[ \t]*(\([^()\n]{1,30}\))?[ \t*_]*[:：][*_]*(?=\s|$)",
     re.MULTILINE,
 )
 """What may be the name of a speaker: before a colon at the start of a line, perhaps with ``(V.O.)``."""
@@ -60,7 +66,9 @@ LAUGHTER = "LAU"
 """In capitals, as in lexicons of telephone speech; ``Lau`` is a name."""
 UNKNOWN_WORDS = frozenset("spn unk oov xxx yyy usb".split())
 """Labels of speech of which nobody knows the words, also in brackets: of aligners, of CHAT, of WebMAUS (``<usb>``)."""
-IN_BRACKETS = re.compile(r"<[^<>]*>|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}|\+\+?\w+\+\+?|&=\S+|♪+|\*+|" + MARKED)
+IN_BRACKETS = re.compile(
+    r"<[^<>]*>|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}|\+\+?\w+\+\+?|&=\S+|♪+|\*+|" + MARKED + "|" + DEED.pattern
+)
 UNKNOWN_SPEECH = re.compile(r"unknown|unintelligible|inaudible|indistinct|garbage|spoken.?noise", re.IGNORECASE)
 
 
@@ -80,7 +88,7 @@ def classify_label(label: str) -> SpokenAs:
 
 def extract_spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
     """Return what is spoken of a text; ``names``: of speakers, as ``find_speaker_names`` returns them."""
-    text = SOUND.sub(" ", TAG.sub("", html.unescape(TAG.sub("", text))))
+    text = DEED.sub(" ", SOUND.sub(" ", TAG.sub("", html.unescape(TAG.sub("", text)))))
     return remove_speakers(SYMBOLS.sub(" ", text), names)[0]
 
 

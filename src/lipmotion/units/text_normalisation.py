@@ -17,9 +17,12 @@ CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
 INITIALS = re.compile("[A-Z]{2,5}s?")
 """What may be letters that are said one by one."""
 RANGE = re.compile(
-    r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=:\d\d))\s?[-–]\s?(?=\d)|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)", re.IGNORECASE
+    r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=:\d\d)|(?<=\d%)|(?<=\d(?:st|nd|rd|th)))\s?[-–]\s?(?=\d)"
+    r"|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)|(?<=\d)(?:-|\s?–\s?)(?=[$£€]\d)",
+    re.IGNORECASE,
 )
-"""The dash of ``9am-5pm`` and ``5:00-6:30``."""
+"""The dash of ``9am-5pm``, ``5:00-6:30``, ``5%-10%``, ``$5-$10`` and ``1st-3rd``."""
+CURRENCY = re.compile(r"(?<=\d) ?(?:USD|EUR|GBP)\b|\b(?:USD|EUR|GBP) ?(?=\d)")
 GROUPED = re.compile(
     r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?: \d{3})* 000)|\d?(?: \d{3}){2,})(?![\d']| \d)"
 )
@@ -62,7 +65,9 @@ def tokenise(text: str) -> tuple[str, ...]:
     ('Dr.', 'brown', 'met', 'Henry VIII', 'at', '5:00', 'in', 'may', '1995')
     """
     text = SMILEY.sub(" ", REFERENCE.sub(lambda found: html.unescape(found[0]), text))
-    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", plain_text(re.sub("№ ?", "No. ", text))))
+    text = re.sub(r"\bWW(?=II?\b)", "World War ", re.sub("№ ?", "No. ", text))
+    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", plain_text(text)))
+    plain = CURRENCY.sub(lambda found: {"U": "$", "E": "€", "G": "£"}[found[0].strip()[0]], plain)
     plain = GROUPED.sub(lambda found: re.sub(r"\D", ",", found[0]), plain)
     shouted = not any(letter.islower() for letter in plain)
     tokens = []
@@ -79,8 +84,8 @@ def _scanner() -> re.Pattern[str]:
     word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
     forms = [rf"(?:{form})(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
-    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|~(?=\d)"
-    dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[m\d])–(?=\d)"
+    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
+    dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%])–(?=[$£€]?\d)"
     begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
     grouped = "|".join([begun, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
     return re.compile(re.sub(r"(?<!\\)\((?!\?)", "(?:", grouped), re.IGNORECASE)

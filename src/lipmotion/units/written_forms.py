@@ -40,7 +40,9 @@ UNITS = parse_table(
     "in=inches ml=milliliters l=liters hz=hertz khz=kilohertz mhz=megahertz ghz=gigahertz kb=kilobytes tb=terabytes "
     "mb=megabytes gb=gigabytes kw=kilowatts kwh=kilowatt_hours w=watts v=volts ms=milliseconds s=seconds sec=seconds "
     "secs=seconds min=minutes mins=minutes hr=hours hrs=hours h=hours yrs=years px=pixels fps=frames_per_second "
-    "db=decibels °=degrees mph=miles_per_hour %=percent"
+    "db=decibels °=degrees mph=miles_per_hour %=percent μs=microseconds μm=micrometers μg=micrograms "
+    "kbps=kilobits_per_second mbps=megabits_per_second gbps=gigabits_per_second mb/s=megabytes_per_second "
+    "gb/s=gigabytes_per_second km/hr=kilometers_per_hour"
 )
 ABBREVIATIONS = parse_table(
     "Dr=doctor|drive Mr=mister Mrs=missus Ms=miz Prof=professor Gov=governor Sen=senator Rep=representative "
@@ -52,6 +54,7 @@ ABBREVIATIONS = parse_table(
 )
 """Without the full stop; those with a capital stand before a name."""
 SIGNS = parse_table(
+    "±=plus_or_minus ≈=about "
     "&=and @=at +=plus|and ×=times|by ÷=divided_by #=hashtag|number|hash ~=about -=minus|negative −=minus|negative "
     "–=to w/=with w/o=without .=dot /=slash _=underscore :=colon"
 ) | {"=": "equals"}
@@ -130,7 +133,7 @@ def _number(digits: str) -> Iterator[str]:
     yield pairs or plain
     yield _hundreds(whole) if len(whole) == 4 else plain
     yield _spelled(whole)
-    yield _spelled(whole, "oh") if len(whole) > 2 or not number else plain
+    yield _spelled(whole, "oh") if len(whole) > 2 or whole[0] == "0" else plain
     if re.fullmatch("00[1-9]", whole):
         yield f"double oh {ONES[number]}"
     if number < 200 or not number % 1000:
@@ -302,7 +305,7 @@ NUMERIC: Forms = (
     (r"(\d+):(\d+)", "{1} to {2}|{1} {2}"),
     (rf"{S}\s?({A})\s?(?:k|thousand)", "{2} thousand {1:s}|{2} k|{2:k} {1:s}|{2:e} {1:s}|{2:*} thousand {1:s}"),
     (
-        rf"{S}\s?{R}(\s?(?:hundred|million|billion|trillion)\b|mm?|mn|mil|bn?|tn?)",
+        rf"{S}\s?{R}(\s?(?:hundred|million|billion|trillion|mn|mil|bn)\b|mm?|bn?|tn?)",
         "{2:*} {3:x} {1:s}|{2} {3:x}|{2} {3:x} {1:b}",
     ),
     (rf"{S}\s?0?\.(?!00)(\d\d)", "{2:c} {1:S}"),
@@ -310,12 +313,18 @@ NUMERIC: Forms = (
     (rf"{S}\s?({NUMBER})\.(\d\d)", "{2:i} {1:s} and {3:c} {1:S}|{2:i} {1:s} {3:c} {1:S}|{2:i} {3:p}|{2:i} {1:s} {3:p}"),
     (rf"{S}\s?{R}(?:\s?[-–]\s?{S})?", "{2:i} {1:s}|{2:i} {1:b}|{2:*} {1:s}"),
     (rf"{R}\s?([$£€¥₹₩¢])", "{1:i} {2:s}|{1:i} {2:b}|{1:*} {2:s}"),
+    (r"'(0[1-9])", "{1:p}|{1}"),
+    (
+        r"(\d+)\s?h(?:\s?(\d\d?)\s?m(?:ins?)?|(\d\d))",
+        "{1} hours {2:c}{3:c} minutes|{1} hours and {2:c}{3:c} minutes|{1} hours {2}{3}",
+    ),
+    (r"(\d+)\s?m(?:ins?)?\s?(\d\d?)\s?s(?:ecs?)?", "{1} minutes {2:c} seconds|{1} minutes and {2:c} seconds"),
     (r"'?(\d0)'?s", "{1:d}|{1} seconds"),
     (r"'?(\d\d\d0)'?s", "{1:d}"),
     (rf"{R}\s?°\s?([cf])", "{1} degrees {2:g}|{1} degrees|{1} {2:w}|{1} {2:g}|{1} degrees centigrade"),
     (rf"{R}((?-i:[CF]))", "{1} degrees {2:g}|{1} {2:w}|{1} degrees|{1} {2:g}"),
     (rf"{R}\s?mph", "{1} miles per hour|{1} m p h|{1} miles an hour|{1:*} miles per hour"),
-    (rf"{R}\s?gb", "{1} gigabytes|{1} gigs|{1} g b|{1:*} gigabytes"),
+    (rf"{R}\s?gb(?!/)", "{1} gigabytes|{1} gigs|{1} g b|{1:*} gigabytes"),
     (rf"{R}((?-i:[M]))", "{1} million|{1:i} meters"),
     (rf"{R}((?-i:[GLHS]))", "{1} {2:w}|{1:i} {2:u}"),
     (rf"{R}(\s?(?-i:[gl])|[hs])", "{1:i} {2:u}|{1} {2:w}"),
