@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from lipmotion.speech.features.voice_events import risen_peaks, voice_events, without_laughter
+from lipmotion.speech.features.voice_events import risen_peaks, silence_phones, voice_events
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from speech.made_voices import RATE_HZ, laugh, noise, pulses, recording, said, vowels
@@ -27,7 +27,7 @@ def test_laughter_is_heard_by_its_calls_and_phones_recognised_in_it_become_silen
     assert times_s == pytest.approx(2.64 + 0.2 * np.arange(8), abs=0.03)
     assert loud[0] == max(loud) == 1
     assert loud[-1] < 0.8
-    left = without_laughter(units, [event])
+    left = silence_phones(units, [(event.start_s, event.end_s)])
     assert [span.label.phone for span in left if span.start_s < 2.3] == ["sil", *["aa"] * 6, "sil"]
     assert {span.label.phone for span in left if span.start_s > 2.3} == {"sil"}
 

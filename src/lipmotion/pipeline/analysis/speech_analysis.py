@@ -31,7 +31,7 @@ from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.features.speaker_similarity import voice_knowledge
-from lipmotion.speech.features.voice_events import voice_events, without_laughter
+from lipmotion.speech.features.voice_events import silence_phones, voice_events
 from lipmotion.speech.recognition.agreement import TranscriptFit, label_fit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.beam_search import english_words
@@ -72,6 +72,7 @@ from lipmotion.types import (
     frames_of,
     silent_monitor,
 )
+from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodTag
 from lipmotion.types.languages import ENGLISH
 from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
@@ -151,16 +152,15 @@ def analyse_speech(
     monitor(Progress("recognising phones", 0, 1, 0.02))
     analysis = _find_phones(model, request, audio, _report_progress(each, audio.duration_s, monitor))
     speech, recognition = analysis.speech, analysis.recognition
-    if request.manner == DETECTED:
-        events = voice_events(audio, speech.units)
-        units = without_laughter(speech.units, events)  # phones that were recognised in laughter are silence
-        speech = with_units(speech, units) if units != speech.units else speech
-        analysis = replace(analysis, speech=speech, events=events)
+    tones = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
+    events = voice_events(audio, speech.units) if request.manner == DETECTED else ()
+    units = silence_phones(speech.units, [*tones, *((e.start_s, e.end_s) for e in events if e.kind == LAUGHTER)])
+    speech = with_units(speech, units) if units != speech.units else speech
+    analysis = replace(analysis, speech=speech, events=events)
     if analysis.is_without_speech and not analysis.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
-    elif audio.tones:
-        places = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
-        LOG.warning("a steady tone covers what is said at %s: the mouth rests there", format_places(places))
+    elif tones:
+        LOG.warning("a steady tone covers what is said at %s: the mouth rests there", format_places(tones))
     if recognition is not None and request.language == ENGLISH:
         warn_of_another_language(recognition)
     given = request.units is not None or analysis.fit is not None

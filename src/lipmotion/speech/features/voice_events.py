@@ -206,12 +206,14 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     return tuple(sorted([*found, *_shouts(judged)], key=lambda event: event.start_s))
 
 
-def without_laughter(units: Timeline[Unit], events: Sequence[VoiceEvent]) -> Timeline[Unit]:
-    """Return recognised phones in time in which laughter is silence; known phones stay."""
-    laughs = [event for event in events if event.kind == LAUGHTER]
+def silence_phones(units: Timeline[Unit], others: Sequence[tuple[float, float]]) -> Timeline[Unit]:
+    """Return recognised phones in time which are silence where something else is heard; known phones stay.
+
+    others : from when to when, in seconds
+    """
     spans = []
     for span in units:
-        inside_s = sum(_overlap_s((span.start_s, span.end_s), laugh) for laugh in laughs)
+        inside_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for start_s, end_s in others)
         is_word = span.label.confidence is None or inside_s < span.duration_s / 2
         spans.append(span if is_word else replace(span, label=Unit("sil", confidence=span.label.confidence)))
     return Timeline(tuple(spans))
