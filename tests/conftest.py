@@ -47,6 +47,7 @@ settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100
 settings.load_profile(FIXED)
 
 
+ENOUGH_STEPS = posterior_network.STEPS / 3
 HASTY = {"cli", "experiments", "training"}
 """Folders of tests whose networks are trained for a few steps."""
 MEASURED_S = pytest.StashKey[float]()
@@ -110,7 +111,7 @@ def ordinary_signals() -> Iterator[None]:
 def short_training() -> Iterator[None]:
     """The toy's motion follows so simply from its sound that a third of the steps of one network are enough."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(posterior_network, "STEPS", posterior_network.STEPS / 3)
+        patched.setattr(posterior_network, "STEPS", ENOUGH_STEPS)
         patched.setattr(posterior_network, "_train_recurrent", lambda *_: None)
         yield
 
@@ -159,7 +160,9 @@ def toy_sentence() -> ToySentence:
 def quickly(corpus: Corpus, engine: str = "trajectory", visual: str = "geometry", **options: Any) -> Model:
     """Return a model, trained in a second; its mouth does not move as English ones do."""
     small = HmmConfig(mixtures=1, iterations=2)
-    return train(corpus, recogniser=small, engine=engine_named(engine, options), visual=visual)[0]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(posterior_network, "STEPS", ENOUGH_STEPS)  # tests that ask for it first may be hasty
+        return train(corpus, recogniser=small, engine=engine_named(engine, options), visual=visual)[0]
 
 
 @pytest.fixture(scope="session")
