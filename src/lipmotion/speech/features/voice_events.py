@@ -198,7 +198,11 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
         pitch = log_f0(sound).astype(np.float64) * 12 / np.log(2)  # semitones
         voiced = np.isfinite(pitch)
         laughs = tuple(_laughs(sound, level_db, voiced, said))
-        phrases = [phrase for phrase in _phrases(said) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
+        phrases = [
+            phrase
+            for phrase in _phrases(said)
+            if not any(_overlap_s(phrase, (laugh.start_s, laugh.end_s)) > 0 for laugh in laughs)
+        ]
         events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
         found += [event.shifted(at_s) for event in events]
         efforts = _efforts(sound, level_db, pitch, phrases)
@@ -213,7 +217,7 @@ def silence_phones(units: Timeline[Unit], others: Sequence[tuple[float, float]])
     """
     spans = []
     for span in units:
-        inside_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for start_s, end_s in others)
+        inside_s = sum(_overlap_s((span.start_s, span.end_s), other) for other in others)
         is_word = span.label.confidence is None or inside_s < span.duration_s / 2
         spans.append(span if is_word else replace(span, label=Unit("sil", confidence=span.label.confidence)))
     return Timeline(tuple(spans))
@@ -235,7 +239,7 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
     words = [span for span in sure if not is_silent(span.label.phone)]
     for bout in laughter(audio.samples, level_db, voiced):
         start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
-        said_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for span in words)
+        said_s = sum(_overlap_s((span.start_s, span.end_s), (start_s, end_s)) for span in words)
         if said_s <= MOST_WORD_SHARE * (end_s - start_s):
             loudness = 2 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 10)
             calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
@@ -373,5 +377,5 @@ def _risen(value: float, limits: tuple[float, float]) -> float:
     return float(np.clip((value - limits[0]) / (limits[1] - limits[0]), 0, 1))
 
 
-def _overlap_s(span: tuple[float, float], event: VoiceEvent) -> float:
-    return max(min(span[1], event.end_s) - max(span[0], event.start_s), 0.0)
+def _overlap_s(one: tuple[float, float], other: tuple[float, float]) -> float:
+    return max(min(one[1], other[1]) - max(one[0], other[0]), 0.0)
