@@ -71,7 +71,7 @@ coverage: $(VENV)/dev
 fuzz: $(VENV)/dev
 	mkdir -p $(BUILD)
 	PYTHONPATH=tests $(BIN)/python -m fuzz --minutes $(MINUTES) --seed $(SEED) $(addprefix --reader ,$(READER)) \
-	  --found $(BUILD)/fuzz --json $(BUILD)/fuzz.json
+	  --found $(BUILD)/fuzz
 
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/main_path.py --grid $(GRID) --full

@@ -1,5 +1,3 @@
-import json
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -10,8 +8,6 @@ from scipy.io import wavfile
 
 from children import LIPMOTION, environment, run_child
 from lipmotion.cli.main import main
-from lipmotion.pipeline.model import VERSION
-from lipmotion.storage.archive import HEADER
 
 
 class Done(NamedTuple):
@@ -63,19 +59,6 @@ def run_outside() -> RunCommand:
 @pytest.fixture
 def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
     return ("animate", toy_speech, "--model", toy_model_file)
-
-
-@pytest.fixture(scope="session")
-def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A model file of a later version."""
-    path = tmp_path_factory.mktemp("newer") / "newer.lipmotion"
-    with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(path, "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            new.writestr(
-                name, json.dumps(json.loads(content) | {"version": VERSION + 1}) if name == HEADER else content
-            )
-    return path
 
 
 @pytest.fixture

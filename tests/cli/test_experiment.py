@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from cli.conftest import check_refused, is_one_error
+from cli.conftest import is_one_error
 from lipmotion import Corpus
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.curves import bootstrap_interval
@@ -114,35 +114,3 @@ def test_all_engines(run, toy_corpus, here):
     assert run("experiment", "engines", toy_corpus.path, *chosen).out == done.out
     (here / "models" / "coupled.lipmotion").write_bytes(b"no model")
     assert is_one_error(run("experiment", "engines", toy_corpus.path, *chosen), 6)
-
-
-UNUSABLE = [
-    ("learning-curve CORPUS --order missing.txt", 4, "missing.txt: no such list file; required: one name a line"),
-    ("learning-curve CORPUS --order empty.txt", 3, "the list of utterances to train on is empty"),
-    ("learning-curve CORPUS --order strange.txt", 4, "1 of 2 names to train on (nobody) are not in the corpus"),
-    ("learning-curve CORPUS --sizes 0,8", 3, "sizes 0, 8; required: from 1 to 8"),
-    ("learning-curve CORPUS --split all", 4, "are in the split that is compared with"),
-    ("folds CORPUS --folds 1", 3, "1 folds; required: from 2 to 8"),
-    ("folds CORPUS -o missing/a.json", 7, "the folder missing does not exist"),
-    ("folds missing", 4, "missing: no such corpus; make one"),
-    ("xieliu2007 CORPUS --systems ph-RNN", 3, "no system 'ph-RNN'; there are: ph-HMM"),
-    ("xieliu2007 CORPUS --noise babble", 3, "a babble of 0 talkers; required at least 2: --talkers"),
-    ("xieliu2007 CORPUS --talkers missing", 3, "missing: no such folder; give one with recordings of other people"),
-    ("xieliu2007 CORPUS --quick --order strange.txt", 3, "--quick takes recordings of its own"),
-    ("xieliu2007 CORPUS --plots missing/a", 7, "the folder missing does not exist"),
-    ("engines CORPUS --models CORPUS", 7, "is the corpus itself; give another name"),
-    ("engines CORPUS --models empty.txt", 7, "empty.txt: is a file"),
-    ("all CORPUS -o empty.txt", 7, "empty.txt: cannot be used: Not a directory; give another folder"),
-    ("all CORPUS -o CORPUS/r", 7, "lies in the corpus"),
-    ("all CORPUS -o r --only hofer", 3, "no experiment 'hofer'; there are: hofer2008, xieliu2007"),
-    ("hofer2008 CORPUS --split tset", 4, "no utterances of split 'tset'"),
-    ("hofer2008 CORPUS --lexicon missing", 3, "missing: no such lexicon file"),
-]
-
-
-def test_what_cannot_be_used(run, toy_corpus, here):
-    (here / "empty.txt").write_text("\n")
-    (here / "strange.txt").write_text("toy00\nnobody\n")
-    for arguments, code, words in UNUSABLE:
-        check_refused(run("experiment", *arguments.replace("CORPUS", str(toy_corpus.path)).split()), code, words)
-        assert len(list(here.iterdir())) == 2

@@ -74,7 +74,6 @@ def test_a_character_and_a_rig_get_their_own_curves(run: RunCommand, tmp_path: P
         return dict(zip(names, np.array(rows, float).T, strict=True))
 
     mouth = load_character(tmp_path / "head.glb").shapes
-    assert mouth is not None
     said = curves("head.glb")
     parted = sum(said[name] * gap for name, gap in zip(mouth.names, mouth.gap, strict=True))
     assert parted[said["opening"] < 0.001].max() < 0.003

@@ -73,7 +73,6 @@ def test_motion_that_became_weights_comes_back() -> None:
 
 def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> None:
     given = find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
-    assert given is not None
     assert given.names == arkit_mouth().names
     assert given["jawOpen"].tolist() == [0.2, 1.0]
     assert given["mouthFunnel"].tolist() == [0.0, 0.0]

@@ -58,7 +58,6 @@ ARRAYS: dict[str, NDArray[Any]] = {
 def test_every_bit_comes_back(tmp_path: Path) -> None:
     Checkpoint(tmp_path, "a").save("stage", ARRAYS)
     found = Checkpoint(tmp_path, "a").load("stage")
-    assert found is not None
     assert found.keys() == ARRAYS.keys()
     for name, array in ARRAYS.items():
         assert (found[name].dtype, found[name].shape) == (array.dtype, array.shape)
@@ -70,7 +69,6 @@ def test_the_last_state_of_the_same_job_counts(tmp_path: Path, caplog: pytest.Lo
     for number in range(3):
         checkpoint.save("stage", {"n": np.array(number)})
     found = checkpoint.load("stage")
-    assert found is not None
     assert found["n"] == 2
     assert checkpoint.load("other") is None
     assert [path.name for path in tmp_path.iterdir()] == ["stage.checkpoint"]

@@ -152,7 +152,6 @@ HOLD = (
 def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "work"
     with child([sys.executable, "-c", HOLD, folder], stdin=PIPE) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "held\n"
         with pytest.raises(ExportError, match=rf"work: another lipmotion \(process {process.pid}\) is at work on it"):
             lock_folder(folder).__enter__()

@@ -87,7 +87,6 @@ def test_recognised_units_may_be_given_and_come_back_as_they_are() -> None:
 def test_lips_meet_in_recognised_units_of_p_b_m_alone() -> None:
     closed, free = recognised().motion["opening"], recognised(closures=False).motion["opening"]
     closure = trained("eVis").closure
-    assert closure is not None
     lips = [slice(80, 90), slice(100, 110)]
     for span in lips:
         assert closed[span].min() <= closure.closed + 1e-9

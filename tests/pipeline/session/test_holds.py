@@ -70,7 +70,6 @@ def show(generation: Generation, character: DrivenCharacter) -> dict[str, Rows]:
         ("head.glb", head_scene(generation, staging=STILL)),
         ("character", character_scene(generation, character, staging=STILL)),
     ):
-        assert scene.weights is not None
         rows[name] = scene.weights.values
     return rows
 
