@@ -1,7 +1,5 @@
 """Budgets of the house: lines and files, and what ``animate`` loads. They may only go down."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 from pathlib import Path

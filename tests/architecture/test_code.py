@@ -1,7 +1,5 @@
 """Rules of the design that no linter checks."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable, Iterator

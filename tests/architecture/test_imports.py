@@ -1,7 +1,5 @@
 """The import contracts of pyproject.toml hold, and each of them fails for a forbidden import."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import sys

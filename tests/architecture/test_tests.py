@@ -1,7 +1,5 @@
 """Rules of the tests themselves."""
 
-from __future__ import annotations
-
 import ast
 import json
 import re

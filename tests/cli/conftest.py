@@ -1,3 +1,4 @@
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -54,6 +55,16 @@ def run_outside() -> RunCommand:
         return Done(done.returncode, done.stdout.splitlines(), done.stderr.splitlines())
 
     return run
+
+
+@pytest.fixture
+def takes(here: Path, toy_speech: Path) -> Path:
+    """A folder of two recordings."""
+    folder = here / "takes"
+    folder.mkdir()
+    for name in ("a.wav", "b.wav"):
+        shutil.copy(toy_speech, folder / name)
+    return folder
 
 
 @pytest.fixture

@@ -1,4 +1,5 @@
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -27,14 +28,23 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})
 
 
+@pytest.fixture
+def figures_of(run, here):
+    """Runs an experiment whose table is that of its figures, and returns these."""
+
+    def figures_of(table: Callable[[Any], str], *words: object) -> Any:
+        done = run("experiment", *words, "-o", "a.json", "--workers", "1")
+        assert (done.code, done.err) == (0, [])
+        figures = json.loads((here / "a.json").read_text())
+        assert "\n".join(done.out) == table(figures)
+        return figures
+
+    return figures_of
+
+
 @pytest.mark.long
-def test_the_table_is_that_of_the_figures(run, toy_corpus, here):
-    done = run(
-        "experiment", "hofer2008", toy_corpus.path, "-o", "a.json", "--split", "val", "--quick", "--workers", "1"
-    )
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == table1.table(figures)
+def test_the_table_is_that_of_the_figures(figures_of, toy_corpus, here):
+    figures = figures_of(table1.table, "hofer2008", toy_corpus.path, "--split", "val", "--quick")
     assert (figures["split"], figures["clips"], figures["mixtures"]) == ("val", 2, [1, 2])
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
@@ -65,35 +75,26 @@ def test_quick_runs_of_all_experiments_are_of_the_same_recordings(run, toy_corpu
 
 
 @pytest.mark.long
-def test_the_learning_curve_of_a_list(run, toy_corpus, here):
+def test_the_learning_curve_of_a_list(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
     chosen = ("--order", "order.txt", "--sizes", "3", "--split", "val")
-    done = run("experiment", "learning-curve", toy_corpus.path, *chosen, "-o", "a.json", "--workers", "1")
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == learning_curve.table(figures)
+    figures = figures_of(learning_curve.table, "learning-curve", toy_corpus.path, *chosen)
     assert (figures["split"], figures["order"], figures["workers"]) == ("val", "given", 1)
     assert [row["names"] for row in figures["rows"]] == [3]
 
 
 @pytest.mark.long
-def test_folds_of_the_training_list(run, toy_corpus, here):
-    done = run("experiment", "folds", toy_corpus.path, "--folds", "2", "-o", "a.json", "--workers", "1")
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == folds.table(figures)
+def test_folds_of_the_training_list(figures_of, toy_corpus):
+    figures = figures_of(folds.table, "folds", toy_corpus.path, "--folds", "2")
     assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
 
 
 @pytest.mark.long
-def test_xieliu2007_of_some_systems(run, toy_corpus, here):
+def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
     few = ("--systems", "ph-MSHMM;loudness", "--order", "order.txt")
-    chosen = (*few, "--sizes", "3", "--noise", "white", "--snr", "5", "--plots", "pictures", "--workers", "1")
-    done = run("experiment", "xieliu2007", toy_corpus.path, *chosen, "-o", "a.json")
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == six_systems.table(figures)
+    chosen = (*few, "--sizes", "3", "--noise", "white", "--snr", "5", "--plots", "pictures")
+    figures = figures_of(six_systems.table, "xieliu2007", toy_corpus.path, *chosen)
     assert [row["names"] for row in figures["rows"]] == [3]
     assert (figures["order"], figures["tuning"]["tried"]) == ("given", {})
     assert [(row["kind"], row["snr_db"]) for row in figures["noise"]] == [("white", 5)]
@@ -102,15 +103,12 @@ def test_xieliu2007_of_some_systems(run, toy_corpus, here):
 
 
 @pytest.mark.long
-def test_all_engines(run, toy_corpus, here):
-    chosen = ("--split", "test", "--models", "models", "-o", "a.json", "--workers", "1")
-    done = run("experiment", "engines", toy_corpus.path, *chosen)
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == text.table(figures)
+def test_all_engines(figures_of, run, toy_corpus, here):
+    chosen = ("engines", toy_corpus.path, "--split", "test", "--models", "models")
+    figures = figures_of(text.table, *chosen)
     assert (figures["split"], figures["clips"]) == ("test", 2)
     kept = sorted(path.name for path in (here / "models").iterdir())
     assert kept == ["coupled.lipmotion", "selection.lipmotion", "trajectory.lipmotion"]
-    assert run("experiment", "engines", toy_corpus.path, *chosen).out == done.out
+    assert text.table(figures_of(text.table, *chosen)) == text.table(figures)
     (here / "models" / "coupled.lipmotion").write_bytes(b"no model")
-    assert is_one_error(run("experiment", "engines", toy_corpus.path, *chosen), 6)
+    assert is_one_error(run("experiment", *chosen, "-o", "a.json", "--workers", "1"), 6)

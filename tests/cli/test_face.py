@@ -7,19 +7,15 @@ import pytest
 from cli.conftest import check_refused
 from lipmotion_faces.film import build
 from lipmotion_faces.filmed.face import load_face, save_face
-from pipeline.film.toy_footage import ToyVideo, install, write_video
+from pipeline.film.toy_footage import ToyVideo, install, write_videos
 from speech import stand_in_voice
-from testing.toy import toy_sentences
 
 SENTENCES = 3
 
 
 @pytest.fixture(scope="module")
 def videos(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, ToyVideo]:
-    folder = tmp_path_factory.mktemp("filmed") / "anna"
-    folder.mkdir()
-    found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(SENTENCES)]
-    return {video.path.resolve(): video for video in found}
+    return write_videos(tmp_path_factory.mktemp("filmed") / "anna", SENTENCES)
 
 
 @pytest.fixture

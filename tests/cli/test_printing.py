@@ -28,6 +28,7 @@ from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
+from robustness.case import changed_model
 
 EVIL = "q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
 SHOWN = r"q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
@@ -42,13 +43,8 @@ def poisoned(here: Path, toy_corpus: Corpus, toy_model_file: Path, toy_speech: P
     shutil.copy(toy_speech, here / f"{EVIL}.wav")
     shutil.copy(toy_speech, here / "a.wav")
     shutil.copy(toy_model_file, here / EVIL)
-    with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(here / "m.lipmotion", "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            if name == "header.json":
-                told = {"name": EVIL, "corpus": [EVIL], "licence": EVIL, "adapted": {EVIL: EVIL}, EVIL: 1}
-                content = json.dumps(json.loads(content) | told).encode()
-            new.writestr(name, content)
+    told = {"name": EVIL, "corpus": [EVIL], "licence": EVIL, "adapted": {EVIL: EVIL}, EVIL: 1}
+    changed_model(toy_model_file, here / "m.lipmotion", {}, **told)
     with zipfile.ZipFile(here / "other.lipmotion", "w") as new:
         new.writestr("header.json", json.dumps({"format": "lipmotion.model", "version": EVIL}))
     shutil.copytree(toy_corpus.path, here / "c")
@@ -205,6 +201,7 @@ def test_what_is_laid_out_stays_so(capsys):
 def test_a_message_that_repeats_a_file_is_cut_in_its_middle():
     for error in (InputError, OSError):
         told = outcome(error(f"a.csv: found {'x' * 100_000}; give numbers"))
+        assert told is not None
         assert told[0] == InputError.exit_code
         assert len(told[1]) < 1100
         assert told[1].startswith("a.csv: found xxx")
@@ -217,8 +214,10 @@ def test_a_message_that_repeats_a_file_is_cut_in_its_middle():
 
 def test_a_current_folder_that_is_gone_is_said():
     told = outcome(FileNotFoundError(2, os.strerror(2)))
+    assert told is not None
     assert "the current folder has been deleted" in told[1]
     other = outcome(FileNotFoundError(2, os.strerror(2), "a.wav"))
+    assert other is not None
     assert "a.wav" in other[1]
 
 

@@ -38,6 +38,7 @@ def test_after_effects(rhubarb, here, dialogue):
     assert set(shapes_of((here / "output.json").read_text())) <= set("ABCDEFGX")
     assert rhubarb(*line, "missing.wav").code != 0
     found = re.search(r"\[Fatal\] ([\s\S]*)", (here / "log.txt").read_text())
+    assert found is not None
     assert "missing.wav: no such file" in found[1]
 
 
@@ -46,6 +47,7 @@ def test_after_effects_asks_for_the_version(rhubarb):
         done = rhubarb(option)
         found = re.search(r"Rhubarb Lip Sync version ((\d+)\.(\d+).(\d+)(-[0-9A-Za-z-.]+)?)", "\n".join(done.out))
         assert done.code == 0
+        assert found is not None
         assert found[2] == "1"
         assert int(found[3]) >= 9
 

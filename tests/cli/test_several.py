@@ -1,7 +1,6 @@
 import io
 import json
 import os
-import shutil
 import sys
 import threading
 from pathlib import Path
@@ -14,15 +13,6 @@ from lipmotion import read_motion
 from lipmotion.cli.main import main
 from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
 from meshes.heads import head, write_glb
-
-
-@pytest.fixture
-def takes(here: Path, toy_speech: Path) -> Path:
-    folder = here / "takes"
-    folder.mkdir()
-    for name in ("a", "b"):
-        shutil.copy(toy_speech, folder / f"{name}{toy_speech.suffix}")
-    return folder
 
 
 def test_a_folder_of_recordings(run, takes, toy_model_file, here):

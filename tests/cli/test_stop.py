@@ -3,7 +3,7 @@ import os
 import signal
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -218,30 +218,28 @@ def test_a_late_signal_does_not_change_what_is_done(toy_model_file, here):
     assert list(here.iterdir()) == []
 
 
-def test_once_settled_a_signal_comes_too_late():
+@pytest.fixture
+def stopper() -> Iterator[Stopper]:
     stopper = Stopper()
     stopper.listen()
-    try:
-        stopper.settle()
+    yield stopper
+    stopper.stop_listening(process_ends=False)
+
+
+def test_once_settled_a_signal_comes_too_late(stopper):
+    stopper.settle()
+    signal.raise_signal(signal.SIGTERM)
+    stopper.check()
+    stopper.settle()
+    assert stopper.code is None
+
+
+def test_what_was_swallowed_is_not_settled(stopper):
+    with suppress(KeyboardInterrupt):
         signal.raise_signal(signal.SIGTERM)
-        stopper.check()
+    with pytest.raises(Stopped):
         stopper.settle()
-        assert stopper.code is None
-    finally:
-        stopper.stop_listening(process_ends=False)
-
-
-def test_what_was_swallowed_is_not_settled():
-    stopper = Stopper()
-    stopper.listen()
-    try:
-        with suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGTERM)
-        with pytest.raises(Stopped):
-            stopper.settle()
-        assert stopper.code == 143
-    finally:
-        stopper.stop_listening(process_ends=False)
+    assert stopper.code == 143
 
 
 def test_little_is_loaded_before_signals_are_listened_to():

@@ -23,6 +23,8 @@ COMMAND = re.compile(r"(?:lipmotion|python|make|pip|ffmpeg|dask|export) ")
 def module_at(path: str) -> ModuleType:
     """Return a module of the repository that is in no package; the settings of the site do not need Sphinx."""
     spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

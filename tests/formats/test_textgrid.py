@@ -136,6 +136,7 @@ def test_two_tiers_of_phones_and_binary_grids_are_refused(tmp_path):
 @pytest.mark.recordings
 def test_a_real_one(recordings: Path):
     found = read_labels(recordings / "speech-open" / "61-70968-0000.TextGrid")
+    assert found.words is not None
     assert found.words[:4] == ("he", "began", "a", "confused")
     assert found.words == read_labels(recordings / "speech-open" / "61-70968-0000.lab").words
     assert found.phones is None

@@ -59,6 +59,8 @@ def test_documents_inside_of_other_files_are_changed_in_their_place():
     for name, content in (("a.glb", whole), ("a.npz", ZIP)):
         made = next(documents.systematic({name: content}, Random(0)))[name]
         found, before = documents.document_in(name, made), documents.document_in(name, content)
+        assert found is not None
+        assert before is not None
         assert found[0] != before[0]
         assert found[1](before[0])[:4] == content[:4]
     sizes = [documents.change(Random(seed), whole) for seed in range(40)]

@@ -25,11 +25,6 @@ def line(before: int = 60, after: int = 60, seed: int = 1) -> np.ndarray:
     return level + np.random.default_rng(seed).normal(0, 0.3, len(level))
 
 
-def around(frames: int, level: float, seed: int = 2) -> np.ndarray:
-    """Another silence: digital, or of another noise."""
-    return level + np.random.default_rng(seed).normal(0, 0.3, frames)
-
-
 @given(offset=st.floats(-50, 50))
 def test_loud_is_relative_to_the_recording(offset):
     loud = np.nonzero(loudness.find_loud_frames(energy() + offset, smoothing=5))[0]
@@ -58,7 +53,7 @@ def test_nothing_is_loud_in_the_shortest_recordings_and_where_nothing_changes():
 @pytest.mark.parametrize("other", [ROOM - 15, ROOM - 3, ROOM + 3])
 def test_another_silence_around_a_recording_changes_no_level(frames: int, other: float):
     alone = line()
-    pad = around(frames, other)
+    pad = other + np.random.default_rng(2).normal(0, 0.3, frames)  # digital, or of another noise
     padded = np.r_[pad, alone, pad]
     own = slice(frames, frames + len(alone))
     assert loudness.measure_levels(padded) == pytest.approx(loudness.measure_levels(alone), abs=0.1)

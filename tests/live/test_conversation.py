@@ -1,7 +1,5 @@
 """Words of services with their times, in the motion of a voice agent."""
 
-from __future__ import annotations
-
 import asyncio
 
 import numpy as np

@@ -27,10 +27,7 @@ def encoded(pixels=QUARTERS, form="PNG") -> bytes:
 
 def textured(tmp_path, *, image: bytes | None = None, material=None, extension=None):
     """The square with a picture on it."""
-    content, binary = textured_document(encoded() if image is None else image, material, extension)
-    path = tmp_path / "head.glb"
-    path.write_bytes(glb(content, binary))
-    return read_gltf(path)
+    return _read(tmp_path, *textured_document(encoded() if image is None else image, material, extension))
 
 
 def picture_of(mesh: Mesh) -> np.ndarray:

@@ -43,6 +43,7 @@ def test_regressors_that_are_missing_have_their_mean(fitted: PredictorFit, hidde
     """As without posteriors, or with a network that has more units: what is left tells the motion."""
     one, motion = standing(50)
     prior = one.speech.prior
+    assert prior is not None
     units = np.resize(prior.hidden.T, (hidden, len(prior.hidden))).T
     found, _ = fitted.predictor.predict(replace(one.speech, prior=replace(prior, hidden=units)))
     assert np.corrcoef(found[:, 0], motion[:, 0])[0, 1] > 0.9

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from lipmotion import load_model
 from lipmotion.motion import unseen_speaker
@@ -16,7 +15,7 @@ from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.model import with_prior
 from lipmotion.pipeline.request import Request
 from lipmotion.testing.examples import timeline
-from lipmotion.types import Constraints, Generation, Motion, Pin, Span, Speech, Timeline, Unit
+from lipmotion.types import Constraints, Generation, Pin, Span, Speech, Timeline, Unit
 from lipmotion.units import VOWELS
 
 WELCOME = Path(__file__).parent.parent.parent / "examples" / "welcome.flac"
@@ -166,12 +165,9 @@ def test_jaw_and_lips_go_with_the_opening(welcome: Speech) -> None:
     slopes = []
     for voice in (1.0, 0.0):
         motion = generated(replace(welcome, voice=voice)).motion
-        slopes.append([np.polyfit(motion["opening"], apart, 1)[0] for apart in _distances(motion)])
+        distances = -motion["y_152"], motion["y_13"] - motion["y_14"]
+        slopes.append([np.polyfit(motion["opening"], apart, 1)[0] for apart in distances])
     np.testing.assert_allclose(slopes[1], slopes[0], rtol=0.15)
-
-
-def _distances(motion: Motion) -> tuple[NDArray[np.floating], ...]:
-    return -motion["y_152"], motion["y_13"] - motion["y_14"]
 
 
 def test_pins_are_in_delivered_units(welcome: Speech) -> None:

@@ -6,10 +6,11 @@ from PIL import Image
 
 import lipmotion
 from faces.test_cut_out import draw
+from formats.examples import of_motion
 from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.compiler import numba_works
-from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, silent_monitor
+from lipmotion.types import Audio, Channel, Generation, Motion, Timeline, silent_monitor
 from lipmotion_faces import Staging
 from lipmotion_faces.outputs.drawn_video import load_drawing, write_drawn_face
 from lipmotion_faces.portrait.planar import PlanarRasteriser
@@ -32,9 +33,7 @@ def drawn_poses(monkeypatch):
 
 @pytest.fixture
 def rising() -> Generation:
-    values = np.linspace(0, 0.2, 40)[:, None]
-    trace = StateTrace(("known",), np.zeros(len(values), np.intp))
-    return Generation(Motion(values, 100.0, (Channel("opening"),)), np.zeros_like(values), Timeline(()), trace)
+    return of_motion(Motion(np.linspace(0, 0.2, 40)[:, None], 100.0, (Channel("opening"),)))
 
 
 def write(path, generation, **staging) -> None:

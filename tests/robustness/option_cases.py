@@ -24,7 +24,6 @@ _option(
 )
 _option("an unknown --recogniser", 3, "unknown recogniser 'best'; required one of: auto", "--recogniser", "best")
 _option("--intensity nan", 3, "the intensity is nan, required 0 to 3", "--intensity=nan")
-_option("--anticipation-ms 2000", 3, "the anticipation is 2000 ms, required -1000", "--anticipation-ms=2000")
 _option("--offset-ms that leaves nothing", 3, "nothing is left; give a smaller one", "--offset-ms=-60000")
 _option("--posteriors of a model without chains", 3, "'trajectory' has no chains", "--posteriors", "a.png")
 _option("--posteriors as .jpg", 7, "unknown format '.jpg'; required: .png", "--posteriors", "a.jpg")
@@ -38,9 +37,6 @@ case(GROUP, "cues --hold 1000000000", 0)(
 for _name, _options, _message in [
     ("--visual of an unknown name", ("--visual", "pixels"), "visual is 'pixels', required one of: geometry, eigenlips"),
     ("--set without a value", ("--set", "states"), "the setting 'states' has no value; required NAME=VALUE"),
-    ("--set of a text instead of a number", ("--set", "states=many"), "states is 'many', required a whole number"),
-    ("--set of a number out of range", ("--set", "states=4"), "states is 4, required an odd number from 1"),
-    ("--system of an unknown name", ("--system", "HMM"), "no preset 'HMM'; there are: ph-HMM"),
 ]:
 
     @case(GROUP, f"train {_name}", 3, _message)

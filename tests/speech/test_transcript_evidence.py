@@ -308,6 +308,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
     phones, whole, half = Recogniser(load_model().phones, "auto"), 0, 0
     for name in names:
         audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), spell_name(name)
+        assert words is not None
         for said, kept in ((words, True), (words[:3], False)):
             units = phones.align(audio, analysed(audio).mfcc(), said, Lexicon())
             noticed = bool(agreement.transcript_fit(audio, units).missing)

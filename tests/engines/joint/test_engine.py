@@ -9,8 +9,7 @@ from lipmotion.engines.joint.engine import JointEngine, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import StreamWeights
 from lipmotion.testing.examples import example, examples, speech, timeline
-from lipmotion.types import Example, Generation, Span, Speech, Timeline, Unit
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import Example, Generation, Span, Speech, Timeline, Unit, silent_monitor
 from lipmotion.units import UNIT_SETS
 
 SOUND = speech(timeline(("t", "aa", "p", "iy", "m", "uw", "s", "aa")))

@@ -12,7 +12,7 @@ from lipmotion_faces.film.build import Take, build_face
 from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
-from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
+from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video, write_videos
 from testing.toy import toy_sentences
 from testing.toy_face import toy_chin_px
 
@@ -23,10 +23,7 @@ Event = Progress | Item
 
 @pytest.fixture(scope="module")
 def videos(tmp_path_factory: pytest.TempPathFactory) -> Videos:
-    folder = tmp_path_factory.mktemp("filmed") / "anna"
-    folder.mkdir()
-    found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(SENTENCES)]
-    return {video.path.resolve(): video for video in found}
+    return write_videos(tmp_path_factory.mktemp("filmed") / "anna", SENTENCES)
 
 
 @pytest.fixture
