@@ -1,5 +1,8 @@
+import io
 import shutil
+import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,6 +12,7 @@ from scipy.io import wavfile
 
 from children import LIPMOTION, environment, run_child
 from lipmotion.cli.main import main
+from lipmotion.cli.verbs import about
 
 
 class Done(NamedTuple):
@@ -47,6 +51,12 @@ def run(capsys: pytest.CaptureFixture[str]) -> RunCommand:
 
 
 @pytest.fixture
+def make_info(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Gives ``lipmotion info`` something else to do."""
+    return partial(monkeypatch.setattr, about, "run_info")
+
+
+@pytest.fixture
 def run_outside() -> RunCommand:
     """Runs a command in a process of its own, as a shell does."""
 
@@ -65,6 +75,12 @@ def takes(here: Path, toy_speech: Path) -> Path:
     for name in ("a.wav", "b.wav"):
         shutil.copy(toy_speech, folder / name)
     return folder
+
+
+@pytest.fixture
+def _piped_speech(toy_speech: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The recording at the standard input."""
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
 
 
 @pytest.fixture

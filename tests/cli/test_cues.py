@@ -1,7 +1,5 @@
-import io
 import json
 import logging
-import sys
 from pathlib import Path
 
 import pytest
@@ -128,9 +126,9 @@ def test_warnings_are_status_lines_too(run, basics):
     assert logging.getLogger().handlers == handlers
 
 
-def test_sound_from_a_pipe_is_not_named(here, toy_speech, toy_model_file, monkeypatch):
+@pytest.mark.usefixtures("_piped_speech")
+def test_sound_from_a_pipe_is_not_named(here, toy_model_file):
     """Its file is temporary, and gone when the cues are opened."""
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
     assert main(["cues", "-", "--model", str(toy_model_file), "-o", "a.json", "a.xml"]) == 0
     assert json.loads((here / "a.json").read_text())["metadata"]["soundFile"] == ""
     assert "<soundFile></soundFile>" in (here / "a.xml").read_text()

@@ -23,7 +23,6 @@ from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, Stopper
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
 from lipmotion.cli.terminal.progress import outcome, report_progress
-from lipmotion.cli.verbs import about
 from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text
@@ -142,7 +141,7 @@ def test_what_is_obeyed_is_shown(capsys):
         assert SHOWN[:8] in shown or line in NOT_SHOWN, line
 
 
-def test_warnings(run, monkeypatch):
+def test_warnings(run, make_info):
     def warn(_: Namespace) -> None:
         logging.getLogger("lipmotion").warning("%s is odd", EVIL)
         logging.getLogger("another.package").error(EVIL)
@@ -150,7 +149,7 @@ def test_warnings(run, monkeypatch):
             warnings.simplefilter("always")
             warnings.warn(EVIL, stacklevel=1)
 
-    monkeypatch.setattr(about, "run_info", warn)
+    make_info(warn)
     head = "lipmotion: warning: "
     with logged():
         done = run("info")

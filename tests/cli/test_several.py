@@ -90,8 +90,8 @@ def test_a_character_is_opened_once(run, takes, toy_model_file, here, monkeypatc
     assert read_motion(here / "out" / "b.json")[0].names[0] == "jawOpen"
 
 
-def test_standard_input_and_output(toy_model_file, toy_speech, here, monkeypatch):
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
+@pytest.mark.usefixtures("_piped_speech")
+def test_standard_input_and_output(toy_model_file, here, monkeypatch):
     written = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written))
     words = ["animate", "-", "--model", str(toy_model_file), "-o", "-", "a.csv", "a.json", "--format", "csv"]
