@@ -2,15 +2,14 @@
 
 The stages of a frame: ``face_poses`` (motion, phones and voice → numbers) → ``geometry`` (numbers → outlines) →
 ``mouth_painting`` (outlines → pixels) → ``portrait_rasteriser`` (pixels → picture, moved by ``movement``). The still
-parts are painted once, by ``still_parts`` and ``eyes`` on a ``layer``. ``planar`` draws the same for the encoder of a
-video.
+parts are painted once, by ``parts`` on a ``layer``.
 A character is a ``design``: ``woman``, ``man``, ``cartoon``.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING, final
 
@@ -22,7 +21,7 @@ from lipmotion_faces.base import TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.portrait.design import Design
 
 if TYPE_CHECKING:
-    from lipmotion_faces.portrait.portrait_rasteriser import FacePose
+    from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 
 __all__ = ["Cartoon", "DrawnFace", "Man", "Portrait", "Woman"]
 
@@ -56,28 +55,15 @@ class DrawnFace(Face):
         from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 
         poses = face_poses(motion, units, fps, self.staging, self.prosody)
-        return DrawnMotion(poses, lambda: self._painter)
+        return DrawnMotion(poses, lambda: self._rasteriser.paint)
 
     @cached_property
-    def _painter(self) -> Callable[[FacePose], NDArray[np.uint8]]:
-        from lipmotion_faces.portrait.portrait_rasteriser import Rasteriser, make_painter
+    def _rasteriser(self) -> Rasteriser:
+        from lipmotion_faces.portrait.portrait_rasteriser import Rasteriser
 
         chosen = self.staging
         background = None if chosen.background == TRANSPARENT else chosen.colour or chosen.background
-        return make_painter(Rasteriser(self.design, chosen.size or OWN_SIZE, background))
-
-    def render_planes(  # noqa: D102
-        self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
-    ) -> Iterator[NDArray[np.uint8]] | None:
-        from lipmotion_faces.portrait.planar import PlanarRasteriser
-        from lipmotion_faces.portrait.portrait_rasteriser import face_poses, make_painter
-
-        chosen = self.staging
-        if chosen.background == TRANSPARENT:
-            return None
-        poses = face_poses(motion, units, fps, chosen, self.prosody)
-        background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE
-        return iter(DrawnMotion(poses, lambda: make_painter(PlanarRasteriser(self.design, size, background))))
+        return Rasteriser(self.design, chosen.size or OWN_SIZE, background)
 
 
 @final

@@ -43,10 +43,11 @@ LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.1, 0.13)
 
 
 class MouthPainter:
-    """Paints mouths of a character into the pixels of one window, with textures in its layers' colours, or its own."""
+    """Paints mouths of a character into the pixels of one window."""
 
-    def __init__(self, design: Design, window: Window, textures: MouthTextures | None = None) -> None:
-        self._lips, self._textures = design.lips, textures or mouth_textures(design)
+    def __init__(self, design: Design, window: Window) -> None:
+        self._lips, colours = design.lips, design.palette
+        self._textures = _flat_textures(colours) if design.flat else _shaded_textures(colours)
         self._x = window.columns(COLUMNS).reshape(-1, COLUMNS).T.astype(np.float64)
         self._scale, self._first_row = window.view.scale, window.y0 - window.view.origin[1]
 
@@ -169,11 +170,6 @@ class MouthTextures:
     corners: Texture
     fold: Texture
     outline: Texture
-
-
-def mouth_textures(design: Design) -> MouthTextures:
-    """Return the textures of a character's mouth."""
-    return _flat_textures(design.palette) if design.flat else _shaded_textures(design.palette)
 
 
 def _flat_textures(colours: Palette) -> MouthTextures:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,6 @@ from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter
 from lipmotion_faces.portrait.parts import EyePainter, paint_still_layers
 
-CanvasT = TypeVar("CanvasT")
 Pixels = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Canvas = NDArray[np.uint16]
@@ -74,36 +72,19 @@ def face_poses(
     ]
 
 
-class Draws(Protocol[CanvasT]):
-    """What draws the pictures of poses, each thread on a canvas of its own."""
-
-    def canvas(self) -> CanvasT:
-        """Return what ``picture`` draws on."""
-
-    def picture(self, pose: FacePose, canvas: CanvasT) -> NDArray[np.uint8]:
-        """Return one frame."""
-
-
-def make_painter(drawing: Draws[CanvasT]) -> Callable[[FacePose], Picture]:
-    """Return what draws the picture of a pose, on a canvas of the thread that calls it."""
-    canvases = threading.local()
-
-    def paint(pose: FacePose) -> Picture:
-        if not hasattr(canvases, "own"):
-            canvases.own = drawing.canvas()
-        return drawing.picture(pose, canvases.own)
-
-    return paint
-
-
 class Rasteriser:
-    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own."""
+    """Draws a character at one size; ``paint`` may be called by several threads, each of which has its own canvas."""
 
     def __init__(self, design: Design, size: int, background: Colour | str | None = SCENE) -> None:
-        view = View(size)
+        view, line_y = View(size), design.lips.line_y
         whole = view.window(-9, -9, 9, 9)
-        self._opaque = background is not None
-        self._jaw, self._mouth, self._eyes, self._brow, self._below_brows, self._head = moving_parts(view, design)
+        self._opaque, self._canvases = background is not None, threading.local()
+        self._jaw = view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95)
+        self._mouth = view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7)
+        self._eyes, self._brow = view.window(-0.66, -0.24, 0.66, 0.21), view.window(-0.8, -0.64, 0.8, -0.06)
+        # the part of the eyes' window that the brows' does not have
+        self._below_brows = Window(view, self._eyes.x0, self._brow.y1, self._eyes.x1, self._eyes.y1)
+        self._head = view.window(-1.3, -9, 1.3, 1.9)
         self._skin, self._below, self._shade, self._front, still = paint_still_layers(whole, design, background)
         self._eye_painter = EyePainter(design, self._eyes)
         self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint16)
@@ -116,6 +97,12 @@ class Rasteriser:
     def canvas(self) -> Canvas:
         """Return the picture of the resting face without eyes and mouth, to draw on [shape=(size, size, 4)]."""
         return self._still.copy()
+
+    def paint(self, pose: FacePose) -> Picture:
+        """Return one frame, drawn on the canvas of the thread that calls; shape as of ``picture``."""
+        if not hasattr(self._canvases, "own"):
+            self._canvases.own = self.canvas()
+        return self.picture(pose, self._canvases.own)
 
     def picture(self, pose: FacePose, canvas: Canvas) -> Bytes:
         """Return one frame [shape=(size, size, 3), or 4 channels where transparent]; the canvas is changed."""
@@ -153,28 +140,3 @@ class Rasteriser:
     def _lay(self, skin: Pixels, window: Window, target: Canvas) -> None:
         area = window.area
         stack(self._below[area], self._shade[area], skin, self._front[area], target)
-
-
-class MovingParts(NamedTuple):
-    """Windows of what moves; ``below_brows`` is the part of the eyes' window that the brows' does not have."""
-
-    jaw: Window
-    mouth: Window
-    eyes: Window
-    brow: Window
-    below_brows: Window
-    head: Window
-
-
-def moving_parts(view: View, design: Design) -> MovingParts:
-    """Return the windows of what moves in a view of a character."""
-    line_y = design.lips.line_y
-    eyes, brow = view.window(-0.66, -0.24, 0.66, 0.21), view.window(-0.8, -0.64, 0.8, -0.06)
-    return MovingParts(
-        jaw=view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95),
-        mouth=view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7),
-        eyes=eyes,
-        brow=brow,
-        below_brows=Window(view, eyes.x0, brow.y1, eyes.x1, eyes.y1),
-        head=view.window(-1.3, -9, 1.3, 1.9),
-    )
