@@ -92,9 +92,7 @@ class MeshFace(Face):
         return self._character
 
     def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> MeshFace:
-        """Return the same character with other settings, and the prosody (None: not known) for accents of brows and
-        head.
-        """
+        """Return the same character with other settings, and prosody for accents of brows and head."""
         return MeshFace(self._character, *self._size, staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
@@ -134,9 +132,7 @@ def write_picture(path: Path, character: DrivenCharacter) -> None:
 
 
 class MeshStage:
-    """A mesh before the camera, in light, for several threads; ``colour`` of the background, 0 to 255 (None: a
-    gradient).
-    """
+    """A mesh before the camera, in light, for several threads; colour: of the background (None: a gradient)."""
 
     def __init__(
         self, character: DrivenCharacter, width: int, height: int, colour: tuple[int, int, int] | None = None

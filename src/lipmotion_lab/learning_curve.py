@@ -84,9 +84,7 @@ def learning_curve(
 
 
 def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
-    """Return the sizes, or the usual ones, rising. Raises InputError: sizes under 1 or over ``listed``, or an empty
-    list.
-    """
+    """Return the sizes, or the usual ones, rising. Raises InputError: not from 1 to ``listed``, or an empty list."""
     if not listed:
         raise InputError("the list of utterances to train on is empty; give one name a line")
     steps = sorted(set(sizes)) if sizes is not None else [*(n for n in SIZES if n < listed), listed]

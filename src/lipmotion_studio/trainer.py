@@ -138,9 +138,7 @@ class Trainer:
         return {path.stem: path for path in paths if path.is_file() and not path.name.startswith(".")}
 
     def begin(self, kind: str, name: str, numbers: Sequence[int], options: VoiceOptions) -> None:
-        """Begin to make a voice or a face. Raises InputError: busy, or no such kind, name or videos. ExportError: no
-        write.
-        """
+        """Begin to make a voice or a face. Raises InputError: busy; no such kind, name or videos. ExportError."""
         if kind not in KINDS:
             raise InputError(f"no kind {shorten(repr(kind))}; required {' or '.join(KINDS)}")
         plain = clean_name(name, "")
@@ -312,9 +310,7 @@ class Trainer:
             return False
 
     def restore(self) -> None:
-        """Replace a damaged file by its copy, and keep it beside. Raises InputError: no damage or copy. ExportError: no
-        write.
-        """
+        """Put the copy in place of a damaged file, which stays beside. Raises InputError: no damage, no copy. ExportError."""
         with self._lock:
             if not self.damage or not self.is_restorable:
                 raise InputError(self.damage or "what is known of the training is not damaged; nothing is restored")

@@ -265,9 +265,7 @@ class _Joins:
 
 
 class _Plan:
-    """A background, its scenes (first frame, end), and the cost of turning, beginning or ending at each frame
-    [shape=(T,)].
-    """
+    """A background, its scenes, and the cost of turning, beginning or ending at each frame [shape=(T,)]."""
 
     def __init__(
         self, descriptors: FrameDescriptors, rate_hz: float, allowed: NDArray[np.bool_], cuts: Sequence[int]

@@ -74,9 +74,7 @@ def region_map(face_to_frame: Array, scale: float, corner: tuple[float, float] =
 
 
 def best_scale(face_to_frame: Array) -> int:
-    """Return the samples a pixel, 1 to ``LARGEST_SCALE``, with which footage of these maps [shape=(T, 2, 3)] loses
-    nothing.
-    """
+    """Return the samples a pixel, 1 to ``LARGEST_SCALE``, with which footage [maps: shape=(T, 2, 3)] loses nothing."""
     size = np.sqrt(np.abs(np.linalg.det(face_to_frame[:, :, :2])))
     return int(np.clip(np.floor(np.median(size) + 0.25), 1, LARGEST_SCALE))
 
@@ -104,9 +102,7 @@ def mouth_ellipse(scale: int) -> Mask:
 
 
 def cheek_light(mouths: NDArray[Any]) -> Array:
-    """Return the mean red, green, blue of the corners of mouth pictures [shape=(T, 3)]. Raises InputError: another
-    size.
-    """
+    """Return the mean colours of the corners of mouth pictures [shape=(T, 3)]. Raises InputError: another size."""
     scale = mouths.shape[1] // mouth_region.HEIGHT if mouths.ndim == 4 else 0
     required = (mouth_region.HEIGHT * scale, mouth_region.WIDTH * scale, 3)
     if not scale or mouths.shape[1:] != required:

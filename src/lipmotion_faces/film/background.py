@@ -233,9 +233,7 @@ def open_stored_background(background: StoredBackground) -> BackgroundSequence:
 
 
 def open_background(path: Path, appearance: Appearance | None = None, *, in_time: bool = False) -> BackgroundSequence:
-    """Return a video as a background; others than ``appearance`` are warned about. Raises InputError: no video, no
-    face.
-    """
+    """Return a video as a background; warn where it is not ``appearance``'s. Raises InputError: no video, no face."""
     footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
     if appearance is not None:
         frame = int(np.flatnonzero(footage.track.seen)[0])

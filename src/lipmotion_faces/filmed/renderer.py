@@ -89,9 +89,7 @@ class StitchingOptions:
 
 STITCHING = StitchingOptions()
 AS_PRINTED = StitchingOptions(mouth=PAPER, sharpening=0, average=3)
-"""The mean of three pictures, then the nearest of 500 candidates for every colour and picture: Xie & Liu 2007, §6.1 and
-Eqs. 14–16.
-"""
+"""The mean of three pictures, then the nearest of 500 candidates: Xie & Liu 2007, §6.1 and Eqs. 14–16."""
 
 
 @dataclass(frozen=True, eq=False)

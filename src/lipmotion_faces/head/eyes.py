@@ -163,9 +163,7 @@ def lash_triangles() -> NDArray[np.int32]:
 
 
 def lashes(edge: Real, shut: float) -> Real:
-    """Return the places of the left lashes [shape=(3 * LASHES, 3)], a wedge along the upper lid's edge [shape=(LASHES,
-    3)].
-    """
+    """Return the left lashes [shape=(3 * LASHES, 3)], a wedge along the lid's edge [shape=(LASHES, 3)]."""
     share = np.linspace(0, 1, LASHES)
     thick = 0.004 + 0.018 * np.sin(np.pi * (0.12 + 0.8 * share)) ** 0.7 * share**0.4
     length = (0.012 + 0.045 * share**1.5) * np.clip((1 - share) / 0.03 + 0.35, 0, 1)

@@ -194,9 +194,7 @@ class ShownPerson(_WithHead):
 
 
 def shown_face(face: AnyFace | ShownFace) -> ShownFace:
-    """Return a face as outputs show it, of a name, a path or a value. Raises InputError: none. Raises ModelFormatError:
-    damaged.
-    """
+    """Return a face as outputs show it, of a name, a path or a value. Raises InputError, ModelFormatError: none."""
     if isinstance(face, ShownFace):
         return face
     if isinstance(face, DrivenCharacter):

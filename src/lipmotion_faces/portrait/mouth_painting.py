@@ -32,8 +32,7 @@ Texture = NDArray[np.float64]
 COLUMNS = 4
 """Places in each column of pixels at which heights are computed."""
 FOLD, FOLD_TOP = (0.19, 0.1), -0.235
-"""A fold between nose and mouth begins so far from the middle, and ends so far beside the corner; its upper end lies so
-far below the line of the lips."""
+"""Where a fold begins, from the middle, and ends, from the corner; and its top, from the line of the lips."""
 CORNER_REACH = 1.28
 """The shadows beside the corners are painted up to this multiple of the mouth's half width."""
 SPAN = 0.26

@@ -27,18 +27,15 @@ are not found; 93 clips of GRID: at most 1 picture of 6,882 is below)."""
 LARGEST_SHARE = 1 / 3
 """Where more pictures repeat the one before, they are drawn and may stay as they are (toy faces: half of them)."""
 FROZEN_S = 0.2
-"""Pictures that repeat one another for so long are frozen; single ones are doubled, as where frame rates were changed.
-"""
+"""Pictures that repeat one another for so long are frozen; single ones are doubled, as by changed frame rates."""
 JUMP = 1.5
-"""The picture after frozen ones differs at least so much more than most do; after people who stand still it does not.
-"""
+"""The picture after frozen ones differs at least so much more than most; after people who stand still it does not."""
 MOST_COMPARED = 4000
 """Mouths of a person that each one is compared with, spread evenly."""
 LEAST_COMPARED = 500
 """With fewer mouths, no one can say what is unlike the others."""
 APART_S = 10.0
-"""A mouth is compared with those of other clips, and with those of its own that are so far away: smears last seconds.
-"""
+"""A mouth is compared with other clips, and with its own from so far away on: smears last seconds."""
 SIZE, FINE_PX, COARSE_PX = (24, 18), 1.0, 5.0
 """Size of a compared mouth, and the details in it: between these two standard deviations, px of the mouth region."""
 LEAST_CONTRAST = 20.0

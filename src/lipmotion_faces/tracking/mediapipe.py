@@ -54,9 +54,7 @@ class _Graph:
 
 
 class FaceMesh(_Graph):
-    """Finds the faces in a clip's frames, up to ``most``, and follows them. Raises MissingDependencyError: no
-    MediaPipe.
-    """
+    """Finds up to ``most`` faces in frames, and follows them. Raises MissingDependencyError: no MediaPipe."""
 
     def __init__(self, most: int = 1) -> None:
         module = import_face_mesh()

@@ -67,9 +67,7 @@ def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
 
 
 def forget_rater(folder: Path, name: str) -> int:
-    """Delete a rater and all answers, not of exported files; return how many. Raises InputError: no study, no such
-    rater.
-    """
+    """Delete a rater and all answers; return how many. Raises InputError: no study, no such rater."""
     read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:
         return store.forget(rater_number(name))
