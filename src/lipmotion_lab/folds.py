@@ -23,20 +23,9 @@ from lipmotion.measures.curves import pooled_correlation
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor
+from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import figures_of
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip
-from lipmotion_lab.runner import (
-    DEFAULT_SETTINGS,
-    ExperimentSettings,
-    PartKey,
-    check_opening,
-    clips_from_arrays,
-    clips_to_arrays,
-    open_parts,
-    opening_row_with_rates,
-    shuffled,
-    train_and_generate,
-)
 
 FOLDS = 5
 _ABOUT = "about"
@@ -58,7 +47,7 @@ class _GeneratedFold:
         about = [list(self.clips), self.speakers, self.used, self.closed_under]
         arrays = {_ABOUT: np.array(json.dumps(about))}
         for number, clips in enumerate(self.clips.values()):
-            arrays |= {f"{number}/{name}": array for name, array in clips_to_arrays(clips).items()}
+            arrays |= {f"{number}/{name}": array for name, array in runner.clips_to_arrays(clips).items()}
         return arrays
 
 
@@ -69,7 +58,7 @@ def _fold_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> _GeneratedFold:
         number, _, name = key.partition("/")
         if name:
             parts[int(number)][name] = array
-    return _GeneratedFold(dict(zip(conditions, map(clips_from_arrays, parts), strict=True)), *about)
+    return _GeneratedFold(dict(zip(conditions, map(runner.clips_from_arrays, parts), strict=True)), *about)
 
 
 @one_thread()
@@ -79,7 +68,7 @@ def folds(
     count: int | None = None,
     by_speaker: bool = False,
     work: Path | None = None,
-    settings: ExperimentSettings = DEFAULT_SETTINGS,
+    settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Divide the training list into parts; generate each by a model of the others; return figures over all clips.
 
@@ -100,10 +89,10 @@ def folds(
     if not 2 <= count <= len(groups):
         what = "speakers" if by_speaker else "utterances"
         raise InputError(f"{count} folds; required: from 2 to {len(groups)}, which is how many {what} there are")
-    check_opening(corpus, names)
-    mixed = shuffled(groups, settings.seed)
-    key = PartKey(engine_named("trajectory"), names, others=f"{count} {by_speaker}")
-    kept, results = open_parts(work, corpus, settings, key), []
+    runner.check_opening(corpus, names)
+    mixed = runner.shuffled(groups, settings.seed)
+    key = runner.PartKey(engine_named("trajectory"), names, others=f"{count} {by_speaker}")
+    kept, results = runner.open_parts(work, corpus, settings, key), []
     for fold in range(count):
         stage = f"fold-{fold}"
         arrays = kept.load(stage)
@@ -113,7 +102,7 @@ def folds(
         held_out = [name for part in mixed[fold::count] for name in part]
         monitor = sub_monitor(settings.monitor, fold / count, (fold + 1) / count, f"fold {fold + 1}: ")
         others = [name for name in names if name not in held_out]
-        made = train_and_generate(corpus, others, held_out, (OPENING,), replace(settings, monitor=monitor), work)
+        made = runner.train_and_generate(corpus, others, held_out, (OPENING,), replace(settings, monitor=monitor), work)
         speakers = [utterance.speaker for utterance in made.recordings.utterances]
         results.append(_GeneratedFold(made.clips, speakers, len(made.used), made.recordings.closed_under))
         if work is not None:
@@ -129,7 +118,7 @@ def _row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, by_spe
     """Return the figures of the clips of all folds in one condition, and the correlation of each speaker's opening."""
     pooled = [clip for result in results for clip in result.clips[condition]]
     figures = figures_of(pooled, results[0], seed)
-    row = opening_row_with_rates(figures)
+    row = runner.opening_row_with_rates(figures)
     if not by_speaker:
         return row
     clips: dict[str, list[ComparedClip]] = {}

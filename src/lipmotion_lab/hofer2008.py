@@ -24,14 +24,7 @@ from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import UNIT_SETS, Lexicon
-from lipmotion_lab.evaluation.evaluate import (
-    closing_score_statistic,
-    correlation_statistic,
-    figures_of,
-    opening_curves,
-    sign_of_difference,
-    significance_mark,
-)
+from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
@@ -179,7 +172,7 @@ def _train_system(
             gaussians = model.hmm.models[SPEECH].tied.mixtures.size[1]
             if gaussians in counts:
                 clips = generate_clips(choosing, AUDIO_ONLY, engine, model)
-                tried[gaussians] = correlation_statistic(*opening_curves(choosing, clips)).value
+                tried[gaussians] = evaluate.correlation_statistic(*evaluate.opening_curves(choosing, clips)).value
                 if _best_count(tried) == gaussians:
                     arrays = engine.to_arrays(model)
         if not tried:
@@ -203,13 +196,13 @@ def _table(
     seed: int,
 ) -> dict[str, Any]:
     """Return the figures of all sets in one condition, and the intervals of the differences of every two of them."""
-    openings = {units: opening_curves(recordings, own) for units, own in clips.items()}
+    openings = {units: evaluate.opening_curves(recordings, own) for units, own in clips.items()}
     threshold = recordings.closed_under or 0.0
-    scores = {units: closing_score_statistic(*pair, threshold) for units, pair in openings.items()}
-    acc = {units: correlation_statistic(*pair) for units, pair in openings.items()}
+    scores = {units: evaluate.closing_score_statistic(*pair, threshold) for units, pair in openings.items()}
+    acc = {units: evaluate.correlation_statistic(*pair) for units, pair in openings.items()}
     rows = {}
     for units, system in systems.items():
-        figures = figures_of(clips[units], recordings, seed)
+        figures = evaluate.figures_of(clips[units], recordings, seed)
         rows[units] = opening_row(figures) | {
             "units": UNIT_SETS[units].count,
             "paper": PAPER_SCORES[units],
@@ -254,8 +247,8 @@ def table(figures: Mapping[str, Any]) -> str:
 
 def _line(units: str, row: Mapping[str, Any]) -> str:
     interval = "–".join(figure_text(end, ".1f") for end in row["score_95"])
-    score = f"{figure_text(row['score'], '.1f')}{significance_mark(row['score_gain_95'])} ({interval})"
-    acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], significance_mark(row["acc_gain_95"]), *row["acc_95"])
+    score = f"{figure_text(row['score'], '.1f')}{evaluate.significance_mark(row['score_gain_95'])} ({interval})"
+    acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], evaluate.significance_mark(row["acc_gain_95"]), *row["acc_95"])
     return (
         f"  {units:6} {row['units']:5} {row['paper']:6.1f}  {score:22}{figure_text(row['precision'], '9.1f')}"
         f"{figure_text(row['recall_p_b_m'], '7.1f')}{figure_text(row['timing_ms'], '+8.0f')}  {acc:22}"
@@ -265,7 +258,7 @@ def _line(units: str, row: Mapping[str, Any]) -> str:
 
 def what_held(block: Mapping[str, Any]) -> str:
     """Return how many of the pairs of sets that the paper orders by score are ordered so here, and which is best."""
-    signs = [sign_of_difference(pair["score_gain_95"]) for pair in block["paper_order"]]
+    signs = [evaluate.sign_of_difference(pair["score_gain_95"]) for pair in block["paper_order"]]
     against = [
         f"{pair['worse']} over {pair['better']}"
         for pair, sign in zip(block["paper_order"], signs, strict=True)

@@ -30,6 +30,7 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
+from lipmotion_lab import runner
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves, significance_mark
 from lipmotion_lab.evaluation.held_out import (
@@ -41,14 +42,6 @@ from lipmotion_lab.evaluation.held_out import (
     make_speech,
 )
 from lipmotion_lab.learning_curve import check_training_names
-from lipmotion_lab.runner import (
-    DEFAULT_SETTINGS,
-    ExperimentSettings,
-    PartKey,
-    check_opening,
-    open_parts,
-    opening_row_with_rates,
-)
 
 WIDTH = 36
 HEAD = f"  {'':{WIDTH}}{'ACC (95 %)':23}p b m  elsewhere  joins  hard  smooth  variance and jerk: opening, width, outer"
@@ -178,7 +171,7 @@ def minnis2000(
     models: Path | None = None,
     quick: bool = False,
     work: Path | None = None,
-    settings: ExperimentSettings = DEFAULT_SETTINGS,
+    settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Return the figures of the paper's system and of its variants on ``val``, if the corpus has it, and ``test``.
 
@@ -207,8 +200,8 @@ def minnis2000(
     for number, (split, names) in enumerate(lists.items()):
         start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))
         part = replace(settings, monitor=sub_monitor(monitor, start, stop, f"{split}: "))
-        key = PartKey(trained.model.engine, names, model=trained.model, others=str(rows()))
-        kept = open_parts(work and work / split, corpus, settings, key)
+        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(rows()))
+        kept = runner.open_parts(work and work / split, corpus, settings, key)
         found[split] = _on_list(corpus, names, trained.model, kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
@@ -221,7 +214,7 @@ def minnis2000(
 
 
 def _on_list(
-    corpus: Corpus, names: Sequence[str], model: Model, kept: Checkpoint, settings: ExperimentSettings
+    corpus: Corpus, names: Sequence[str], model: Model, kept: Checkpoint, settings: runner.ExperimentSettings
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
     monitor = settings.monitor
@@ -229,7 +222,7 @@ def _on_list(
         corpus,
         cached_recogniser(model.phones),
         selection=Selection(names=names),
-        channels=check_opening(corpus, names),
+        channels=runner.check_opening(corpus, names),
         lexicon=settings.lexicon,
         monitor=sub_monitor(monitor, 0, 0.4),
     )
@@ -252,7 +245,7 @@ def _on_list(
                 clips = generate_compared(recordings, spoken[key], engine, learned)
                 settings.receive(name, condition, recordings, clips)
                 figures = figures_of(clips, recordings, settings.seed)
-                row = opening_row_with_rates(figures)
+                row = runner.opening_row_with_rates(figures)
                 row["channels"] = {
                     channel: {figure: values[figure] for figure in WHAT_IS_SHOWN}
                     for channel, values in figures["channels"].items()

@@ -263,7 +263,7 @@ class ProjectFolder:
             return False
 
     def restore_edits(self, recording: ProjectRecording) -> None:
-        """Put the copy in place of damaged edits, which stay beside. Raises InputError: no damage, no copy. ExportError."""
+        """Put the copy in place of damaged edits, which stay beside. Raises InputError: no damage or copy."""
         with self.lock:
             if not self.is_restorable(recording):
                 self.read_edits(recording)  # says what is damaged

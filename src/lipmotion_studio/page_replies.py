@@ -61,13 +61,15 @@ class RecordingReplies:
         commands = self._studio.add_phones(steps)
         return await self._state_after(number, lambda recording: recording.edit(revision, commands, instead))
 
-    async def undo(self, request: Request) -> Response:
-        """Edits to be taken back."""
-        return await self._step(request, OpenRecording.undo)
+    def stepping(self, step: Callable[[OpenRecording, int, int], Changed]) -> Callable[[Request], Awaitable[Response]]:
+        """Return what replies once so many edits were taken back, or made again."""
 
-    async def redo(self, request: Request) -> Response:
-        """Edits to be made again."""
-        return await self._step(request, OpenRecording.redo)
+        async def reply(request: Request) -> Response:
+            number, content, revision = await self._change(request)
+            count = whole(content, "count", 1, least=1)
+            return await self._state_after(number, lambda recording: step(recording, revision, count))
+
+        return reply
 
     async def settle(self, request: Request) -> Response:
         """The full motion to be made, after edits of a long recording."""
@@ -234,12 +236,6 @@ class RecordingReplies:
         """Return the recording of a change, what it brings, and the revision that its author saw."""
         content = await read_content(request)
         return self._number(request), content, whole(content, "revision")
-
-    async def _step(self, request: Request, step: Callable[[OpenRecording, int, int], Changed]) -> Response:
-        """Return the state of a recording after so many of its edits were taken back, or made again."""
-        number, content, revision = await self._change(request)
-        count = whole(content, "count", 1, least=1)
-        return await self._state_after(number, lambda recording: step(recording, revision, count))
 
     async def _change_versions(
         self, number: int, revision: int, changed: Callable[[ProjectRecording, OpenRecording], ProjectRecording]

@@ -81,7 +81,7 @@ class OpenRecording:
         self.session.generate(file.edits)
 
     def with_model(self, model: Model, onto: FilmedFace | None) -> OpenRecording:
-        """Return it with another model, or mapped onto a person. Raises InputError: an edit fails, or no such person."""
+        """Return it with another model, or mapped onto a person. Raises InputError: an edit fails; no such person."""
         key = id(model), id(onto)
         if key not in self._others:
             self._others[key] = OpenRecording(self.file, self.folder, self.number, model, self.audio, onto)
@@ -155,7 +155,7 @@ class OpenRecording:
         return changed | {"guessed": rows}
 
     def restore_version(self, revision: int, version: str) -> dict[str, Any]:
-        """Go back to a kept version, and keep the edits as they are. Raises as ``edit``; InputError: no such version."""
+        """Go back to a kept version; keep the edits as they are, too. Raises as ``edit``; InputError: no version."""
         check_revision("the recording", self.revision, revision)
         recording, now = self.folder.recording(self.number), self.file.edits.sentences
         recording.with_version(now)  # refuses one too many before anything has changed

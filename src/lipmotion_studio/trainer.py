@@ -19,18 +19,7 @@ from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.pipeline.workers import start_process
 from lipmotion.storage.files import UNFINISHED, atomic_file, make_folder, read_text_file, remove, work_folder
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.types.values import (
-    any_members,
-    as_tuple,
-    items,
-    members,
-    number,
-    one_of,
-    optional,
-    text,
-    value_of,
-    whole,
-)
+from lipmotion.types import values
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
 from lipmotion_studio.folder import ProjectFolder, clean_name, copy_file, restore_copy, write_with_copy
 from lipmotion_studio.project import ProjectRecording
@@ -310,7 +299,7 @@ class Trainer:
             return False
 
     def restore(self) -> None:
-        """Put the copy in place of a damaged file, which stays beside. Raises InputError: no damage, no copy. ExportError."""
+        """Put the copy in place of a damaged file, which stays beside. Raises InputError: no damage or copy."""
         with self._lock:
             if not self.damage or not self.is_restorable:
                 raise InputError(self.damage or "what is known of the training is not damaged; nothing is restored")
@@ -336,15 +325,29 @@ def _read_jobs(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
         raise InputError(f"{file}: {error}") from error
 
 
-_TEXT, _ANY = text(1 << 20), any_members(lambda value: value)
-_REQUEST = {"kind": one_of(KINDS), "name": _TEXT, "lines": as_tuple(items(whole(0, 1 << 31))), "options": _ANY}
-_STATUS = {
-    **{"state": one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)), "stage": _TEXT, "share": number(0, 1)},
-    **{"warnings": items(_TEXT), "skipped": items(_ANY), "error": _TEXT, "report": optional(_ANY)},
+_TEXT, _ANY = values.text(1 << 20), values.any_members(lambda value: value)
+_REQUEST = {
+    "kind": values.one_of(KINDS),
+    "name": _TEXT,
+    "lines": values.as_tuple(values.items(values.whole(0, 1 << 31))),
+    "options": _ANY,
 }
-_JOB = {"wanted": value_of(TrainingRequest, _REQUEST, _REQUEST), "told": members(_STATUS, ["state"])}
-_STATE = members(
-    _JOB | {"format": one_of([FORMAT]), "version": one_of([VERSION]), "made": items(members(_JOB, _JOB))},
+_STATUS = {
+    **{
+        "state": values.one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)),
+        "stage": _TEXT,
+        "share": values.number(0, 1),
+    },
+    **{"warnings": values.items(_TEXT), "skipped": values.items(_ANY), "error": _TEXT, "report": values.optional(_ANY)},
+}
+_JOB = {"wanted": values.value_of(TrainingRequest, _REQUEST, _REQUEST), "told": values.members(_STATUS, ["state"])}
+_STATE = values.members(
+    _JOB
+    | {
+        "format": values.one_of([FORMAT]),
+        "version": values.one_of([VERSION]),
+        "made": values.items(values.members(_JOB, _JOB)),
+    },
     ("format", "version", *_JOB),
 )
 

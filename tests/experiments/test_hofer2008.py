@@ -13,7 +13,7 @@ from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import hofer2008 as table1
-from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options, hofer2008, table, what_held
+from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options, hofer2008, table
 from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -70,13 +70,6 @@ def test_pins_move_the_lips_of_the_same_units(figures):
     assert pinned["recall_p_b_m"] == 100
     assert pinned["nrmse"] != printed["nrmse"]
     assert pinned["gaussians"] == printed["gaussians"]
-
-
-def test_what_held_of_the_order_is_told_in_words():
-    gains = [("eVis", "pbVis", (1.0, 3.0)), ("eVis", "phone", (-2.0, -1.0)), ("pbVis", "phone", (-1.0, 1.0))]
-    pairs = [{"better": better, "worse": worse, "score_gain_95": gain} for better, worse, gain in gains]
-    block = {"rows": {"eVis": {"score": 70.0}, "phone": {"score": 71.0}}, "paper_order": pairs}
-    assert what_held(block) == ("best: phone; of the paper's 3 pairs hold 1, reversed 1 (phone over eVis), open 1")
 
 
 def test_a_star_is_that_of_its_own_interval():

@@ -83,7 +83,7 @@ def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_traine
         return SimpleNamespace(recordings=SimpleNamespace(closed_under=0.1), clips={"audio only": []})
 
     monkeypatch.setattr(module, "SIZES", (3, 9))
-    monkeypatch.setattr(module, "train_and_generate", result)
+    monkeypatch.setattr("lipmotion_lab.runner.train_and_generate", result)
     monkeypatch.setattr(module, "_row", lambda *_: {})
     received: list[tuple[str, str]] = []
     settings = ExperimentSettings(seed=1, receive=lambda *given: received.append(given[:2]))

@@ -14,17 +14,8 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, Picture, Staging, stage_liveliness
 from lipmotion_faces.kernels.painting import stack, warp, warp_bytes
+from lipmotion_faces.portrait import geometry
 from lipmotion_faces.portrait.design import Colour, Design
-from lipmotion_faces.portrait.geometry import (
-    STEP,
-    BrowField,
-    BrowPose,
-    HeadField,
-    HeadPlacement,
-    MouthPose,
-    SkinField,
-    brow_pose,
-)
 from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter
 from lipmotion_faces.portrait.parts import EyePainter, paint_still_layers
@@ -45,12 +36,12 @@ LARGEST_TURN = np.array([0.35, 0.35, 0.13])
 class FacePose(NamedTuple):
     """Everything that moves in a frame; lengths in eye distances, gaze to the right and down, lids closed 0..1."""
 
-    mouth: MouthPose
+    mouth: geometry.MouthPose
     lids: float = 0.0
     gaze_x: float = 0.0
     gaze_y: float = 0.0
     brows: float = 0.0
-    head: HeadPlacement = HeadPlacement()
+    head: geometry.HeadPlacement = geometry.HeadPlacement()
     mood: UpperFace = CALM
 
 
@@ -65,7 +56,15 @@ def face_poses(
     heads = np.stack([SWAY_X * yaw, -SWAY_Y * pitch, roll, YAW * yaw, -PITCH * pitch], axis=1)
     lids, rows = np.maximum(moved.lids, RESTING_LIDS), mouth.with_corners(moved.unit(12), moved.unit(15)).rows()
     return [
-        FacePose(MouthPose(*(row[name] for name in MouthPose._fields)), shut, x, -y, brows, HeadPlacement(*head), mood)
+        FacePose(
+            geometry.MouthPose(*(row[name] for name in geometry.MouthPose._fields)),
+            shut,
+            x,
+            -y,
+            brows,
+            geometry.HeadPlacement(*head),
+            mood,
+        )
         for row, shut, (x, y), brows, head, mood in zip(
             rows, lids.tolist(), gaze.tolist(), moved.brows.tolist(), heads.tolist(), moved.upper_face, strict=True
         )
@@ -90,8 +89,8 @@ class Rasteriser:
         self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint16)
         self._frame = self._still[..., : 3 if self._opaque else 4].astype(np.uint8)
         self._brows = lru_cache(maxsize=64)(self._paint_brows)
-        self._skin_field, self._brow_field = SkinField(self._jaw, design.lips), BrowField(self._brow)
-        self._head_field = HeadField(self._head)
+        self._skin_field, self._brow_field = geometry.SkinField(self._jaw, design.lips), geometry.BrowField(self._brow)
+        self._head_field = geometry.HeadField(self._head)
         self._mouth_painter = MouthPainter(design, self._mouth)
 
     def canvas(self) -> Canvas:
@@ -109,7 +108,7 @@ class Rasteriser:
         skin = self._move_skin(self._jaw, self._skin_field.shifts(pose.mouth, pose.mood))
         self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])
-        canvas[self._brow.area] = self._brows(brow_pose(pose.brows, pose.mood, self._brow.view.scale))
+        canvas[self._brow.area] = self._brows(geometry.brow_pose(pose.brows, pose.mood, self._brow.view.scale))
         canvas[self._below_brows.area] = self._still[self._below_brows.area]
         eyes = self._eye_painter.paint(pose.lids, pose.gaze_x, pose.gaze_y, pose.mood)
         mixed = eyes * np.array([1, 1, 1, 255], np.float32)
@@ -118,7 +117,7 @@ class Rasteriser:
         canvas[self._eyes.area] = mixed
         frame = self._frame.copy()
         area = self._head.area
-        warp_bytes(canvas[area], *self._head_field.shifts(pose.head), STEP, frame[area])
+        warp_bytes(canvas[area], *self._head_field.shifts(pose.head), geometry.STEP, frame[area])
         if not self._opaque:  # straight alpha, as files store it
             cover = frame[..., 3:].astype(np.uint16)
             edge = (cover[..., 0] > 0) & (cover[..., 0] < 255)
@@ -126,7 +125,7 @@ class Rasteriser:
             frame[edge, :3] = np.minimum(colours, 255)
         return frame
 
-    def _paint_brows(self, brows: BrowPose) -> Canvas:
+    def _paint_brows(self, brows: geometry.BrowPose) -> Canvas:
         picture = np.empty_like(self._still[self._brow.area])
         self._lay(self._move_skin(self._brow, self._brow_field.shifts(brows)), self._brow, picture)
         return picture
@@ -134,7 +133,7 @@ class Rasteriser:
     def _move_skin(self, window: Window, shifts: tuple[NDArray[np.float64], NDArray[np.float64]]) -> Pixels:
         source = self._skin[window.area]
         skin = np.empty_like(source)
-        warp(source, *shifts, STEP, skin)
+        warp(source, *shifts, geometry.STEP, skin)
         return skin
 
     def _lay(self, skin: Pixels, window: Window, target: Canvas) -> None:

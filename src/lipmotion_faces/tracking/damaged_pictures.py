@@ -116,7 +116,9 @@ def find_damaged(
         others = slice(None) if is_one else slice(number, number + 1)
         light, sharpness = (_median([look[part] for look in looks[others]], seen[others]) for part in (0, 1))
         lights, sharp = looks[number]
-        dark, blurred = lights < DARKNESS * light, _median_of_neighbours(sharp) < SHARPNESS * sharpness
+        padded = np.pad(sharp, BLUR_FRAMES // 2, "edge")
+        steady = np.median(np.lib.stride_tricks.sliding_window_view(padded, BLUR_FRAMES), axis=-1)
+        dark, blurred = lights < DARKNESS * light, steady < SHARPNESS * sharpness
         found = {"dark": dark, "blurred": blurred, "smeared": _find_smeared(values / usual)}
         result.append({kind: mask & which for kind, which in found.items()})
     return result
@@ -161,8 +163,3 @@ def _describe(mouths: Pictures) -> tuple[Floats, Floats, Floats]:
         sharpness.append(np.abs(cv2.Laplacian(grey, cv2.CV_32F)).mean() / max(float(grey.mean()), 1.0))
         details.append(detail / max(float(np.linalg.norm(detail)), LEAST_CONTRAST))
     return np.array(light), np.array(sharpness), np.array(details, np.float32)
-
-
-def _median_of_neighbours(values: Floats) -> Floats:
-    half = BLUR_FRAMES // 2
-    return np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, half, "edge"), BLUR_FRAMES), axis=-1)

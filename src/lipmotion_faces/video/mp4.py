@@ -94,17 +94,23 @@ def write_mp4(
     Raises ExportError: no frames, frames of odd or different sizes, no sound, fps not positive, an unknown tag, or the
     file cannot be written.
     """
-    if not 0 < fps < np.inf:
-        raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
-    if not len(audio.samples):
-        raise ExportError(f"{path}: the sound has no samples")
+    rate = check_rate(path, fps, audio)
     if unknown := set(tags or ()) - TAGS:
         raise ExportError(f"{path}: unknown tags {', '.join(sorted(unknown))}; known: {', '.join(sorted(TAGS))}")
     texts = {name: as_text(text) for name, text in (tags or {}).items()}
     with atomic_file(path) as temporary:
-        _encode(temporary, path, check_frames(frames, path, (3,)), frame_rate(fps), audio, texts)
+        _encode(temporary, path, check_frames(frames, path, (3,)), rate, audio, texts)
         if xmp is not None:
             append_xmp(temporary, xmp)
+
+
+def check_rate(path: Path, fps: float, audio: Audio) -> Fraction:
+    """Return the exact frame rate. Raises ExportError: not positive, or there is no sound."""
+    if not 0 < fps < np.inf:
+        raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
+    if not len(audio.samples):
+        raise ExportError(f"{path}: the sound has no samples")
+    return frame_rate(fps)
 
 
 def frame_rate(fps: float) -> Fraction:
@@ -228,12 +234,9 @@ def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: 
     """
     if path.suffix.lower() not in _CONTAINERS:
         raise ExportError(f"{path}: required one of: {' '.join(_CONTAINERS)}")
-    if not 0 < fps < np.inf:
-        raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
-    if not len(audio.samples):
-        raise ExportError(f"{path}: the sound has no samples")
+    rate = check_rate(path, fps, audio)
     with atomic_file(path) as temporary:
-        _encode_alpha(temporary, path, check_frames(frames, path), frame_rate(fps), audio)
+        _encode_alpha(temporary, path, check_frames(frames, path), rate, audio)
 
 
 def write_pictures(path: Path, frames: Iterable[Frame]) -> None:

@@ -31,14 +31,8 @@ from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Example, Monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
-from lipmotion_lab.evaluation.evaluate import (
-    ClipStatistic,
-    correlation_statistic,
-    distance_statistic,
-    figures_of,
-    opening_curves,
-    significance_mark,
-)
+from lipmotion_lab import runner
+from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
@@ -50,18 +44,6 @@ from lipmotion_lab.evaluation.held_out import (
     load_held_out,
 )
 from lipmotion_lab.learning_curve import check_training_names, choose_sizes
-from lipmotion_lab.runner import (
-    DEFAULT_SETTINGS,
-    QUICK_CLIPS,
-    ExperimentSettings,
-    PartKey,
-    check_opening,
-    clips_from_arrays,
-    clips_to_arrays,
-    open_parts,
-    opening_row_with_rates,
-    shuffled,
-)
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
     COMPARED_SYSTEMS,
@@ -106,7 +88,7 @@ DEFAULT_OPTIONS = ComparisonOptions()
 QUICK = ComparisonOptions(
     systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"],
     tuning=TuningOptions(
-        clips=QUICK_CLIPS["train"], judges=QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
+        clips=runner.QUICK_CLIPS["train"], judges=runner.QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
     ),
 )
 """A small comparison, for the recordings of ``runner.take_quick_part``; conversion by factorial chains is slow."""
@@ -122,7 +104,7 @@ def xieliu2007(  # noqa: PLR0913
     sizes: Sequence[int] | None = None,
     plots: Path | None = None,
     work: Path | None = None,
-    settings: ExperimentSettings = DEFAULT_SETTINGS,
+    settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
 
@@ -138,13 +120,13 @@ def xieliu2007(  # noqa: PLR0913
     names, seed = select_systems(options.systems), settings.seed
     check_visual(options.visual)
     tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
-    listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
+    listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), seed)
     held_out, validation = corpus.required(split), corpus.required("val") if tunes else ()
     check_training_names(corpus, listed, (*held_out, *validation))
     steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
     if options.visual != EIGENLIPS:
-        check_opening(corpus, held_out)  # before the long work
+        runner.check_opening(corpus, held_out)  # before the long work
     if plots is not None:
         check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
@@ -194,7 +176,7 @@ class _TrainingSetup:
     held_out: Sequence[str]
     validation: Sequence[str]
     options: ComparisonOptions
-    settings: ExperimentSettings
+    settings: runner.ExperimentSettings
     work: Path | None
 
     def tune(self, systems: Sequence[str], listed: Sequence[str], monitor: Monitor) -> dict[str, list[Trial]]:
@@ -260,12 +242,12 @@ class _TrainingSetup:
     def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
         everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.tuning), *compared))
-        key = PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
-        return open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
+        key = runner.PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
+        return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
 
 def _size(
-    trained: _TrainedSystems, transcripts: bool, settings: ExperimentSettings, kept: Checkpoint
+    trained: _TrainedSystems, transcripts: bool, settings: runner.ExperimentSettings, kept: Checkpoint
 ) -> dict[str, Any]:
     """Return the figures of all systems trained on one number of utterances."""
     recordings, systems, seed = trained.recordings, trained.systems, settings.seed
@@ -300,9 +282,9 @@ def _generate(
         stage = f"{condition}-{name}"
         found = kept.load(stage)
         if found is None:
-            found = clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
+            found = runner.clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
             kept.save(stage, found)
-        made[name] = clips_from_arrays(found)
+        made[name] = runner.clips_from_arrays(found)
     return made
 
 
@@ -328,7 +310,7 @@ def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[Compared
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
     reference, rows = _statistics(recordings, made[REFERENCE_SYSTEM]), {}
     for system, clips in made.items():
-        figures = figures_of(clips, recordings, seed)
+        figures = evaluate.figures_of(clips, recordings, seed)
         row: dict[str, Any] = {}
         for name, statistic in _statistics(recordings, clips).items():
             row[name], row[f"{name}_95"] = statistic.value, statistic.interval(seed)
@@ -336,13 +318,13 @@ def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[Compared
         still = not varies(np.concatenate([clip.generated for clip in clips])).any()
         row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
         if OPENING in recordings.channels:
-            rmse = float(curves.rmse(*opening_curves(recordings, clips))[0])
-            row["opening"] = opening_row_with_rates(figures) | {"rmse": rmse}
+            rmse = float(curves.rmse(*evaluate.opening_curves(recordings, clips))[0])
+            row["opening"] = runner.opening_row_with_rates(figures) | {"rmse": rmse}
         rows[system] = row
     return rows
 
 
-def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, ClipStatistic]:
+def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, evaluate.ClipStatistic]:
     """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; and the ACC of the opening."""
     pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
     parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
@@ -351,10 +333,10 @@ def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> 
         if columns.any():
             generated = [clip.generated[:, columns] for clip in made]
             original = [clip.original[:, columns] for clip in made]
-            statistics[f"{part}amse"] = distance_statistic(generated, original)
-            statistics[f"{part}acc"] = correlation_statistic(generated, original)
+            statistics[f"{part}amse"] = evaluate.distance_statistic(generated, original)
+            statistics[f"{part}acc"] = evaluate.correlation_statistic(generated, original)
     if OPENING in recordings.channels:
-        statistics["opening_acc"] = correlation_statistic(*opening_curves(recordings, made))
+        statistics["opening_acc"] = evaluate.correlation_statistic(*evaluate.opening_curves(recordings, made))
     return statistics
 
 
@@ -425,7 +407,7 @@ def _pair_lines(pairs: Sequence[Mapping[str, Any]], amse_form: str) -> list[str]
     for pair in pairs:
         acc, amse = (
             "{:+{f}}{} ({:+{f}} to {:+{f}})".format(
-                pair[key], significance_mark(pair[f"{key}_95"]), *pair[f"{key}_95"], f=form
+                pair[key], evaluate.significance_mark(pair[f"{key}_95"]), *pair[f"{key}_95"], f=form
             )
             for key, form in (("acc", ".3f"), ("amse", amse_form))
         )
@@ -448,7 +430,7 @@ def _with_interval(row: Mapping[str, Any], name: str, form: str) -> str:
     if name not in row:
         return "–"
     low, high = (format(end, form) for end in row[f"{name}_95"])
-    return f"{row[name]:{form}}{significance_mark(row[f'{name}_gain_95'])} ({low}–{high})"
+    return f"{row[name]:{form}}{evaluate.significance_mark(row[f'{name}_gain_95'])} ({low}–{high})"
 
 
 def _noise_lines(kind: str, figures: Mapping[str, Any], amse_form: str) -> list[str]:
@@ -461,8 +443,8 @@ def _noise_lines(kind: str, figures: Mapping[str, Any], amse_form: str) -> list[
     lines.append(f"  {'system':{WIDTH}}" + "".join(f"{head:>17}" for head in heads))
     for name in clean:
         cells = [
-            f"{row['acc']:.3f}{significance_mark(row['acc_gain_95'])} / "
-            f"{row['amse']:{amse_form}}{significance_mark(row['amse_gain_95'])}"
+            f"{row['acc']:.3f}{evaluate.significance_mark(row['acc_gain_95'])} / "
+            f"{row['amse']:{amse_form}}{evaluate.significance_mark(row['amse_gain_95'])}"
             for row in (clean[name], *(row["systems"][name] for row in in_noise))
         ]
         lines.append(f"  {name:{WIDTH}}" + "".join(f"{cell:>17}" for cell in cells))
