@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +15,6 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import one_thread
-from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor
 from lipmotion_lab import runner
@@ -112,31 +111,3 @@ def _row(corpus: Corpus, result: runner.HeldOutResult, seed: int) -> dict[str, A
         "seconds": result.seconds,
         "conditions": conditions,
     }
-
-
-def table(figures: Mapping[str, Any]) -> str:
-    """Return the figures of ``learning_curve`` as text."""
-    order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
-    lines = [
-        f"trained on the first N clips of {order[figures['order']]}, with up to {figures['workers']} process(es); "
-        f"split {figures['split']}: {figures['clips']} clips"
-    ]
-    for condition in figures["rows"][0]["conditions"]:
-        lines += ["", condition, HEAD, *(_line(row, row["conditions"][condition]) for row in figures["rows"])]
-    return "\n".join([*lines, "", LEGEND])
-
-
-HEAD = f"      N  used  minutes  seconds  {'ACC (95 %)':20}  nRMSE  variance  width  outer"
-LEGEND = (
-    "used, minutes: of the N clips what training could use; seconds: of training; ACC, nRMSE, variance: of the "
-    "opening, the last by that of the recordings; width, outer: their ACC"
-)
-
-
-def _line(row: Mapping[str, Any], opening: Mapping[str, Any]) -> str:
-    acc = "{:.3f} ({:.3f}–{:.3f})".format(opening["acc"], *opening["acc_95"])
-    others = "".join(f"  {figure_text(opening[f'acc_{name}'], '5.3f')}" for name in OTHERS)
-    return (
-        f"  {row['names']:5}{row['used']:6}{row['minutes']:9.1f}{row['seconds']:9.1f}  {acc:20}"
-        f"{opening['nrmse']:7.3f}{opening['global_variance']:10.2f}{others}"
-    )

@@ -159,7 +159,11 @@ class RecordingReplies:
         def reply(recording: OpenRecording) -> Response:
             motion = self._studio.vary(number, recording, by).numbers("variance" if of == "deviation" else of)
             if names is not None:
-                motion = _choose_channels(motion, [name for name in names if name in motion.names] if by else names)
+                chosen = [name for name in names if name in motion.names or not by]
+                if unknown := [name for name in chosen if name not in motion.names]:
+                    known = ", ".join(motion.names)
+                    raise InputError(f"names: there is no {shorten(repr(unknown[0]))}, required some of: {known}")
+                motion = motion.selected(chosen)
             frames = stretch(query, motion.rate_hz, len(motion.values))
             values = motion.values[frames]
             if of == "deviation":
@@ -276,14 +280,6 @@ class RecordingReplies:
         parts = {"sound": "sound.wav"} | ({"video": "recorded"} if video else {})
         addresses = {name: self._access.with_key(f"/api/lines/{number}/{path}") for name, path in parts.items()}
         return addresses | ({"sound_begins_s": video[1]} if video else {})
-
-
-def _choose_channels(motion: Motion, names: list[str]) -> Motion:
-    """Return some channels of a motion, in the order of their names. Raises InputError: it has none of a name."""
-    for name in names:
-        if name not in motion.names:
-            raise InputError(f"names: there is no {shorten(repr(name))}, required some of: {', '.join(motion.names)}")
-    return motion.selected(names)
 
 
 def _numbers_reply(motion: Motion, first: int, more: dict[str, str]) -> Response:

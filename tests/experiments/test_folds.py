@@ -16,7 +16,8 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
-from lipmotion_lab.folds import folds, table
+from lipmotion_lab.folds import folds
+from lipmotion_lab.report.sections import folds_section
 from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -159,7 +160,8 @@ def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypat
     assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(
         {"anna": 1, "ben": -1, "eve": 1, "unknown": 1}
     )
-    assert "4 speakers unknown to the model: mean ACC 0.500, -1.000 (ben) to 1.000 (unknown)" in table(figures)
+    told = ["4 speakers: mean ACC 0.500, -1.000 (ben) to 1.000 (unknown)."]
+    assert folds_section(figures).words["Speakers unknown to the model"] == told
     left_out.clear()
     folds(corpus, by_speaker=True, count=2)
     assert [len(each) for each in left_out] == [2, 2]

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,27 +125,21 @@ def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[
     for name in corpus.names("train") or corpus.names():
         entry = read_entry(corpus.folder(name))
         stated = entry["source"]
-        file = _find_file(files.get(str(stated.get("file", "")), []), stated)
-        if file is None:
+        size, known = stated.get("bytes"), files.get(str(stated.get("file", "")), [])
+        same = [file for file in known if size is None or str(file.stat().st_size) == str(size)]
+        if len(same) > 1 and "sha256" in stated:  # people of a corpus may share names of files
+            same = [file for file in same if sha256_of(file) == stated["sha256"]]
+        if not same:
             continue
         rights = {key: str(stated[key]) for key in RIGHTS if key in stated}
         start_s, end_s = float(stated.get("start_s", 0.0)), stated.get("end_s")
-        item = SourceRecording(name, file, None, rights=rights, speaker=str(entry.get("speaker", "")))
+        item = SourceRecording(name, same[0], None, rights=rights, speaker=str(entry.get("speaker", "")))
         items.append(replace(item, start_s=start_s, end_s=None if end_s is None else float(end_s)))
         collections[name] = str(stated.get("collection", ""))
     if not items:
         raise InputError(f"{recordings}: holds none of the videos of {corpus.path}; give the folder that they are in")
     chosen = _select_person(items, speaker, str(corpus.path))
     return [_make_take(item, recordings, collections[item.name]) for item in chosen]
-
-
-def _find_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
-    """Return the file of an utterance, of those of its name: people of a corpus may share names of files."""
-    size = stated.get("bytes")
-    same = [file for file in files if size is None or str(file.stat().st_size) == str(size)]
-    if len(same) > 1 and "sha256" in stated:
-        same = [file for file in same if sha256_of(file) == stated["sha256"]]
-    return next(iter(same), None)
 
 
 def _make_take(

@@ -18,12 +18,10 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
-from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.printable import printable
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
@@ -338,114 +336,3 @@ def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> 
     if OPENING in recordings.channels:
         statistics["opening_acc"] = evaluate.correlation_statistic(*evaluate.opening_curves(recordings, made))
     return statistics
-
-
-WIDTH = 34
-NAMED_CHANNELS = 8
-HEAD = (
-    f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
-    "nRMSE    RMSE    lag  score  p b m  false  variance   numbers  seconds"
-)
-
-LEGEND = (
-    "paper: its AMSE and ACC; nRMSE, RMSE, variance: of the opening, the last by that of the recordings; lag: ms",
-    "score, p b m: %; false: closings outside p b m, a minute of speech; seconds: of a processor, for training",
-)
-
-
-def table(figures: Mapping[str, Any]) -> str:
-    """Return the figures of ``xieliu2007`` as text."""
-    order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
-    amse_form = ".1f" if figures["visual"] == EIGENLIPS else ".4f"  # grey levels, or eye distances
-    closed = f"; closed under {figures['closed_under']:.4f}" if figures["closed_under"] is not None else ""
-    names = figures["channels"]
-    compared = ", ".join(names) if len(names) <= NAMED_CHANNELS else f"{len(names)} channels"
-    lines = [
-        f"the first N clips of {order[figures['order']]}; split {figures['split']}: {figures['clips']} clips",
-        f"AMSE, ACC of {compared}{closed}; numbers: what the chains have learned",
-    ]
-    for size in figures["rows"]:
-        for condition, rows in size["conditions"].items():
-            lines += ["", f"{condition}, {size['used']} of the first {size['names']} clips", HEAD]
-            lines += [_line(name, row, size["training"][name], amse_form) for name, row in rows.items()]
-            lines += _eigenlips(rows)
-        changed = []
-        for name, row in size["training"].items():
-            if row["tried"]:
-                options = {key: value for key, value in row["options"].items() if key not in ("structure", "chains")}
-                texts = (f"{key}={value}" if key == "start" else f"{key}={value:g}" for key, value in options.items())
-                changed.append(f"  {name:{WIDTH}}{', '.join(texts) or 'as printed'}")
-        lines += ["", "settings, the best on val", *changed] if changed else []
-        lines += _pair_lines(size["pairs"], amse_form)
-    for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
-        lines += ["", *_noise_lines(kind, figures, amse_form)]
-    lines += [
-        "",
-        f"* differs from {REFERENCE_SYSTEM}: the 95 % interval of the difference on the same clips leaves out 0",
-        *LEGEND,
-    ]
-    return "\n".join(map(printable, lines))
-
-
-def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any], amse_form: str) -> str:
-    printed = "{:.3f} {:.3f}".format(*PAPER_FIGURES[name]) if name in PAPER_FIGURES else ""
-    amse, acc = _with_interval(row, "amse", amse_form), _with_interval(row, "acc", ".3f")
-    lips = (row["opening"] or {}) | {"lag_ms": row["lag_ms"]}
-    columns = {"nrmse": "7.3f", "rmse": "8.4f", "lag_ms": "+7.0f", "score": "7.1f", "recall_p_b_m": "7.1f"}
-    columns |= {"false_per_minute": "7.1f", "global_variance": "10.2f"}
-    texts = "".join(figure_text(lips.get(key), form) for key, form in columns.items())
-    return (
-        f"  {name:{WIDTH}}{printed:>13}  {amse:25}  {acc:22}  {_with_interval(row, 'opening_acc', '.3f'):22}{texts}"
-        f"{figure_text(training['parameters'], '10.0f')}{training['seconds']:9.1f}"
-    )
-
-
-def _pair_lines(pairs: Sequence[Mapping[str, Any]], amse_form: str) -> list[str]:
-    if not pairs:
-        return []
-    lines = ["", f"  {'in the paper better than':{2 * WIDTH}}{'ACC (95 %)':27}AMSE (95 %)"]
-    for pair in pairs:
-        acc, amse = (
-            "{:+{f}}{} ({:+{f}} to {:+{f}})".format(
-                pair[key], evaluate.significance_mark(pair[f"{key}_95"]), *pair[f"{key}_95"], f=form
-            )
-            for key, form in (("acc", ".3f"), ("amse", amse_form))
-        )
-        lines.append(f"  {pair['better']:{WIDTH}}{pair['worse']:{WIDTH}}{acc:27}{amse}")
-    return lines
-
-
-def _eigenlips(rows: Mapping[str, Any]) -> list[str]:
-    """Return the lines of AMSE and ACC of eigenlips; none where eigenlips are not compared beside geometry."""
-    if "eigenlips_acc" not in next(iter(rows.values())):
-        return []
-    lines = [f"  {'eigenlips':{WIDTH}}{'AMSE (95 %)':27}{'ACC (95 %)'}"]
-    for name, row in rows.items():
-        amse, acc = _with_interval(row, "eigenlips_amse", ".2f"), _with_interval(row, "eigenlips_acc", ".3f")
-        lines.append(f"  {name:{WIDTH}}{amse:27}{acc}")
-    return lines
-
-
-def _with_interval(row: Mapping[str, Any], name: str, form: str) -> str:
-    if name not in row:
-        return "–"
-    low, high = (format(end, form) for end in row[f"{name}_95"])
-    return f"{row[name]:{form}}{evaluate.significance_mark(row[f'{name}_gain_95'])} ({low}–{high})"
-
-
-def _noise_lines(kind: str, figures: Mapping[str, Any], amse_form: str) -> list[str]:
-    """Return the lines of ACC and AMSE of every system, from clean sound to the loudest noise."""
-    in_noise = [row for row in figures["noise"] if row["kind"] == kind]
-    size = figures["rows"][-1]
-    clean = next(iter(size["conditions"].values()))
-    heads = ["clean", *(f"{row['snr_db']:g} dB" for row in in_noise)]
-    lines = [f"{kind} noise, audio only, trained on {size['used']} clips without noise: ACC / AMSE"]
-    lines.append(f"  {'system':{WIDTH}}" + "".join(f"{head:>17}" for head in heads))
-    for name in clean:
-        cells = [
-            f"{row['acc']:.3f}{evaluate.significance_mark(row['acc_gain_95'])} / "
-            f"{row['amse']:{amse_form}}{evaluate.significance_mark(row['amse_gain_95'])}"
-            for row in (clean[name], *(row["systems"][name] for row in in_noise))
-        ]
-        lines.append(f"  {name:{WIDTH}}" + "".join(f"{cell:>17}" for cell in cells))
-    return lines

@@ -119,11 +119,6 @@ def deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.b
     return (_contrasts(pairs, len(model.strengths)) * (is_first - expected)[:, None]) @ model.covariance
 
 
-def group_text(names: Sequence[str], groups: Sequence[Sequence[int]]) -> str:
-    """Return groups of conditions in words."""
-    return "; ".join(", ".join(names[place] for place in group) for group in groups)
-
-
 def _logistic(values: crossed.Array) -> crossed.Array:
     return 1 / (1 + np.exp(-values))
 
@@ -288,7 +283,8 @@ def strength_figures(table: PairTable) -> Figures:
     first, second = table.wins()
     groups = link_groups(first + second)
     if len(groups) > 1:
-        return {"missing": f"no comparison links the groups {group_text(table.conditions, groups)}"}
+        texts = (", ".join(table.conditions[place] for place in group) for group in groups)
+        return {"missing": f"no comparison links the groups {'; '.join(texts)}"}
     model = fit_strengths(first, second)
     moved = deviations(model, table.shown, table.is_first)
     names = table.conditions
