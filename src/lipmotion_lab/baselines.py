@@ -103,7 +103,7 @@ class LinearBaseline(Baseline):
     def regressors(self, features: Float32Array) -> Array:
         """Return the regressors of each frame [shape=(T, F)]."""
 
-    def fit_map(self, recordings: Sequence[Recording], monitor: Monitor) -> Array:  # noqa: ARG002, D102 - takes seconds
+    def fit_map(self, recordings: Sequence[Recording], monitor: Monitor) -> Array:  # noqa: D102, ARG002 - takes seconds
         statistics, frames = None, 0
         for inputs, targets, mask in recordings:
             rows = self.regressors(inputs)[mask]
