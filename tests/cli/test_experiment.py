@@ -2,6 +2,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,11 +11,11 @@ from cli.conftest import is_one_error
 from lipmotion import Corpus
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.curves import bootstrap_interval
-from lipmotion_lab import engine_comparison as text
-from lipmotion_lab import folds, learning_curve, runner
 from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab import minnis2000 as minnis_2000
+from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate as evaluation_figures
+from lipmotion_lab.report import sections
 from lipmotion_lab.report.report import PARTS
 from lipmotion_lab.xie_liu2007 import six_systems
 
@@ -30,13 +31,13 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def figures_of(run, here):
-    """Runs an experiment whose table is that of its figures, and returns these."""
+    """Runs an experiment that prints the section of its figures, and returns these."""
 
-    def figures_of(table: Callable[[Any], str], *words: object) -> Any:
+    def figures_of(section: Callable[[Any], Any], *words: object) -> Any:
         done = run("experiment", *words, "-o", "a.json", "--workers", "1")
         assert (done.code, done.err) == (0, [])
         figures = json.loads((here / "a.json").read_text())
-        assert "\n".join(done.out) == table(figures)
+        assert "\n".join(done.out) == section(figures).as_text()
         return figures
 
     return figures_of
@@ -44,7 +45,7 @@ def figures_of(run, here):
 
 @pytest.mark.long
 def test_the_table_is_that_of_the_figures(figures_of, toy_corpus, here):
-    figures = figures_of(table1.table, "hofer2008", toy_corpus.path, "--split", "val", "--quick")
+    figures = figures_of(sections.hofer_section, "hofer2008", toy_corpus.path, "--split", "val", "--quick")
     assert (figures["split"], figures["clips"], figures["mixtures"]) == ("val", 2, [1, 2])
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
@@ -56,11 +57,14 @@ def test_quick_runs_of_all_experiments_are_of_the_same_recordings(run, toy_corpu
         taken.append(corpus.names())
         return {"rows": []}
 
+    def command(figures: Any) -> Any:
+        return SimpleNamespace(as_text=lambda: figures["stamp"]["command"])
+
     monkeypatch.setattr(runner, "QUICK_CLIPS", {"train": 3, "val": 1, "test": 1})
     for module, name in ((table1, "hofer2008"), (six_systems, "xieliu2007"), (minnis_2000, "minnis2000")):
         monkeypatch.setattr(module, name, taking)
-    for module in (table1, six_systems, minnis_2000):
-        monkeypatch.setattr(module, "table", lambda figures: figures["stamp"]["command"])
+    for name in ("hofer2008", "xieliu2007", "minnis2000"):
+        monkeypatch.setitem(PARTS, name, replace(PARTS[name], section=command))
     monkeypatch.setitem(PARTS, "folds", replace(PARTS["folds"], run=lambda given: taking(given.corpus)))
     for name in ("hofer2008", "xieliu2007", "minnis2000"):
         done = run("experiment", name, toy_corpus.path, "--quick", "-o", "a.json")
@@ -78,14 +82,14 @@ def test_quick_runs_of_all_experiments_are_of_the_same_recordings(run, toy_corpu
 def test_the_learning_curve_of_a_list(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
     chosen = ("--order", "order.txt", "--sizes", "3", "--split", "val")
-    figures = figures_of(learning_curve.table, "learning-curve", toy_corpus.path, *chosen)
+    figures = figures_of(sections.learning_section, "learning-curve", toy_corpus.path, *chosen)
     assert (figures["split"], figures["order"], figures["workers"]) == ("val", "given", 1)
     assert [row["names"] for row in figures["rows"]] == [3]
 
 
 @pytest.mark.long
 def test_folds_of_the_training_list(figures_of, toy_corpus):
-    figures = figures_of(folds.table, "folds", toy_corpus.path, "--folds", "2")
+    figures = figures_of(sections.folds_section, "folds", toy_corpus.path, "--folds", "2")
     assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
 
 
@@ -94,7 +98,7 @@ def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
     few = ("--systems", "ph-MSHMM;loudness", "--order", "order.txt")
     chosen = (*few, "--sizes", "3", "--noise", "white", "--snr", "5", "--plots", "pictures")
-    figures = figures_of(six_systems.table, "xieliu2007", toy_corpus.path, *chosen)
+    figures = figures_of(sections.xie_liu_section, "xieliu2007", toy_corpus.path, *chosen)
     assert [row["names"] for row in figures["rows"]] == [3]
     assert (figures["order"], figures["tuning"]["tried"]) == ("given", {})
     assert [(row["kind"], row["snr_db"]) for row in figures["noise"]] == [("white", 5)]
@@ -105,10 +109,10 @@ def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
 @pytest.mark.long
 def test_all_engines(figures_of, run, toy_corpus, here):
     chosen = ("engines", toy_corpus.path, "--split", "test", "--models", "models")
-    figures = figures_of(text.table, *chosen)
+    figures = figures_of(sections.engines_section, *chosen)
     assert (figures["split"], figures["clips"]) == ("test", 2)
     kept = sorted(path.name for path in (here / "models").iterdir())
     assert kept == ["coupled.lipmotion", "selection.lipmotion", "trajectory.lipmotion"]
-    assert text.table(figures_of(text.table, *chosen)) == text.table(figures)
+    assert sections.engines_section(figures_of(sections.engines_section, *chosen)) == sections.engines_section(figures)
     (here / "models" / "coupled.lipmotion").write_bytes(b"no model")
     assert is_one_error(run("experiment", *chosen, "-o", "a.json", "--workers", "1"), 6)
