@@ -125,7 +125,7 @@ def cue_formats() -> str:
 
 def character_limits() -> str:
     """Return what the files of a character may hold."""
-    from lipmotion.meshes.model.file_limits import ALLOWANCE
+    from lipmotion_faces.characters.file_limits import ALLOWANCE
 
     return "At most " + ", ".join(f"{most:,} {what}" for what, most in ALLOWANCE.items()) + "."
 

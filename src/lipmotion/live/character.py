@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import LEAST_GAP
 from lipmotion.errors import InputError
+from lipmotion.extensions import load_provided
 from lipmotion.live.face import LiveFrame
 from lipmotion.live.network import STEP_S
-from lipmotion.meshes.files.rig_tables import apply_rig, read_rig_table
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
-from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.meshes.fitting.shape_weights import NEAREST_VOWEL, with_gap
 from lipmotion.meshes.model.face_shapes import FaceShapes
+from lipmotion.meshes.model.rig_tables import apply_rig, read_rig_table
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, VISEMES_15
 
 
@@ -32,7 +32,7 @@ class LiveCharacter:
         if path.suffix.lower() == ".csv":
             self._rows = read_rig_table(path)
             return
-        character = load_character(path)
+        character = load_provided("load_character")(path)
         if character.shapes is None or not any(character.shapes.known):
             raise InputError(f"{path}: live motion needs a mouth with blendshapes of ARKit, visemes or VRM's vowels")
         self._shapes, self._rows = character.shapes, character.table_rows()

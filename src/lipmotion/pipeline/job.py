@@ -162,14 +162,13 @@ def open_face(outputs: Outputs) -> ShownFace:
 
 def open_character(outputs: Outputs) -> DrivenCharacter:
     """Return the character that outputs name, from its files. Raises InputError: they cannot be read."""
-    from lipmotion.meshes.fitting.driven import load_character
-
-    return load_character(
+    character: DrivenCharacter = load_provided("load_character")(
         outputs.character or Path(),
         points=outputs.lip_points,
         binding=outputs.binding,
         by_points=outputs.control_points,
     )
+    return character
 
 
 def choose_curves(outputs: Outputs, face: ShownFace) -> str | DrivenCharacter | None:

@@ -23,7 +23,7 @@ from lipmotion.extensions import installed_version, load_provided
 from lipmotion.formats.base import motion_suffixes
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.formats.label_files import LABEL_SUFFIXES, find_label_files
-from lipmotion.meshes.files.rig_tables import table_path
+from lipmotion.meshes.model.rig_tables import table_path
 from lipmotion.pipeline.batch.lines import CONTROL, OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import shipped_path

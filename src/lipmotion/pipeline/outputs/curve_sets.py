@@ -17,7 +17,6 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import InputError, shorten
 from lipmotion.formats.fap import NAMES, PARAMETERS, move_faps
-from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_rig_table, suggest_names
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import GROUPS, compute_living_curves
@@ -28,6 +27,7 @@ from lipmotion.meshes.fitting.shape_weights import (
     weigh_visemes,
 )
 from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, read_rig_table, suggest_names
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, arkit_name
 from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Hold, Motion, Prosody, Span, Timeline, Unit
 from lipmotion.types.delivery import Staging

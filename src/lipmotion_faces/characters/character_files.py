@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.model.file_limits import Budget
-from lipmotion.meshes.model.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
+from lipmotion.meshes.model.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart, Texture
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.meshes.model.textures import Texture, read_texture
 from lipmotion.storage.sources import check_kind, is_file
+from lipmotion_faces.characters.file_limits import Budget
+from lipmotion_faces.characters.gltf_scene import read_gltf
+from lipmotion_faces.characters.textures import read_texture
 
 NEUTRAL = "neutral"
 """The file of a folder with this word in its name, in any case, is the mesh; the others are its blendshapes."""
