@@ -4,7 +4,8 @@
                                  [--list] [-o RESULTS.json] [-- PYTEST OPTIONS]
 
 MUTANTS.json is a list of objects: ``name``, ``path`` (below ``src/lipmotion``, ``src`` or the tree), ``old`` (text that
-it holds exactly once), ``new`` (what takes its place), and ``tests`` (files or folders of the tree: where a test should fail).
+it holds exactly once), ``new`` (what takes its place), and ``tests`` (files or folders of the tree: where a test should
+fail).
 
 Each mutant gets a fresh copy of the tree, so the tree itself is never changed, and one run of pytest that stops at the
 first failing test. A test that fails also without the mutant does not count: it is left out, and the run repeated.
