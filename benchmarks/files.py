@@ -28,7 +28,7 @@ from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.output import measure_prosody
 from lipmotion.types import Generation
 from lipmotion_blender.curves import at_frames
-from lipmotion_faces.characters.load import load_character
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.pose import head_poses

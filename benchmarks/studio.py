@@ -48,7 +48,7 @@ from lipmotion.pipeline.request import Request  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
 from lipmotion.storage.json_text import as_json  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
-from lipmotion_faces.characters.load import load_character  # noqa: E402
+from lipmotion_faces.characters.character_files import load_character  # noqa: E402
 from lipmotion_faces.mesh import MeshFace  # noqa: E402
 from lipmotion_faces.outputs.shown_faces import ShownFace, shown_face  # noqa: E402
 from lipmotion_faces.registry import make_face  # noqa: E402

@@ -13,8 +13,8 @@ from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
 from lipmotion.storage.files import temporary_folder
 from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.delivery import MOODS, MoodKey
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.file_limits import Budget
-from lipmotion_faces.characters.load import load_character
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.filmed.face import SUFFIX
 from lipmotion_faces.mesh import MeshFace

@@ -17,7 +17,7 @@ from children import LIPMOTION, child
 from cli.conftest import RunCommand
 from lipmotion.speech.sound import audio_files
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion_faces.characters.load import load_character
+from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import head, write_glb
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"

@@ -13,7 +13,7 @@ from cli.conftest import check_refused, is_one_error
 from lipmotion import read_motion
 from lipmotion.cli.main import main
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion_faces.characters.load import load_character
+from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import head, write_glb
 
 

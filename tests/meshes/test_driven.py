@@ -22,8 +22,8 @@ from lipmotion.meshes.model.mesh import (
 from lipmotion.meshes.model.rig_tables import table_path, write_rig_table
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces.characters.binding_files import save_binding, write_weights
+from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
 from lipmotion_faces.characters.gltf_scene import read_gltf
-from lipmotion_faces.characters.load import JAW_OPEN, load_character, with_jaw
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, head, lip_points, shaped, write_glb, write_obj
 from meshes.speech import motion, units

@@ -22,7 +22,7 @@ from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curv
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
-from lipmotion_faces.characters.load import load_character
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.stage import figure, head_mesh, lip_gap
 from lipmotion_faces.outputs.scenes import character_scene, head_scene

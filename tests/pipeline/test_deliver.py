@@ -17,7 +17,7 @@ from lipmotion.types import Prosody
 from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Face, Staging
-from lipmotion_faces.characters.load import load_character
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.scenes import delivered_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face

@@ -21,7 +21,7 @@ from lipmotion.pipeline.outputs.motion_files import fit_to_format, read_generati
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
-from lipmotion_faces.characters.load import load_character
+from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import head, write_glb
 
 TAKE = Path("a.livelink.csv")

@@ -14,8 +14,8 @@ from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Pin, Timeline
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
-from lipmotion_faces.characters.load import load_character
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh

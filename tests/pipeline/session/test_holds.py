@@ -16,7 +16,7 @@ from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.request import Request
 from lipmotion.types import Delivery, Generation
 from lipmotion_faces.base import Staging
-from lipmotion_faces.characters.load import load_character
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths
