@@ -19,8 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "extras"))
+sys.path.extend(str(Path(__file__).parents[1] / folder) for folder in ("tests", "extras"))
 
 import lipmotion
 from lipmotion.formats.blender import write_addon

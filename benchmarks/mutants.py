@@ -4,8 +4,7 @@
                                  [--list] [-o RESULTS.json] [-- PYTEST OPTIONS]
 
 MUTANTS.json is a list of objects: ``name``, ``path`` (below ``src/lipmotion``, ``src`` or the tree), ``old`` (text that
-it holds exactly once), ``new`` (what takes its place), and ``tests`` (files or folders of the tree: where a test should
-fail).
+it holds once), ``new`` (what takes its place), and ``tests`` (files or folders of the tree: where a test should fail).
 
 Each mutant gets a fresh copy of the tree, so the tree itself is never changed, and one run of pytest that stops at the
 first failing test. A test that fails also without the mutant does not count: it is left out, and the run repeated.
@@ -31,9 +30,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 PACKAGES = Path("src"), Path("src") / "lipmotion", Path()
-PARTS = (".ci", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "SECURITY.md",
-         "benchmarks", "docs", "examples", "extras", "pyproject.toml", "requirements", "scripts", "src",
-         "tests")  # fmt: skip
+PARTS = """.ci CHANGELOG.md CITATION.cff CONTRIBUTING.md LICENSE Makefile README.md SECURITY.md benchmarks docs examples
+extras pyproject.toml requirements scripts src tests""".split()
 """What tests may look at, as far as the tree has it."""
 ALL = ("tests",)
 SHARED = "shared"
