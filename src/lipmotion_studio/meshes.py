@@ -10,7 +10,7 @@ import numpy as np
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
-from lipmotion.storage.files import temporary_folder
+from lipmotion.storage.locks import temporary_folder
 from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.delivery import MOODS, MoodKey
 from lipmotion_faces.characters.character_files import load_character

@@ -253,12 +253,12 @@ def test_a_jaw_bone_opens_the_mouth():
 
 def test_a_character_with_a_jaw_bone_alone_follows_the_motion(tmp_path):
     """The square of two triangles is no head; the made head has no skin. So the bone is put on the read mesh."""
-    from lipmotion_faces.characters import load
+    from lipmotion_faces.characters import character_files
 
     path = tmp_path / "head.glb"
     write_glb(path, head(shapes=False))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(load, "read_character", lambda _: with_bone(head(shapes=False)))
+        patch.setattr(character_files, "read_character", lambda _: with_bone(head(shapes=False)))
         character = load_character(path)
     weights = character.weights(motion(), units())
     assert weights.names == (JAW_OPEN,)

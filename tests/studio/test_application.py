@@ -22,7 +22,7 @@ from lipmotion_faces.video.mp4 import write_mp4
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
-from lipmotion.storage.files import LOCK
+from lipmotion.storage.locks import LOCK
 from lipmotion_studio import recording as recording_module
 from lipmotion_studio.application import studio_application
 from lipmotion_studio.folder import ProjectFolder, open_folder

@@ -22,9 +22,9 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.storage.files import atomic_file, check_regular
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json
-from lipmotion.storage.sources import check_kind
+from lipmotion.storage.sources import check_kind, check_regular
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, Unit
 
 LOG = logging.getLogger("lipmotion")

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import load_provided
 from lipmotion.pipeline.request import Outputs, Request, locate_paths
-from lipmotion.storage.files import check_listable, portable_name
+from lipmotion.storage.files import portable_name
 from lipmotion.storage.json_text import read_toml
+from lipmotion.storage.sources import check_listable
 from lipmotion.types.configuration import Configuration, option
 from lipmotion.types.delivery import Delivery, Staging
 from lipmotion.types.progress import Monitor, silent_monitor, sub_monitor

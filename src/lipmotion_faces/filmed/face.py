@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
-from lipmotion.storage.files import check_source
 from lipmotion.storage.schema import (
     LARGEST_NUMBER,
     POSITIVE,
@@ -23,6 +22,7 @@ from lipmotion.storage.schema import (
     format_errors,
     refuse_undeclared,
 )
+from lipmotion.storage.sources import check_source
 from lipmotion.types import Audio, Channel, Motion
 from lipmotion_faces.appearance.person import Appearance, appearance_arrays, appearance_from_arrays
 from lipmotion_faces.coded_video import STORED_VIDEO, StoredVideo, stored_video_from_arrays, stored_video_to_arrays

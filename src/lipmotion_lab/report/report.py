@@ -19,15 +19,9 @@ from lipmotion.formats.web_page import GENERATOR
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import GEOMETRY
 from lipmotion.pipeline.training.labels import fingerprint_training
-from lipmotion.storage.files import (
-    TEMPORARY,
-    atomic_file,
-    atomic_folder,
-    lock_folder,
-    remove_unfinished,
-    unfinished_work,
-)
+from lipmotion.storage.files import TEMPORARY, atomic_file, atomic_folder
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.locks import lock_folder, remove_unfinished, unfinished_work
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, sub_monitor
 from lipmotion.units import Lexicon

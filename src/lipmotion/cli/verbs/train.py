@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import GEOMETRY, save_model
     from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.storage.files import unfinished_work
+    from lipmotion.storage.locks import unfinished_work
     from lipmotion.units import Lexicon
 
     with report_progress(options) as report:
