@@ -81,7 +81,7 @@ from lipmotion.types import (
     Unit,
     silent_monitor,
 )
-from lipmotion.types.generation import Locked
+from lipmotion.types.edits import Locked
 from lipmotion.units import Pronunciation, group_words, split_words
 
 ResultT = TypeVar("ResultT")

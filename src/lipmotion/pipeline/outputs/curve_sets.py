@@ -31,7 +31,7 @@ from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, read_rig_table,
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, arkit_name
 from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Hold, Motion, Prosody, Span, Timeline, Unit
 from lipmotion.types.delivery import Staging
-from lipmotion.types.generation import Locked
+from lipmotion.types.edits import Locked
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 VISEMES, HELD_VISEMES = "visemes", "held-visemes"
