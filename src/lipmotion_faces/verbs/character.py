@@ -55,9 +55,9 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.meshes.fitting.driven import list_rows
     from lipmotion.meshes.model.rig_tables import read_rig_table, table_path, write_rig_table
     from lipmotion.pipeline.job import open_character
-    from lipmotion.pipeline.outputs.curve_sets import describe_character
     from lipmotion.storage.sources import is_file
     from lipmotion_faces.characters.binding_files import save_binding, write_points, write_weights
+    from lipmotion_faces.characters.calibration import describe_character
     from lipmotion_faces.characters.character_files import read_character
 
     stated, path = _read_values(options), options.character
@@ -97,7 +97,7 @@ def _write_table(
 ) -> None:
     """Write a table with the gains and offsets by which its controls have the stated values; print those."""
     from lipmotion.meshes.model.rig_tables import write_rig_table
-    from lipmotion.pipeline.outputs.curve_sets import calibrate_rows, pose_sources
+    from lipmotion_faces.characters.calibration import calibrate_rows, pose_sources
 
     changed = calibrate_rows(rows, pose_sources(curves, rows), stated) if stated else rows
     for row in changed:
