@@ -10,7 +10,10 @@ from inspect import isawaitable
 from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.live.conversation import (
+from lipmotion.live.face import LiveFrame
+from lipmotion.live.stream import REST_STEPS
+from lipmotion.pipeline.model import Model
+from lipmotion_agents.conversation import (
     FRAMES_IN_MESSAGE,
     LOOK_AHEAD_MS,
     REST_S,
@@ -20,9 +23,6 @@ from lipmotion.live.conversation import (
     blend,
     list_messages,
 )
-from lipmotion.live.face import LiveFrame
-from lipmotion.live.stream import REST_STEPS
-from lipmotion.pipeline.model import Model
 
 try:
     from livekit.agents.types import USERDATA_TIMED_TRANSCRIPT

@@ -9,9 +9,9 @@ from inspect import isawaitable
 from typing import Any
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.live.conversation import LOOK_AHEAD_MS, REST_S, Conversation, OnFrames, Playout, list_messages
 from lipmotion.live.face import LiveFrame
 from lipmotion.pipeline.model import Model
+from lipmotion_agents.conversation import LOOK_AHEAD_MS, REST_S, Conversation, OnFrames, Playout, list_messages
 
 try:
     from pipecat.frames.frames import (
