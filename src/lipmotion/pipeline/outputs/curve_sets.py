@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import EDITED, GAP, gap_to_opening, read_edited, read_gap
-from lipmotion.articulation.curve_edits import apply_curve_edits, edited_share
+from lipmotion.articulation.curve_edits import apply_curve_edits, check_drawn, edited_share, find_pinned_frame
 from lipmotion.articulation.expression import is_mood, read_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shorten
 from lipmotion.formats.fap import NAMES, PARAMETERS, move_faps
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
@@ -28,7 +30,20 @@ from lipmotion.meshes.fitting.shape_weights import (
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, read_rig_table
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, arkit_name
-from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Hold, Motion, Prosody, Timeline, Unit
+from lipmotion.pipeline.analysis.speech_analysis import LATE_S
+from lipmotion.types import (
+    WEIGHT,
+    Channel,
+    CurveEdit,
+    DrawnCurve,
+    Generation,
+    Hold,
+    Motion,
+    Pin,
+    Prosody,
+    Timeline,
+    Unit,
+)
 from lipmotion.types.delivery import Staging
 from lipmotion.types.edits import Locked
 
@@ -40,6 +55,7 @@ WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *VRM_VOWELS)
 FAPS = {name: NAMES[number] for number, name, *_ in PARAMETERS}
 KNOWN_CURVES = (*WEIGHTS, *FAPS)
 """Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
+LIP_POINT = re.compile(r"[xyz]_\d+")
 SETS_OF = {WHOLE_FACE: (*ARKIT_MOUTH, *ARKIT_OTHERS), VISEMES: VISEME_CHANNELS, VOWELS: VRM_VOWELS}
 """The curves that are edited in each set (``show_edited_curves``)."""
 GAP_CHANNELS = ("opening", "outer", GAP, EDITED["opening"])
@@ -144,6 +160,32 @@ def rename_edits(edits: Sequence[CurveEdit], named: Mapping[str, str]) -> tuple[
                 edit if isinstance(edit, Hold) else replace(edit, channel=named.get(edit.channel, edit.channel))
             )
     return tuple(renamed)
+
+
+def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) -> None:
+    """Raise InputError if an edit is of no curve that is known, or of no time of the recording.
+
+    others : names of curves that outputs will have besides
+    """
+    known = (*motion.names, *GESTURES, *KNOWN_CURVES, *others)
+    if edit.channel and edit.channel not in known:
+        verb = {Pin: "pin", DrawnCurve: "draw"}.get(type(edit), "change")
+        lower = {name.lower(): name for name in known}
+        near = get_close_matches(edit.channel.lower(), lower, 1)
+        pinned = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
+        name = shorten(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
+        raise InputError(
+            f"cannot {verb} {name}; channels that can be pinned: {pinned}; lip points, as y_14; curves, as "
+            "jawOpen, viseme_PP, open_jaw"
+        )
+    last_s = (len(motion.values) - 1) / motion.rate_hz
+    if isinstance(edit, Pin):
+        find_pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
+    elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
+        verb = {DrawnCurve: "draw", Hold: "hold"}.get(type(edit), "gain")
+        raise InputError(f"{verb} from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
+    if isinstance(edit, DrawnCurve):
+        check_drawn(edit, is_weight=edit.channel in WEIGHTS)
 
 
 def edit_curves(curves: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
