@@ -94,7 +94,7 @@ def test_a_character_is_opened_once(run, takes, toy_model_file, here, monkeypatc
         opened.append(path)
         return load_character(path, **how)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("lipmotion_faces.characters.load.load_character", counted)
+    monkeypatch.setattr("lipmotion_faces.characters.character_files.load_character", counted)
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--character", "head.glb")
     assert done == (0, ["out/a.json", "out/b.json"], [])
     assert opened == [Path("head.glb")]

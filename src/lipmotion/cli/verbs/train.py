@@ -110,7 +110,7 @@ def add_adapt(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     add_input(parser, "recordings", what="recording", **recordings)
     add_options(parser, Request, "model")
     add_output(parser, "-o", "--output", force=True, required=True, metavar="MODEL")
-    parser.set_defaults(run_adapt=run_adapt)
+    parser.set_defaults(run=run_adapt)
 
 
 def run_adapt(options: argparse.Namespace) -> None:
