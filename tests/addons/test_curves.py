@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from lipmotion import read_motion as read_library_motion
-from lipmotion.addons.blender.curves import at_frames, closures, control, matched, read_motion, spelling
 from lipmotion.formats.base import write_motion
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion_blender.curves import at_frames, closures, control, matched, read_motion, spelling
 
 NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")
 

@@ -8,14 +8,15 @@ from lipmotion import Delivery
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
-from lipmotion.meshes.fitting.driven import load_character
-from lipmotion.meshes.model.scene import Scene, Thinning
+from lipmotion.formats.keys import Thinning
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Pin, Timeline
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
+from lipmotion_faces.characters.character_files import load_character
+from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
+from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, delivered_scene, head_scene, write_scene

@@ -11,20 +11,8 @@ from lipmotion import Corpus
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.files import (
-    LOCK,
-    TEMPORARY,
-    atomic_file,
-    atomic_folder,
-    confine,
-    lock_folder,
-    make_folder,
-    open_own,
-    remove,
-    remove_unfinished,
-    temporary_folder,
-    unfinished_work,
-)
+from lipmotion.storage.files import TEMPORARY, atomic_file, atomic_folder, confine, make_folder, open_own, remove
+from lipmotion.storage.locks import LOCK, lock_folder, remove_unfinished, temporary_folder, unfinished_work
 from lipmotion_faces.corpus.sync import sync
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST

@@ -15,13 +15,11 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
 from lipmotion.articulation.mouth import frame_times, measure_mouth_at_rest, spoken_mouth
 from lipmotion.articulation.rest import add_rest
-from lipmotion.meshes.files.gltf_writer import write_animated_gltf, write_gltf_scene
-from lipmotion.meshes.files.usd_writer import asset, write_usda
+from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.mesh import Blendshape, head_quaternions
-from lipmotion.meshes.model.scene import HeadTurn, Scene, Thinning
 from lipmotion.pipeline.outputs.curve_sets import edit_weights
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
@@ -29,6 +27,9 @@ from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
 from lipmotion.types.motion import WEIGHT
 from lipmotion_faces.base import Staging, stage_liveliness
+from lipmotion_faces.characters.gltf_writer import write_animated_gltf, write_gltf_scene
+from lipmotion_faces.characters.scene import HeadTurn, Scene
+from lipmotion_faces.characters.usd_writer import asset, write_usda
 from lipmotion_faces.outputs.drawn_video import check_drawable
 
 GLTF, USD = ".glb", ".usda"

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -32,10 +32,6 @@ from lipmotion.speech.sound.resampling import decimated
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
-
-if TYPE_CHECKING:
-    from lipmotion.meshes.model.scene import Scene
-    from lipmotion.pipeline.model import Model
 
 Made = TypeVar("Made")
 
@@ -67,7 +63,7 @@ class ShownFace(ABC):
     @abstractmethod
     def scene(
         self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
-    ) -> Scene:
+    ) -> Any:
         """Return the character of files for 3D programs, with its animation.
 
         frames : of the motion: the only ones that are wanted; None: all
