@@ -308,9 +308,9 @@ def write(  # noqa: PLR0913
 
     generation : from ``animate``
     outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.livelink.csv`` (a take of Live Link Face),
-               ``.glb``, ``.usda`` (a 3D character with its animation), ``.TextGrid`` (phones in time), ``.mp4``,
-               ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
-               ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
+               ``.glb``, ``.usda``, ``.fbx`` (a 3D character with its animation), ``.TextGrid`` (phones in time),
+               ``.mp4``, ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without
+               sound); where ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion, whose corpus and licence motion files name; None: those that the
                generation names
