@@ -15,8 +15,9 @@ from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, describe_training, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.storage.files import make_folder, unfinished_work
+from lipmotion.storage.files import make_folder
 from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.locks import unfinished_work
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves

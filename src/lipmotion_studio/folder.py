@@ -27,16 +27,14 @@ from lipmotion.storage.files import (
     atomic_file,
     create_folders,
     is_link,
-    lock_folder,
     make_folder,
     portable_name,
-    read_text_file,
     remove,
-    remove_unfinished,
-    sha256_of,
     sound_reference,
 )
 from lipmotion.storage.json_text import as_json, as_json_rows, from_json
+from lipmotion.storage.locks import lock_folder, remove_unfinished
+from lipmotion.storage.sources import read_text_file, sha256_of
 from lipmotion.types.languages import AUTO, ENGLISH
 from lipmotion.units import Lexicon
 from lipmotion_studio.project import (

@@ -15,8 +15,9 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.storage.files import TEMPORARY, remove, temporary_folder
+from lipmotion.storage.files import TEMPORARY, remove
 from lipmotion.storage.json_text import as_json
+from lipmotion.storage.locks import temporary_folder
 from lipmotion.types import Motion, values
 from lipmotion.types.configuration import kind_of
 from lipmotion.types.values import items

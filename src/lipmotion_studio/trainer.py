@@ -17,8 +17,10 @@ from typing import Any
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.pipeline.workers import start_process
-from lipmotion.storage.files import UNFINISHED, atomic_file, make_folder, read_text_file, remove, work_folder
+from lipmotion.storage.files import atomic_file, make_folder, remove
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.locks import UNFINISHED, work_folder
+from lipmotion.storage.sources import read_text_file
 from lipmotion.types import values
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
 from lipmotion_studio.folder import ProjectFolder, clean_name, copy_file, restore_copy, write_with_copy

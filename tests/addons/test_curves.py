@@ -3,9 +3,9 @@ import pytest
 
 from formats.examples import of_motion
 from lipmotion import read_motion as read_library_motion
-from lipmotion.addons.blender.curves import at_frames, closures, control, matched, read_motion, spelling
 from lipmotion.formats import write_motion
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
+from lipmotion_blender.curves import at_frames, closures, control, matched, read_motion, spelling
 
 NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")
 

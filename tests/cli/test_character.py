@@ -7,7 +7,7 @@ import pytest
 
 from cli.conftest import check_refused
 from lipmotion import read_motion
-from lipmotion.meshes.files.character_files import read_character
+from lipmotion_faces.characters.character_files import read_character
 from meshes.heads import head, lip_points, write_glb, write_obj
 
 

@@ -12,9 +12,9 @@ import pytest
 
 from children import LIPMOTION, child
 from cli.conftest import RunCommand
-from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.speech.sound import audio_files
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import VISEMES, renamed, write_glb
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"

@@ -9,9 +9,9 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion import read_motion
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.outputs.scenes import write_scene
 from meshes.heads import head
 

@@ -11,7 +11,8 @@ import pytest
 from cli.conftest import check_refused, is_one_error
 from lipmotion import read_motion
 from lipmotion.cli.main import main
-from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import head, write_glb
 
 
@@ -83,7 +84,7 @@ def test_a_character_is_opened_once(run, takes, toy_model_file, here, monkeypatc
         opened.append(path)
         return load_character(path, **how)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("lipmotion.meshes.fitting.driven.load_character", counted)
+    monkeypatch.setattr("lipmotion_faces.characters.character_files.load_character", counted)
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--character", "head.glb")
     assert done == (0, ["out/a.json", "out/b.json"], [])
     assert opened == [Path("head.glb")]

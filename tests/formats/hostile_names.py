@@ -22,15 +22,15 @@ from lipmotion.formats import write_motion
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.formats.label_files import write_labels
 from lipmotion.formats.textgrid import parse_interval_tiers
-from lipmotion.meshes.files.gltf_document import read_gltf_document
-from lipmotion.meshes.files.gltf_writer import write_gltf_scene
-from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.batch.report import Mark, _field, _for_page
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import as_text
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
+from lipmotion_faces.characters.gltf_document import read_gltf_document
+from lipmotion_faces.characters.gltf_writer import write_gltf_scene
+from lipmotion_faces.characters.scene import Scene
+from lipmotion_faces.characters.usd_writer import write_usda
 from lipmotion_faces.video.synthetic_mark import mark_metadata
 
 PARTS = (

@@ -4,7 +4,7 @@ import asyncio
 
 import numpy as np
 
-from lipmotion.live.conversation import Conversation
+from lipmotion_agents.conversation import Conversation
 
 
 def test_words_with_odd_times_do_no_harm() -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.types import Motion
+from lipmotion_faces.characters.gltf_writer import write_gltf_scene
+from lipmotion_faces.characters.scene import Scene
 
 SEAM, HALF = -0.86, 0.3
 """Height of the mouth and half its width, in eye distances."""

@@ -6,12 +6,12 @@ import pytest
 
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.meshes.files import binding_files
 from lipmotion.meshes.fitting import lip_placement
 from lipmotion.meshes.fitting.lip_placement import part_named_lips, place_lips_by_points, place_lips_by_shape
 from lipmotion.meshes.model.binding import MAX_WEIGHTS, bind, paint_weights, skin_vertices
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.surface import build_surface
+from lipmotion_faces.characters import binding_files
 from meshes.heads import COLUMNS, HALF, SEAM, SIZE, head, lip_points, shaped
 from oracles.skinning import skinned_vertex_by_vertex
 

@@ -9,10 +9,10 @@ import pytest
 from fuzz.character_floods import CHARACTER_FLOODS
 from fuzz.inputs import lay_out
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.character_files import read_character, read_obj
-from lipmotion.meshes.files.gltf_writer import write_animated_gltf
-from lipmotion.meshes.model.file_limits import ALLOWANCE, Budget
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.characters.character_files import read_character, read_obj
+from lipmotion_faces.characters.file_limits import ALLOWANCE, Budget
+from lipmotion_faces.characters.gltf_writer import write_animated_gltf
 from meshes.gltf import document, glb
 from meshes.heads import head, shaped, write_obj
 

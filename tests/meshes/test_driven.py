@@ -6,10 +6,6 @@ import pytest
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.binding_files import save_binding, write_weights
-from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
-from lipmotion.meshes.fitting.driven import JAW_OPEN, load_character, with_jaw
 from lipmotion.meshes.model.face_shapes import life_scale
 from lipmotion.meshes.model.mesh import (
     HEAD,
@@ -21,7 +17,11 @@ from lipmotion.meshes.model.mesh import (
     bone_kind,
     merge_bones,
 )
+from lipmotion.meshes.model.rig_tables import table_path, write_rig_table
 from lipmotion.types.delivery import parse_moods
+from lipmotion_faces.characters.binding_files import save_binding, write_weights
+from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
+from lipmotion_faces.characters.gltf_scene import read_gltf
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, VISEMES, head, lip_points, renamed, shaped, write_glb, write_obj
 from meshes.speech import motion, units
@@ -245,12 +245,12 @@ def test_a_jaw_bone_opens_the_mouth():
 
 def test_a_character_with_a_jaw_bone_alone_follows_the_motion(tmp_path):
     """The square of two triangles is no head; the made head has no skin. So the bone is put on the read mesh."""
-    from lipmotion.meshes.fitting import driven
+    from lipmotion_faces.characters import character_files
 
     path = tmp_path / "head.glb"
     write_glb(path, head(shapes=False))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(driven, "read_character", lambda _: with_bone(head(shapes=False)))
+        patch.setattr(character_files, "read_character", lambda _: with_bone(head(shapes=False)))
         character = load_character(path)
     weights = character.weights(motion(), units())
     assert weights.names == (JAW_OPEN,)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.files.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
+from lipmotion_faces.characters.gltf_scene import read_gltf
+from lipmotion_faces.characters.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
 from meshes.gltf import (
     OPEN,
     POSITIONS,

@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model import shape_names
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
-from lipmotion.meshes.model.scene import EVERY_KEY, HeadTurn, Scene, Thinning, compute_shading_normals, place_keys
 from lipmotion.meshes.model.surface import drop_back_sides
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.characters.scene import HeadTurn, Scene, compute_shading_normals
 from meshes.heads import head, shaped
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])

@@ -5,10 +5,10 @@ import pytest
 from PIL import Image
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.character_files import read_obj, read_obj_folder
-from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart
-from lipmotion.meshes.model.textures import Texture, decode_srgb, read_texture, texture_table
+from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart, Texture
+from lipmotion_faces.characters.character_files import read_obj, read_obj_folder
+from lipmotion_faces.characters.gltf_scene import read_gltf
+from lipmotion_faces.characters.textures import decode_srgb, read_texture, texture_table
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion_faces.rendering.rasteriser import Camera, flat

@@ -15,13 +15,14 @@ from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.formats import write_motion
 from lipmotion.formats.fap import FAP
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
-from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
+from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, make_curves
 from lipmotion.pipeline.outputs.deliver import deliver
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curves
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.stage import figure, head_mesh, lip_gap
 from lipmotion_faces.outputs.scenes import character_scene, head_scene

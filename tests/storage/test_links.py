@@ -12,6 +12,7 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
 from lipmotion.storage import files
 from lipmotion.storage.archive import Checkpoint
+from lipmotion.storage.locks import LOCK, lock_folder, remove_unfinished, temporary_folder, unfinished_work
 from lipmotion_faces.corpus.sync import sync
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST
@@ -82,7 +83,7 @@ def answer_study(folder: Path) -> None:
 
 
 def train(folder: Path) -> None:
-    with files.unfinished_work(folder / "m") as work:
+    with unfinished_work(folder / "m") as work:
         Checkpoint(work, "of this").save("stage", {"a": np.zeros(1)})
         raise KeyboardInterrupt
 
@@ -90,22 +91,19 @@ def train(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("verb", "name"),
     [
-        *((drop, name) for name in (files.LOCK, "project.json", "sounds", "sounds/line.wav")),
+        *((drop, name) for name in (LOCK, "project.json", "sounds", "sounds/line.wav")),
         *((vote, name) for name in ("votes.json", "lexicon.txt")),
         *((pronounce, name) for name in ("lexicon.txt",)),
-        *((train_voice, f"training/{name}") for name in ("", "recordings", "corpus", f"corpus/{files.LOCK}")),
+        *((train_voice, f"training/{name}") for name in ("", "recordings", "corpus", f"corpus/{LOCK}")),
         *((train_voice, name) for name in ("voices", "recordings")),
         *(
             (add_to_corpus, name)
             for name in ("corpus.json", "utterances", "utterances/toy00", f"{files.TEMPORARY}left")
         ),
-        *((sync_corpus, name) for name in (files.LOCK, "utterances")),
-        *(
-            (begin_batch, name)
-            for name in (".batch", f".batch/{files.LOCK}", ".batch/work", "batch.jsonl", "report.csv")
-        ),
+        *((sync_corpus, name) for name in (LOCK, "utterances")),
+        *((begin_batch, name) for name in (".batch", f".batch/{LOCK}", ".batch/work", "batch.jsonl", "report.csv")),
         *((answer_study, f"{ANSWERS}{suffix}") for suffix in ("", "-wal", "-shm", "-journal")),
-        *((train, name) for name in ("m.unfinished", f"m.unfinished/{files.LOCK}", "m.unfinished/stage.checkpoint")),
+        *((train, name) for name in ("m.unfinished", f"m.unfinished/{LOCK}", "m.unfinished/stage.checkpoint")),
     ],
 )
 def test_no_verb_follows_a_link_in_a_folder_of_a_stranger(tmp_path: Path, verb: Verb, name: str) -> None:
@@ -133,7 +131,7 @@ def test_a_confined_folder_may_be_a_link_itself(
 ) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "given").symlink_to("there")
-    with files.lock_folder(tmp_path / "given"):
+    with lock_folder(tmp_path / "given"):
         files.make_folder(tmp_path / "given" / "a" / "b")
         with write(tmp_path / "given" / "a" / "b" / "c") as new:
             new.touch()
@@ -148,7 +146,7 @@ def test_what_is_removed_is_not_behind_a_link(tmp_path: Path) -> None:
         (tmp_path / "given" / name).symlink_to(aim)
     with files.confine(tmp_path / "given"):
         files.remove(tmp_path / "given" / "one" / "file")
-        files.remove_unfinished(tmp_path / "given" / "one")
+        remove_unfinished(tmp_path / "given" / "one")
         files.remove(tmp_path / "given" / "two")
     assert content_of(outside) == before
     assert [path.name for path in (tmp_path / "given").iterdir()] == ["one"]
@@ -170,16 +168,16 @@ def test_folders_that_killed_runs_left_are_swept(tmp_path: Path, monkeypatch: py
     """Not those that are in use, nor what a link of such a name leads to."""
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     (tmp_path / "lipmotion-killed" / "deep").mkdir(parents=True)
-    (tmp_path / "lipmotion-killed" / files.LOCK).touch()
+    (tmp_path / "lipmotion-killed" / LOCK).touch()
     (tmp_path / "precious").mkdir()
-    for name in (files.LOCK, "file"):
+    for name in (LOCK, "file"):
         (tmp_path / "precious" / name).touch()
     (tmp_path / "lipmotion-link").symlink_to("precious")
-    with files.temporary_folder() as used:
+    with temporary_folder() as used:
         (used / "sound.wav").touch()
-        with files.temporary_folder() as other:
+        with temporary_folder() as other:
             assert other != used
         assert (used / "sound.wav").exists()
         assert not (tmp_path / "lipmotion-killed").exists()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["lipmotion-link", "precious"]
-    assert sorted(path.name for path in (tmp_path / "precious").iterdir()) == [files.LOCK, "file"]
+    assert sorted(path.name for path in (tmp_path / "precious").iterdir()) == [LOCK, "file"]

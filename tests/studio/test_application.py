@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, save_model
-from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.units import Lexicon
+from lipmotion_faces.characters.gltf_weights import read_gltf_motion
 from lipmotion_faces.video.mp4 import write_mp4
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
-from lipmotion.storage.files import LOCK
+from lipmotion.storage.locks import LOCK
 from lipmotion_studio import recording as recording_module
 from lipmotion_studio.application import studio_application
 from lipmotion_studio.folder import ProjectFolder, open_folder

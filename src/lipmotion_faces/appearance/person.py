@@ -25,7 +25,6 @@ from lipmotion.motion.eigenlips import (
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.coded_video import decode_pictures, encode_pictures
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance import candidates, lower_face, motion_map
@@ -35,6 +34,7 @@ from lipmotion_faces.appearance.camera_noise import (
     camera_noise_from_arrays,
     estimate_noise,
 )
+from lipmotion_faces.coded_video import decode_pictures, encode_pictures
 
 Array = NDArray[np.float64]
 Values = NDArray[np.floating[Any]]

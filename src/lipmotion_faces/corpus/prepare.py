@@ -23,8 +23,9 @@ from lipmotion.extensions import installed_version
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import confine, lock_folder, portable_name, remove_unfinished, sha256_of
-from lipmotion.storage.sources import Source, check_apart, is_folder
+from lipmotion.storage.files import confine, portable_name
+from lipmotion.storage.locks import lock_folder, remove_unfinished
+from lipmotion.storage.sources import Source, check_apart, is_folder, sha256_of
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
 from lipmotion_faces.corpus import supplied

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.coded_video import FrameGroups, encode_video
 from lipmotion_faces.appearance import looping, lower_face
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.appearance.placing import cut, feather, inverse_map
+from lipmotion_faces.coded_video import FrameGroups, encode_video
 from lipmotion_faces.filmed.face import StoredBackground
 from lipmotion_faces.filmed.renderer import Background
 from lipmotion_faces.tracking.footage import Footage, footage_frames, footage_groups, track_footage

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage import schema
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
-from lipmotion.storage.coded_video import STORED_VIDEO, StoredVideo, stored_video_from_arrays, stored_video_to_arrays
-from lipmotion.storage.files import check_source
+from lipmotion.storage.sources import check_source
 from lipmotion.types import Audio, Channel, Motion
 from lipmotion_faces.appearance.person import Appearance, appearance_arrays, appearance_from_arrays
+from lipmotion_faces.coded_video import STORED_VIDEO, StoredVideo, stored_video_from_arrays, stored_video_to_arrays
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.meshes.model.surface import compute_normals
-from lipmotion.meshes.model.textures import decode_srgb
+from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.rendering.lighting import Finish
 
 Real = NDArray[np.float64]

@@ -8,7 +8,6 @@ from pathlib import Path
 from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
 from lipmotion.pipeline.outputs.curve_sets import WEIGHTS
@@ -20,6 +19,7 @@ from lipmotion.types.delivery import MOODS
 from lipmotion.types.progress import with_reports
 from lipmotion.units.phones import OPTIONAL
 from lipmotion_faces.base import Face, Staging
+from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.cut_out import CutOut, read_cut_out
 from lipmotion_faces.film import filmed_video
 from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face

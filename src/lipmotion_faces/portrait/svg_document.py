@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.storage.files import check_regular
+from lipmotion.storage.sources import check_regular
 
 STEPS = 12
 """Points for each Bézier curve, and for a quarter of an ellipse."""

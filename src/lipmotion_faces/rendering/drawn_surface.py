@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh
-from lipmotion.meshes.model.textures import Texture, TextureTable, decode_srgb, texture_table
+from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh, Texture
+from lipmotion_faces.characters.textures import TextureTable, decode_srgb, texture_table
 from lipmotion_faces.kernels.textured import (
     CLEAR,
     CUT,

@@ -19,7 +19,7 @@ from lipmotion.formats.web_page import GENERATOR
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import GEOMETRY
 from lipmotion.pipeline.training.labels import fingerprint_training
-from lipmotion.storage import files
+from lipmotion.storage import files, locks
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, sub_monitor
@@ -184,8 +184,8 @@ def experiment_report(
         raise CorpusError(f"{corpus.path}: {name} is {reason}")
     check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
     _check_folder(folder)
-    with files.lock_folder(folder):
-        files.remove_unfinished(folder)
+    with locks.lock_folder(folder):
+        locks.remove_unfinished(folder)
         config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
         of_input = fingerprint_training(
             corpus, corpus.names(), engine_named("trajectory"), config, lexicon, GEOMETRY, None
@@ -288,7 +288,7 @@ class _Writer:
     def _run(self, name: str, settings: ExperimentSettings) -> None:
         part, target = PARTS[name], self.folder / name
         models = self.folder / "models" / self.key("models")[:KEY_DIGITS]  # of other recordings, other models
-        with files.unfinished_work(self.folder / f"{name}.json") as work:
+        with locks.unfinished_work(self.folder / f"{name}.json") as work:
             stamp = Stamp()
             keeper = ClipKeeper(work / MOTION, self.key(name))
             running = replace(settings, monitor=sub_monitor(settings.monitor, 0, 0.95), receive=keeper)

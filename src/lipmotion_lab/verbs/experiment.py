@@ -70,7 +70,7 @@ def run_experiment(
     ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
-    from lipmotion.storage.files import unfinished_work
+    from lipmotion.storage.locks import unfinished_work
     from lipmotion_lab.report.report import PARTS
     from lipmotion_lab.runner import ExperimentSettings, Stamp, take_quick_part
 

@@ -14,7 +14,8 @@ from secrets import token_urlsafe
 from typing import Any, TypeVar
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.files import check_own, sha256_of
+from lipmotion.storage.files import check_own
+from lipmotion.storage.sources import sha256_of
 from lipmotion_studio.study.manifest import MANIFEST
 
 ResultT = TypeVar("ResultT")

@@ -11,8 +11,8 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.storage.archive import read_archive, read_archive_header, write_archive
-from lipmotion.storage.coded_video import STORED_VIDEO
 from lipmotion_faces.appearance.person import APPEARANCE, PARTS
+from lipmotion_faces.coded_video import STORED_VIDEO
 from lipmotion_faces.filmed.face import (
     BACKGROUND,
     MOST_TAKES,

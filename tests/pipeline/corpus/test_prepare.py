@@ -11,7 +11,7 @@ from children import NOWHERE, child
 from lipmotion import Corpus, prepare
 from lipmotion.corpora.store import read_entry
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
-from lipmotion.storage.files import lock_folder
+from lipmotion.storage.locks import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Track
 from lipmotion_faces.corpus import prepare as module
 from pipeline.made import replace_tracking, write_noise
