@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, final
+from typing import TYPE_CHECKING, Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.engines.trajectory.model import Experts, TrajectoryModel, model_arrays, model_from_arrays
-from lipmotion.engines.trajectory.trajectory_training import TrainingOptions, fit_trajectory
 from lipmotion.motion.frame_labels import StateLayout, label_full_context, with_unit_names
 from lipmotion.motion.general_motion import hear_articulators
 from lipmotion.motion.modulation_filter import STRENGTH
@@ -34,6 +33,9 @@ from lipmotion.types import (
     option,
 )
 from lipmotion.units import UnitSet, load_unit_set
+
+if TYPE_CHECKING:
+    from lipmotion.engines.trajectory.trajectory_training import TrainingOptions
 
 POSITIVE, ODD = Rule(above=0), Rule(least=1, odd=True)
 
@@ -113,6 +115,8 @@ class TrajectoryConfig(Configuration):
     @property
     def training(self) -> TrainingOptions:
         """The options of the training. Raises InputError: no such unit set, or a table with errors."""
+        from lipmotion.engines.trajectory.trajectory_training import TrainingOptions
+
         names = {field.name for field in fields(TrainingOptions)} - {"layout"}
         return TrainingOptions(self.layout(load_unit_set(self.units)), **{name: getattr(self, name) for name in names})
 
@@ -137,6 +141,8 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Fit[TrajectoryModel]:
+        from lipmotion.engines.trajectory.trajectory_training import fit_trajectory  # who animates does not train
+
         model = fit_trajectory(examples, self.config.training, monitor, checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
         uses_prior = model.network is not None and model.network.uses_prior

@@ -45,24 +45,7 @@ from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """Options of the training, from a ``TrajectoryConfig``.
-
-    layout       : the states of phones and silences
-    components   : principal components that all point channels (``x_17``, ...) are reduced to
-    tree_factor  : gain that a split of a decision tree must have, in units of its description length
-    least_frames : smallest number of frames of a leaf
-    shrinkage, variance_shrinkage : weights, in frames, of the mean and of the variance of the parent node
-    acoustic_regression : regress the means on the acoustic features around the frame
-    acoustic_components : principal components that these features are reduced to
-    ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the regression that
-                   all nodes share towards zero
-    ridge_frames : smallest number of frames of a node with a regression of its own
-    joint_recogniser : train the joint model as well
-    epochs : how often the training of the predictor uses each recording
-    articulation : lean on the table of articulation
-    predictor : name of the predictor, or ``auto``
-    modulation_filter : strength of the filter of generated motion; 0: none
-    """
+    """Options of the training: those of a ``TrajectoryConfig``, with the states of phones and silences as ``layout``."""
 
     layout: StateLayout
     components: int
