@@ -45,7 +45,7 @@ from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """Options of the training: those of a ``TrajectoryConfig``, with the states of phones and silences as ``layout``."""
+    """Options of the training: those of a ``TrajectoryConfig``, and the states of phones and silences."""
 
     layout: StateLayout
     components: int
