@@ -81,13 +81,8 @@ def fit_phone_recogniser(
             observed = stream_observations(np.asarray(speech.features.values), speech.log_f0, x, example.valid)
             units, bounds = units_to_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
             utterances.append(TrainingUtterance(observed, units, bounds))
-        hmm = train_joint(
-            utterances,
-            Inventory(PHONES.units, PHONES.silence, CONFIG.states),
-            PHONES.classes(),
-            CONFIG,
-            monitor,
-        )
+        inventory = Inventory(PHONES.units, PHONES.silence, CONFIG.states)
+        hmm = train_joint(utterances, inventory, PHONES.classes(), CONFIG, monitor)
         arrays = joint_to_arrays(hmm, np.float32)
         checkpoint.save(_CHECKPOINT, arrays)
     hmm = joint_from_arrays(arrays, CONFIG)
