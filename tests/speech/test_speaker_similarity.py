@@ -66,7 +66,7 @@ def test_a_known_voice_in_noise_is_not_a_stranger(toy_model: Model) -> None:
     sounds = [analysed(sentence.audio) for sentence in toy_sentences(6)]
     mean = mean_speaker_vector(sounds[:5])
     old, known, opposite = (replace(toy_model.phones, speaker=speaker) for speaker in (None, mean, -mean))
-    noisy = analysed(noisy_audio(sounds[5], "white", 25))
+    noisy = analysed(noisy_audio(sounds[5], "white", 15))
     assert voice_knowledge(old, sounds[5]) == voice_knowledge(known, sounds[5]) > 0.9
     assert voice_knowledge(known, noisy) > voice_knowledge(old, noisy) + 0.3
     assert voice_knowledge(opposite, noisy) == voice_knowledge(old, noisy)

@@ -23,8 +23,8 @@ STRANGER_SCORE, OWN_SCORE = -9.0, -3.0
 The score of another speaker in the same studio is -4 to -6 for GRID's models, of other voices in other rooms -7 to -15,
 and of the training's own in noise no more."""
 STRANGER_LIKENESS, OWN_LIKENESS = (0.3, 0.6), (0.6, 0.9)
-"""The same of the likeness of speaker vectors, each where the score says nothing of the voice, as in noise, and where it
-half knows it (docs/results/voices.md)."""
+"""The same of the likeness of speaker vectors: each where the score says nothing of the voice, as in noise, and where
+it half knows it (docs/results/voices.md)."""
 QUIET_SHARE = 0.4
 """So many of the frames, the most quiet, are not used for a speaker vector: pauses sound like the room alone."""
 JUDGED_RECORDINGS = 100
