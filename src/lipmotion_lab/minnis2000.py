@@ -17,8 +17,15 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
-from lipmotion.engines.selection.concatenation import pieces_of
-from lipmotion.engines.selection.costs import ABUTTING_JOIN, MINNIS_2000, SelectionConfig
+from lipmotion.engines.selection.concatenation import Piece, pieces_of
+from lipmotion.engines.selection.costs import (
+    ABUTTING_JOIN,
+    JOIN_BEFORE,
+    MINNIS_2000,
+    Costs,
+    SelectionConfig,
+    Target,
+)
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
@@ -31,7 +38,13 @@ from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves, significance_mark
+from lipmotion_lab.evaluation.evaluate import (
+    correlation_statistic,
+    distance_statistic,
+    figures_of,
+    opening_curves,
+    significance_mark,
+)
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     DISTANCES,
@@ -51,12 +64,17 @@ from lipmotion_lab.runner import (
 )
 
 WIDTH = 36
-HEAD = f"  {'':{WIDTH}}{'ACC (95 %)':23}p b m  elsewhere  joins  hard  smooth  variance and jerk: opening, width, outer"
+HEAD = (
+    f"  {'':{WIDTH}}{'ACC (95 %)':23}p b m  elsewhere  candidates  joins  hard  overlap  smooth  "
+    "variance and jerk: opening, width, outer"
+)
 NOTE = (
     "* differs from the system as printed: the 95 % interval of the difference on the same clips leaves out 0\n"
-    "p b m: share closed, without pins, %; elsewhere: closings outside p b m a minute; joins: a clip; hard: share that "
-    "abuts, %;\nsmooth: share where the velocity changes by no more than the speaker's own 95th percentile, %; "
-    "variance and jerk: by those of the recordings\nThe paper prints no figures of its own."
+    "p b m: share closed, without pins, %; elsewhere: closings outside p b m a minute; candidates: a phone (median);\n"
+    "joins: a clip; hard: share that abuts, %; overlap: error of the opening, in thousandths of the eye distance, in\n"
+    "phones in which the system as printed overlaps units, but not half and half; smooth: share where the velocity\n"
+    "changes by no more than the speaker's own 95th percentile, %; variance and jerk: by those of the recordings\n"
+    "The paper prints no figures of its own."
 )
 
 
@@ -75,12 +93,15 @@ def _line(name: str, row: Mapping[str, Any]) -> str:
     joins, channels = row["joins"], [row["channels"].get(each) for each in DISTANCES]
     acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], significance_mark(row["acc_gain_95"]), *row["acc_95"])
     shares = [figure_text(None if joins[key] is None else 100 * joins[key], ".0f") for key in ("hard", "smooth")]
+    wrong = row["overlap"]["error"]
+    overlap = figure_text(None if wrong is None else 1000 * wrong, ".1f") + significance_mark(row["overlap"]["gain_95"])
     ratios = [
         "/".join(figure_text(each[key], ".2f") for each in channels if each) for key in ("global_variance", "jerk")
     ]
     return (
         f"  {name:{WIDTH}}{acc:23}{figure_text(row['recall_p_b_m'], '5.1f')}"
-        f"{figure_text(row['false_per_minute'], '11.1f')}{joins['per_clip']:7.1f}{shares[0]:>6}{shares[1]:>8}  "
+        f"{figure_text(row['false_per_minute'], '11.1f')}{joins['candidates']:12.0f}{joins['per_clip']:7.1f}"
+        f"{shares[0]:>6}{overlap:>9}{shares[1]:>8}  "
         f"{'  '.join(ratios)}"
     )
 
@@ -89,6 +110,7 @@ Array = NDArray[np.float64]
 REACH = 4
 """Frames before and after a frame between which velocities are compared: 40 ms, a picture of a video."""
 PERCENTILES = (50, 75, 95)
+HALF = 0.5
 
 
 def join_figures(
@@ -96,13 +118,14 @@ def join_figures(
 ) -> dict[str, Any]:
     """Return how many joins some speech takes, and how much the velocity of the opening changes there.
 
-    ``hard`` is the share of joins in which units abut; ``smooth`` that of joins where the velocity changes by no more
-    than the 95th percentile of the recordings.
+    ``candidates`` is the median number of units that are looked up for a phone, ``single`` the share of phones that
+    have one alone; ``hard`` is the share of joins in which units abut; ``smooth`` that of joins where the velocity
+    changes by no more than the 95th percentile of the recordings.
     """
-    costs, kinds, changes, recorded = model.costs(engine.config), [], [], []
+    kinds, changes, recorded, candidates = [], [], [], list[int]()
     for utterance, spoken in zip(utterances, speech, strict=True):
-        target = target_of(model, costs, spoken)
-        pieces = pieces_of(costs, target, select(costs, target).units)
+        costs, target, pieces = select_pieces(engine, model, spoken)
+        candidates += [len(costs.candidates(target, number)) for number in range(len(target))]
         opening = engine.generate(model, spoken).motion[OPENING]
         frames = np.array([round(piece.start_s * FRAME_RATE_HZ) for piece in pieces[1:]], np.intp)
         changes.append(velocity_change(opening)[np.minimum(frames, len(opening) - 1)])
@@ -114,6 +137,8 @@ def join_figures(
     made, own = np.concatenate(changes), np.concatenate(recorded)
     bound = float(np.percentile(own, PERCENTILES[-1])) if len(own) else float("nan")
     return {
+        "candidates": float(np.median(candidates)),
+        "single": float(np.mean(np.array(candidates) == 1)),
         "joins": len(kinds),
         "per_clip": len(kinds) / len(utterances),
         "hard": kinds.count(ABUTTING_JOIN) / len(kinds) if kinds else float("nan"),
@@ -121,6 +146,19 @@ def join_figures(
         "changes": np.percentile(made, PERCENTILES).tolist() if kinds else None,
         "recorded_changes": np.percentile(own, PERCENTILES).tolist() if len(own) else None,
     }
+
+
+def select_pieces(engine: SelectionEngine, model: SelectionModel, speech: Speech) -> tuple[Costs, Target, list[Piece]]:
+    """Return the costs of a system, the phones of some speech, and the pieces that it chooses for them."""
+    costs = model.costs(engine.config)
+    target = target_of(model, costs, speech)
+    return costs, target, pieces_of(costs, target, select(costs, target).units)
+
+
+def overlap_times_s(costs: Costs, target: Target, pieces: Sequence[Piece]) -> Array:
+    """Return start and end of the phones in which pieces overlap in other shares than halves [shape=(N, 2)]."""
+    shared = [piece.first - (piece.join == JOIN_BEFORE) for piece in pieces[1:] if piece.join != ABUTTING_JOIN]
+    return target.windows.times_s[[number for number in shared if costs.forward_share(target, number) != HALF]]
 
 
 def velocity_change(curve: NDArray[np.floating[Any]]) -> Array:
@@ -133,11 +171,11 @@ ENGINE = "selection"
 PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
 DEFAULTS = SelectionConfig().as_mapping()
 ADDITIONS: Mapping[str, tuple[str, ...]] = {
-    "300 candidates a bias": ("candidates",),
+    "300 candidates a bias, 25 searched": ("candidates", "beam"),
     "guide from the sound": ("guide",),
-    "300 candidates and the guide": ("candidates", "guide"),
+    "300 candidates and the guide": ("candidates", "beam", "guide"),
     "joins cost what motions differ by": ("join",),
-    "300 candidates and this": ("candidates", "join"),
+    "300 candidates and this": ("candidates", "beam", "join"),
     "durations count": ("duration",),
     "own phone recogniser": ("joint_recogniser",),
     "table of articulation": ("articulation",),
@@ -145,16 +183,18 @@ ADDITIONS: Mapping[str, tuple[str, ...]] = {
 }
 """Options of the preset that take the value of the default, by the name of the row."""
 VARIANTS: Mapping[str, Mapping[str, Any]] = {
+    "one candidate a bias": {"candidates": 1},
     "no phone invisible": {"suppressed": False, "invisible": ""},
     "t d g k l suppressed": {"invisible": "t d g k l"},
     "Table 1 symmetric: 73/27 for 77/23": {"overlap": "symmetric"},
+    "Table 1, forward is the phone after": {"overlap": "anticipatory"},
     "overlaps half and half": {"overlap": "middle"},
     "overlaps learned": {"overlap": "learned"},
     "window N = 3": {"window": 3},
     "window N = 7": {"window": 7},
 }
 """Other readings of the print, and what it leaves open."""
-_ROW, _SUMS = "row", "correlation"
+_ROW, _SUMS, _OVERLAP = "row", "correlation", "overlap"
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 
@@ -235,21 +275,27 @@ def _on_list(
     )
     conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
     spoken: dict[tuple[str, bool], list[Speech]] = {}
-    reference: dict[str, NDArray[np.float64]] = {}
+    reference: dict[str, tuple[Array, Array]] = {}
+    inside: dict[str, list[NDArray[np.bool_]]] = {}
+
+    def speak(condition: str, *, by_own_recogniser: bool) -> list[Speech]:
+        if (condition, by_own_recogniser) not in spoken:
+            listening = SelectionConfig(joint_recogniser=by_own_recogniser)
+            of_row = _of_the_row(model.learned, listening)
+            spoken[condition, by_own_recogniser] = make_speech(
+                recordings, condition, SelectionEngine(listening), of_row
+            )
+        return spoken[condition, by_own_recogniser]
+
     for name, config in with_progress(list(rows().items()), "comparing", sub_monitor(monitor, 0.4, 1)):
         learned = _of_the_row(model.learned, config)
         for condition, found in conditions.items():
             stage = f"{len(found)} {condition}"
             arrays = kept.load(stage)
             if arrays is None:
-                key = condition, config.joint_recogniser and condition == AUDIO_ONLY
-                if key not in spoken:
-                    listening = SelectionConfig(joint_recogniser=key[1])
-                    spoken[key] = make_speech(
-                        recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening)
-                    )
-                engine = SelectionEngine(config)
-                clips = generate_compared(recordings, spoken[key], engine, learned)
+                engine, own = SelectionEngine(config), config.joint_recogniser and condition == AUDIO_ONLY
+                speech = speak(condition, by_own_recogniser=own)
+                clips = generate_compared(recordings, speech, engine, learned)
                 settings.receive(name, condition, recordings, clips)
                 figures = figures_of(clips, recordings, settings.seed)
                 row = opening_row_with_rates(figures)
@@ -257,13 +303,31 @@ def _on_list(
                     channel: {figure: values[figure] for figure in WHAT_IS_SHOWN}
                     for channel, values in figures["channels"].items()
                 }
-                row["joins"] = join_figures(engine, learned, spoken[key], recordings.utterances)
-                statistic = correlation_statistic(*opening_curves(recordings, clips))
-                printed = replace(statistic, sums=list(reference.get(condition, statistic.sums)))
-                row["acc_gain_95"] = statistic.gain(printed, settings.seed)
-                arrays = {_ROW: np.array(json.dumps(row)), _SUMS: np.stack(statistic.sums)}
+                row["joins"] = join_figures(engine, learned, speech, recordings.utterances)
+                if condition not in inside:
+                    system, others = SelectionEngine(rows()[PRINTED]), speak(condition, by_own_recogniser=False)
+                    units = _of_the_row(model.learned, system.config)
+                    inside[condition] = [
+                        ((clip.time_s >= times_s[:, :1]) & (clip.time_s < times_s[:, 1:])).any(axis=0)
+                        for clip, each in zip(clips, others, strict=True)
+                        for times_s in [overlap_times_s(*select_pieces(system, units, each))]
+                    ]
+                both = opening_curves(recordings, clips)
+                statistic = correlation_statistic(*both)
+                masked = ([x[mask] for x, mask in zip(each, inside[condition], strict=True)] for each in both)
+                distance = distance_statistic(*masked)
+                sums = np.stack(statistic.sums), np.stack(distance.sums)
+                printed = reference.get(condition, sums)
+                row["acc_gain_95"] = statistic.gain(replace(statistic, sums=list(printed[0])), settings.seed)
+                gain = distance.gain(replace(distance, sums=list(printed[1])), settings.seed)
+                row["overlap"] = {
+                    "frames": int(np.concatenate(inside[condition]).sum()),
+                    "error": distance.value,
+                    "gain_95": gain,
+                }
+                arrays = {_ROW: np.array(json.dumps(row)), _SUMS: sums[0], _OVERLAP: sums[1]}
                 kept.save(stage, arrays)
-            reference.setdefault(condition, arrays[_SUMS])
+            reference.setdefault(condition, (arrays[_SUMS], arrays[_OVERLAP]))
             found[name] = json.loads(str(arrays[_ROW]))
     return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}
 

@@ -90,7 +90,10 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
         "hofer2008", help="which unit set predicts closings of the mouth, by the paper's own system (Table 1)"
     )
     parser.add_argument("--split", default="test", help="compare on test, val, train or all (default: test)")
-    add_experiment_arguments(parser, quick="one or two Gaussians a state")
+    channels = "model these channels of motion alone; opening,width: the two features of the paper (default: all)"
+    parser.add_argument("--channels", default="", metavar="NAME,NAME", help=channels)
+    parser.add_argument("--states", type=numbers, metavar="N,N", help="states of a unit (default: 3,5; quick: 5)")
+    add_experiment_arguments(parser, quick="one or two Gaussians")
     parser.set_defaults(run=run_hofer2008)
 
 
@@ -98,7 +101,8 @@ def run_hofer2008(options: argparse.Namespace) -> None:
     """Call ``hofer2008`` and print its table."""
     from lipmotion_lab.hofer2008 import FULL, QUICK, hofer2008, table
 
-    chosen = QUICK if options.quick else FULL
+    usual = QUICK if options.quick else FULL
+    chosen = replace(usual, channels=options.channels.replace(",", " "), states=options.states or usual.states)
     run_experiment(options, partial(hofer2008, options=chosen, split=list_or_all(options.split)), table)
 
 

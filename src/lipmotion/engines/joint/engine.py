@@ -85,6 +85,7 @@ class JointEngineConfig(Configuration):
     states     : states per unit, left to right, without skips
     mixtures, motion_mixtures : Gaussians per state of speech, and of motion (powers of two)
     components : principal components that all point channels are reduced to
+    channels   : channels of motion that are modelled, as ``opening width``; empty: all
     f0         : model the three streams of F0 (False: their weights are 0 everywhere)
     motion_in_training : the motion stream takes part when states are aligned in training (False: its weight is 0)
     speech_weight, f0_weight, motion_weight : of the streams when states are aligned in training
@@ -129,6 +130,7 @@ class JointEngineConfig(Configuration):
     both_neighbours: bool = option(False, omit_default=True)
     flat_start: bool = option(False, omit_default=True)
     modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
+    channels: str = option("", omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"hofer2008": HOFER_2008}
     aliases: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
@@ -246,6 +248,7 @@ class JointEngine(Engine[JointModel]):
         monitor: Monitor,
         checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes two minutes
     ) -> Fit[JointModel]:
+        examples = self._with_channels(examples)
         learning = self._learning(examples)
         hmm = train_joint(learning.utterances, learning.inventory, learning.units.classes(), self.config.hmm, monitor)
         figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
@@ -257,10 +260,15 @@ class JointEngine(Engine[JointModel]):
         """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``. Raises
         as that.
         """
-        learning = self._learning(examples)
+        learning = self._learning(self._with_channels(examples))
         classes = learning.units.classes()
         for hmm in grow_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor):
             yield learning.model(with_durations(hmm, learning.utterances))
+
+    def _with_channels(self, examples: Sequence[Example]) -> Sequence[Example]:
+        """Return examples with the channels that are modelled. Raises InputError: there is no such channel."""
+        names = self.config.channels.split()
+        return [replace(each, motion=each.motion.selected(names)) for each in examples] if names else examples
 
     def _learning(self, examples: Sequence[Example]) -> _Learning:
         """Return what the joint model is trained on. Raises CorpusError: there is no speech."""

@@ -17,6 +17,7 @@ from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, find_similar_lips
 
 LINE = 110
+LEFT, RIGHT, NO_BIAS = range(3)
 
 
 def source_of(inventory: RecordedUnits, unit: int) -> str:
@@ -155,7 +156,8 @@ class UnitIndex:
         """Return the units whose windows agree best with a window, in ascending order.
 
         window   : symbols [shape=(N,)]; the phone itself is in the middle
-        count    : for each bias so many of the longest agreement; of equally long ones those that cost least
+        count    : for each bias so many of the longest agreement; of equally long ones those that cost least. 0: every
+                   match, all units of the longest agreement to the left, to the right, and equally far on both sides
         excluded : units that are not wanted [shape=(U,)]
         costs    : what units cost [shape=(N,)]; where it is the same, or None, those of the lowest keys are taken
         Empty, if no unit has the phone.
@@ -163,7 +165,7 @@ class UnitIndex:
         found = [
             each
             for bias, (order, keys) in enumerate(zip(self.orders, self.keys, strict=True))
-            for each in _longest(order, keys, window[digits(bias, len(window))], count, excluded, costs)
+            for each in _longest(order, keys, window[digits(bias, len(window))], count, excluded, costs, bias)
         ]
         return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
 
@@ -182,7 +184,7 @@ def unit_index(inventory: RecordedUnits, invisible: Collection[str], window: int
 
 
 def digits(bias: int, window: int) -> list[int]:
-    """Return the columns of a window in the order of a key; bias 0 is left, 1 right, 2 none."""
+    """Return the columns of a window in the order of a key; ``LEFT``, ``RIGHT`` or ``NO_BIAS``."""
     middle = window // 2
     left, right = list(range(middle - 1, -1, -1)), list(range(middle + 1, window))
     sides = (left + right, right + left, [column for pair in zip(left, right, strict=True) for column in pair])
@@ -215,10 +217,13 @@ def _longest(
     count: int,
     excluded: NDArray[np.bool_] | None,
     costs: Callable[[UnitNumbers], Array] | None,
+    bias: int,
 ) -> Iterator[UnitNumbers]:
-    """Yield units in the order of the length of their agreement, until there are ``count``."""
+    """Yield units in the order of the length of their agreement, until there are ``count``; of 0, of one length."""
     inner: tuple[int, int] | None = None
-    for length in range(len(symbols), 0, -1):
+    matches = range(len(symbols), 0, -2) if bias == NO_BIAS else range(len(symbols) // 2 + 1, 0, -1)
+    found = 0
+    for length in range(len(symbols), 0, -1) if count else matches:
         low = int(_keys(symbols[None, :length])[0]) * SYMBOLS ** (len(symbols) - length)
         first, stop = np.searchsorted(keys, [low, low + SYMBOLS ** (len(symbols) - length)]).tolist()
         outside = [(first, stop)] if inner is None else [(first, inner[0]), (inner[1], stop)]
@@ -227,11 +232,13 @@ def _longest(
             units = order[begin:end]
             if excluded is not None:
                 units = units[~excluded[units]]
-            if costs is not None and len(units) > count:
+            if costs is not None and 0 < count - found < len(units):
                 units = units[np.argsort(costs(units), kind="stable")]
-            units = units[:count]
-            count -= len(units)
+            units = units[: count - found] if count else units
+            found += len(units)
             if len(units):
                 yield units
-            if count <= 0:
+            if 0 < count <= found:
                 return
+        if found and not count:
+            return
