@@ -198,8 +198,11 @@ _ROW, _SUMS, _OVERLAP = "row", "correlation", "overlap"
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 
-def rows() -> dict[str, SelectionConfig]:
-    """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged."""
+def rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
+    """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged.
+
+    guided : with the rows whose models learn from the sound, a guide or phones of the speaker's own
+    """
     printed = SelectionConfig.parsed(MINNIS_2000)
     found = {PRINTED: printed}
     found |= {
@@ -208,7 +211,8 @@ def rows() -> dict[str, SelectionConfig]:
     }
     found |= {name: replace(printed, **changes) for name, changes in VARIANTS.items()}
     everything = SelectionConfig(closures=False)
-    return found | {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
+    found |= {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
+    return {name: each for name, each in found.items() if guided or not (each.guide or each.joint_recogniser)}
 
 
 @one_thread()
@@ -217,6 +221,7 @@ def minnis2000(
     *,
     models: Path | None = None,
     quick: bool = False,
+    guided: bool = True,
     work: Path | None = None,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
@@ -224,6 +229,8 @@ def minnis2000(
 
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
+    quick  : only see that it runs: few epochs
+    guided : as of ``rows``; without, training takes a minute instead of twenty, and no model is kept
     work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
@@ -238,8 +245,10 @@ def minnis2000(
     monitor = settings.monitor
     training = replace(settings, monitor=sub_monitor(monitor, 0, 0.6))
     kept_in = models or (work and work / "model")
-    if quick:
-        start_s, model = perf_counter(), train_engine(corpus, engine_named(ENGINE, {"epochs": 20}), training)
+    if quick or not guided:
+        options = ({} if guided else {"guide": 0.0, "joint_recogniser": False}) | ({"epochs": 20} if quick else {})
+        start_s, engine = perf_counter(), engine_named(ENGINE, options)
+        model = train_engine(corpus, engine, training, work and work / "model")
         trained = EngineModel(model, perf_counter() - start_s)
     else:
         trained = engine_models(corpus, kept_in, training, [ENGINE])[ENGINE]
@@ -247,21 +256,28 @@ def minnis2000(
     for number, (split, names) in enumerate(lists.items()):
         start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))
         part = replace(settings, monitor=sub_monitor(monitor, start, stop, f"{split}: "))
-        key = PartKey(trained.model.engine, names, model=trained.model, others=str(rows()))
+        key = PartKey(trained.model.engine, names, model=trained.model, others=str(rows(guided=guided)))
         kept = open_parts(work and work / split, corpus, settings, key)
-        found[split] = _on_list(corpus, names, trained.model, kept, part)
+        found[split] = _on_list(corpus, names, trained.model, rows(guided=guided), kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
     printed = vars(SelectionConfig.parsed(MINNIS_2000))
-    options = {name: vars(config).items() for name, config in rows().items()}
     about |= {
-        "rows": {name: {key: value for key, value in of if value != printed[key]} for name, of in options.items()}
+        "rows": {
+            name: {key: value for key, value in vars(config).items() if value != printed[key]}
+            for name, config in rows(guided=guided).items()
+        }
     }
     return nan_as_null(about | {"lists": found})
 
 
 def _on_list(
-    corpus: Corpus, names: Sequence[str], model: Model, kept: Checkpoint, settings: ExperimentSettings
+    corpus: Corpus,
+    names: Sequence[str],
+    model: Model,
+    systems: Mapping[str, SelectionConfig],
+    kept: Checkpoint,
+    settings: ExperimentSettings,
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
     monitor = settings.monitor
@@ -287,7 +303,7 @@ def _on_list(
             )
         return spoken[condition, by_own_recogniser]
 
-    for name, config in with_progress(list(rows().items()), "comparing", sub_monitor(monitor, 0.4, 1)):
+    for name, config in with_progress(list(systems.items()), "comparing", sub_monitor(monitor, 0.4, 1)):
         learned = _of_the_row(model.learned, config)
         for condition, found in conditions.items():
             stage = f"{len(found)} {condition}"
@@ -305,7 +321,7 @@ def _on_list(
                 }
                 row["joins"] = join_figures(engine, learned, speech, recordings.utterances)
                 if condition not in inside:
-                    system, others = SelectionEngine(rows()[PRINTED]), speak(condition, by_own_recogniser=False)
+                    system, others = SelectionEngine(systems[PRINTED]), speak(condition, by_own_recogniser=False)
                     units = _of_the_row(model.learned, system.config)
                     inside[condition] = [
                         ((clip.time_s >= times_s[:, :1]) & (clip.time_s < times_s[:, 1:])).any(axis=0)

@@ -17,7 +17,6 @@ from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, find_similar_lips
 
 LINE = 110
-LEFT, RIGHT, NO_BIAS = range(3)
 
 
 def source_of(inventory: RecordedUnits, unit: int) -> str:
@@ -157,16 +156,22 @@ class UnitIndex:
 
         window   : symbols [shape=(N,)]; the phone itself is in the middle
         count    : for each bias so many of the longest agreement; of equally long ones those that cost least. 0: every
-                   match, all units of the longest agreement to the left, to the right, and equally far on both sides
+                   contextual match: all units of the longest agreement to the left, to the right, and equally far to
+                   both sides; where no neighbour agrees, all units of the phone
         excluded : units that are not wanted [shape=(U,)]
         costs    : what units cost [shape=(N,)]; where it is the same, or None, those of the lowest keys are taken
         Empty, if no unit has the phone.
         """
+        length = len(window)
+        sides = (range(length // 2 + 1, 1, -1), range(length // 2 + 1, 1, -1), range(length, 1, -2))
+        lengths = sides if not count else (range(length, 0, -1),) * 3
         found = [
             each
             for bias, (order, keys) in enumerate(zip(self.orders, self.keys, strict=True))
-            for each in _longest(order, keys, window[digits(bias, len(window))], count, excluded, costs, bias)
+            for each in _longest(order, keys, window[digits(bias, length)], lengths[bias], count, excluded, costs)
         ]
+        if not found and not count:
+            found = [*_longest(self.orders[0], self.keys[0], window[digits(0, length)], (1,), 0, excluded, costs)]
         return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
 
 
@@ -184,7 +189,7 @@ def unit_index(inventory: RecordedUnits, invisible: Collection[str], window: int
 
 
 def digits(bias: int, window: int) -> list[int]:
-    """Return the columns of a window in the order of a key; ``LEFT``, ``RIGHT`` or ``NO_BIAS``."""
+    """Return the columns of a window in the order of a key; bias 0 is left, 1 right, 2 none."""
     middle = window // 2
     left, right = list(range(middle - 1, -1, -1)), list(range(middle + 1, window))
     sides = (left + right, right + left, [column for pair in zip(left, right, strict=True) for column in pair])
@@ -214,16 +219,15 @@ def _longest(
     order: UnitNumbers,
     keys: NDArray[np.int64],
     symbols: NDArray[np.intp],
+    lengths: Iterable[int],
     count: int,
     excluded: NDArray[np.bool_] | None,
     costs: Callable[[UnitNumbers], Array] | None,
-    bias: int,
 ) -> Iterator[UnitNumbers]:
-    """Yield units in the order of the length of their agreement, until there are ``count``; of 0, of one length."""
+    """Yield units whose agreement has some falling lengths, until there are ``count``; 0: those of the first length."""
     inner: tuple[int, int] | None = None
-    matches = range(len(symbols), 0, -2) if bias == NO_BIAS else range(len(symbols) // 2 + 1, 0, -1)
     found = 0
-    for length in range(len(symbols), 0, -1) if count else matches:
+    for length in lengths:
         low = int(_keys(symbols[None, :length])[0]) * SYMBOLS ** (len(symbols) - length)
         first, stop = np.searchsorted(keys, [low, low + SYMBOLS ** (len(symbols) - length)]).tolist()
         outside = [(first, stop)] if inner is None else [(first, inner[0]), (inner[1], stop)]
