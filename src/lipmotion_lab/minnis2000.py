@@ -248,7 +248,7 @@ def minnis2000(
     if quick or not guided:
         options = ({} if guided else {"guide": 0.0, "joint_recogniser": False}) | ({"epochs": 20} if quick else {})
         start_s, engine = perf_counter(), engine_named(ENGINE, options)
-        model = train_engine(corpus, engine, training, work and work / "model")
+        model = train_engine(corpus, engine, training, work)
         trained = EngineModel(model, perf_counter() - start_s)
     else:
         trained = engine_models(corpus, kept_in, training, [ENGINE])[ENGINE]
