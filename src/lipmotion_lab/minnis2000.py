@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -109,7 +110,6 @@ def _line(name: str, row: Mapping[str, Any]) -> str:
 Array = NDArray[np.float64]
 REACH = 4
 """Frames before and after a frame between which velocities are compared: 40 ms, a picture of a video."""
-PERCENTILES = (50, 75, 95)
 HALF = 0.5
 
 
@@ -135,7 +135,7 @@ def join_figures(
         start_s, end_s = target.windows.times_s[0, 1], target.windows.times_s[-1, 0]
         recorded.append(velocity_change(original)[int(start_s * FRAME_RATE_HZ) : int(end_s * FRAME_RATE_HZ)])
     made, own = np.concatenate(changes), np.concatenate(recorded)
-    bound = float(np.percentile(own, PERCENTILES[-1])) if len(own) else float("nan")
+    bound = float(np.percentile(own, 95)) if len(own) else float("nan")
     return {
         "candidates": float(np.median(candidates)),
         "single": float(np.mean(np.array(candidates) == 1)),
@@ -143,8 +143,6 @@ def join_figures(
         "per_clip": len(kinds) / len(utterances),
         "hard": kinds.count(ABUTTING_JOIN) / len(kinds) if kinds else float("nan"),
         "smooth": float(np.mean(made <= bound)) if kinds else float("nan"),
-        "changes": np.percentile(made, PERCENTILES).tolist() if kinds else None,
-        "recorded_changes": np.percentile(own, PERCENTILES).tolist() if len(own) else None,
     }
 
 
@@ -290,18 +288,23 @@ def _on_list(
         monitor=sub_monitor(monitor, 0, 0.4),
     )
     conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
-    spoken: dict[tuple[str, bool], list[Speech]] = {}
     reference: dict[str, tuple[Array, Array]] = {}
-    inside: dict[str, list[NDArray[np.bool_]]] = {}
 
-    def speak(condition: str, *, by_own_recogniser: bool) -> list[Speech]:
-        if (condition, by_own_recogniser) not in spoken:
-            listening = SelectionConfig(joint_recogniser=by_own_recogniser)
-            of_row = _of_the_row(model.learned, listening)
-            spoken[condition, by_own_recogniser] = make_speech(
-                recordings, condition, SelectionEngine(listening), of_row
-            )
-        return spoken[condition, by_own_recogniser]
+    @cache
+    def speak(condition: str, by_own_recogniser: bool) -> list[Speech]:
+        listening = SelectionConfig(joint_recogniser=by_own_recogniser)
+        return make_speech(recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening))
+
+    @cache
+    def find_overlaps(condition: str) -> list[NDArray[np.bool_]]:
+        """Return which frames of each recording ``overlap`` is about: where the system as printed overlaps units."""
+        system, masks = SelectionEngine(systems[PRINTED]), list[NDArray[np.bool_]]()
+        units = _of_the_row(model.learned, system.config)
+        for utterance, speech in zip(recordings.utterances, speak(condition, False), strict=True):
+            time_s = np.flatnonzero(utterance.track.seen) / utterance.track.motion.rate_hz
+            start_s, end_s = overlap_times_s(*select_pieces(system, units, speech)).T[:, :, None]
+            masks.append(((time_s >= start_s) & (time_s < end_s)).any(axis=0))
+        return masks
 
     for name, config in with_progress(list(systems.items()), "comparing", sub_monitor(monitor, 0.4, 1)):
         learned = _of_the_row(model.learned, config)
@@ -309,8 +312,8 @@ def _on_list(
             stage = f"{len(found)} {condition}"
             arrays = kept.load(stage)
             if arrays is None:
-                engine, own = SelectionEngine(config), config.joint_recogniser and condition == AUDIO_ONLY
-                speech = speak(condition, by_own_recogniser=own)
+                engine = SelectionEngine(config)
+                speech = speak(condition, config.joint_recogniser and condition == AUDIO_ONLY)
                 clips = generate_compared(recordings, speech, engine, learned)
                 settings.receive(name, condition, recordings, clips)
                 figures = figures_of(clips, recordings, settings.seed)
@@ -320,26 +323,19 @@ def _on_list(
                     for channel, values in figures["channels"].items()
                 }
                 row["joins"] = join_figures(engine, learned, speech, recordings.utterances)
-                if condition not in inside:
-                    system, others = SelectionEngine(systems[PRINTED]), speak(condition, by_own_recogniser=False)
-                    units = _of_the_row(model.learned, system.config)
-                    inside[condition] = [
-                        ((clip.time_s >= times_s[:, :1]) & (clip.time_s < times_s[:, 1:])).any(axis=0)
-                        for clip, each in zip(clips, others, strict=True)
-                        for times_s in [overlap_times_s(*select_pieces(system, units, each))]
-                    ]
-                both = opening_curves(recordings, clips)
-                statistic = correlation_statistic(*both)
-                masked = ([x[mask] for x, mask in zip(each, inside[condition], strict=True)] for each in both)
-                distance = distance_statistic(*masked)
-                sums = np.stack(statistic.sums), np.stack(distance.sums)
-                printed = reference.get(condition, sums)
-                row["acc_gain_95"] = statistic.gain(replace(statistic, sums=list(printed[0])), settings.seed)
-                gain = distance.gain(replace(distance, sums=list(printed[1])), settings.seed)
+                both, inside = opening_curves(recordings, clips), find_overlaps(condition)
+                parts = ([x[mask] for x, mask in zip(each, inside, strict=True)] for each in both)
+                statistics = correlation_statistic(*both), distance_statistic(*parts)
+                sums = [np.stack(each.sums) for each in statistics]
+                gains = [
+                    each.gain(replace(each, sums=list(printed)), settings.seed)
+                    for each, printed in zip(statistics, reference.get(condition, sums), strict=True)
+                ]
+                row["acc_gain_95"] = gains[0]
                 row["overlap"] = {
-                    "frames": int(np.concatenate(inside[condition]).sum()),
-                    "error": distance.value,
-                    "gain_95": gain,
+                    "frames": int(np.concatenate(inside).sum()),
+                    "error": statistics[1].value,
+                    "gain_95": gains[1],
                 }
                 arrays = {_ROW: np.array(json.dumps(row)), _SUMS: sums[0], _OVERLAP: sums[1]}
                 kept.save(stage, arrays)
