@@ -99,14 +99,15 @@ def run_motion(options: argparse.Namespace) -> None:
     from lipmotion.types import Timeline
 
     corpus, chosen = Corpus.open(options.corpus), [name for name in options.channels.split(",") if name]
-    names = corpus.required(list_or_all(options.split))
-    make_folder(options.output)
-    for name in names:
+    tracked = {}
+    for name in corpus.required(list_or_all(options.split)):
         utterance = corpus.utterance(name)
         motion = utterance.track.motion.selected(chosen) if chosen else utterance.track.motion
-        tracked = as_generation(motion, utterance.phones or Timeline(()))
-        write_motion(options.output / f"{name}.json", tracked, source={"tracked": name}, model={})
-    print_line(f"{options.output}: the motion of {len(names)} recordings")
+        tracked[name] = as_generation(motion, utterance.phones or Timeline(()))
+    make_folder(options.output)
+    for name, generation in tracked.items():
+        write_motion(options.output / f"{name}.json", generation, source={"tracked": name}, model={})
+    print_line(f"{options.output}: the motion of {len(tracked)} recordings")
 
 
 def run_sync(options: argparse.Namespace) -> None:

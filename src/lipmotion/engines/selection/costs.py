@@ -318,6 +318,8 @@ class Costs:
 
     def _distances(self, left: UnitNumbers, at_left: float, right: UnitNumbers, at_right: float) -> Array:
         """Return the squared deviations between units at fractions of their durations, weighted."""
+        if not self.config.join:
+            return np.zeros((len(left), len(right)))
         a, b = self._states(at_left)[left], self._states(at_right)[right]
         squares = np.square(a).sum(axis=1)[:, None] + np.square(b).sum(axis=1)
         return self.config.join * np.maximum(squares - 2 * a @ b.T, 0)
