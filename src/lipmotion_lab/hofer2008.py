@@ -185,7 +185,7 @@ def _train_system(
     """
     config, tried, arrays = engine.config, dict[tuple[int, int], float](), dict[str, Any]()
 
-    def try_numbers(monitor: Monitor, **most: int) -> None:
+    def try_numbers(monitor: Monitor, **most: Any) -> None:
         for model in JointEngine(replace(config, **most)).growing_models(examples, monitor):
             speech, motion = (model.hmm.models[stream].tied.mixtures.size[1] for stream in (SPEECH, MOTION))
             if (speech, motion) in tried or speech not in options.mixtures or motion not in options.motion_mixtures:
