@@ -64,7 +64,7 @@ from lipmotion_lab.runner import (
     opening_row_with_rates,
 )
 
-WIDTH = 36
+WIDTH = 37
 HEAD = (
     f"  {'':{WIDTH}}{'ACC (95 %)':23}p b m  elsewhere  candidates  joins  hard  overlap  smooth  "
     "variance and jerk: opening, width, outer"
@@ -72,9 +72,9 @@ HEAD = (
 NOTE = (
     "* differs from the system as printed: the 95 % interval of the difference on the same clips leaves out 0\n"
     "p b m: share closed, without pins, %; elsewhere: closings outside p b m a minute; candidates: a phone (median);\n"
-    "joins: a clip; hard: share that abuts, %; overlap: error of the opening, in thousandths of the eye distance, in\n"
-    "phones in which the system as printed overlaps units, but not half and half; smooth: share where the velocity\n"
-    "changes by no more than the speaker's own 95th percentile, %; variance and jerk: by those of the recordings\n"
+    "joins: a clip; hard: share that abuts, %; overlap: error of the opening, in eye distances, in phones in which\n"
+    "the system as printed overlaps units, but not half and half; smooth: share where the velocity changes by no\n"
+    "more than the speaker's own 95th percentile, %; variance and jerk: by those of the recordings\n"
     "The paper prints no figures of its own."
 )
 
@@ -94,8 +94,7 @@ def _line(name: str, row: Mapping[str, Any]) -> str:
     joins, channels = row["joins"], [row["channels"].get(each) for each in DISTANCES]
     acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], significance_mark(row["acc_gain_95"]), *row["acc_95"])
     shares = [figure_text(None if joins[key] is None else 100 * joins[key], ".0f") for key in ("hard", "smooth")]
-    wrong = row["overlap"]["error"]
-    overlap = figure_text(None if wrong is None else 1000 * wrong, ".1f") + significance_mark(row["overlap"]["gain_95"])
+    overlap = figure_text(row["overlap"]["error"], ".4f") + significance_mark(row["overlap"]["gain_95"])
     ratios = [
         "/".join(figure_text(each[key], ".2f") for each in channels if each) for key in ("global_variance", "jerk")
     ]

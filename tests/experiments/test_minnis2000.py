@@ -127,5 +127,5 @@ def test_every_row_stands_in_the_table(figures):
         for systems in found["conditions"].values():
             assert list(systems) == list(rows())
             for name, row in systems.items():
-                assert f"  {name:36}{row['acc']:.3f}" in text
+                assert f"  {name:37}{row['acc']:.3f}" in text
                 assert row["joins"]["per_clip"] > 0

@@ -164,7 +164,7 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
 
 def _effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
     """Return which of some rows are better than the system as printed, worse, and neither for sure."""
-    signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names}
+    signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names if name in rows}
     printed = rows[PRINTED]["acc"]
     described = {name: f"{name} ({figure_text(difference(rows[name]['acc'], printed), '+.3f')})" for name in signs}
     outcomes = ((1, "ACC is higher"), (-1, "ACC is lower"), (0, "The interval of the difference contains 0"))
