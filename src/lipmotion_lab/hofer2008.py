@@ -187,7 +187,8 @@ def _train_system(
 
     def try_numbers(monitor: Monitor, **most: Any) -> None:
         for model in JointEngine(replace(config, **most)).growing_models(examples, monitor):
-            speech, motion = (model.hmm.models[stream].tied.mixtures.size[1] for stream in (SPEECH, MOTION))
+            sizes = (model.hmm.models[stream].tied.mixtures.size[1] for stream in (SPEECH, MOTION))
+            speech, motion = (1 << (size - 1).bit_length() for size in sizes)  # where data is short, not all are split
             if (speech, motion) in tried or speech not in options.mixtures or motion not in options.motion_mixtures:
                 continue
             clips = generate_clips(choosing, AUDIO_ONLY, engine, model)
