@@ -53,7 +53,7 @@ test-explore: $(VENV)/dev
 
 # their own warnings of what Python will remove are not ours
 test-agents: $(AGENTS)/ready
-	PYTHONPATH=src $(AGENTS)/bin/python scripts/processor_time.py --limit 60 $(AGENTS)/bin/python -m pytest -W ignore::DeprecationWarning tests/agents
+	PYTHONPATH=src:extras $(AGENTS)/bin/python scripts/processor_time.py --limit 60 $(AGENTS)/bin/python -m pytest -W ignore::DeprecationWarning tests/agents
 
 check: $(VENV)/dev
 	$(BIN)/ruff format --check .
@@ -71,7 +71,7 @@ coverage: $(VENV)/dev
 fuzz: $(VENV)/dev
 	mkdir -p $(BUILD)
 	PYTHONPATH=tests $(BIN)/python -m fuzz --minutes $(MINUTES) --seed $(SEED) $(addprefix --reader ,$(READER)) \
-	  --found $(BUILD)/fuzz --json $(BUILD)/fuzz.json
+	  --found $(BUILD)/fuzz
 
 bench: $(VENV)/dev
 	$(BIN)/python benchmarks/main_path.py --grid $(GRID) --full

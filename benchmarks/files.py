@@ -19,16 +19,16 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.extend(str(Path(__file__).parents[1] / folder) for folder in ("tests", "extras"))
 
 import lipmotion
-from lipmotion.addons.blender.curves import at_frames
 from lipmotion.formats.blender import write_addon
-from lipmotion.meshes.fitting.driven import load_character
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.output import measure_prosody
 from lipmotion.types import Generation
+from lipmotion_blender.curves import at_frames
+from lipmotion_faces.characters.character_files import load_character
+from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.stage import figure, head_mesh, mouth_weights

@@ -3,8 +3,8 @@
     python benchmarks/mutants.py MUTANTS.json [--tree .] [--only NAME ...] [--tests PATH ...] [--rest] [--every]
                                  [--list] [-o RESULTS.json] [-- PYTEST OPTIONS]
 
-MUTANTS.json is a list of objects: ``name``, ``path`` (below ``src/lipmotion`` or ``src``), ``old`` (text that it holds
-exactly once), ``new`` (what takes its place), and ``tests`` (files or folders of the tree: where a test should fail).
+MUTANTS.json is a list of objects: ``name``, ``path`` (below ``src/lipmotion``, ``src`` or the tree), ``old`` (text that
+it holds once), ``new`` (what takes its place), and ``tests`` (files or folders of the tree: where a test should fail).
 
 Each mutant gets a fresh copy of the tree, so the tree itself is never changed, and one run of pytest that stops at the
 first failing test. A test that fails also without the mutant does not count: it is left out, and the run repeated.
@@ -29,9 +29,9 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-PACKAGES = Path("src"), Path("src") / "lipmotion"
-PARTS = (".ci", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "SECURITY.md",
-         "benchmarks", "docs", "examples", "pyproject.toml", "requirements", "scripts", "src", "tests")  # fmt: skip
+PACKAGES = Path("src"), Path("src") / "lipmotion", Path()
+PARTS = """.ci CHANGELOG.md CITATION.cff CONTRIBUTING.md LICENSE Makefile README.md SECURITY.md benchmarks docs examples
+extras pyproject.toml requirements scripts src tests""".split()
 """What tests may look at, as far as the tree has it."""
 ALL = ("tests",)
 SHARED = "shared"
@@ -48,7 +48,7 @@ FAILURE = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 class Mutant:
     """A small bug.
 
-    path  : of the file, below ``src/lipmotion`` or ``src``
+    path  : of the file, below ``src/lipmotion``, ``src`` or the tree
     old   : text that it holds exactly once
     new   : what takes its place
     tests : where a test should fail

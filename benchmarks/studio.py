@@ -41,7 +41,6 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 
 from lipmotion.formats.sound import write_sound  # noqa: E402
 from lipmotion.kernels.compiler import numba_works  # noqa: E402
-from lipmotion.meshes.fitting.driven import load_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
 from lipmotion.pipeline.edits import parse_step  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
@@ -49,6 +48,7 @@ from lipmotion.pipeline.request import Request  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
 from lipmotion.storage.json_text import as_json  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
+from lipmotion_faces.characters.character_files import load_character  # noqa: E402
 from lipmotion_faces.mesh import MeshFace  # noqa: E402
 from lipmotion_faces.outputs.shown_faces import ShownFace, shown_face  # noqa: E402
 from lipmotion_faces.registry import make_face  # noqa: E402

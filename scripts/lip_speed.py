@@ -16,14 +16,14 @@ import numpy as np
 
 import lipmotion
 from lipmotion.motion.space import resample_to_model
-from lipmotion.speech.sound.sound_offset import (
+from lipmotion.types import FRAME_RATE_HZ, Features
+from lipmotion_faces.corpus.sound_offset import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     WEIGHTS,
     context_features,
     measured_opening_speed,
 )
-from lipmotion.types import FRAME_RATE_HZ, Features
 
 RIDGE = 100.0
 

@@ -107,7 +107,7 @@ def motion_formats() -> str:
     from lipmotion.formats.base import MOTION_FORMATS
 
     lines, only_written = [], []
-    for name in MOTION_FORMATS.built_in:
+    for name in MOTION_FORMATS.names:
         chosen = MOTION_FORMATS.load(name)
         says = line_on(name, chosen.write.__module__)
         says += f"; {chosen.rate_hz:g} frames a second" if chosen.rate_hz else ""
@@ -125,7 +125,7 @@ def cue_formats() -> str:
 
 def character_limits() -> str:
     """Return what the files of a character may hold."""
-    from lipmotion.meshes.model.file_limits import ALLOWANCE
+    from lipmotion_faces.characters.file_limits import ALLOWANCE
 
     return "At most " + ", ".join(f"{most:,} {what}" for what, most in ALLOWANCE.items()) + "."
 

@@ -7,8 +7,6 @@ terminal, without the settings of the shell, and as the leader of a process grou
 block, or after ``limit_s``; an alarm ends it where the tests themselves are killed.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import signal

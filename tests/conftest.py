@@ -1,7 +1,5 @@
 """What all tests share: the toy corpus, a model of it, the real recordings where they are present."""
 
-from __future__ import annotations
-
 import os
 
 # Before NumPy is loaded: two threads of a matrix product wait for one another in a loop, and for long where the machine

@@ -1,7 +1,5 @@
 """Extensions of installed packages, and built-in ones, by name."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

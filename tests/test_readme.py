@@ -1,7 +1,5 @@
 """What the README and the first steps say, done."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

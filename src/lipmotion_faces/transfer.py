@@ -23,7 +23,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Onto, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.files import check_source
+from lipmotion.storage.sources import check_source
 from lipmotion.types import Audio, Example, Track
 from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion_faces.tracking.frames import VideoSpan

@@ -9,13 +9,13 @@ import numpy as np
 
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.fitting.driven import load_character
-from lipmotion.meshes.model.file_limits import Budget
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
-from lipmotion.storage.files import temporary_folder
+from lipmotion.storage.locks import temporary_folder
 from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.delivery import MOODS, MoodKey
+from lipmotion_faces.characters.character_files import load_character
+from lipmotion_faces.characters.file_limits import Budget
+from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.filmed.face import SUFFIX
 from lipmotion_faces.mesh import MeshFace
 from lipmotion_faces.outputs.scenes import KEPT, head_scene, write_scene

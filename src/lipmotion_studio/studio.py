@@ -22,7 +22,9 @@ from lipmotion.pipeline.job import Job, check_outputs, open_face, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.request import Outputs
-from lipmotion.storage.files import create_folders, sha256_of, temporary_folder
+from lipmotion.storage.files import create_folders
+from lipmotion.storage.locks import temporary_folder
+from lipmotion.storage.sources import sha256_of
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import MANNERS, MOODS, Delivery, Staging
 from lipmotion.units import PHONES, is_silent, split_words

@@ -22,7 +22,8 @@ from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.edit_files import check_sound
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, train
-from lipmotion.storage.files import atomic_file, confine, create_folders, remove, unfinished_work
+from lipmotion.storage.files import atomic_file, confine, create_folders, remove
+from lipmotion.storage.locks import unfinished_work
 from lipmotion.types import Item, Monitor, Progress, sub_monitor
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.units import Lexicon

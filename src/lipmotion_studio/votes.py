@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.storage.files import read_text_file
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.sources import read_text_file
 from lipmotion.types.values import as_tuple, items, members, optional, text, value_of, whole
 
 DIGEST = re.compile(r"[0-9a-f]{64}|")

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
+from formats.examples import of_motion
 from lipmotion import read_motion as read_library_motion
-from lipmotion.addons.blender.curves import at_frames, closures, control, matched, read_motion, spelling
-from lipmotion.formats.base import write_motion
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.formats import write_motion
+from lipmotion.types import WEIGHT, Channel, Generation, Motion
+from lipmotion_blender.curves import at_frames, closures, control, matched, read_motion, spelling
 
 NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")
 
@@ -13,7 +14,7 @@ NAMES = ("jawOpen", "mouthSmileLeft", "tongueOut")
 def generation() -> Generation:
     rng = np.random.default_rng(3)
     moved = Motion(rng.random((121, 3)), 60.0, tuple(Channel(name, WEIGHT) for name in NAMES))
-    return Generation(moved, np.zeros((121, 3)), Timeline(()), StateTrace(("a",), np.zeros(121, np.intp)))
+    return of_motion(moved)
 
 
 @pytest.mark.parametrize("suffix", [".json", ".csv", ".livelink.csv"])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lipmotion import write
-from lipmotion.addons.blender.curves import at_frames
 from lipmotion.formats.blender import write_addon
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.types import Audio, Generation
+from lipmotion_blender.curves import at_frames
 from pipeline.conftest import generation
 from programs import python_with, run_with
 

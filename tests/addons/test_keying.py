@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lipmotion.addons.blender.keying import add_sound, key_shapes
+from lipmotion_blender.keying import add_sound, key_shapes
 
 
 class Strips(list[Any]):
@@ -39,7 +39,7 @@ def keyed(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Curve]]:
     blocks = {name: SimpleNamespace(slider_min=0.0, slider_max=1.0) for name in ("jawOpen", "eyeBlinkLeft")}
     mesh = SimpleNamespace(name="face", data=SimpleNamespace(shape_keys=SimpleNamespace(key_blocks=blocks)))
     fcurves = SimpleNamespace(find=keys.get, new=lambda path: keys.setdefault(path, Curve()))
-    monkeypatch.setattr("lipmotion.addons.blender.keying._fcurves", lambda *_: fcurves)
+    monkeypatch.setattr("lipmotion_blender.keying._fcurves", lambda *_: fcurves)
 
     def key(values: list[float], first: float, **how: Any) -> list[Curve]:
         key_shapes(mesh, dict.fromkeys(blocks, values), {name: name for name in blocks}, first, **how)

@@ -18,7 +18,7 @@ from livekit.agents.voice.avatar import AudioSegmentEnd, AvatarRunner, QueueAudi
 from agents import read_speech, run
 from agents.test_livekit import bytes_of, frames_of
 from lipmotion import Stream
-from lipmotion_faces.livekit import PICTURES_WAITING, AvatarVideo
+from lipmotion_agents.livekit_video import PICTURES_WAITING, AvatarVideo
 
 
 def picture_of(frame: rtc.VideoFrame) -> np.ndarray:

@@ -1,7 +1,5 @@
 """Budgets of the house: lines and files, and what ``animate`` loads. They may only go down."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,9 +9,9 @@ import pytest
 from children import run_child
 
 ROOT = Path(__file__).parents[2]
-SOURCE_LINES, SOURCE_FILES = 90_870, 485
-CORE_LINES = 62_750
-LOADED_FILES, LOADED_LINES = 152, 27_520
+SOURCE_LINES, SOURCE_FILES = 89_443, 475
+CORE_LINES = 57_596
+LOADED_FILES, LOADED_LINES = 145, 27_236
 TEST_LINES, BENCHMARK_LINES, DOC_WORDS = 66_860, 4_807, 44_990
 LOADED = """
 import sys, lipmotion

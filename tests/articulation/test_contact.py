@@ -17,17 +17,14 @@ from lipmotion.articulation.contact import (
     sample_pictures,
     show_contact,
 )
-from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion.types import Channel, Motion
+from meshes.speech import said
 
 RATES = (24.0, 25.0, 29.97, 30.0, 60.0, 100.0)
 
 
 def motion(opening: np.ndarray, rate_hz: float = 100.0, name: str = "opening") -> Motion:
     return Motion(np.asarray(opening, float)[:, None], rate_hz, (Channel(name),))
-
-
-def said(*spans: tuple[float, float, str]) -> Timeline[Unit]:
-    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
 
 
 def runs(mask: np.ndarray) -> list[tuple[int, int]]:

@@ -1,15 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.articulation.expression import (
-    PREFIX,
-    action_units,
-    is_mood,
-    mood_rows,
-    mood_table,
-    read_moods,
-    with_moods,
-)
+from lipmotion.articulation import expression
 from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, spoken_mouth
 from lipmotion.types import Channel, Motion, Prosody
@@ -27,7 +19,7 @@ PROTOTYPES = {
 
 
 def test_every_mood_has_known_action_units_with_intensities_and_sources():
-    rows = mood_rows()
+    rows = expression.mood_rows()
     assert {row.mood for row in rows} == {*MOODS}
     assert len({(row.mood, row.unit) for row in rows}) == len(rows)
     assert {row.source for row in rows} == SOURCES
@@ -35,12 +27,12 @@ def test_every_mood_has_known_action_units_with_intensities_and_sources():
         assert row.unit in ACTION_UNITS
         assert 0 < row.intensity <= 1
     for mood, asked in PROTOTYPES.items():
-        assert asked <= {*mood_table()[mood]}
+        assert asked <= {*expression.mood_table()[mood]}
         assert asked <= {row.unit for row in rows if row.mood == mood and row.source == "EMFACS"}
 
 
 def test_a_mood_comes_and_goes_smoothly_around_its_time():
-    moved = with_moods(motion(), parse_moods("happy:0.6 at 0.5, sad at 1.2"))
+    moved = expression.with_moods(motion(), parse_moods("happy:0.6 at 0.5, sad at 1.2"))
     happy, sad = moved["mood_happy"], moved["mood_sad"]
     assert happy[10] == sad[10] == 0
     assert happy[80] == pytest.approx(0.6)
@@ -50,18 +42,18 @@ def test_a_mood_comes_and_goes_smoothly_around_its_time():
 
 
 def test_from_the_start_a_mood_is_there_at_once_and_others_replace_it():
-    moved = with_moods(motion(), parse_moods("angry"))
+    moved = expression.with_moods(motion(), parse_moods("angry"))
     assert (moved["mood_angry"] == 1).all()
-    again = with_moods(moved, parse_moods("tired:0.5"))
-    assert [name for name in again.names if is_mood(name)] == ["mood_tired"]
-    assert {name: curve[0] for name, curve in read_moods(again).items()} == {"tired": 0.5}
+    again = expression.with_moods(moved, parse_moods("tired:0.5"))
+    assert [name for name in again.names if expression.is_mood(name)] == ["mood_tired"]
+    assert {name: curve[0] for name, curve in expression.read_moods(again).items()} == {"tired": 0.5}
 
 
 def test_neutral_adds_nothing():
-    moved = with_moods(motion(), (MoodKey(0.0, NEUTRAL),))
+    moved = expression.with_moods(motion(), (MoodKey(0.0, NEUTRAL),))
     assert moved.names == motion().names
     assert np.array_equal(moved.values, motion().values)
-    assert not action_units(moved)
+    assert not expression.action_units(moved)
     mouth = spoken_mouth(moved, units())
     assert not any(getattr(mouth, name).any() for name in EXPRESSED)
     assert not compute_liveliness(moved.time_s, moved, units(), None).units
@@ -69,7 +61,7 @@ def test_neutral_adds_nothing():
 
 @pytest.mark.parametrize("mood", MOODS)
 def test_round_lips_stay_round_in_every_mood(mood):
-    plain, mouth = (spoken_mouth(with_moods(motion(), parse_moods(each)), units()) for each in ("", mood))
+    plain, mouth = (spoken_mouth(expression.with_moods(motion(), parse_moods(each)), units()) for each in ("", mood))
     round_ = slice(108, 122)  # in uw
     assert mouth.width[round_].max() <= plain.width[round_].max() + 0.03
     assert mouth.width[round_].max() < ROUND_WIDTH + 0.001
@@ -79,7 +71,7 @@ def test_round_lips_stay_round_in_every_mood(mood):
 
 def test_a_smile_widens_the_mouth_at_rest_and_surprise_opens_it():
     plain, happy, surprised = (
-        spoken_mouth(with_moods(motion(), parse_moods(mood)), units()) for mood in ("", "happy", "surprised")
+        spoken_mouth(expression.with_moods(motion(), parse_moods(mood)), units()) for mood in ("", "happy", "surprised")
     )
     assert happy.width[20] > plain.width[20] + 0.1
     assert happy.smile[20] > 0.8
@@ -90,7 +82,7 @@ def test_a_smile_widens_the_mouth_at_rest_and_surprise_opens_it():
 
 def test_the_head_sinks_in_sadness_unless_it_is_still():
     time_s = np.arange(51) / 25
-    sad = with_moods(motion(), parse_moods("sad"))
+    sad = expression.with_moods(motion(), parse_moods("sad"))
     plain, moved, still = (
         compute_liveliness(time_s, of, units(), None, head=head)
         for of, head in ((motion(), True), (sad, True), (sad, False))
@@ -102,16 +94,16 @@ def test_the_head_sinks_in_sadness_unless_it_is_still():
 
 def test_a_mood_comes_and_goes_in_the_upper_face_and_grows_with_accents():
     time_s = np.arange(0, 60, 0.04)
-    sad = with_moods(Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),)), parse_moods("sad"))
+    sad = expression.with_moods(Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),)), parse_moods("sad"))
     accent = np.arange(6001) % 300 > 200
     voice = Prosody(-40 + 25.0 * accent, 5.0 + 0.3 * accent)
     still, lively = (compute_liveliness(time_s, sad, units(), voice, brows=brows).unit(1) for brows in (False, True))
-    usual = mood_table()["sad"][1]
+    usual = expression.mood_table()["sad"][1]
     assert still == pytest.approx(np.full(len(time_s), usual))
     assert 0.03 < lively.std() < 0.2
     assert lively.min() > 0.6 * usual
 
 
 def test_channels_are_named_by_mood():
-    assert PREFIX + "happy" in with_moods(motion(), parse_moods("happy")).names
-    assert not is_mood("mood_hungry")
+    assert expression.PREFIX + "happy" in expression.with_moods(motion(), parse_moods("happy")).names
+    assert not expression.is_mood("mood_hungry")

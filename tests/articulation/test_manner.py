@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
+from formats.examples import of_motion
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.pipeline.outputs.deliver import FACTORS, with_detected, with_manners
-from lipmotion.types import Generation, StateTrace, VoiceEvent
+from lipmotion.types import Generation, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from lipmotion.types.delivery import MANNERS, PLAIN, format_moods, parse_moods
 from meshes.speech import motion, units
@@ -11,9 +12,7 @@ from meshes.speech import motion, units
 
 @pytest.fixture(scope="module")
 def generation() -> Generation:
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), int))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
+    return of_motion(motion(), units())
 
 
 def test_shouted_vowels_are_more_open_and_mumbled_ones_less(generation: Generation) -> None:

@@ -13,7 +13,8 @@ from lipmotion.articulation.mouth import (
     upper_share,
 )
 from lipmotion.errors import InputError
-from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion.types import Channel, Motion, Timeline, Unit
+from meshes.speech import said
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())
 
@@ -21,10 +22,6 @@ NOTHING_SAID: Timeline[Unit] = Timeline(())
 def motion(rate_hz: float = 25.0, **curves: list[float] | np.ndarray) -> Motion:
     values = np.stack([np.asarray(curve, dtype=np.float64) for curve in curves.values()], axis=1)
     return Motion(values, rate_hz, tuple(Channel(name) for name in curves))
-
-
-def said(*spans: tuple[float, float, str]) -> Timeline[Unit]:
-    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
 
 
 def in_phone(phone: str, opening: float = 0.06, width: float = 0.57) -> dict[str, float]:

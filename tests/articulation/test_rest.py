@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from formats.examples import of_motion
 from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.rest import (
@@ -19,8 +20,9 @@ from lipmotion.articulation.rest import (
     share_short_pauses,
 )
 from lipmotion.errors import InputError
-from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit, VoiceEvent
+from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER
+from meshes.speech import said
 
 SILENCE = Timeline((Span(0.0, 0.2, Unit("sil")), Span(0.2, 1.0, Unit("aa"))))
 
@@ -56,14 +58,9 @@ def test_sizes_at_rest_are_positive():
 TIME_S = np.arange(301) / 100
 
 
-def said(*spans: tuple[float, float, str]) -> Timeline[Unit]:
-    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
-
-
 def generation(units: Timeline[Unit], opening: float = 0.1) -> Generation:
     values = np.column_stack([np.full(301, opening), np.where(TIME_S < 0.3, 0.5, 0.55)])
-    motion = Motion(values, 100.0, (Channel("opening"), Channel("width")))
-    return Generation(motion, np.zeros_like(values), units, StateTrace(("",), np.zeros(301, np.intp)))
+    return of_motion(Motion(values, 100.0, (Channel("opening"), Channel("width"))), units)
 
 
 LINE = said((0, 0.4, "sil"), (0.4, 1.0, "aa"), (1.0, 1.5, "sp"), (1.5, 2.0, "aa"), (2.0, 2.15, "sp"), (2.15, 2.9, "eh"),
@@ -150,7 +147,7 @@ def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
     values = plain.motion.values.copy()
     values[:, 0] = np.where((TIME_S > 2.1) & (TIME_S < 2.5), 0.2, 0.0)
     values[:, 1] = 0.6 - 0.5 * values[:, 0]
-    moving = Generation(Motion(values, 100.0, plain.motion.channels), plain.spread, QUIET, plain.trace)
+    moving = of_motion(Motion(values, 100.0, plain.motion.channels), QUIET)
     moved = rest_in_pauses(moving, REST, events=[LAUGH]).motion
     assert moved["width"][50] == pytest.approx(0.6 - 0.5 * moved["opening"][50], abs=1e-6)
     natural = rest_in_pauses(moving, NATURAL, events=[LAUGH])

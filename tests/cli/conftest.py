@@ -1,6 +1,8 @@
-import json
-import zipfile
+import io
+import shutil
+import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,8 +12,7 @@ from scipy.io import wavfile
 
 from children import LIPMOTION, environment, run_child
 from lipmotion.cli.main import main
-from lipmotion.pipeline.model import VERSION
-from lipmotion.storage.archive import HEADER
+from lipmotion.cli.verbs import about
 
 
 class Done(NamedTuple):
@@ -50,6 +51,12 @@ def run(capsys: pytest.CaptureFixture[str]) -> RunCommand:
 
 
 @pytest.fixture
+def make_info(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Gives ``lipmotion info`` something else to do."""
+    return partial(monkeypatch.setattr, about, "run_info")
+
+
+@pytest.fixture
 def run_outside() -> RunCommand:
     """Runs a command in a process of its own, as a shell does."""
 
@@ -61,21 +68,24 @@ def run_outside() -> RunCommand:
 
 
 @pytest.fixture
+def takes(here: Path, toy_speech: Path) -> Path:
+    """A folder of two recordings."""
+    folder = here / "takes"
+    folder.mkdir()
+    for name in ("a.wav", "b.wav"):
+        shutil.copy(toy_speech, folder / name)
+    return folder
+
+
+@pytest.fixture
+def _piped_speech(toy_speech: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The recording at the standard input."""
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
+
+
+@pytest.fixture
 def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
     return ("animate", toy_speech, "--model", toy_model_file)
-
-
-@pytest.fixture(scope="session")
-def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A model file of a later version."""
-    path = tmp_path_factory.mktemp("newer") / "newer.lipmotion"
-    with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(path, "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            new.writestr(
-                name, json.dumps(json.loads(content) | {"version": VERSION + 1}) if name == HEADER else content
-            )
-    return path
 
 
 @pytest.fixture

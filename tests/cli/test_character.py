@@ -7,7 +7,7 @@ import pytest
 
 from cli.conftest import check_refused
 from lipmotion import read_motion
-from lipmotion.meshes.files.character_files import read_character
+from lipmotion_faces.characters.character_files import read_character
 from meshes.heads import head, lip_points, write_glb, write_obj
 
 
@@ -79,13 +79,3 @@ def test_a_character_speaks(run, glb, basics, here):
     assert read_character(here / "said.glb").shape_names == head().shape_names
     stored = json.loads((here / "said.glb").read_bytes()[20:].split(b"\0")[0].rsplit(b"}", 1)[0] + b"}")
     assert stored["animations"][0]["name"] == "speech"
-
-
-def test_what_is_wrong_is_said_in_one_line(run, here, basics):
-    for arguments, message in (
-        (("--curves", "visems", "-o", "a.csv"), "no set of curves 'visems', required one of arkit, face, "),
-        (("--control-points", "-o", "a.csv"), "belong to a character"),
-        (("--character", "nothing.glb", "-o", "a.mp4"), "no such file"),
-    ):
-        check_refused(run(*basics, *arguments), 3, message)
-        assert list(here.iterdir()) == []

@@ -2,7 +2,6 @@ import re
 from importlib.metadata import version
 from pathlib import Path
 
-from cli.conftest import check_refused
 from lipmotion.citations import ENGINE_KEYS, bibliography, engine_citations, model_citations
 from lipmotion.engines import ENGINES
 from lipmotion.pipeline.model import shipped_path
@@ -33,16 +32,6 @@ def test_engines_and_keys(run):
     for key in set(bibliography()) - {"lipmotion"}:
         done = run("cite", key)
         assert (done.code, done.err, keys(done.out)) == (0, [], [key])
-
-
-def test_what_cannot_be_cited(run, here):
-    (here / "text").write_text("words")
-    for name, code, words in (
-        ("hofer", 3, "nothing to cite is called 'hofer'; give a model file, or one of: trajectory, coupled, joint, "),
-        ("text", 6, "text: not a lipmotion model"),
-        (".", 3, ".: no such model"),
-    ):
-        check_refused(run("cite", name), code, words)
 
 
 def test_every_built_in_engine_names_its_papers():

@@ -1,13 +1,11 @@
 import json
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cli.conftest import check_refused, is_one_error
-from lipmotion.errors import MissingDependencyError
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.pipeline.training.prompts import prompts
@@ -76,35 +74,6 @@ def test_prepare_prints_the_counts(run, monkeypatch):
     assert asked == {
         "directory": Path("videos"), "output": Path("mine"), "workers": 2, "crops": False, "offset_ms": -40.0,
     }  # fmt: skip
-
-
-def test_what_cannot_be_used(run, here, toy_corpus):
-    (here / "empty").mkdir()
-    for arguments, code, words in (
-        (["coverage", toy_corpus.path, "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
-        (["coverage", "missing"], 4, "missing: no such corpus"),
-        (["coverage", toy_corpus.path, "--lexicon", "missing"], 3, "missing: no such lexicon file"),
-        (["prompts", "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
-        (["prompts", "--have", "missing"], 4, "missing: no such corpus"),
-        (["prompts", "--count", "0"], 3, "0 prompts asked for, required at least 1"),
-        (["prompts", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
-        (["info", "missing"], 4, "missing: no such corpus"),
-        (["info", "x" * 300], 3, "File name too long"),
-        (["prepare", "empty", "-o", "mine"], 4, "empty: no videos in it"),
-    ):
-        check_refused(run("corpus", *arguments), code, words)
-        assert [path.name for path in here.rglob("*")] == ["empty"]
-
-
-def test_without_the_packages_for_video(run, here, monkeypatch):
-    def missing() -> dict[str, str]:
-        raise MissingDependencyError('face tracking needs MediaPipe; pip install "lipmotion[video]"')
-
-    monkeypatch.setattr(prepare, "make_tracker", lambda _: SimpleNamespace(versions=missing))
-    (here / "videos").mkdir()
-    (here / "videos" / "a.mp4").touch()
-    assert is_one_error(run("corpus", "prepare", "videos", "-o", "mine"), 8)
-    assert not (here / "mine").exists()
 
 
 def test_coverage(run, toy_corpus):

@@ -1,7 +1,5 @@
-import io
 import json
 import logging
-import sys
 from pathlib import Path
 
 import pytest
@@ -86,23 +84,6 @@ def test_transcript_and_edited_phones(run, basics, here):
     assert [line.split("\t")[1] for line in run(*basics, "--units", "b.json").out] == ["X", "X"]
 
 
-def test_what_cannot_be_done(run, basics, here):
-    for options, code, words in (
-        (["--fps", "nan"], 3, "frame rate is nan, required 1 to 100"),
-        (["--hold", "0"], 3, "hold is 0 frames"),
-        (["--shapes", "XYZ"], 3, "optional shapes are 'XYZ'"),
-        (["-o", "a.tsv", "a.txt"], 7, "unknown cue format '.txt'"),
-        (["-o", "a.tsv", "missing/a.dat"], 7, "the folder missing does not exist"),
-        (["--model", "missing.lipmotion"], 3, "no such model"),
-        (["-o", "a.tsv", "--transcript", "missing.txt"], 3, "no such transcript file"),
-    ):
-        check_refused(run(*basics, *options), code, words)
-        done = run(*basics, *options, "--machine-readable")
-        assert (done.code, done.out) == (code, [])
-        assert words in str(events(done)[-1]["reason"])
-    assert list(here.iterdir()) == []
-
-
 def test_speech_that_cannot_be_used(run, toy_model_file, bad_speech):
     for path in bad_speech.values():
         done = run("cues", path, "--model", toy_model_file, "--machineReadable")
@@ -145,18 +126,9 @@ def test_warnings_are_status_lines_too(run, basics):
     assert logging.getLogger().handlers == handlers
 
 
-@pytest.mark.long
-def test_other_processes_can_read_it(run_outside, basics):
-    """As an add-on runs it: the output is ASCII, whatever the encoding of the terminal."""
-    done = run_outside(*basics, "-f", "json", "--machineReadable", encoding="ascii")
-    assert done.code == 0
-    assert json.loads("\n".join(done.out))["metadata"]["soundFile"] == str(basics[1])
-    assert [event["type"] for event in events(done)][-1] == "success"
-
-
-def test_sound_from_a_pipe_is_not_named(here, toy_speech, toy_model_file, monkeypatch):
+@pytest.mark.usefixtures("_piped_speech")
+def test_sound_from_a_pipe_is_not_named(here, toy_model_file):
     """Its file is temporary, and gone when the cues are opened."""
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
     assert main(["cues", "-", "--model", str(toy_model_file), "-o", "a.json", "a.xml"]) == 0
     assert json.loads((here / "a.json").read_text())["metadata"]["soundFile"] == ""
     assert "<soundFile></soundFile>" in (here / "a.xml").read_text()

@@ -1,19 +1,21 @@
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from cli.conftest import check_refused, is_one_error
+from cli.conftest import is_one_error
 from lipmotion import Corpus
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.curves import bootstrap_interval
-from lipmotion_lab import engine_comparison as text
-from lipmotion_lab import folds, learning_curve, runner
 from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab import minnis2000 as minnis_2000
+from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate as evaluation_figures
+from lipmotion_lab.report import sections
 from lipmotion_lab.report.report import PARTS
 from lipmotion_lab.xie_liu2007 import six_systems
 
@@ -27,14 +29,23 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})
 
 
+@pytest.fixture
+def figures_of(run, here):
+    """Runs an experiment that prints the section of its figures, and returns these."""
+
+    def figures_of(section: Callable[[Any], Any], *words: object) -> Any:
+        done = run("experiment", *words, "-o", "a.json", "--workers", "1")
+        assert (done.code, done.err) == (0, [])
+        figures = json.loads((here / "a.json").read_text())
+        assert "\n".join(done.out) == section(figures).as_text()
+        return figures
+
+    return figures_of
+
+
 @pytest.mark.long
-def test_the_table_is_that_of_the_figures(run, toy_corpus, here):
-    done = run(
-        "experiment", "hofer2008", toy_corpus.path, "-o", "a.json", "--split", "val", "--quick", "--workers", "1"
-    )
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == table1.table(figures)
+def test_the_table_is_that_of_the_figures(figures_of, toy_corpus, here):
+    figures = figures_of(sections.hofer_section, "hofer2008", toy_corpus.path, "--split", "val", "--quick")
     assert (figures["split"], figures["clips"], figures["mixtures"]) == ("val", 2, [1, 2])
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
@@ -46,11 +57,14 @@ def test_quick_runs_of_all_experiments_are_of_the_same_recordings(run, toy_corpu
         taken.append(corpus.names())
         return {"rows": []}
 
+    def command(figures: Any) -> Any:
+        return SimpleNamespace(as_text=lambda: figures["stamp"]["command"])
+
     monkeypatch.setattr(runner, "QUICK_CLIPS", {"train": 3, "val": 1, "test": 1})
     for module, name in ((table1, "hofer2008"), (six_systems, "xieliu2007"), (minnis_2000, "minnis2000")):
         monkeypatch.setattr(module, name, taking)
-    for module in (table1, six_systems, minnis_2000):
-        monkeypatch.setattr(module, "table", lambda figures: figures["stamp"]["command"])
+    for name in ("hofer2008", "xieliu2007", "minnis2000"):
+        monkeypatch.setitem(PARTS, name, replace(PARTS[name], section=command))
     monkeypatch.setitem(PARTS, "folds", replace(PARTS["folds"], run=lambda given: taking(given.corpus)))
     for name in ("hofer2008", "xieliu2007", "minnis2000"):
         done = run("experiment", name, toy_corpus.path, "--quick", "-o", "a.json")
@@ -65,35 +79,26 @@ def test_quick_runs_of_all_experiments_are_of_the_same_recordings(run, toy_corpu
 
 
 @pytest.mark.long
-def test_the_learning_curve_of_a_list(run, toy_corpus, here):
+def test_the_learning_curve_of_a_list(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
     chosen = ("--order", "order.txt", "--sizes", "3", "--split", "val")
-    done = run("experiment", "learning-curve", toy_corpus.path, *chosen, "-o", "a.json", "--workers", "1")
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == learning_curve.table(figures)
+    figures = figures_of(sections.learning_section, "learning-curve", toy_corpus.path, *chosen)
     assert (figures["split"], figures["order"], figures["workers"]) == ("val", "given", 1)
     assert [row["names"] for row in figures["rows"]] == [3]
 
 
 @pytest.mark.long
-def test_folds_of_the_training_list(run, toy_corpus, here):
-    done = run("experiment", "folds", toy_corpus.path, "--folds", "2", "-o", "a.json", "--workers", "1")
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == folds.table(figures)
+def test_folds_of_the_training_list(figures_of, toy_corpus):
+    figures = figures_of(sections.folds_section, "folds", toy_corpus.path, "--folds", "2")
     assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
 
 
 @pytest.mark.long
-def test_xieliu2007_of_some_systems(run, toy_corpus, here):
+def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
     few = ("--systems", "ph-MSHMM;loudness", "--order", "order.txt")
-    chosen = (*few, "--sizes", "3", "--noise", "white", "--snr", "5", "--plots", "pictures", "--workers", "1")
-    done = run("experiment", "xieliu2007", toy_corpus.path, *chosen, "-o", "a.json")
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == six_systems.table(figures)
+    chosen = (*few, "--sizes", "3", "--noise", "white", "--snr", "5", "--plots", "pictures")
+    figures = figures_of(sections.xie_liu_section, "xieliu2007", toy_corpus.path, *chosen)
     assert [row["names"] for row in figures["rows"]] == [3]
     assert (figures["order"], figures["tuning"]["tried"]) == ("given", {})
     assert [(row["kind"], row["snr_db"]) for row in figures["noise"]] == [("white", 5)]
@@ -102,47 +107,12 @@ def test_xieliu2007_of_some_systems(run, toy_corpus, here):
 
 
 @pytest.mark.long
-def test_all_engines(run, toy_corpus, here):
-    chosen = ("--split", "test", "--models", "models", "-o", "a.json", "--workers", "1")
-    done = run("experiment", "engines", toy_corpus.path, *chosen)
-    assert (done.code, done.err) == (0, [])
-    figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == text.table(figures)
+def test_all_engines(figures_of, run, toy_corpus, here):
+    chosen = ("engines", toy_corpus.path, "--split", "test", "--models", "models")
+    figures = figures_of(sections.engines_section, *chosen)
     assert (figures["split"], figures["clips"]) == ("test", 2)
     kept = sorted(path.name for path in (here / "models").iterdir())
     assert kept == ["coupled.lipmotion", "selection.lipmotion", "trajectory.lipmotion"]
-    assert run("experiment", "engines", toy_corpus.path, *chosen).out == done.out
+    assert sections.engines_section(figures_of(sections.engines_section, *chosen)) == sections.engines_section(figures)
     (here / "models" / "coupled.lipmotion").write_bytes(b"no model")
-    assert is_one_error(run("experiment", "engines", toy_corpus.path, *chosen), 6)
-
-
-UNUSABLE = [
-    ("learning-curve CORPUS --order missing.txt", 4, "missing.txt: no such list file; required: one name a line"),
-    ("learning-curve CORPUS --order empty.txt", 3, "the list of utterances to train on is empty"),
-    ("learning-curve CORPUS --order strange.txt", 4, "1 of 2 names to train on (nobody) are not in the corpus"),
-    ("learning-curve CORPUS --sizes 0,8", 3, "sizes 0, 8; required: from 1 to 8"),
-    ("learning-curve CORPUS --split all", 4, "are in the split that is compared with"),
-    ("folds CORPUS --folds 1", 3, "1 folds; required: from 2 to 8"),
-    ("folds CORPUS -o missing/a.json", 7, "the folder missing does not exist"),
-    ("folds missing", 4, "missing: no such corpus; make one"),
-    ("xieliu2007 CORPUS --systems ph-RNN", 3, "no system 'ph-RNN'; there are: ph-HMM"),
-    ("xieliu2007 CORPUS --noise babble", 3, "a babble of 0 talkers; required at least 2: --talkers"),
-    ("xieliu2007 CORPUS --talkers missing", 3, "missing: no such folder; give one with recordings of other people"),
-    ("xieliu2007 CORPUS --quick --order strange.txt", 3, "--quick takes recordings of its own"),
-    ("xieliu2007 CORPUS --plots missing/a", 7, "the folder missing does not exist"),
-    ("engines CORPUS --models CORPUS", 7, "is the corpus itself; give another name"),
-    ("engines CORPUS --models empty.txt", 7, "empty.txt: is a file"),
-    ("all CORPUS -o empty.txt", 7, "empty.txt: cannot be used: Not a directory; give another folder"),
-    ("all CORPUS -o CORPUS/r", 7, "lies in the corpus"),
-    ("all CORPUS -o r --only hofer", 3, "no experiment 'hofer'; there are: hofer2008, xieliu2007"),
-    ("hofer2008 CORPUS --split tset", 4, "no utterances of split 'tset'"),
-    ("hofer2008 CORPUS --lexicon missing", 3, "missing: no such lexicon file"),
-]
-
-
-def test_what_cannot_be_used(run, toy_corpus, here):
-    (here / "empty.txt").write_text("\n")
-    (here / "strange.txt").write_text("toy00\nnobody\n")
-    for arguments, code, words in UNUSABLE:
-        check_refused(run("experiment", *arguments.replace("CORPUS", str(toy_corpus.path)).split()), code, words)
-        assert len(list(here.iterdir())) == 2
+    assert is_one_error(run("experiment", *chosen, "-o", "a.json", "--workers", "1"), 6)

@@ -2,8 +2,6 @@ import json
 
 import pytest
 
-from cli.conftest import check_refused
-
 pytestmark = pytest.mark.usefixtures("here")
 
 
@@ -18,17 +16,6 @@ def test_several_times_and_any_engine(run, toy_model_file, toy_speech):
 def test_for_machines(run, coupled_model_file, toy_speech):
     done = run("explain", toy_speech, "--model", coupled_model_file, "--at", "0.8", "--at", "0.5", "--json")
     assert [json.loads(line)["frame"] for line in done.out] == [80, 50]
-
-
-def test_what_cannot_be_explained(run, coupled_model_file, toy_speech):
-    for options, code, words in (
-        ([toy_speech, "--model", coupled_model_file, "--at=-1"], 3, "-1.0 s lies outside the recording (0 to "),
-        ([toy_speech, "--model", coupled_model_file, "--at", "nan"], 3, "nan s lies outside the recording"),
-        ([toy_speech, "--model", "missing", "--at", "1"], 3, "missing: no such model"),
-        (["missing.wav", "--model", coupled_model_file, "--at", "1"], 3, "missing.wav: no such file"),
-        ([coupled_model_file, "--model", toy_speech, "--at", "1"], 6, "not a lipmotion model"),
-    ):
-        check_refused(run("explain", *options), code, words)
 
 
 def test_without_a_time_all_states_are_listed(run, toy_model_file, toy_speech):

@@ -1,6 +1,4 @@
-import json
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
@@ -9,19 +7,15 @@ import pytest
 from cli.conftest import check_refused
 from lipmotion_faces.film import build
 from lipmotion_faces.filmed.face import load_face, save_face
-from pipeline.film.toy_footage import ToyVideo, install, write_video
+from pipeline.film.toy_footage import ToyVideo, install, write_videos
 from speech import stand_in_voice
-from testing.toy import toy_sentences
 
 SENTENCES = 3
 
 
 @pytest.fixture(scope="module")
 def videos(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, ToyVideo]:
-    folder = tmp_path_factory.mktemp("filmed") / "anna"
-    folder.mkdir()
-    found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(SENTENCES)]
-    return {video.path.resolve(): video for video in found}
+    return write_videos(tmp_path_factory.mktemp("filmed") / "anna", SENTENCES)
 
 
 @pytest.fixture
@@ -62,22 +56,6 @@ def test_build_and_info(run, tracker, here):
 
 
 @pytest.mark.long
-def test_build_for_a_program(run, tracker, here):
-    """One object a line: progress that rises, and at the end the name of the file."""
-    done = run("face", "build", tracker, "-o", "anna.face", "--workers", "1", "--machine-readable")
-    events: list[dict[str, Any]] = [json.loads(line) for line in done.out]
-    assert done.code == 0
-    assert done.err == []
-    progress = [event for event in events if event["type"] == "progress"]
-    assert [event["value"] for event in progress] == sorted(event["value"] for event in progress)
-    assert progress[-1]["value"] == 1.0
-    assert [event["type"] for event in events[-1:]] == ["success"]
-    assert events[-1]["file"] == "anna.face"
-    assert any("60 s of varied speech" in event.get("message", "") for event in events)
-    assert (here / "anna.face").is_file()
-
-
-@pytest.mark.long
 def test_what_cannot_be_built(run, tracker, here):
     video = tracker / "toy00.mp4"
     before = video.read_bytes()
@@ -92,11 +70,6 @@ def test_what_cannot_be_built(run, tracker, here):
         check_refused(run("face", "build", *arguments, "--workers", "1"), code, words)
         assert list(here.iterdir()) == []
     assert video.read_bytes() == before
-
-
-def test_a_wrong_command_line(run):
-    for arguments in ([], ["build"], ["build", "a.mp4"], ["info"], ["paint", "a.mp4"]):
-        assert run("face", *arguments).code == 2
 
 
 def test_info(run, filmed_face_file):

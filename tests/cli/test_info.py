@@ -1,8 +1,7 @@
 from dataclasses import replace
 
-from cli.conftest import check_refused
 from lipmotion import load_model, save_model
-from lipmotion.pipeline.model import VERSION, read_header, shipped_path
+from lipmotion.pipeline.model import read_header, shipped_path
 
 
 def test_a_model_says_whose_recordings_it_comes_from(run, toy_model_file):
@@ -52,14 +51,3 @@ def test_the_shipped_model_is_the_default(run):
     done = run("info")
     assert done.out == run("info", shipped_path()).out
     assert any(line.startswith("attribution") and "GRID" in line for line in done.out)
-
-
-def test_what_is_no_model(run, newer_model, here):
-    (here / "text").write_text("words")
-    for name, code, words in (
-        ("missing", 3, "missing: no such model"),
-        ("text", 6, "text: not a lipmotion model"),
-        (".", 3, ".: no such model"),
-        (newer_model, 6, f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
-    ):
-        check_refused(run("info", name), code, words)

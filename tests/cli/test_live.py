@@ -1,13 +1,10 @@
 """``lipmotion live``."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
 import signal
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +12,10 @@ import pytest
 
 from children import LIPMOTION, child
 from cli.conftest import RunCommand
-from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.speech.sound import audio_files
 from lipmotion.speech.sound.audio_files import read_audio
-from meshes.heads import head, write_glb
+from lipmotion_faces.characters.character_files import load_character
+from meshes.heads import VISEMES, renamed, write_glb
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
@@ -60,11 +57,8 @@ def test_a_signal_that_a_package_swallows_ends_it(run: RunCommand, monkeypatch: 
 
 def test_a_character_and_a_rig_get_their_own_curves(run: RunCommand, tmp_path: Path) -> None:
     """Lips that touch in the frames touch on a character of visemes."""
-    mesh = head()
-    spoken = {"jawOpen": "aa", "mouthPucker": "U", "mouthFunnel": "O", "mouthSmileLeft": "E", "mouthStretchLeft": "I"}
-    spoken |= {"mouthRollLower": "FF", "mouthPressLeft": "PP", "mouthLowerDownLeft": "DD", "mouthUpperUpLeft": "SS"}
-    shapes = (replace(each, name=f"V_{spoken[each.name]}") for each in mesh.shapes if each.name in spoken)
-    write_glb(tmp_path / "head.glb", replace(mesh, shapes=tuple(shapes)))
+    spoken = {own: name.replace("viseme", "V") for own, name in VISEMES.items()}
+    write_glb(tmp_path / "head.glb", renamed(spoken))
     (tmp_path / "rig.csv").write_text("control,source,gain\nChin.rotateX,jawOpen,-20\n")
 
     def curves(character: str) -> dict[str, np.ndarray]:

@@ -8,7 +8,6 @@ import pytest
 from children import PIPE, child, run_child
 from cli.conftest import check_refused, is_one_error
 from lipmotion.cli import main
-from lipmotion.cli.verbs import about
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
 
 STOPPED = "lipmotion: stopped; run the same command again to go on"
@@ -77,7 +76,7 @@ def test_words_of_other_tools_are_answered_with_a_verb(run):
         assert done.err[-1].startswith(f"lipmotion: error: {hint}")
 
 
-def test_an_error_is_one_line(run, monkeypatch):
+def test_an_error_is_one_line(run, make_info):
     errors: list[tuple[BaseException, int, str]] = [
         (LipMotionError("what"), 1, "lipmotion: error: what"),
         (AlignmentError("two\n  lines"), 5, "lipmotion: error: two\\n  lines"),
@@ -88,7 +87,7 @@ def test_an_error_is_one_line(run, monkeypatch):
         (KeyboardInterrupt(), 130, STOPPED),
     ]  # fmt: skip
     for error, code, line in errors:
-        monkeypatch.setattr(about, "run_info", partial(_fail, error))
+        make_info(partial(_fail, error))
         assert run("info") == (code, [], [line])
 
 
@@ -96,8 +95,8 @@ def _fail(error: BaseException, _: object) -> None:
     raise error
 
 
-def test_a_bug_is_not_hidden(monkeypatch):
-    monkeypatch.setattr(about, "run_info", partial(_fail, ZeroDivisionError()))
+def test_a_bug_is_not_hidden(make_info):
+    make_info(partial(_fail, ZeroDivisionError()))
     with pytest.raises(ZeroDivisionError):
         main.main(["info"])
 

@@ -23,11 +23,11 @@ from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, Stopper
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
 from lipmotion.cli.terminal.progress import outcome, report_progress
-from lipmotion.cli.verbs import about
 from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
+from robustness.case import changed_model
 
 EVIL = "q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
 SHOWN = r"q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
@@ -42,13 +42,8 @@ def poisoned(here: Path, toy_corpus: Corpus, toy_model_file: Path, toy_speech: P
     shutil.copy(toy_speech, here / f"{EVIL}.wav")
     shutil.copy(toy_speech, here / "a.wav")
     shutil.copy(toy_model_file, here / EVIL)
-    with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(here / "m.lipmotion", "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            if name == "header.json":
-                told = {"name": EVIL, "corpus": [EVIL], "licence": EVIL, "adapted": {EVIL: EVIL}, EVIL: 1}
-                content = json.dumps(json.loads(content) | told).encode()
-            new.writestr(name, content)
+    told = {"name": EVIL, "corpus": [EVIL], "licence": EVIL, "adapted": {EVIL: EVIL}, EVIL: 1}
+    changed_model(toy_model_file, here / "m.lipmotion", {}, **told)
     with zipfile.ZipFile(here / "other.lipmotion", "w") as new:
         new.writestr("header.json", json.dumps({"format": "lipmotion.model", "version": EVIL}))
     shutil.copytree(toy_corpus.path, here / "c")
@@ -146,7 +141,7 @@ def test_what_is_obeyed_is_shown(capsys):
         assert SHOWN[:8] in shown or line in NOT_SHOWN, line
 
 
-def test_warnings(run, monkeypatch):
+def test_warnings(run, make_info):
     def warn(_: Namespace) -> None:
         logging.getLogger("lipmotion").warning("%s is odd", EVIL)
         logging.getLogger("another.package").error(EVIL)
@@ -154,7 +149,7 @@ def test_warnings(run, monkeypatch):
             warnings.simplefilter("always")
             warnings.warn(EVIL, stacklevel=1)
 
-    monkeypatch.setattr(about, "run_info", warn)
+    make_info(warn)
     head = "lipmotion: warning: "
     with logged():
         done = run("info")
@@ -202,10 +197,6 @@ def test_what_is_laid_out_stays_so(capsys):
     assert document.isprintable()
 
 
-def test_a_bug_is_none():
-    assert outcome(RuntimeError("oh")) is None
-
-
 def test_a_message_that_repeats_a_file_is_cut_in_its_middle():
     for error in (InputError, OSError):
         told = outcome(error(f"a.csv: found {'x' * 100_000}; give numbers"))
@@ -215,6 +206,9 @@ def test_a_message_that_repeats_a_file_is_cut_in_its_middle():
         assert told[1].startswith("a.csv: found xxx")
         assert told[1].endswith("x; give numbers")
         assert " ... " in told[1]
+    whole = outcome(InputError("word " * 199))
+    assert whole is not None
+    assert " ... " not in whole[1]
 
 
 def test_a_current_folder_that_is_gone_is_said():
@@ -224,12 +218,6 @@ def test_a_current_folder_that_is_gone_is_said():
     other = outcome(FileNotFoundError(2, os.strerror(2), "a.wav"))
     assert other is not None
     assert "a.wav" in other[1]
-
-
-def test_a_message_of_usual_length_is_whole():
-    told = outcome(InputError("word " * 199))
-    assert told is not None
-    assert " ... " not in told[1]
 
 
 def test_a_wrong_command_line_is_one_line_of_limited_length(run):

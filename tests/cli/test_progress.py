@@ -90,14 +90,6 @@ def test_training_for_a_program(run, toy_corpus, here):
     assert [path.name for path in here.iterdir()] == ["m.lipmotion"]
 
 
-def test_a_failure_is_said_to_both(run):
-    done = run("train", "missing", "-o", "m", "--machine-readable")
-    assert done.code == 4
-    start, failure = objects(done)
-    assert (start["type"], failure["type"], failure["exit_code"]) == ("start", "failure", 4)
-    assert done.err == [f"lipmotion: error: {failure['reason']}"]
-
-
 def test_why_it_failed(capsys, monkeypatch):
     def fail(error: BaseException, _: Namespace) -> None:
         raise error

@@ -6,12 +6,12 @@ import av
 import numpy as np
 import pytest
 
-from cli.conftest import RunCommand, check_refused, is_one_error
+from cli.conftest import RunCommand, is_one_error
 from lipmotion import read_motion
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.outputs.scenes import write_scene
 from meshes.heads import head
 
@@ -79,23 +79,6 @@ def test_sound_and_motion_of_other_lengths(run, motion_file, toy_speech, here):
     assert "the motion lasts 0.59 s, the sound" in done.err[0]
     assert "the last pose stays" in done.err[0]
     assert len(read_motion(here / "cut.csv")[0].values) == pytest.approx(len(read_motion(motion_file)[0].values), abs=2)
-
-
-def test_what_cannot_be_drawn(run, motion_file, here):
-    before = motion_file.read_bytes()
-    (here / "brows.csv").write_text("time_s,browInnerUp\n0,0\n0.1,1\n")
-    (here / "slow.csv").write_text("time_s,opening\n0,0.1\n999999,0.2\n")
-    (here / "fast.csv").write_text("time_s,opening\n0,0.1\n1e-6,0.2\n")
-    for options, code, words in (
-        ("none.json -o a.csv", 3, "none.json"),
-        ("said.json -o said.json", 7, "said.json: is the motion file itself"),
-        ("said.json --sound none.wav -o a.csv", 3, "none.wav: no such file"),
-        ("brows.csv -o a.mp4", 7, "no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'"),
-        ("slow.csv -o a.json", 3, "1e-06 frames a second, required 1 to 10000; export it again"),
-        ("fast.csv -o a.json", 3, "1e+06 frames a second, required 1 to 10000"),
-    ):
-        check_refused(run("render", *options.split()), code, words)
-    assert motion_file.read_bytes() == before
 
 
 def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -162,11 +162,3 @@ def test_the_recording_behind_the_outputs(run, here, verb):
         assert done.code == 3
         assert "missing.wav: no such file" in done.err[-1]
     assert list(here.iterdir()) == []
-
-
-def test_several_recordings_behind_a_folder(run, here):
-    for name in ("a.wav", "b.wav"):
-        (here / name).write_text("no sound")
-    done = run("animate", "-o", "out/", "a.wav", "b.wav")
-    assert done.code == 3
-    assert "2 of 2 recordings were not animated" in done.err[-1]

@@ -1,7 +1,6 @@
 import io
 import json
 import os
-import shutil
 import sys
 import threading
 from pathlib import Path
@@ -12,17 +11,9 @@ import pytest
 from cli.conftest import check_refused, is_one_error
 from lipmotion import read_motion
 from lipmotion.cli.main import main
-from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import head, write_glb
-
-
-@pytest.fixture
-def takes(here: Path, toy_speech: Path) -> Path:
-    folder = here / "takes"
-    folder.mkdir()
-    for name in ("a", "b"):
-        shutil.copy(toy_speech, folder / f"{name}{toy_speech.suffix}")
-    return folder
 
 
 def test_a_folder_of_recordings(run, takes, toy_model_file, here):
@@ -93,15 +84,15 @@ def test_a_character_is_opened_once(run, takes, toy_model_file, here, monkeypatc
         opened.append(path)
         return load_character(path, **how)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("lipmotion.meshes.fitting.driven.load_character", counted)
+    monkeypatch.setattr("lipmotion_faces.characters.character_files.load_character", counted)
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--character", "head.glb")
     assert done == (0, ["out/a.json", "out/b.json"], [])
     assert opened == [Path("head.glb")]
     assert read_motion(here / "out" / "b.json")[0].names[0] == "jawOpen"
 
 
-def test_standard_input_and_output(toy_model_file, toy_speech, here, monkeypatch):
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
+@pytest.mark.usefixtures("_piped_speech")
+def test_standard_input_and_output(toy_model_file, here, monkeypatch):
     written = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written))
     words = ["animate", "-", "--model", str(toy_model_file), "-o", "-", "a.csv", "a.json", "--format", "csv"]

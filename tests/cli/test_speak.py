@@ -78,20 +78,6 @@ def test_wrong_command_lines(run):
         assert said in done.err[-1]
 
 
-def test_errors(run, basics, here):
-    for more, code, said in (
-        ("-o a.mp3", 7, ".wav .flac .ogg"),
-        ("-o no/a.wav", 7, "does not exist"),
-        ("-o a.wav ./a.wav", 7, "is given twice"),
-        ("-o a.wav --voice three", 3, "no voice 'three' is installed; lipmotion speak --voices"),
-        ("-o a.wav --voice stand-out:one", 3, "unknown synthesiser 'stand-out'"),
-        ("-o a.json --channels smile", 3, "no motion channel 'smile'"),
-        ("-o a.json --speaker nobody", 3, "no 'nobody'"),
-    ):
-        check_refused(run(*basics, *more.split()), code, said)
-        assert list(here.iterdir()) == []
-
-
 def test_without_a_synthesiser_it_says_what_to_install(run, basics, monkeypatch):
     only = installed.SYNTHESISERS["stand-in"]
     monkeypatch.setattr(installed, "SYNTHESISERS", {"stand-in": replace(only, voices=tuple)})

@@ -3,7 +3,7 @@ import os
 import signal
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,6 @@ from children import LIPMOTION, PIPE, child, environment, run_child
 from children import Done as Completed
 from cli import signalled
 from lipmotion.cli.terminal.events import Stopped, Stopper
-from lipmotion.cli.verbs import about
 
 LINE = "lipmotion: stopped; run the same command again to go on"
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -26,19 +25,19 @@ pytestmark = [
 
 
 @BOTH
-def test_a_signal_is_one_line_and_an_exit_code(run, monkeypatch, number):
+def test_a_signal_is_one_line_and_an_exit_code(run, make_info, number):
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.excepthook
 
     def kill(_: Namespace) -> None:
         signal.raise_signal(number)
         raise AssertionError
 
-    monkeypatch.setattr(about, "run_info", kill)
+    make_info(kill)
     assert run("info") == (128 + number, [], [LINE])
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.excepthook) == before
 
 
-def test_an_error_that_follows_from_a_signal_is_not_shown(run, monkeypatch):
+def test_an_error_that_follows_from_a_signal_is_not_shown(run, make_info):
     def kill(error: Exception, _: Namespace) -> None:
         try:
             signal.raise_signal(signal.SIGINT)
@@ -46,11 +45,11 @@ def test_an_error_that_follows_from_a_signal_is_not_shown(run, monkeypatch):
             raise error from None
 
     for error in (ImportError("cannot import"), OSError("interrupted"), ZeroDivisionError()):
-        monkeypatch.setattr(about, "run_info", partial(kill, error))
+        make_info(partial(kill, error))
         assert run("info") == (130, [], [LINE])
 
 
-def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(run, monkeypatch):
+def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(run, make_info):
     tidied = []
 
     def kill(_: Namespace) -> None:
@@ -60,15 +59,15 @@ def test_a_second_signal_at_once_does_not_disturb_the_tidying_up(run, monkeypatc
             signal.raise_signal(signal.SIGINT)
             tidied.append(True)
 
-    monkeypatch.setattr(about, "run_info", kill)
+    make_info(kill)
     assert run("info").code == 130
     assert tidied == [True]
 
 
-def test_an_ignored_signal_stays_ignored(monkeypatch, run):
+def test_an_ignored_signal_stays_ignored(make_info, run):
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        monkeypatch.setattr(about, "run_info", lambda _: signal.raise_signal(signal.SIGINT))
+        make_info(lambda _: signal.raise_signal(signal.SIGINT))
         assert run("info") == (0, [], [])
         assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     finally:
@@ -218,30 +217,28 @@ def test_a_late_signal_does_not_change_what_is_done(toy_model_file, here):
     assert list(here.iterdir()) == []
 
 
-def test_once_settled_a_signal_comes_too_late():
+@pytest.fixture
+def stopper() -> Iterator[Stopper]:
     stopper = Stopper()
     stopper.listen()
-    try:
-        stopper.settle()
+    yield stopper
+    stopper.stop_listening(process_ends=False)
+
+
+def test_once_settled_a_signal_comes_too_late(stopper):
+    stopper.settle()
+    signal.raise_signal(signal.SIGTERM)
+    stopper.check()
+    stopper.settle()
+    assert stopper.code is None
+
+
+def test_what_was_swallowed_is_not_settled(stopper):
+    with suppress(KeyboardInterrupt):
         signal.raise_signal(signal.SIGTERM)
-        stopper.check()
+    with pytest.raises(Stopped):
         stopper.settle()
-        assert stopper.code is None
-    finally:
-        stopper.stop_listening(process_ends=False)
-
-
-def test_what_was_swallowed_is_not_settled():
-    stopper = Stopper()
-    stopper.listen()
-    try:
-        with suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGTERM)
-        with pytest.raises(Stopped):
-            stopper.settle()
-        assert stopper.code == 143
-    finally:
-        stopper.stop_listening(process_ends=False)
+    assert stopper.code == 143
 
 
 def test_little_is_loaded_before_signals_are_listened_to():

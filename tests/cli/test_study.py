@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from cli.conftest import check_refused, is_one_error
-from lipmotion.storage.files import lock_folder
 from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.locks import lock_folder
 from lipmotion_studio.study.analysis.analyse import analyse_study, analysis_table
 from lipmotion_studio.study.answers import read_answers, write_answers
 from lipmotion_studio.study.store import AnswerSheet, StudyStore

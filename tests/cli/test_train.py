@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from cli.conftest import check_refused
 from lipmotion import Corpus, Model, adapt, load_model, read_motion, save_model
 from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
 from lipmotion.pipeline.training.train import TrainReport
@@ -115,32 +114,6 @@ def test_other_voices_are_learned_from_but_those_for_judging(run, toy_model, toy
     for arguments in (["--voices", "--recordings", "open"], ["--voices"], []):
         assert run("train", toy_corpus.path, "-o", "m", "--engine", "coupled", *arguments).code == 0
     assert speakers == [["friend", "rms"], ["rms"], []]
-
-
-UNUSABLE = [
-    ("missing -o m", 4, "missing: no such corpus; make one"),
-    ("folder -o m", 4, "folder: not a corpus"),
-    ("CORPUS -o missing/m", 7, "the folder missing does not exist"),
-    ("CORPUS -o folder", 7, "folder: is a folder"),
-    ("CORPUS -o m --split tset", 4, "no utterances of split 'tset' (there are train: 8, val: 2"),
-    ("CORPUS -o m --speaker dora", 4, "no speaker 'dora' (there are: no speaker by name)"),
-    ("CORPUS -o m --lexicon missing", 3, "missing: no such lexicon file"),
-    ("CORPUS -o m --from nofile", 3, "nofile: no such model; train one (lipmotion train), or use the one"),
-    ("CORPUS -o m --units evis", 3, "no unit set 'evis'; there are: 2vis, sVis, pbVis"),
-    ("CORPUS -o m --units folder", 3, "folder: "),
-    ("CORPUS -o m --engine coupled --recordings missing", 4, "missing: no such folder"),
-    ("CORPUS -o m --engine coupled --units eVis", 3, '--set chains="phone viseme"'),
-    ("CORPUS -o m --engine joint --system ph-HMM", 3, "not of 'joint'; leave --engine out"),
-    ("CORPUS -o m --set tree=1", 3, "no option 'tree'; there are: states, silent_states"),
-    ("CORPUS -o m --engine joined", 3, "no engine 'joined'; there are: trajectory, coupled, joint"),
-]
-
-
-def test_what_cannot_be_used(run, toy_corpus, here):
-    (here / "folder").mkdir()
-    for arguments, code, words in UNUSABLE:
-        check_refused(run("train", *arguments.replace("CORPUS", str(toy_corpus.path)).split()), code, words)
-        assert [path.name for path in here.rglob("*")] == ["folder"]
 
 
 @pytest.mark.long

@@ -2,15 +2,9 @@ from pathlib import Path
 
 import pytest
 
+from corpora.test_folder import touch
 from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import RecordingFolder
-
-
-def made(folder: Path, *names: str) -> None:
-    """Make empty files in a folder."""
-    for name in names:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).touch()
 
 
 def read(folder: Path) -> list[tuple[str, str, str | None]]:
@@ -33,8 +27,8 @@ GRID_VIDEOS = {
 def test_grid_of_all_speakers(tmp_path: Path, lies: str) -> None:
     video, times = GRID_VIDEOS[lies]
     speakers = [f"s{number}" for number in range(1, 35) if number != 21]
-    made(tmp_path, *(video.format(speaker) for speaker in speakers))
-    made(tmp_path, video.format("s2").replace("bbaf2n", "swiz9n"))
+    touch(tmp_path, *(video.format(speaker) for speaker in speakers))
+    touch(tmp_path, video.format("s2").replace("bbaf2n", "swiz9n"))
     (tmp_path / times.format("s2")).parent.mkdir(parents=True, exist_ok=True)
     (tmp_path / times.format("s2")).write_text(SECOND)
     (tmp_path / "test.txt").write_text("s34/bbaf2n\n")
@@ -52,7 +46,7 @@ def test_grid_of_all_speakers(tmp_path: Path, lies: str) -> None:
 
 def test_crema_d_says_its_sentences_in_its_names(tmp_path: Path) -> None:
     names = "1001_DFA_ANG_XX", "1001_IEO_HAP_LO", "1091_WSI_SAD_X"
-    made(tmp_path, *(f"VideoFlash/{name}.flv" for name in names), *(f"AudioWAV/{name}.wav" for name in names))
+    touch(tmp_path, *(f"VideoFlash/{name}.flv" for name in names), *(f"AudioWAV/{name}.wav" for name in names))
     said = [
         ("1001_DFA_ANG_XX", "1001", "don't forget a jacket"),
         ("1001_IEO_HAP_LO", "1001", "it's eleven o'clock"),
@@ -64,7 +58,7 @@ def test_crema_d_says_its_sentences_in_its_names(tmp_path: Path) -> None:
 
 def test_tcd_timit_from_the_front_with_its_scripts(tmp_path: Path) -> None:
     clips = "volunteers/01M/Clips/straightcam", "volunteers/02F/straightcam", "lipspeakers/Lipspkr1/Clips/straightcam"
-    made(tmp_path, *(f"{folder}/sa1.mp4" for folder in clips), "volunteers/01M/Clips/30degcam/sa1.mp4")
+    touch(tmp_path, *(f"{folder}/sa1.mp4" for folder in clips), "volunteers/01M/Clips/30degcam/sa1.mp4")
     (tmp_path / clips[0] / "SA1.txt").write_text("0 8000 sil\n8000 9100 She\n9100 9900 had,\n9900 12000 YOUR\n")
     (tmp_path / clips[1] / "sa1.txt").write_text("She had your dark suit.\n")
     assert read(tmp_path) == [
@@ -78,12 +72,12 @@ def test_tcd_timit_from_the_front_with_its_scripts(tmp_path: Path) -> None:
 
 def test_mead_from_the_front(tmp_path: Path) -> None:
     views = "front", "down", "left_30", "left_60", "right_30", "right_60", "top"
-    made(
+    touch(
         tmp_path,
         *(f"M003/video/{view}/happy/level_1/001.mp4" for view in views),
         "W009/video/front/sad/level_2/001.mp4",
     )
-    made(tmp_path, "M003/audio/happy/level_1/001.m4a")
+    touch(tmp_path, "M003/audio/happy/level_1/001.m4a")
     (tmp_path / "M003/video/front/happy/level_1/001.txt").write_text("Hello there.")
     assert read(tmp_path) == [("M003-happy-level_1-001", "M003", "hello there"), ("W009-sad-level_2-001", "W009", None)]
 
@@ -92,7 +86,7 @@ LRS2 = "Text:  WHEN YOU'RE COOKING\nConf:  4\n\nWORD START END ASDSCORE\nWHEN 0.
 
 
 def test_lrs_texts_lists_and_sets(tmp_path: Path) -> None:
-    made(tmp_path, "main/635/00001.mp4", "main/635/00002.mp4", "main/77/00001.mp4", "pretrain/77/00001.mp4")
+    touch(tmp_path, "main/635/00001.mp4", "main/635/00002.mp4", "main/77/00001.mp4", "pretrain/77/00001.mp4")
     (tmp_path / "main/635/00001.txt").write_text("Text:  IT'S {LG} TWENTY PAST\nConf:  4\n")
     (tmp_path / "main/77/00001.txt").write_text("Text:  HELLO\n")
     (tmp_path / "pretrain/77/00001.txt").write_text(LRS2)
@@ -109,20 +103,20 @@ def test_lrs_texts_lists_and_sets(tmp_path: Path) -> None:
 
 
 def test_the_test_folder_of_lrs3_is_the_test_list(tmp_path: Path) -> None:
-    made(tmp_path, "trainval/0Amg53UuRqE/50001.mp4", "test/0Fi83BHQsMA/00002.mp4")
+    touch(tmp_path, "trainval/0Amg53UuRqE/50001.mp4", "test/0Fi83BHQsMA/00002.mp4")
     found = {each.name: each.split for each in discover(tmp_path).recordings}
     assert found == {"0Amg53UuRqE-50001": "train", "0Fi83BHQsMA-00002": "test"}
 
 
 def test_other_folders_are_read_as_before(tmp_path: Path) -> None:
-    made(tmp_path, "main/anna/hello.mp4", "1001_DFA_ANG_XX.mp4", "s1/day.mp4", "ben/straightcam.mp4")
+    touch(tmp_path, "main/anna/hello.mp4", "1001_DFA_ANG_XX.mp4", "s1/day.mp4", "ben/straightcam.mp4")
     found = discover(tmp_path)
     assert found.kind == "folder of videos"
     assert [each.speaker for each in found.recordings] == ["", "ben", "main", "s1"]
 
 
 def test_one_name_twice_is_left_out(tmp_path: Path) -> None:
-    made(tmp_path, "s1/mpg_vcd/bbaf2n.mpg", "s1/mpg_6000/bbaf2n.mpg", "s2/mpg_vcd/bbaf2n.mpg")
+    touch(tmp_path, "s1/mpg_vcd/bbaf2n.mpg", "s1/mpg_6000/bbaf2n.mpg", "s2/mpg_vcd/bbaf2n.mpg")
     found = discover(tmp_path)
     assert [each.name for each in found.recordings] == ["s2-bbaf2n"]
     assert "2 recordings share this name" in found.problems["s1-bbaf2n"]

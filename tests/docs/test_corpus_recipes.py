@@ -3,10 +3,8 @@
 import json
 import re
 import shlex
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,8 +18,8 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.pipeline.training import train as train_module
 from lipmotion.types import Track, Utterance
-from lipmotion_faces.corpus import prepare as prepare_module
 from lipmotion_lab.evaluation import evaluate as evaluation_figures
+from pipeline.made import replace_tracking
 from testing.toy import toy_utterances
 
 FOLDER = Path(__file__).parents[2] / "recipes"
@@ -72,9 +70,7 @@ def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def track(path: Path, **_: object) -> Track:
         return tracks[path.resolve()]
 
-    monkeypatch.setattr(prepare_module, "track", track)
-    versions: Callable[[], dict[str, str]] = lambda: {"mediapipe": "0"}  # noqa: E731
-    monkeypatch.setattr(prepare_module, "make_tracker", lambda _: SimpleNamespace(versions=versions))
+    replace_tracking(monkeypatch, track)
     monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.chdir(tmp_path)

@@ -66,32 +66,25 @@ def test_what_a_page_writes_keeps_its_contract(page, tmp_path):
 
 
 @pytest.mark.long
-def test_an_installed_engine_trains_saves_loads_and_animates(toy_corpus, toy_speech, tmp_path):
-    package, model = Package("engine.md", tmp_path / "package"), tmp_path / "ridge.lipmotion"
-    package.lipmotion("train", toy_corpus.path, "-o", model, "--engine", "ridge", "--set", "penalty=500")
-    assert "penalty=500.0" in package.lipmotion("info", model)
+@pytest.mark.parametrize(
+    ("page", "chosen", "missing"),
+    [
+        ("engine.md", ("--engine", "ridge", "--set", "penalty=500"),
+         "no engine 'ridge'; there are: trajectory, coupled, joint, selection; install the package that adds it"),
+        ("predictor.md", ("--set", "predictor=frames"),
+         "no predictor 'frames'; there are: network, posteriors, prior, encoding; install the package that adds it"),
+    ],
+)  # fmt: skip
+def test_what_is_installed_trains_saves_loads_and_animates(page, chosen, missing, toy_corpus, toy_speech, tmp_path):
+    package, model = Package(page, tmp_path / "package"), tmp_path / "a.lipmotion"
+    package.lipmotion("train", toy_corpus.path, "-o", model, *chosen)
+    assert chosen[-1] in package.lipmotion("info", model)
     package.lipmotion("animate", toy_speech, "--model", model, "-o", tmp_path / "a.csv")
-    lines = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
-    assert lines[0].startswith("time_s,opening,width,outer")
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8").startswith("time_s,opening,width,outer")
     package.lipmotion("explain", toy_speech, "--model", model, "--at", "1.0")
-    missing = run_child([*LIPMOTION, "info", "--structure", model])
-    assert missing.returncode == 6
-    assert "no engine 'ridge'; there are: trajectory, coupled, joint, selection; install the package" in missing.stderr
-
-
-@pytest.mark.long
-def test_an_installed_predictor_is_chosen_by_name(toy_corpus, toy_speech, tmp_path):
-    package, model = Package("predictor.md", tmp_path / "package"), tmp_path / "frames.lipmotion"
-    package.lipmotion("train", toy_corpus.path, "-o", model, "--set", "predictor=frames")
-    assert "predictor=frames" in package.lipmotion("info", model)
-    package.lipmotion("animate", toy_speech, "--model", model, "-o", tmp_path / "a.csv")
-    assert (tmp_path / "a.csv").read_text(encoding="utf-8").startswith("time_s,opening")
-    missing = run_child([*LIPMOTION, "animate", toy_speech, "--model", model, "-o", tmp_path / "b.csv"])
-    assert missing.returncode == 6
-    assert (
-        "no predictor 'frames'; there are: network, posteriors, prior, encoding; install the package that adds it"
-        in missing.stderr
-    )
+    without = run_child([*LIPMOTION, "animate", toy_speech, "--model", model, "-o", tmp_path / "b.csv"])
+    assert without.returncode == 6
+    assert missing in without.stderr
 
 
 @pytest.mark.long

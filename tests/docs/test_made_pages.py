@@ -1,7 +1,5 @@
 """Figures of pages are those of their sheets, and tables of the reference are those of the code."""
 
-from __future__ import annotations
-
 import json
 import re
 

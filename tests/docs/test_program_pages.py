@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.meshes.files.rig_tables import read_rig_table
+from lipmotion.meshes.model.rig_tables import read_rig_table
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from meshes.speech import motion, units
 

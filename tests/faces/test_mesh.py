@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from lipmotion import Staging
-from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
+from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.mesh import HEAD, NECK, Bone, Material, Mesh, MeshPart
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.mesh import MeshFace, MeshStage
 from lipmotion_faces.testing import check_face
 from meshes.heads import head, write_glb

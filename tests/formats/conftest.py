@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from formats.examples import of_motion
+from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
 
 
 @pytest.fixture
@@ -12,4 +13,4 @@ def generation() -> Generation:
     values[3] = [-1e-9, 0.123456789]
     motion = Motion(values, 100.0, (Channel("opening"), Channel("x_17", "metre")))
     units = Timeline((Span(0.0, 0.3, Unit("sil", "sil")), Span(0.3, 0.45, Unit("m", "m", word="mama"))))
-    return Generation(motion, np.ones((101, 2)), units, StateTrace(("a",), np.zeros(101, dtype=np.intp)))
+    return of_motion(motion, units)

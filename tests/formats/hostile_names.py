@@ -14,22 +14,23 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from formats.examples import of_motion
 from lipmotion import CueSheet, read_motion
 from lipmotion.citations import model_citations
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.base import write_motion
+from lipmotion.formats import write_motion
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.formats.label_files import write_labels
 from lipmotion.formats.textgrid import parse_interval_tiers
-from lipmotion.meshes.files.gltf_document import read_gltf_document
-from lipmotion.meshes.files.gltf_writer import write_gltf_scene
-from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.batch.report import Mark, _field, _for_page
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import as_text
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
+from lipmotion_faces.characters.gltf_document import read_gltf_document
+from lipmotion_faces.characters.gltf_writer import write_gltf_scene
+from lipmotion_faces.characters.scene import Scene
+from lipmotion_faces.characters.usd_writer import write_usda
 from lipmotion_faces.video.synthetic_mark import mark_metadata
 
 PARTS = (
@@ -56,7 +57,7 @@ def generation(name: str, unit: str = "eye_distance", label: Unit | None = None)
     """Return three frames of a channel of that name."""
     motion = Motion(np.array([[0.0], [0.5], [0.25]]), 25.0, (Channel(name, unit),))
     units = Timeline((Span(0.0, 0.1, label or Unit("aa")),))
-    return Generation(motion, np.zeros((3, 1)), units, StateTrace(("",), np.zeros(3, np.intp)))
+    return of_motion(motion, units)
 
 
 def mesh(name: str) -> Mesh:

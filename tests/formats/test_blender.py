@@ -9,7 +9,7 @@ import pytest
 
 from formats.examples import of_motion
 from lipmotion.errors import ExportError
-from lipmotion.formats.base import write_motion
+from lipmotion.formats import write_motion
 from lipmotion.formats.blender import write_addon
 from lipmotion.types import WEIGHT, Channel, Motion
 

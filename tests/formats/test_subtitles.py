@@ -33,7 +33,6 @@ def test_words_and_phones_are_written_and_words_come_back(tmp_path: Path, suffix
     plain = Timeline((*UNITS.spans[:3], Span(0.52, 3599.9996, Unit("dh", "", "there"))))
     text(plain, f"a{suffix}")
     transcript = read_labels(tmp_path / f"a{suffix}").transcript
-    assert transcript is not None
     assert [(line.start_s, line.end_s) for line in transcript.lines] == [(0.31, 0.52), (0.52, 3600.0)]
     assert transcript.words == ("ma", "there")
     silence = text(Timeline((Span(0.0, 1.0, Unit("sil")),)), f"b{suffix}")

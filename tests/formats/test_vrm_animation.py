@@ -10,9 +10,9 @@ import programs
 from formats.examples import generation, written
 from lipmotion import read_motion
 from lipmotion.errors import ExportError
-from lipmotion.meshes.files.gltf_document import read_gltf_document
 from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
 from lipmotion.types import Generation
+from lipmotion_faces.characters.gltf_document import read_gltf_document
 
 NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES)
 

@@ -1,6 +1,6 @@
 """Fuzz every reader for a while.
 
-    PYTHONPATH=tests python -m fuzz [--minutes 10] [--reader NAME ...] [--seed 0] [--json FILE]
+    PYTHONPATH=tests python -m fuzz [--minutes 10] [--reader NAME ...] [--seed 0]
     PYTHONPATH=tests python -m fuzz --reader NAME --replay FOLDER
 
 The minutes are shared between the readers; making the good input (a minute) is not counted. Each defect is stored in a
@@ -24,7 +24,7 @@ from fuzz.good import good_in, make_good
 from fuzz.inputs import Good, picked_up
 from fuzz.judge import READ, REFUSED
 from fuzz.readers import READERS
-from fuzz.report import keep, row, write_json
+from fuzz.report import keep, row
 from fuzz.worker import Worker
 
 
@@ -36,7 +36,6 @@ def main() -> int:
     parser.add_argument(
         "--workers", type=int, default=os.cpu_count() or 1, help="readers at a time (default: one a core)"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures and the traces")
     parser.add_argument("--found", type=Path, default=Path("build/fuzz"), help="where defects go (default: build/fuzz)")
     parser.add_argument("--replay", type=Path, metavar="FOLDER", help="read one kept input; says what becomes of it")
     parser.add_argument("--good", type=Path, metavar="FOLDER", help="keep the good input here, for further runs")
@@ -73,8 +72,6 @@ def fuzz(options: argparse.Namespace, good: Good) -> int:
             stopped.set()
         records = [run.result() for run in runs]
     print(*map(row, records), sep="\n")
-    if options.json:
-        write_json(options.json, records, options.seed, options.minutes)
     return int(any(record.findings for record in records))
 
 

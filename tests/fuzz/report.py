@@ -1,15 +1,13 @@
-"""The findings of a fuzzing run: reduced, stored, and with all figures as JSON."""
+"""The findings of a fuzzing run, reduced and stored, and its figures."""
 
-import json
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from fuzz.campaign import CampaignRecord, Finding
 from fuzz.inputs import Files, lay_out
-from fuzz.judge import CRASH, HANG, MEMORY, READ, REFUSED, WRONG
+from fuzz.judge import HANG
 from fuzz.worker import Worker
 
 PATIENCE_S = 30.0
@@ -55,27 +53,11 @@ def smallest(files: Files, same: Callable[[Files], bool], patience_s: float) -> 
     return files
 
 
-OTHERS = tuple(kind for kind in WRONG if kind not in (CRASH, HANG, MEMORY))
-
-
-def row(record: CampaignRecord) -> dict[str, Any]:
-    counts = {name: record.kinds[kind] for name, kind in {"read": READ, "refused": REFUSED}.items()}
-    wrong = {"crashes": record.kinds[CRASH], "hangs": record.kinds[HANG], "memory": record.kinds[MEMORY]}
-    rate = round(record.distinct / record.seconds, 1) if record.seconds else 0.0
-    return {
-        **{"reader": record.reader, "tried": record.made, "distinct": record.distinct, **counts, **wrong},
-        **{"errors": sum(record.kinds[kind] for kind in OTHERS), "defects": len(record.findings)},
-        **{"kept": record.kept, "lines": len(record.lines), "per_s": rate, "slowest_s": round(record.slowest_s, 1)},
-    }
-
-
-def write_json(path: Path, records: Sequence[CampaignRecord], seed: int, minutes: float) -> None:
-    """Write the figures as JSON, and every defect with its trace."""
-    found = [
-        {"reader": record.reader, "kind": finding.result.kind, "where": finding.result.where, "inputs": finding.count}
-        | {"detail": finding.result.detail}
-        for record in records
-        for finding in record.findings.values()
-    ]
-    whole = {"seed": seed, "minutes": minutes, "readers": [row(record) for record in records], "defects": found}
-    path.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
+def row(record: CampaignRecord) -> str:
+    """Return the figures of a reader in one line."""
+    rate = record.distinct / record.seconds if record.seconds else 0.0
+    kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(record.kinds.items()))
+    return (
+        f"{record.reader}: {record.made} tried, {record.distinct} distinct ({kinds}), {len(record.findings)} defects, "
+        f"{record.kept} kept, {len(record.lines)} lines, {rate:.1f} a second, the slowest {record.slowest_s:.1f} s"
+    )

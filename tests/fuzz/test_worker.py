@@ -1,6 +1,5 @@
 """The worker process, with a reader that has planted defects, its judgement, and the report."""
 
-import json
 import sys
 import warnings
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from fuzz.campaign import CampaignRecord, campaign
 from fuzz.inputs import Files, Good, Reader, picked_up
 from fuzz.judge import CRASH, ERROR, HANG, IMPLAUSIBLE, LEFT, MEMORY, READ, REFUSED, Result, read_result
 from fuzz.planted import MEGABYTES, readers, seeds
-from fuzz.report import keep, smallest, write_json
+from fuzz.report import keep, row, smallest
 from fuzz.worker import Worker
 from lipmotion.errors import InputError
 
@@ -86,6 +85,7 @@ def test_a_campaign_finds_and_counts(planted):
     assert first.distinct == 30 <= first.made
     assert sum(first.kinds.values()) == 30
     assert first.kinds == second.kinds
+    assert row(first).startswith(f"planted: {first.made} tried, 30 distinct (")
 
 
 def _input(order: str) -> Files:
@@ -121,19 +121,3 @@ def test_memory_and_warnings_are_defects(tmp_path):
 
     assert read_with(MemoryError("no room"), tmp_path).kind == MEMORY
     assert read_result(Reader("planted", seeds, warn), FILES, tmp_path / "bad", NOWHERE).kind == ERROR
-
-
-def records() -> list[CampaignRecord]:
-    first, second = CampaignRecord("audio", made=5, seconds=2.0), CampaignRecord("labels", made=2, seconds=1.0)
-    for kind in (READ, CRASH, HANG, LEFT):
-        first.add(Result(kind, "somewhere", "a trace"), {"a": b""})
-    second.add(Result(READ), {"a": b""})
-    return [first, second]
-
-
-def test_the_same_as_json(tmp_path):
-    write_json(tmp_path / "a.json", records(), 7, 0.5)
-    found = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
-    assert [one["reader"] for one in found["readers"]] == ["audio", "labels"]
-    assert {one["kind"] for one in found["defects"]} == {CRASH, HANG, LEFT}
-    assert found["defects"][0]["detail"] == "a trace"

@@ -4,18 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
+from lipmotion.hmm import loudness
 from lipmotion.hmm.align import align_units, choose_pronunciations
-from lipmotion.hmm.loudness import (
-    LEAST_FRAMES,
-    PAUSE_FRAMES,
-    QUIET_DROP,
-    QUIET_REACH_FRAMES,
-    find_loud_frames,
-    find_quiet_frames,
-    find_sound_runs,
-    find_spoken_frames,
-    measure_levels,
-)
 from lipmotion.hmm.network import compute_log_likelihoods, penalise_silence, penalise_speech
 
 ROOM = -10.0
@@ -35,14 +25,9 @@ def line(before: int = 60, after: int = 60, seed: int = 1) -> np.ndarray:
     return level + np.random.default_rng(seed).normal(0, 0.3, len(level))
 
 
-def around(frames: int, level: float, seed: int = 2) -> np.ndarray:
-    """Another silence: digital, or of another noise."""
-    return level + np.random.default_rng(seed).normal(0, 0.3, frames)
-
-
 @given(offset=st.floats(-50, 50))
 def test_loud_is_relative_to_the_recording(offset):
-    loud = np.nonzero(find_loud_frames(energy() + offset, smoothing=5))[0]
+    loud = np.nonzero(loudness.find_loud_frames(energy() + offset, smoothing=5))[0]
     assert (loud[0], loud[-1]) == pytest.approx((40, 99), abs=1)
     assert len(loud) == loud[-1] - loud[0] + 1
 
@@ -50,40 +35,40 @@ def test_loud_is_relative_to_the_recording(offset):
 def test_clicks_shorter_than_the_smoothing_are_not_loud():
     clicks = energy()
     clicks[[10, 120]] = 12.0
-    assert find_loud_frames(clicks, smoothing=1)[[10, 120]].all()
-    assert not find_loud_frames(clicks, smoothing=5)[[10, 120]].any()
+    assert loudness.find_loud_frames(clicks, smoothing=1)[[10, 120]].all()
+    assert not loudness.find_loud_frames(clicks, smoothing=5)[[10, 120]].any()
 
 
 def test_nothing_is_loud_in_the_shortest_recordings_and_where_nothing_changes():
     for frames in (1, 2, 3):
-        assert not find_loud_frames(np.full(frames, -3.0), smoothing=21).any()
+        assert not loudness.find_loud_frames(np.full(frames, -3.0), smoothing=21).any()
     for level in (-69.0, 20.0):
         steady = (level * (1 + 1e-7 * np.random.default_rng(0).uniform(-1, 1, 300))).astype(np.float32)
-        assert not find_loud_frames(steady).any()
+        assert not loudness.find_loud_frames(steady).any()
     for frames in (1, 40):
-        assert not find_quiet_frames(np.full(frames, -9.0, np.float32)).any()
+        assert not loudness.find_quiet_frames(np.full(frames, -9.0, np.float32)).any()
 
 
 @pytest.mark.parametrize("frames", [50, 500, 6000])
 @pytest.mark.parametrize("other", [ROOM - 15, ROOM - 3, ROOM + 3])
 def test_another_silence_around_a_recording_changes_no_level(frames: int, other: float):
     alone = line()
-    pad = around(frames, other)
+    pad = other + np.random.default_rng(2).normal(0, 0.3, frames)  # digital, or of another noise
     padded = np.r_[pad, alone, pad]
     own = slice(frames, frames + len(alone))
-    assert measure_levels(padded) == pytest.approx(measure_levels(alone), abs=0.1)
-    assert measure_levels(alone) == pytest.approx((-2, ROOM), abs=1.5)
-    assert np.array_equal(find_spoken_frames(padded)[own], find_spoken_frames(alone))
-    assert find_quiet_frames(padded)[: frames - 20].all() == (other < -QUIET_DROP - 2)
+    assert loudness.measure_levels(padded) == pytest.approx(loudness.measure_levels(alone), abs=0.1)
+    assert loudness.measure_levels(alone) == pytest.approx((-2, ROOM), abs=1.5)
+    assert np.array_equal(loudness.find_spoken_frames(padded)[own], loudness.find_spoken_frames(alone))
+    assert loudness.find_quiet_frames(padded)[: frames - 20].all() == (other < -loudness.QUIET_DROP - 2)
 
 
 def test_short_pauses_are_part_of_the_sound_and_clicks_are_none():
     sound = np.zeros(400, bool)
-    sound[100:150] = sound[150 + PAUSE_FRAMES - 1 : 250] = True
-    sound[300 : 300 + LEAST_FRAMES - 1] = True
-    assert find_sound_runs(sound) == [(100, 250)]
-    assert find_sound_runs(sound, 10) == [(100, 150), (150 + PAUSE_FRAMES - 1, 250)]
-    assert find_sound_runs(np.zeros(9, bool)) == []
+    sound[100:150] = sound[150 + loudness.PAUSE_FRAMES - 1 : 250] = True
+    sound[300 : 300 + loudness.LEAST_FRAMES - 1] = True
+    assert loudness.find_sound_runs(sound) == [(100, 250)]
+    assert loudness.find_sound_runs(sound, 10) == [(100, 150), (150 + loudness.PAUSE_FRAMES - 1, 250)]
+    assert loudness.find_sound_runs(np.zeros(9, bool)) == []
 
 
 def stranger():
@@ -111,13 +96,13 @@ def test_loud_frames_are_neither_aligned_with_silence_nor_chosen_as_pauses():
 
 
 def test_quiet_frames_are_far_under_the_loud_ones_and_away_from_them():
-    level = np.full(200, -QUIET_DROP - 1)
+    level = np.full(200, -loudness.QUIET_DROP - 1)
     level[50:120] = 0
-    level[70:76] = -QUIET_DROP - 9  # the closure of a stop
-    quiet = find_quiet_frames(level.astype(np.float32))
-    assert quiet[: 50 - QUIET_REACH_FRAMES].all()
-    assert quiet[120 + QUIET_REACH_FRAMES :].all()
-    assert not quiet[50 - QUIET_REACH_FRAMES : 120 + QUIET_REACH_FRAMES].any()
+    level[70:76] = -loudness.QUIET_DROP - 9  # the closure of a stop
+    quiet = loudness.find_quiet_frames(level.astype(np.float32))
+    assert quiet[: 50 - loudness.QUIET_REACH_FRAMES].all()
+    assert quiet[120 + loudness.QUIET_REACH_FRAMES :].all()
+    assert not quiet[50 - loudness.QUIET_REACH_FRAMES : 120 + loudness.QUIET_REACH_FRAMES].any()
 
 
 def test_quiet_frames_are_silence_whatever_they_sound_like():

@@ -23,7 +23,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.network import build_unit_loop, compute_log_likelihoods, decode_units
 from lipmotion.hmm.unit_training import TranscribedUtterance, train_hmm
 from lipmotion.stats.bigram import estimate_bigram
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import silent_monitor
 
 CONFIG = HmmConfig(mixtures=2, context_frames=20)
 

@@ -133,10 +133,6 @@ def chained(seed: int, frames: int, spread: float, chains: int = 2):
     return expectation, factors, columns
 
 
-def joint_of(factors, columns) -> np.ndarray:
-    return sum(factor[:, column].astype(float) for factor, column in zip(factors, columns, strict=True))
-
-
 @given(seed=st.integers(0, 1000), chains=st.integers(1, 3), spread=st.sampled_from([0.1, 4.0, 1e2, 1e3, 1e5]))
 @SHARED
 def test_densities_of_chains_are_as_their_products(seed, chains, spread):
@@ -145,23 +141,12 @@ def test_densities_of_chains_are_as_their_products(seed, chains, spread):
     factors[0][masked] = -np.inf
     frames = np.array([12, 18])
     found = expectation.product_posteriors(factors, columns, frames)
-    log_emission = joint_of(factors, columns)
+    log_emission = sum(factor[:, column] for factor, column in zip(factors, columns, strict=True))
     wanted = expectation.posteriors(log_emission, np.arange(log_emission.shape[1]), frames)
     tolerance = 1e-10 if spread < 1e4 else 1e-7
     assert found.posterior == pytest.approx(wanted.posterior, abs=tolerance)
     assert found.counts == pytest.approx(wanted.counts, abs=30 * tolerance)
     assert found.log_likelihood == pytest.approx(wanted.log_likelihood, abs=1e-8 if spread < 1e4 else 1e-4)
-
-
-@pytest.mark.parametrize("spread", [1.0, 30.0, 1e3])
-def test_single_precision_of_chains_is_close(spread):
-    expectation, factors, columns = chained(7, 60, spread)
-    factors = [factor.astype(np.float32) for factor in factors]
-    found = expectation.product_posteriors(factors, columns, np.array([60]))
-    exact = expectation.product_posteriors([factor.astype(float) for factor in factors], columns, np.array([60]))
-    assert found.posterior.dtype == np.float32
-    assert found.posterior == pytest.approx(exact.posterior, abs=1e-4)
-    assert found.log_likelihood == pytest.approx(exact.log_likelihood, rel=1e-6)
 
 
 @pytest.mark.parametrize(("against", "frames"), [(3.0, 40), (20.0, 3), (100.0, 3)])

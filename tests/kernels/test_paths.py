@@ -34,22 +34,6 @@ def block(request, monkeypatch) -> int:
     return request.param
 
 
-@pytest.mark.usefixtures("block")
-def test_agrees_with_the_enumeration_of_all_paths():
-    for frames in range(1, 7):
-        for seed in range(3):
-            arrays, arcs = random_network(seed, states=3 + seed % 2, densities=3, density_of_arcs=0.5)
-            log_emission = random_emission(seed, frames, 3)
-            path, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays))
-            ends = arrays["log_initial"], arrays["log_final"]
-            wanted, best = oracle.best_path(log_emission, arrays["emission"], arcs, *ends)
-            if np.isinf(best):
-                assert score == -np.inf
-            else:
-                assert tuple(path) == wanted
-                assert score == pytest.approx(best, abs=1e-3)
-
-
 @given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 80), block=st.integers(1, 90))
 @settings(max_examples=25)
 def test_blocks_change_nothing(seed, frames, block):

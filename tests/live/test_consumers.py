@@ -1,7 +1,5 @@
 """What takes live frames: packets as their receivers read them, files, the command line."""
 
-from __future__ import annotations
-
 import socket
 import struct
 

@@ -1,12 +1,10 @@
 """Words of services with their times, in the motion of a voice agent."""
 
-from __future__ import annotations
-
 import asyncio
 
 import numpy as np
 
-from lipmotion.live.conversation import Conversation
+from lipmotion_agents.conversation import Conversation
 
 
 def test_words_with_odd_times_do_no_harm() -> None:

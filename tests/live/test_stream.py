@@ -1,7 +1,5 @@
 """Live motion: pieces do not matter, frames are neither lost nor doubled, closures, rest, interruption."""
 
-from __future__ import annotations
-
 import asyncio
 import copy
 import gc

@@ -1,16 +1,16 @@
 """A small head for tests: a curved sheet with a mouth cut into it, ARKit's blendshapes, teeth behind, eyes beside."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
-from lipmotion.meshes.model.scene import Scene
-from lipmotion.storage.files import as_text
 from lipmotion.types import Motion
+from lipmotion_faces.characters.gltf_writer import write_gltf_scene
+from lipmotion_faces.characters.scene import Scene
 
 SEAM, HALF = -0.86, 0.3
 """Height of the mouth and half its width, in eye distances."""
@@ -22,9 +22,12 @@ SIZE = 10.0
 
 def head(*, shapes: bool = True, slit: bool = True, size: float = SIZE) -> Mesh:
     """The face, and teeth as a piece of their own."""
-    face = _sheet(slit)
-    teeth = Mesh(np.array([[-0.1, -0.95, 0.1], [0.1, -0.95, 0.1], [0.0, -1.05, 0.1]]), np.array([[0, 2, 1]], np.int32))
-    whole = joined({"face": face, "teeth": teeth})
+    vertices, triangles = _sheet(slit)
+    first, stop = len(triangles), len(triangles) + 1
+    parts = (MeshPart("face", 0, first), MeshPart("teeth", first, stop))
+    triangles = np.concatenate([triangles, [[len(vertices), len(vertices) + 2, len(vertices) + 1]]]).astype(np.int32)
+    vertices = np.concatenate([vertices, [[-0.1, -0.95, 0.1], [0.1, -0.95, 0.1], [0.0, -1.05, 0.1]]])
+    whole = Mesh(vertices, triangles, parts)
     made = tuple(_shapes(whole)) if shapes else ()
     scaled = tuple(Blendshape(each.name, each.rows, size * each.displacements) for each in made)
     return Mesh(size * whole.vertices, whole.triangles, whole.parts, scaled)
@@ -41,8 +44,8 @@ def lip_points(mesh: Mesh, size: float = SIZE) -> dict[int, int]:
     return names | {13: upper, 14: lower}
 
 
-def _sheet(slit: bool) -> Mesh:
-    """A grid of vertices; along the seam those of the lower lip are others than those of the upper lip."""
+def _sheet(slit: bool) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Vertices and triangles of a grid; along the seam the lower lip has others than the upper lip."""
     seam = int(np.abs(ROWS - SEAM).argmin())
     x, y = np.meshgrid(COLUMNS, ROWS)
     y[seam] = SEAM
@@ -59,7 +62,7 @@ def _sheet(slit: bool) -> Mesh:
         for column in range(len(COLUMNS) - 1):
             a, b, c, d = top[column], top[column + 1], bottom[column], bottom[column + 1]
             triangles += [(a, c, b), (b, c, d)]
-    return Mesh(vertices, np.array(triangles, np.int32))
+    return vertices, np.array(triangles)
 
 
 def _depth(x, y):
@@ -107,39 +110,6 @@ def _under(mesh: Mesh):
     return under
 
 
-def joined(meshes: Mapping[str, Mesh]) -> Mesh:
-    """Return one mesh of several ones; each gives one part of its name, of the material of its first part.
-
-    Blendshapes of one name become one. Texture coordinates remain where one has some, and are 0 in the others; colours
-    remain where all have some.
-    """
-    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes.values())])
-    triangles = [mesh.triangles + offset for mesh, offset in zip(meshes.values(), offsets, strict=False)]
-    stops = np.cumsum([0, *(len(rows) for rows in triangles)])
-    parts = [
-        MeshPart(name, int(first), int(stop), mesh.parts[0].material)
-        for (name, mesh), first, stop in zip(meshes.items(), stops, stops[1:], strict=False)
-    ]
-    shapes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
-    for mesh, offset in zip(meshes.values(), offsets, strict=False):
-        for shape in mesh.shapes:
-            shapes.setdefault(shape.name, []).append((shape.rows + offset, shape.displacements))
-    uv = [np.zeros((*mesh.triangles.shape, 2)) if mesh.uv is None else mesh.uv for mesh in meshes.values()]
-    mapped = any(mesh.uv is not None for mesh in meshes.values())
-    colours = [mesh.colours for mesh in meshes.values() if mesh.colours is not None]
-    return Mesh(
-        np.concatenate([mesh.vertices for mesh in meshes.values()]),
-        np.concatenate(triangles).astype(np.int32),
-        tuple(parts),
-        tuple(
-            Blendshape(name, np.concatenate([rows for rows, _ in moved]), np.concatenate([way for _, way in moved]))
-            for name, moved in shapes.items()
-        ),
-        np.concatenate(uv) if mapped else None,
-        np.concatenate(colours) if len(colours) == len(meshes) else None,
-    )
-
-
 def shaped(mesh: Mesh, weights: dict[str, float]) -> NDArray[np.float64]:
     """The vertices under weights of blendshapes; the others have weight 0."""
     assert weights.keys() <= set(mesh.shape_names)
@@ -162,16 +132,21 @@ def write_obj(path: Path, mesh: Mesh, vertices: NDArray[np.float64] | None = Non
     places = mesh.vertices if vertices is None else vertices
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in places.tolist())
-        if mesh.uv is not None:
-            file.writelines(f"vt {u:.7g} {v:.7g}\n" for u, v in mesh.uv.reshape(-1, 2).tolist())
         for part in mesh.parts:
-            file.write(f"o {_one_line(part.name)}\nusemtl {_one_line(part.material.name)}\n")
-            for number in range(part.first, part.stop):
-                corners = (mesh.triangles[number] + 1).tolist()
-                textures = range(3 * number + 1, 3 * number + 4)
-                words = [f"{v}/{t}" for v, t in zip(corners, textures, strict=True)] if mesh.uv is not None else corners
-                file.write(f"f {' '.join(map(str, words))}\n")
+            file.write(f"o {part.name}\nusemtl {part.material.name or 'part'}\n")
+            file.writelines(f"f {a} {b} {c}\n" for a, b, c in (mesh.triangles[part.first : part.stop] + 1).tolist())
 
 
-def _one_line(text: str) -> str:
-    return as_text(" ".join(text.split())).rstrip("\\") or "part"  # a backslash at the end continues the line
+VISEMES = {
+    "jawOpen": "viseme_aa", "mouthPucker": "viseme_U", "mouthFunnel": "viseme_O", "mouthSmileLeft": "viseme_E",
+    "mouthStretchLeft": "viseme_I", "mouthRollLower": "viseme_FF", "mouthPressLeft": "viseme_PP",
+    "mouthLowerDownLeft": "viseme_DD", "mouthUpperUpLeft": "viseme_SS",
+}  # fmt: skip
+"""Shapes of the head, and visemes that they may stand for."""
+
+
+def renamed(names: Mapping[str, str]) -> Mesh:
+    """The head with these of its shapes alone, under other names."""
+    mesh = head()
+    kept = tuple(replace(shape, name=names[shape.name]) for shape in mesh.shapes if shape.name in names)
+    return replace(mesh, shapes=kept)

@@ -12,8 +12,13 @@ JAWS = (0.0, 0.03, 0.15, 0.08, 0.05, 0.0)
 WIDTHS = (0.59, 0.58, 0.60, 0.57, 0.50, 0.59)
 
 
+def said(*spans: tuple[float, float, str]) -> Timeline[Unit]:
+    """Return phones in time, each given with its start and its end, seconds."""
+    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
+
+
 def units() -> Timeline[Unit]:
-    return Timeline(tuple(Span(start, end, Unit(phone)) for phone, start, end in PHONES))
+    return said(*((start, end, phone) for phone, start, end in PHONES))
 
 
 def motion(*, points: bool = True, rate_hz: float = 100.0) -> Motion:

@@ -6,19 +6,12 @@ import pytest
 
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.meshes.files.binding_files import (
-    load_binding,
-    read_points,
-    read_weights,
-    save_binding,
-    write_points,
-    write_weights,
-)
 from lipmotion.meshes.fitting import lip_placement
 from lipmotion.meshes.fitting.lip_placement import part_named_lips, place_lips_by_points, place_lips_by_shape
 from lipmotion.meshes.model.binding import MAX_WEIGHTS, bind, paint_weights, skin_vertices
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.surface import build_surface
+from lipmotion_faces.characters import binding_files
 from meshes.heads import COLUMNS, HALF, SEAM, SIZE, head, lip_points, shaped
 from oracles.skinning import skinned_vertex_by_vertex
 
@@ -85,19 +78,19 @@ def test_skinning_is_the_weighted_sum_of_the_transformed_vertices(binding, mesh)
 
 def test_a_stored_binding_is_the_same_and_of_its_mesh_and_a_damaged_one_is_refused(binding, mesh, tmp_path):
     path = tmp_path / "head.binding"
-    save_binding(path, binding, mesh)
-    again = load_binding(path, mesh)
+    binding_files.save_binding(path, binding, mesh)
+    again = binding_files.load_binding(path, mesh)
     for name in ("rows", "controls", "weights"):
         np.testing.assert_array_equal(getattr(again, name), getattr(binding, name))
     assert again.placement.vertices.tolist() == binding.placement.vertices.tolist()
     with pytest.raises(InputError, match="made for"):
-        load_binding(path, head(shapes=False, slit=False))
+        binding_files.load_binding(path, head(shapes=False, slit=False))
 
     def refused():
         with pytest.raises(ModelFormatError, match="bind the character again"):
-            load_binding(path, mesh)
+            binding_files.load_binding(path, mesh)
 
-    save_binding(path, replace(binding, weights=np.minimum(3 * binding.weights, 1)), mesh)
+    binding_files.save_binding(path, replace(binding, weights=np.minimum(3 * binding.weights, 1)), mesh)
     refused()
     path.write_bytes(b"binding")
     refused()
@@ -110,7 +103,7 @@ def test_painted_weights_replace_those_of_a_vertex(binding, mesh, tmp_path):
     vertex = int(binding.rows[0])
     paint = tmp_path / "paint.csv"
     paint.write_text(f"vertex,point,weight\n{vertex},152,0.25\n{vertex},17,0.5\n\n# more\n0,17,2e-1\n")
-    after = paint_weights(binding, mesh, read_weights(paint))
+    after = paint_weights(binding, mesh, binding_files.read_weights(paint))
     template = mouth_template()
     moved = _moved(after, mesh, [template.row(17)], [0, 1, 0])
     assert moved[vertex, 1] == pytest.approx(0.5)
@@ -121,11 +114,11 @@ def test_painted_weights_replace_those_of_a_vertex(binding, mesh, tmp_path):
 
 
 def test_written_weights_paint_the_same_binding_and_points_are_read(binding, mesh, tmp_path):
-    write_weights(tmp_path / "weights.csv", binding)
-    again = paint_weights(binding, mesh, read_weights(tmp_path / "weights.csv"))
+    binding_files.write_weights(tmp_path / "weights.csv", binding)
+    again = paint_weights(binding, mesh, binding_files.read_weights(tmp_path / "weights.csv"))
     np.testing.assert_allclose(again.matrix.toarray(), binding.matrix.toarray(), atol=1e-5)
-    write_points(tmp_path / "points.csv", binding.placement)
-    named = read_points(tmp_path / "points.csv")
+    binding_files.write_points(tmp_path / "points.csv", binding.placement)
+    named = binding_files.read_points(tmp_path / "points.csv")
     assert [named[point] for point in binding.placement.points] == binding.placement.vertices.tolist()
 
 
@@ -145,7 +138,7 @@ def test_paint_is_checked(binding, mesh, tmp_path):
     for text, message in WRONG:
         (tmp_path / "paint.csv").write_text(text)
         with pytest.raises(InputError, match=message):
-            paint_weights(binding, mesh, read_weights(tmp_path / "paint.csv"))
+            paint_weights(binding, mesh, binding_files.read_weights(tmp_path / "paint.csv"))
 
 
 GRID = 0.05 * SIZE

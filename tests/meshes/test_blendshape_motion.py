@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from formats.examples import of_motion
 from lipmotion import Staging
 from lipmotion.articulation.contact import CLOSED_OPENING, opening_to_gap
 from lipmotion.articulation.expression import with_moods
@@ -30,14 +31,14 @@ from lipmotion.meshes.model.face_shapes import find_face_shapes
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.meshes.model.shape_names import VISEMES_15
 from lipmotion.meshes.model.surface import build_surface
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit
 from lipmotion.types.delivery import parse_moods
 from lipmotion.types.motion import RADIAN
 from lipmotion.units import PHONES
 from lipmotion_faces.base import stage_liveliness
 from lipmotion_faces.head.pose import head_poses
 from meshes.heads import head
-from meshes.speech import motion, units
+from meshes.speech import motion, said, units
 
 
 def weights(**curves: list[float]) -> Motion:
@@ -73,7 +74,6 @@ def test_motion_that_became_weights_comes_back() -> None:
 
 def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> None:
     given = find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
-    assert given is not None
     assert given.names == arkit_mouth().names
     assert given["jawOpen"].tolist() == [0.2, 1.0]
     assert given["mouthFunnel"].tolist() == [0.0, 0.0]
@@ -221,11 +221,14 @@ def test_phones_fade_around_their_border():
 
 
 def test_visemes_rest_where_the_curves_do():
-    said = Timeline(tuple(Span(a, b, Unit(p)) for a, b, p in ((0, 0.5, "aa"), (0.5, 1.1, "sp"), (1.1, 1.6, "aa"))))
+    spoken = said((0, 0.5, "aa"), (0.5, 1.1, "sp"), (1.1, 1.6, "aa"))
     held = Motion(np.full((161, 1), 0.1), 100.0, (Channel("opening"),))
-    generation = Generation(held, np.zeros((161, 1)), said, StateTrace(("",), np.zeros(161, np.intp)))
+    generation = of_motion(held, spoken)
     for style, rests in (("rest", True), ("natural", False)):
         moved = rest_in_pauses(generation, style).motion
-        found, arkit = weigh_visemes(said, spoken_mouth(moved, said)), solve_shape_weights(moved, said, arkit_mouth())
+        found, arkit = (
+            weigh_visemes(spoken, spoken_mouth(moved, spoken)),
+            solve_shape_weights(moved, spoken, arkit_mouth()),
+        )
         assert (found["viseme_sil"][80] > 0.99) == rests
         assert (arkit["jawOpen"][80] < 0.01) == rests

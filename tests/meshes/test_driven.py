@@ -6,10 +6,6 @@ import pytest
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.binding_files import save_binding, write_weights
-from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
-from lipmotion.meshes.fitting.driven import JAW_OPEN, load_character, with_jaw
 from lipmotion.meshes.model.face_shapes import life_scale
 from lipmotion.meshes.model.mesh import (
     HEAD,
@@ -17,15 +13,17 @@ from lipmotion.meshes.model.mesh import (
     LEFT_EYE,
     NECK,
     RIGHT_EYE,
-    Blendshape,
     Bone,
-    Mesh,
     bone_kind,
     merge_bones,
 )
+from lipmotion.meshes.model.rig_tables import table_path, write_rig_table
 from lipmotion.types.delivery import parse_moods
+from lipmotion_faces.characters.binding_files import save_binding, write_weights
+from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
+from lipmotion_faces.characters.gltf_scene import read_gltf
 from meshes.gltf import POSITIONS, document, glb, with_skin
-from meshes.heads import SEAM, head, lip_points, shaped, write_glb, write_obj
+from meshes.heads import SEAM, VISEMES, head, lip_points, renamed, shaped, write_glb, write_obj
 from meshes.speech import motion, units
 
 TIME_S = np.arange(51) / 25.0
@@ -92,18 +90,12 @@ def test_a_mesh_without_blendshapes_needs_points_and_control_points_have_no_weig
 
 
 def _expressive(*names):
-    """A head with five visemes, and some whole expressions: those whose name begins with ``s`` part the lips."""
-    mesh = head()
-    spoken = {"jawOpen": "viseme_aa", "mouthPucker": "viseme_U", "mouthFunnel": "viseme_O"}
-    spoken |= {"mouthSmileLeft": "viseme_E"}
-    spoken |= {"mouthStretchLeft": "viseme_I", "mouthRollLower": "viseme_FF", "mouthPressLeft": "viseme_PP"}
-    spoken |= {"mouthLowerDownLeft": "viseme_DD"}
-    shapes = {shape.name: shape for shape in mesh.shapes}
-    kept = [Blendshape(name, shapes[own].rows, shapes[own].displacements) for own, name in spoken.items()]
-    for name in names:
-        like = shapes["mouthUpperUpLeft" if name.lower().startswith("s") else "eyeBlinkLeft"]
-        kept.append(Blendshape(name, like.rows, like.displacements))
-    return Mesh(mesh.vertices, mesh.triangles, mesh.parts, tuple(kept))
+    """A head with visemes, and some whole expressions: those whose name begins with ``s`` part the lips."""
+    spoken = {own: name for own, name in VISEMES.items() if own != "mouthUpperUpLeft"}
+    like = {name: "mouthUpperUpLeft" if name.lower().startswith("s") else "eyeBlinkLeft" for name in names}
+    faces = [replace(shape, name=name) for name, own in like.items() for shape in head().shapes if shape.name == own]
+    mesh = renamed(spoken)
+    return replace(mesh, shapes=(*mesh.shapes, *faces))
 
 
 def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_path):
@@ -253,12 +245,12 @@ def test_a_jaw_bone_opens_the_mouth():
 
 def test_a_character_with_a_jaw_bone_alone_follows_the_motion(tmp_path):
     """The square of two triangles is no head; the made head has no skin. So the bone is put on the read mesh."""
-    from lipmotion.meshes.fitting import driven
+    from lipmotion_faces.characters import character_files
 
     path = tmp_path / "head.glb"
     write_glb(path, head(shapes=False))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(driven, "read_character", lambda _: with_bone(head(shapes=False)))
+        patch.setattr(character_files, "read_character", lambda _: with_bone(head(shapes=False)))
         character = load_character(path)
     weights = character.weights(motion(), units())
     assert weights.names == (JAW_OPEN,)

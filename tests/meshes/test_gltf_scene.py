@@ -1,12 +1,11 @@
 import json
-from contextlib import suppress
 
 import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.files.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
+from lipmotion_faces.characters.gltf_scene import read_gltf
+from lipmotion_faces.characters.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
 from meshes.gltf import (
     OPEN,
     POSITIONS,
@@ -157,19 +156,6 @@ def test_what_is_no_gltf_is_refused(tmp_path, content):
     (tmp_path / "head.glb").write_bytes(content)
     with pytest.raises(InputError, match=r"head\.glb"):
         read_gltf(tmp_path / "head.glb")
-
-
-def test_changed_bytes_are_read_or_refused(tmp_path):
-    content, binary = document()
-    whole = np.frombuffer(glb(content, binary), np.uint8)
-    rng = np.random.default_rng(1)
-    path = tmp_path / "head.glb"
-    for _ in range(150):
-        changed = whole.copy()
-        changed[rng.integers(0, len(whole), 3)] = rng.integers(0, 256, 3)
-        path.write_bytes(changed[: len(changed) - int(rng.integers(0, 3)) * 7].tobytes())
-        with suppress(InputError):
-            assert len(read_gltf(path).triangles) > 0
 
 
 def test_attributes_come_back():

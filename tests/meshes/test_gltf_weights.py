@@ -6,7 +6,7 @@ import pytest
 
 from lipmotion import read_motion
 from lipmotion.errors import InputError
-from lipmotion.formats.base import readable_suffixes
+from lipmotion.formats import readable_suffixes
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes import gltf
 from meshes.heads import head, write_glb
@@ -112,15 +112,12 @@ def test_turns_of_neck_and_head_are_against_their_rest(tmp_path: Path) -> None:
     assert motion.values[:, -2:] == pytest.approx(np.zeros((3, 2)), abs=1e-5)
 
 
-def _pointed(pointer: str) -> dict[str, Any]:
-    return {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
-
-
 @pytest.mark.parametrize("pointer", ["/nodes/0/weights", "/meshes/0/weights", "/nodes/0/weights/0"])
 def test_pointers_name_weights(tmp_path: Path, pointer: str) -> None:
     rows = np.random.default_rng(4).random((25, 1 if pointer.endswith("0") else 2))
     content, binary = gltf.animated_document([n / 30 for n in range(25)], rows)
-    content["animations"][1]["channels"][0]["target"] = _pointed(pointer)
+    pointed = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
+    content["animations"][1]["channels"][0]["target"] = pointed
     (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
     motion, _ = read_motion(tmp_path / "a.glb")
     assert motion.names == tuple(NAMES[: rows.shape[1]])

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
-from lipmotion.meshes.files.gltf_writer import find_named_sound, sound_extras, write_animated_gltf
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.characters.character_files import read_character
+from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
+from lipmotion_faces.characters.gltf_writer import find_named_sound, sound_extras, write_animated_gltf
 from meshes import gltf
 from meshes.heads import head, shaped, write_glb
 

@@ -2,18 +2,12 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
+from lipmotion.meshes.model import shape_names
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
-from lipmotion.meshes.model.scene import EVERY_KEY, HeadTurn, Scene, Thinning, compute_shading_normals, place_keys
-from lipmotion.meshes.model.shape_names import (
-    ARKIT_MOUTH,
-    ARKIT_OTHERS,
-    VISEMES_15,
-    arkit_name,
-    viseme_name,
-    vowel_name,
-)
 from lipmotion.meshes.model.surface import drop_back_sides
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.characters.scene import HeadTurn, Scene, compute_shading_normals
 from meshes.heads import head, shaped
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -166,12 +160,12 @@ def test_names_as_files_spell_them():
         "JAW_OPEN": "jawOpen", "A25_Jaw_Open": "jawOpen", "Head|jawOpen_12": "jawOpen",
         "mouthSmile": None, "Fcl_MTH_A": None, "": None, "001": None,
     }  # fmt: skip
-    assert {spelled: arkit_name(spelled) for spelled in arkit} == arkit
-    assert len({*ARKIT_MOUTH, *ARKIT_OTHERS}) == 52
+    assert {spelled: shape_names.arkit_name(spelled) for spelled in arkit} == arkit
+    assert len({*shape_names.ARKIT_MOUTH, *shape_names.ARKIT_OTHERS}) == 52
     visemes = {"viseme_PP": "PP", "viseme_I": "ih", "vrc.v_oh": "oh", "Viseme_aa": "aa", "viseme_ZZ": None}
     visemes |= {"viseme_PP.001": "PP", "aa": None}
-    assert len(set(VISEMES_15)) == 15
-    assert {spelled: viseme_name(spelled) for spelled in visemes} == visemes
+    assert len(set(shape_names.VISEMES_15)) == 15
+    assert {spelled: shape_names.viseme_name(spelled) for spelled in visemes} == visemes
     vowels = {"Fcl_MTH_A": "aa", "Fcl_MTH_O.003": "oh", "aa": "aa", "う": "ou", "oh": "oh"}
     vowels |= {"Fcl_MTH_Angry": None, "Alpha": None}
-    assert {spelled: vowel_name(spelled) for spelled in vowels} == vowels
+    assert {spelled: shape_names.vowel_name(spelled) for spelled in vowels} == vowels

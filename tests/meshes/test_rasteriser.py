@@ -4,7 +4,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
 from lipmotion.meshes.model.surface import compute_normals
-from lipmotion.meshes.model.textures import decode_srgb
+from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches
 from lipmotion_faces.rendering.rasteriser import Camera, Canvas, flat, gradient
 

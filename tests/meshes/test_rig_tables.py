@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.rig_tables import apply_rig, read_rig_table
-from lipmotion.meshes.files.steady_rate import even_out_rows, exact_rate
+from lipmotion.formats.steady_rate import even_out_rows, exact_rate
+from lipmotion.meshes.model.rig_tables import apply_rig, read_rig_table
 
 SOURCES = {"jawOpen": np.array([0.0, 0.5, 1.0]), "mouthPucker": np.array([0.0, 1.0, 0.0])}
 

@@ -15,21 +15,19 @@ from lipmotion.meshes.fitting.shape_weights import (
     solve_shape_weights,
 )
 from lipmotion.meshes.model.face_shapes import find_face_shapes
-from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import Channel, Motion, Timeline
-from meshes.heads import head
+from meshes.heads import VISEMES, head, renamed
 from meshes.speech import PHONES, motion, units
 
 
-def _head_shapes():
-    mesh = head()
+def _shapes_of(mesh):
     return find_face_shapes(mesh, place_lips_by_shape(mesh, build_surface(mesh)))
 
 
 @pytest.fixture(scope="module", params=["mesh", "reference"])
 def shapes(request):
-    return _head_shapes() if request.param == "mesh" else arkit_mouth()
+    return _shapes_of(head()) if request.param == "mesh" else arkit_mouth()
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +86,7 @@ def test_lips_are_pressed_in_p_as_captures_press_them(shapes):
 
 
 def test_known_weights_come_back():
-    shapes = _head_shapes()
+    shapes = _shapes_of(head())
     known = np.zeros((60, len(shapes.names)))
     wave = np.clip(np.sin(np.arange(60) / 9), 0, 1)
     known[:, shapes.row("jawOpen")] = 0.4 * wave
@@ -101,13 +99,7 @@ def test_known_weights_come_back():
 
 
 def test_visemes_are_used_where_there_is_no_jaw_shape():
-    mesh = head()
-    names = {"jawOpen": "viseme_aa", "mouthPucker": "viseme_U", "mouthFunnel": "viseme_O", "mouthSmileLeft": "viseme_E"}
-    names |= {"mouthStretchLeft": "viseme_I", "mouthRollLower": "viseme_FF", "mouthPressLeft": "viseme_PP"}
-    names |= {"mouthLowerDownLeft": "viseme_DD", "mouthUpperUpLeft": "viseme_SS"}
-    kept = tuple(type(s)(names[s.name], s.rows, s.displacements) for s in mesh.shapes if s.name in names)
-    spoken = Mesh(mesh.vertices, mesh.triangles, mesh.parts, kept)
-    shapes = find_face_shapes(spoken, place_lips_by_shape(spoken, build_surface(spoken)))
+    shapes = _shapes_of(renamed(VISEMES))
     assert shapes.style == "visemes"
     found = solve_shape_weights(motion(), units(), shapes)
     assert found["viseme_aa"][75] > 0.2

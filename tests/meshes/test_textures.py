@@ -5,10 +5,10 @@ import pytest
 from PIL import Image
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.character_files import read_obj, read_obj_folder
-from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart
-from lipmotion.meshes.model.textures import Texture, decode_srgb, read_texture, texture_table
+from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart, Texture
+from lipmotion_faces.characters.character_files import read_obj, read_obj_folder
+from lipmotion_faces.characters.gltf_scene import read_gltf
+from lipmotion_faces.characters.textures import decode_srgb, read_texture, texture_table
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion_faces.rendering.rasteriser import Camera, flat
@@ -27,10 +27,7 @@ def encoded(pixels=QUARTERS, form="PNG") -> bytes:
 
 def textured(tmp_path, *, image: bytes | None = None, material=None, extension=None):
     """The square with a picture on it."""
-    content, binary = textured_document(encoded() if image is None else image, material, extension)
-    path = tmp_path / "head.glb"
-    path.write_bytes(glb(content, binary))
-    return read_gltf(path)
+    return _read(tmp_path, *textured_document(encoded() if image is None else image, material, extension))
 
 
 def picture_of(mesh: Mesh) -> np.ndarray:
@@ -134,7 +131,6 @@ def test_opacity_in_a_box_is_never_less_or_more_than_said():
 def test_what_is_no_picture_is_none_and_large_ones_are_reduced(content):
     assert read_texture(content) is None
     texture = read_texture(encoded(np.zeros((10, 3000, 4), np.uint8)))
-    assert texture is not None
     assert texture.pixels.shape[1] == 1024
     with pytest.raises(InputError, match=r"required \(H, W, 4\)"):
         Texture(np.zeros((2, 2, 3), np.uint8))

@@ -6,14 +6,11 @@ from hypothesis import strategies as st
 from lipmotion.motion.frame_labels import StateLayout, label_full_context, with_neighbours
 from lipmotion.motion.rest import find_digital_silence, is_away_from_speech, list_speech_intervals
 from lipmotion.testing.examples import timeline
-from lipmotion.types import ENERGY_FEATURE, Span, Timeline, Unit
+from lipmotion.types import ENERGY_FEATURE, Timeline, Unit
+from meshes.speech import said
 
 LAYOUT = StateLayout(5, 7, 0.1)
 REST = LAYOUT.rest
-
-
-def spans(*labels: tuple[float, float, str]) -> Timeline[Unit]:
-    return Timeline(tuple(Span(start_s, end_s, Unit(phone)) for start_s, end_s, phone in labels))
 
 
 def states_of(units: Timeline[Unit], phone: str, states: int = 5, edge_s: float = 0.08) -> list[int]:
@@ -22,7 +19,7 @@ def states_of(units: Timeline[Unit], phone: str, states: int = 5, edge_s: float 
 
 
 def test_beyond_the_ends_lies_silence():
-    found = list(with_neighbours(spans((0, 0.1, "p"), (0.1, 0.2, "aa"))))
+    found = list(with_neighbours(said((0, 0.1, "p"), (0.1, 0.2, "aa"))))
     assert [(left, span.label.phone, right) for left, span, right in found] == [("sil", "p", "aa"), ("p", "aa", "sil")]
 
 
@@ -36,7 +33,7 @@ def test_beyond_the_ends_lies_silence():
     ],
 )
 def test_short_phones_are_cut_into_equal_states_and_only_the_middle_of_long_ones_is_longer(end_s, given, wanted):
-    assert states_of(spans((0.5, end_s, "aa")), "aa", **given) == wanted
+    assert states_of(said((0.5, end_s, "aa")), "aa", **given) == wanted
 
 
 @given(
@@ -48,7 +45,7 @@ def test_short_phones_are_cut_into_equal_states_and_only_the_middle_of_long_ones
 )
 def test_states_never_go_back_and_are_all_there(start, length, states, edge, offset_s):
     edges = (start / 100 + offset_s, (start + length) / 100 + offset_s)
-    found = states_of(spans((*edges, "aa")), "aa", states, edge / 100)
+    found = states_of(said((*edges, "aa")), "aa", states, edge / 100)
     assert all(0 <= state < states for state in found)
     assert (np.diff(found) >= 0).all()
     if length >= states and start:
@@ -59,25 +56,25 @@ def test_states_never_go_back_and_are_all_there(start, length, states, edge, off
 def test_states_mirror_in_time(start, length, edge):
     """Frames lie evenly in a phone that begins half a frame before its first, as alignments do."""
     edges = (start - 0.5) / 100, (start + length - 0.5) / 100
-    found = states_of(spans((*edges, "aa")), "aa", 5, edge / 100 + 0.0012)
+    found = states_of(said((*edges, "aa")), "aa", 5, edge / 100 + 0.0012)
     assert found == [4 - state for state in reversed(found)]
 
 
 def test_silence_rests_away_from_speech_only():
-    states = label_full_context(spans((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, LAYOUT)
+    states = label_full_context(said((0, 0.595, "sil"), (0.595, 0.695, "aa"), (0.695, 1.5, "sil")), 151, LAYOUT)
     rests = np.array([state == REST for state in states])
     margin = round(LAYOUT.rest_s * 100)
     assert margin == 30
     assert np.flatnonzero(~rests).tolist() == [*range(60 - margin, 70 + margin)]
     assert (states[50].unit, states[50].right) == ("sil", "aa")
-    between_words = spans((0, 0.1, "aa"), (0.1, 0.6, "sil"), (0.6, 0.7, "aa"))
+    between_words = said((0, 0.1, "aa"), (0.1, 0.6, "sil"), (0.6, 0.7, "aa"))
     assert REST not in label_full_context(between_words, 70, LAYOUT)
 
 
 def test_frames_belong_to_the_unit_that_has_begun_and_rest_outside_of_all():
-    states = label_full_context(spans((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
+    states = label_full_context(said((0.1, 0.2, "aa"), (0.3, 0.4, "t")), 60, LAYOUT)
     assert [frame for frame in range(60) if states[frame] != REST] == [*range(10, 20), *range(30, 40)]
-    states = label_full_context(spans((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, LAYOUT)
+    states = label_full_context(said((0.0, 0.105, "aa"), (0.105, 0.2, "t")), 20, LAYOUT)
     assert [state.unit for state in states] == ["aa"] * 11 + ["t"] * 9
 
 

@@ -16,8 +16,7 @@ from lipmotion.motion.limits import MotionLimits, check_poses, check_rest, check
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.pca import Pca
 from lipmotion.testing.examples import PHONES, examples, speech
-from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit, silent_monitor
 
 POSES = np.array([[0.0, 0.5], [0.3, 0.6], [0.1, 0.55]])
 REACH = measure_limits(POSES)

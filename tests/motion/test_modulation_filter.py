@@ -57,11 +57,9 @@ def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wa
     noise = [still for x in values for still in (x[:28], x[-28:])]  # at rest, and 0.3 s away from speech
     noisy, freed = fit_modulation_filter(values, smooth), fit_modulation_filter(values, smooth, noise)
     found = learn_filter(0.5, zip(values, smooth, strict=True), training, values)
-    assert found is not None
     errors = [np.abs(found.taps - each.scale_to(0.5).taps).max() for each in (noisy, freed)]
     assert errors[1] < 0.1 * errors[0]
     nothing = learn_filter(1.0, [], training, values)
-    assert nothing is not None
     assert nothing.apply(values[0]) == pytest.approx(values[0])
 
     def unwanted():
@@ -108,7 +106,6 @@ def test_what_never_moves_is_left_as_it_is() -> None:
 
 def test_it_is_stored() -> None:
     stored = filter_from_arrays(filter_to_arrays(FILTER), 2)
-    assert stored is not None
     assert np.array_equal(stored.taps, FILTER.taps)
     nothing = filter_to_arrays(None)
     assert filter_from_arrays(nothing, 2) is None

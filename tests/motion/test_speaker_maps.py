@@ -5,22 +5,9 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.motion import speaker_maps
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
-from lipmotion.motion.speaker_maps import (
-    FAR_FROM_SPEECH_S,
-    NEAR_SPEECH_S,
-    RANGE_PRIOR_S,
-    VISEME_NAMES,
-    SpeakerMap,
-    SpeakerMaps,
-    add_habits,
-    map_to_mean_person,
-    measure_restfulness,
-    speakers_from_arrays,
-    speakers_to_arrays,
-    weigh_visemes,
-)
 from lipmotion.motion.transfer_map import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map, select_channels
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
 from testing.toy import toy_motion, toy_sentences
@@ -55,13 +42,13 @@ def ben(count: int = 6) -> list[Example]:
 
 
 def restful(example: Example) -> np.ndarray:
-    return measure_restfulness(example.speech.units, len(example.motion.values))
+    return speaker_maps.measure_restfulness(example.speech.units, len(example.motion.values))
 
 
-def both(*groups: Sequence[Example]) -> tuple[list[list[Example]], SpeakerMaps]:
+def both(*groups: Sequence[Example]) -> tuple[list[list[Example]], speaker_maps.SpeakerMaps]:
     examples = [example for group in groups for example in group]
     names = [name for name, group in zip(("anna", "ben", "cleo"), groups, strict=False) for _ in group]
-    mapped, maps = map_to_mean_person(examples, names)
+    mapped, maps = speaker_maps.map_to_mean_person(examples, names)
     parts = iter(mapped)
     return [[next(parts) for _ in group] for group in groups], maps
 
@@ -116,14 +103,14 @@ def test_restfulness_grows_with_the_distance_from_speech() -> None:
     units = toy_sentences(3)[0].units
     speech_s, times = list_speech_intervals(units), np.arange(250) / 100
     distance = np.array([max(0.0, min(max(a - t, t - b) for a, b in speech_s)) for t in times])
-    found = measure_restfulness(units, 250)
-    near, far = distance < NEAR_SPEECH_S, distance > FAR_FROM_SPEECH_S
+    found = speaker_maps.measure_restfulness(units, 250)
+    near, far = distance < speaker_maps.NEAR_SPEECH_S, distance > speaker_maps.FAR_FROM_SPEECH_S
     assert near.any()
     assert far.any()
     assert np.abs(found[near]).max() < 1e-12
     assert found[far].min() > 1 - 1e-12
     assert np.diff(found[np.argsort(distance, kind="stable")]).min() > -1e-9
-    assert (is_away_from_speech(times, speech_s, FAR_FROM_SPEECH_S) == far).all()
+    assert (is_away_from_speech(times, speech_s, speaker_maps.FAR_FROM_SPEECH_S) == far).all()
 
 
 def test_points_share_a_gain_for_each_axis() -> None:
@@ -172,12 +159,14 @@ def test_unseen_frames_change_nothing() -> None:
 
     _, one = both([with_unseen(each, 0.0) for each in anna()], ben())
     _, other = both([with_unseen(each, 9.0) for each in anna()], ben())
-    for array, same in zip(speakers_to_arrays(one).values(), speakers_to_arrays(other).values(), strict=True):
+    for array, same in zip(
+        speaker_maps.speakers_to_arrays(one).values(), speaker_maps.speakers_to_arrays(other).values(), strict=True
+    ):
         assert np.array_equal(array, same)
 
 
 def test_speakers_by_name_and_channels_in_another_order() -> None:
-    mapped, maps = map_to_mean_person([*anna(), *ben(), *anna(3)], ["anna"] * 6 + ["ben"] * 6 + [""] * 3)
+    mapped, maps = speaker_maps.map_to_mean_person([*anna(), *ben(), *anna(3)], ["anna"] * 6 + ["ben"] * 6 + [""] * 3)
     assert len(mapped) == 15
     assert maps.names == ("anna", "ben")  # those without a name are one person more
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
@@ -191,19 +180,21 @@ def test_speakers_by_name_and_channels_in_another_order() -> None:
 
 def test_habits_are_what_is_left_in_each_viseme() -> None:
     examples, names = [*anna(), *ben()], ["anna"] * 6 + ["ben"] * 6
-    mapped, maps = map_to_mean_person(examples, names)
-    planted = np.zeros((len(VISEME_NAMES), 3))
-    planted[VISEME_NAMES.index("lr1"), 1], planted[VISEME_NAMES.index("al"), 2] = 0.1, -0.2
+    mapped, maps = speaker_maps.map_to_mean_person(examples, names)
+    planted = np.zeros((len(speaker_maps.VISEME_NAMES), 3))
+    planted[speaker_maps.VISEME_NAMES.index("lr1"), 1], planted[speaker_maps.VISEME_NAMES.index("al"), 2] = 0.1, -0.2
     generated = [each.motion.values for each in mapped[:6]]
-    generated += [x.motion.values - weigh_visemes(x.speech.units, len(x.motion.values)) @ planted for x in mapped[6:]]
-    found = add_habits(maps, mapped, names, generated)
+    generated += [
+        x.motion.values - speaker_maps.weigh_visemes(x.speech.units, len(x.motion.values)) @ planted for x in mapped[6:]
+    ]
+    found = speaker_maps.add_habits(maps, mapped, names, generated)
     np.testing.assert_allclose(found.of("anna").habits, 0, atol=1e-12)
     habits = found.of("ben").habits
-    assert 0.05 < habits[VISEME_NAMES.index("lr1"), 1] < 0.1
-    assert -0.2 < habits[VISEME_NAMES.index("al"), 2] < -0.05
+    assert 0.05 < habits[speaker_maps.VISEME_NAMES.index("lr1"), 1] < 0.1
+    assert -0.2 < habits[speaker_maps.VISEME_NAMES.index("al"), 2] < -0.05
     assert np.abs(habits[:, 0]).max() < 1e-12
     one = mapped[-1]
-    visemes = weigh_visemes(one.speech.units, len(one.motion.values))
+    visemes = speaker_maps.weigh_visemes(one.speech.units, len(one.motion.values))
     shift = found.of("ben").shift(one.motion.values, visemes)
     assert np.abs(shift).max() > 0.03
     assert np.abs(shift[restful(one) >= 1]).max() < 1e-12
@@ -214,19 +205,19 @@ def test_habits_are_what_is_left_in_each_viseme() -> None:
 
 def test_weights_of_visemes_fade() -> None:
     units = toy_sentences(3)[0].units
-    weights = weigh_visemes(units, 250)
-    assert np.abs(weights.sum(axis=1) + measure_restfulness(units, 250) - 1).max() < 1e-9
+    weights = speaker_maps.weigh_visemes(units, 250)
+    assert np.abs(weights.sum(axis=1) + speaker_maps.measure_restfulness(units, 250) - 1).max() < 1e-9
     assert 0 < np.abs(np.diff(weights, axis=0)).max() < 0.3
     unknown = Timeline((Span(0.0, 1.0, Unit("", "a group")),))
-    assert np.abs(weigh_visemes(unknown, 100)).max() < 1e-12
+    assert np.abs(speaker_maps.weigh_visemes(unknown, 100)).max() < 1e-12
 
 
 def test_maps_are_stored_and_damaged_ones_are_refused() -> None:
     maps = both(anna(3), ben(3))[1]
-    arrays = speakers_to_arrays(maps)
-    again = speakers_from_arrays(arrays)
+    arrays = speaker_maps.speakers_to_arrays(maps)
+    again = speaker_maps.speakers_from_arrays(arrays)
     assert (again.names, again.channels) == (maps.names, maps.channels)
-    for array, same in zip(arrays.values(), speakers_to_arrays(again).values(), strict=True):
+    for array, same in zip(arrays.values(), speaker_maps.speakers_to_arrays(again).values(), strict=True):
         assert np.array_equal(array, same)
     for name, value in (
         ("gain", np.full((2, 3), 5.0)),
@@ -243,10 +234,10 @@ def test_maps_are_stored_and_damaged_ones_are_refused() -> None:
         ("more", np.ones(2)),
     ):
         with pytest.raises(ModelFormatError, match="table of speakers"):
-            speakers_from_arrays(arrays | {name: value})
+            speaker_maps.speakers_from_arrays(arrays | {name: value})
     for name in ("channels", "names", "gain", "offset", "rest", "habits", "lips"):
         with pytest.raises(ModelFormatError, match=name):
-            speakers_from_arrays({other: array for other, array in arrays.items() if other != name})
+            speaker_maps.speakers_from_arrays({other: array for other, array in arrays.items() if other != name})
 
 
 def test_wrong_phones_of_one_clip_do_not_keep_the_lips_of_a_person_open() -> None:
@@ -264,11 +255,11 @@ def test_wrong_phones_of_one_clip_do_not_keep_the_lips_of_a_person_open() -> Non
     assert maps.of("ben").to_person(shut, np.zeros(1))[0, 0] == pytest.approx(closed([clip]), abs=0.01)
 
 
-def random_map(seed: int, habits: float = 0.0) -> SpeakerMap:
+def random_map(seed: int, habits: float = 0.0) -> speaker_maps.SpeakerMap:
     rng = np.random.default_rng(seed)
     channels = anna(1)[0].motion.channels
     gain, offset, rest = rng.uniform(0.5, 2, 3), rng.normal(size=3), rng.normal(size=3)
-    return SpeakerMap(channels, gain, offset, rest, habits * rng.normal(size=(13, 3)), (0.0, 0.1))
+    return speaker_maps.SpeakerMap(channels, gain, offset, rest, habits * rng.normal(size=(13, 3)), (0.0, 0.1))
 
 
 def test_motion_of_the_source_becomes_that_of_the_target() -> None:
@@ -311,7 +302,7 @@ def test_gains_grow_with_the_seconds_of_speech() -> None:
     for count in (1, 6):
         some = examples[:count]
         person = fit_transfer_map(some, resting_open(some))
-        trust = count_speech_s(some) / (count_speech_s(some) + RANGE_PRIOR_S)
+        trust = count_speech_s(some) / (count_speech_s(some) + speaker_maps.RANGE_PRIOR_S)
         np.testing.assert_allclose(np.log(person.gain) / trust, np.log(GAIN), atol=0.05)
 
 

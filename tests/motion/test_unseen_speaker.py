@@ -4,27 +4,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from lipmotion import load_model
+from lipmotion.motion import unseen_speaker
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.closure import REACH_S, find_closable_ranges
 from lipmotion.motion.general_motion import hear_articulators
 from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.unseen_speaker import (
-    CONSONANT_CLOSING,
-    INSET_S,
-    OPENING_BY_DURATION,
-    VOWEL_S,
-    UnseenSpeaker,
-    choose_closing_reach,
-    widen_range,
-)
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.model import with_prior
 from lipmotion.pipeline.request import Request
 from lipmotion.testing.examples import timeline
-from lipmotion.types import Constraints, Generation, Motion, Pin, Span, Speech, Timeline, Unit
+from lipmotion.types import Constraints, Generation, Pin, Span, Speech, Timeline, Unit
 from lipmotion.units import VOWELS
 
 WELCOME = Path(__file__).parent.parent.parent / "examples" / "welcome.flac"
@@ -61,20 +52,20 @@ def shut_share(generation: Generation) -> float:
 @pytest.mark.parametrize(("voice", "change"), [(0.0, 1.0), (0.75, 0.5), (1.0, 0.0)])
 def test_long_vowels_are_more_open_short_ones_and_consonants_less(voice: float, change: float) -> None:
     prior = load_model().learned.motion.prior
-    seconds = np.cumsum([0, 0.5, 0.5, 0.5, 0.04, 0.46, VOWEL_S, 0.4]).tolist()
+    seconds = np.cumsum([0, 0.5, 0.5, 0.5, 0.04, 0.46, unseen_speaker.VOWEL_S, 0.4]).tolist()
     phones = ("t", "aa", "t", "aa", "t", "aa", "t")
     units = Timeline(tuple(Span(*edges, Unit(phone)) for edges, phone in zip(pairwise(seconds), phones, strict=True)))
     means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = UnseenSpeaker(prior, units, 250, 1.0, voice).raise_contrast(
+    statistics = unseen_speaker.UnseenSpeaker(prior, units, 250, 1.0, voice).raise_contrast(
         lambda frames: (means[frames], precisions[frames])
     )
     deviation = prior.matrix[0, 0]
     changed, kept = statistics(slice(20, 240))
     opening = changed[:, 0, 0] / deviation
-    assert opening[75 - 20] == pytest.approx(change * OPENING_BY_DURATION * np.log(5), rel=0.01)
-    assert opening[[5, 215]] == pytest.approx(-change * CONSONANT_CLOSING, rel=0.01)
-    shortest = OPENING_BY_DURATION * np.log(0.04 / VOWEL_S)
-    assert change * shortest <= opening[152 - 20] <= -change * CONSONANT_CLOSING
+    assert opening[75 - 20] == pytest.approx(change * unseen_speaker.OPENING_BY_DURATION * np.log(5), rel=0.01)
+    assert opening[[5, 215]] == pytest.approx(-change * unseen_speaker.CONSONANT_CLOSING, rel=0.01)
+    shortest = unseen_speaker.OPENING_BY_DURATION * np.log(0.04 / unseen_speaker.VOWEL_S)
+    assert change * shortest <= opening[152 - 20] <= -change * unseen_speaker.CONSONANT_CLOSING
     np.testing.assert_array_equal(kept, precisions[20:240])
 
 
@@ -83,7 +74,7 @@ def test_half_known_voices_open_before_they_speak(voice: float, share: float) ->
     prior = load_model().learned.motion.prior
     units = Timeline((Span(0.0, 1.5, Unit("sil")), Span(1.5, 1.8, Unit("aa")), Span(1.8, 2.5, Unit("sil"))))
     means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = UnseenSpeaker(prior, units, 250, 0.5, voice).open_before_speech(
+    statistics = unseen_speaker.UnseenSpeaker(prior, units, 250, 0.5, voice).open_before_speech(
         lambda frames: (means[frames], precisions[frames])
     )
     changed, kept = statistics(slice(10, 250))
@@ -100,7 +91,7 @@ def test_a_model_of_few_phones_opens_no_mouth_before_speech() -> None:
     means, precisions = np.zeros((250, 3, len(prior.centre))), np.ones((250, 3, len(prior.centre)))
     changes = []
     for each in (prior, few):
-        speaker = UnseenSpeaker(each, units, 250, 1.0, 0.8)
+        speaker = unseen_speaker.UnseenSpeaker(each, units, 250, 1.0, 0.8)
         statistics = speaker.open_before_speech(lambda frames: (means[frames], precisions[frames]))
         changes.append(np.abs(statistics(slice(250))[0]).max())
     assert changes[1] == pytest.approx(changes[0] * 10 / 5000)
@@ -128,14 +119,14 @@ def test_movements_are_those_of_typical_talkers_about_the_same_rest(welcome: Spe
     assert np.percentile(own, 98) < 0.18
     assert 0.2 < np.percentile(typical, 98) < 0.3
     assert np.abs(typical[:10] - own[:10]).max() < 0.01
-    for frames in find_closable_ranges(unknown.units, len(typical), reach_s=choose_closing_reach(0.0)):
+    for frames in find_closable_ranges(unknown.units, len(typical), reach_s=unseen_speaker.choose_closing_reach(0.0)):
         assert typical[frames].min() <= load_model().learned.closure.closed + 1e-9
     ratio = np.sqrt(unknown.variance[:, 0] / np.maximum(known.variance[:, 0], 1e-12))
     assert 1.2 < np.median(ratio) < 2
 
 
-def test_a_known_voice_is_moved_by_its_model_alone(welcome: Speech) -> None:
-    assert hear_articulators(replace(welcome, voice=1.0)) is None
+def test_a_known_voice_whose_phones_are_given_is_moved_by_its_model_alone(welcome: Speech) -> None:
+    assert hear_articulators(replace(welcome, voice=1.0, units_known=True)) is None
     assert hear_articulators(replace(welcome, encoding=None)) is None
     assert hear_articulators(welcome).shape == (len(welcome.features.values), len(ARTICULATORS))
 
@@ -146,13 +137,17 @@ def test_a_model_that_stands_on_another_gets_the_same_of_it_whoever_speaks(welco
     np.testing.assert_allclose(known.articulators, unknown.articulators)
 
 
-@pytest.mark.parametrize(("reliability", "share"), [(0.0, 0.75), (1.0, 0.35)])
-def test_strangers_follow_the_sound_in_speech_the_less_phones_are_relied_on(reliability: float, share: float) -> None:
+@pytest.mark.parametrize(
+    ("voice", "reliability", "share"), [(0.0, 0.0, 0.75), (0.0, 1.0, 0.35), (1.0, 0.0, 0.3), (1.0, 1.0, 0.0)]
+)
+def test_motion_follows_the_sound_in_speech_the_less_phones_are_relied_on(
+    voice: float, reliability: float, share: float
+) -> None:
     prior = load_model().learned.motion.prior
     units = Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 2.0, Unit("aa")), Span(2.0, 3.0, Unit("sil"))))
     means, precisions = np.zeros((300, 3, len(prior.centre))), np.ones((300, 3, len(prior.centre)))
     heard = np.tile(np.eye(len(ARTICULATORS))[0], (300, 1))
-    statistics = UnseenSpeaker(prior, units, 300, reliability, 0.0).follow_sound(
+    statistics = unseen_speaker.UnseenSpeaker(prior, units, 300, reliability, voice).follow_sound(
         lambda frames: (means[frames], precisions[frames]), heard
     )
     changed, kept = statistics(slice(10, 300))
@@ -166,20 +161,17 @@ def test_doubtful_closures_are_confirmed_by_the_sound() -> None:
     heard = np.zeros((100, len(ARTICULATORS)))
     heard[:20, 0] = -1
     ranges = [slice(5, 15), slice(50, 60)]
-    assert UnseenSpeaker(prior, units, 100, 1.0, 0.0).confirm_closures(ranges, heard) == ranges
-    assert UnseenSpeaker(prior, units, 100, 0.2, 0.0).confirm_closures(ranges, heard) == ranges[:1]
+    assert unseen_speaker.UnseenSpeaker(prior, units, 100, 1.0, 0.0).confirm_closures(ranges, heard) == ranges
+    assert unseen_speaker.UnseenSpeaker(prior, units, 100, 0.2, 0.0).confirm_closures(ranges, heard) == ranges[:1]
 
 
 def test_jaw_and_lips_go_with_the_opening(welcome: Speech) -> None:
     slopes = []
     for voice in (1.0, 0.0):
-        motion = generated(replace(welcome, voice=voice)).motion
-        slopes.append([np.polyfit(motion["opening"], apart, 1)[0] for apart in _distances(motion)])
+        motion = generated(replace(welcome, voice=voice, confidence=1.0)).motion
+        distances = -motion["y_152"], motion["y_13"] - motion["y_14"]
+        slopes.append([np.polyfit(motion["opening"], apart, 1)[0] for apart in distances])
     np.testing.assert_allclose(slopes[1], slopes[0], rtol=0.15)
-
-
-def _distances(motion: Motion) -> tuple[NDArray[np.floating], ...]:
-    return -motion["y_152"], motion["y_13"] - motion["y_14"]
 
 
 def test_pins_are_in_delivered_units(welcome: Speech) -> None:
@@ -191,22 +183,22 @@ def test_pins_are_in_delivered_units(welcome: Speech) -> None:
 
 def test_the_range_grows_with_what_is_not_known() -> None:
     learned = load_model().learned
-    factors = [widen_range(learned.prior, learned.space, voice, 1.0) for voice in (1.0, 0.7, 0.3, 0.0)]
+    factors = [unseen_speaker.widen_range(learned.prior, learned.space, voice, 1.0) for voice in (1.0, 0.7, 0.3, 0.0)]
     assert factors[0] == pytest.approx(1)
     assert np.diff(factors).min() > 0
-    doubtful = widen_range(learned.prior, learned.space, 0.0, 0.0)
+    doubtful = unseen_speaker.widen_range(learned.prior, learned.space, 0.0, 0.0)
     assert 1 < doubtful < factors[-1]  # the general network, which moves as far as people do, has more of it
     weights = tuple(replace(channel, unit="weight") for channel in learned.space.channels)
     other = MotionSpace(weights, learned.space.direct, learned.space.points)
-    assert widen_range(learned.prior, other, 0.0, 1.0) == pytest.approx(1)
+    assert unseen_speaker.widen_range(learned.prior, other, 0.0, 1.0) == pytest.approx(1)
 
 
 def test_lips_close_within_the_phones_of_unknown_voices() -> None:
-    assert choose_closing_reach(1.0) == pytest.approx(REACH_S)
-    assert choose_closing_reach(0.0) == pytest.approx(-INSET_S)
+    assert unseen_speaker.choose_closing_reach(1.0) == pytest.approx(REACH_S)
+    assert unseen_speaker.choose_closing_reach(0.0) == pytest.approx(-unseen_speaker.INSET_S)
     for duration_s in (0.02, 0.1):
         span = timeline(("b",), duration_s)[1]
-        (frames,) = find_closable_ranges(timeline(("b",), duration_s), 200, reach_s=-INSET_S)
+        (frames,) = find_closable_ranges(timeline(("b",), duration_s), 200, reach_s=-unseen_speaker.INSET_S)
         assert span.start_s - 1e-9 <= frames.start / 100 <= (frames.stop - 1) / 100 <= span.end_s + 1e-9
 
 

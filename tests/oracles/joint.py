@@ -1,10 +1,8 @@
 """Multi-stream models: densities term by term, recognition and posteriors by enumeration."""
 
-from itertools import pairwise
-
 import numpy as np
 
-from oracles.sequences import segmentations
+from oracles.sequences import price, segmentations
 
 
 def gaussian(x, mean, variance) -> float:
@@ -42,17 +40,9 @@ def score(hmm, densities, units, lengths) -> float:
     """Return the log probability of units whose states last so many frames, with the scores of recognition.
 
     densities : of a state and a frame
-    Silence precedes and follows the utterance. One that begins in silence has the insertion penalty of it only;
-    one that ends in another unit has the score of the silence after it.
     """
     silence, inventory = hmm.inventory.silence, hmm.inventory
-
-    def price(unit, following):
-        return hmm.config.bigram_weight * hmm.bigram(unit, following) + hmm.config.insertion
-
-    total = hmm.config.insertion if units[0] == silence else price(silence, units[0])
-    total += sum(price(unit, following) for unit, following in pairwise(units))
-    total += price(units[-1], silence) if units[-1] != silence else 0.0
+    total = price(hmm, units, silence)
     frame, lasting = 0, iter(lengths)
     neighbours = (silence, *units, silence)
     for position, unit in enumerate(units):

@@ -23,11 +23,6 @@ def best_path(log_emission, emission, arcs, log_initial, log_final):
     return path, score
 
 
-def every_path(states, frames):
-    """Return every sequence of states [shape=(T, S^T)]."""
-    return np.indices((states,) * frames).reshape(frames, -1)
-
-
 def posteriors(log_emission, emission, arcs, log_initial, log_final):
     """Return posterior [shape=(T, S)], expected count of each arc (as ``arcs``) and log likelihood (-inf: no path).
 
@@ -35,7 +30,7 @@ def posteriors(log_emission, emission, arcs, log_initial, log_final):
     Sums are of extended precision where the processor has it: log densities of 1e5 cancel to some 1e-13.
     """
     frames, states = len(log_emission), len(emission)
-    paths = every_path(states, frames)
+    paths = np.indices((states,) * frames).reshape(frames, -1)  # every sequence of states
     arc_log = np.full((states, states), -np.inf, np.longdouble)
     for arc, log in arcs.items():
         arc_log[arc] = log

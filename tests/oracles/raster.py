@@ -3,17 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion_faces.kernels import textured
 from lipmotion_faces.kernels.raster import GRID
-from lipmotion_faces.kernels.textured import (
-    CLEAR,
-    CUT,
-    HIDING_OPACITY,
-    NO_TRIANGLE,
-    SCALE,
-    SEEN_OPACITY,
-    SOLID,
-    TexturedTriangles,
-)
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
@@ -81,7 +72,7 @@ def draw_textured(
     points: Real,
     light: Colours,
     shine: Colours,
-    surface: TexturedTriangles,
+    surface: textured.TexturedTriangles,
     area: tuple[int, int, int, int],
     background: Colours,
     tone: NDArray[np.uint8],
@@ -93,12 +84,12 @@ def draw_textured(
     left, top, right, bottom = area
     samples = (2 * left, 2 * top, 2 * right, 2 * bottom)
     size = samples[3] - samples[1], samples[2] - samples[0]
-    shown, before = np.full(size, NO_TRIANGLE, np.int32), np.full(size, NO_TRIANGLE, np.int32)
+    shown, before = np.full(size, textured.NO_TRIANGLE, np.int32), np.full(size, textured.NO_TRIANGLE, np.int32)
     depth, near = np.full(size, np.inf, np.float32), np.full(size, np.inf, np.float32)
     planes = _planes(points, light, shine, surface)
     for number in range(len(surface.triangles)):
         _mark(number, points, planes, surface, samples, depth, shown, depth, False)
-    for number in np.flatnonzero(surface.looks[:, 1] == CLEAR).tolist():
+    for number in np.flatnonzero(surface.looks[:, 1] == textured.CLEAR).tolist():
         _mark(number, points, planes, surface, samples, near, before, depth, True)
     ids = [shown[row::2, column::2] for row in range(2) for column in range(2)]
     layers = [before[row::2, column::2] for row in range(2) for column in range(2)]
@@ -107,7 +98,7 @@ def draw_textured(
         colour = background[top:bottom, left:right].astype(np.float64)
         hidden = np.zeros(colour.shape[:2])
         for marks, solid in ((ids, True), (layers, False)):
-            seen = marks[k] != NO_TRIANGLE
+            seen = marks[k] != textured.NO_TRIANGLE
             place = _middle(marks, k, left, top)
             look = _shaded(marks[k][seen], place[seen], planes, surface)
             alpha = np.ones(len(look)) if solid else look[:, 3]
@@ -138,7 +129,7 @@ def _mark(
     number: int,
     points: Real,
     planes: Real,
-    surface: TexturedTriangles,
+    surface: textured.TexturedTriangles,
     samples: tuple[int, int, int, int],
     depth: Colours,
     marks: Whole,
@@ -161,9 +152,9 @@ def _mark(
     window = slice(y0 - samples[1], y1 - samples[1]), slice(x0 - samples[0], x1 - samples[0])
     seen = inside & (away < depth[window]) & (away <= solid[window])
     kind = surface.looks[number, 1]
-    if kind != SOLID and seen.any():
+    if kind != textured.SOLID and seen.any():
         cut, factor = surface.alphas[number]
-        least = SEEN_OPACITY if blended else cut if kind == CUT else HIDING_OPACITY
+        least = textured.SEEN_OPACITY if blended else cut if kind == textured.CUT else textured.HIDING_OPACITY
         rows, columns = np.nonzero(seen)
         places = np.stack([px[0, columns], py[rows, 0]], axis=1)
         alpha = _texel(np.full(len(places), number), places, planes, surface)[:, 3]
@@ -172,7 +163,7 @@ def _mark(
     marks[window][seen] = number
 
 
-def _planes(points: Real, light: Colours, shine: Colours, surface: TexturedTriangles) -> Real:
+def _planes(points: Real, light: Colours, shine: Colours, surface: textured.TexturedTriangles) -> Real:
     """Return light, highlights, depth, and place in the texture times depth, as linear functions of the place on the
     screen: values at the origin, changes to the right and down [shape=(F, 9, 3)].
     """
@@ -207,7 +198,7 @@ def _on_plane(planes: Real, ids: Whole, number: int, places: Real) -> Real:
     return np.asarray(at[:, 0] + (at[:, 1] * places[:, 0] + at[:, 2] * places[:, 1]))
 
 
-def _shaded(ids: Whole, places: Real, planes: Real, surface: TexturedTriangles) -> Real:
+def _shaded(ids: Whole, places: Real, planes: Real, surface: textured.TexturedTriangles) -> Real:
     """Return light and opacity of triangles at places on the screen [shape=(N, 4)]."""
     result = _texel(ids, places, planes, surface)
     for channel in range(3):
@@ -217,7 +208,7 @@ def _shaded(ids: Whole, places: Real, planes: Real, surface: TexturedTriangles) 
     return result
 
 
-def _texel(ids: Whole, places: Real, planes: Real, surface: TexturedTriangles) -> Real:
+def _texel(ids: Whole, places: Real, planes: Real, surface: textured.TexturedTriangles) -> Real:
     """Return the texture of triangles at places on the screen [shape=(N, 4)]: 0 to 1; 1 where there is none."""
     near = 1.0 / _on_plane(planes, ids, 6, places)
     row = surface.looks[ids, 0]
@@ -237,6 +228,6 @@ def _texel(ids: Whole, places: Real, planes: Real, surface: TexturedTriangles) -
         )
         upper = one + right_share * (two - one)
         lower = three + right_share * (four - three)
-        result[:, channel] = (upper + low_share * (lower - upper)) * SCALE
+        result[:, channel] = (upper + low_share * (lower - upper)) * textured.SCALE
     result[row < 0] = 1.0
     return result

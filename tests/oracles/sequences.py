@@ -19,21 +19,23 @@ def sequences(inventory, counts: dict[str, int], frames: int):
                 yield units
 
 
-def score(hmm, features, units, durations, silence: str = "sil") -> float:
-    """Return the log probability of units whose states last ``durations`` frames.
+def price(hmm, units, silence: str) -> float:
+    """Return the log probability of a sequence of units.
 
     Silence precedes and follows the recording. Every unit has its bigram once, given the one before it; where the
     recording begins in silence, that silence has the insertion penalty only; where it ends in another unit, the
     score of the silence after it is added.
     """
-    config = hmm.config
+    weight, insertion = hmm.config.bigram_weight, hmm.config.insertion
+    pairs = list(pairwise((silence, *units, silence)))
+    priced = pairs[units[0] == silence : len(pairs) - (units[-1] == silence)]
+    first = insertion if units[0] == silence else 0.0
+    return float(first + sum(weight * hmm.bigram(unit, following) + insertion for unit, following in priced))
 
-    def price(unit, following):
-        return config.bigram_weight * hmm.bigram(unit, following) + config.insertion
 
-    total = config.insertion if units[0] == silence else price(silence, units[0])
-    total += sum(price(unit, following) for unit, following in pairwise(units))
-    total += price(units[-1], silence) if units[-1] != silence else 0.0
+def score(hmm, features, units, durations, silence: str = "sil") -> float:
+    """Return the log probability of units whose states last ``durations`` frames."""
+    total = price(hmm, units, silence)
     neighbours = (silence, *units, silence)
     frame, lasting = 0, iter(durations)
     for position, unit in enumerate(units):

@@ -1,19 +1,17 @@
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from formats.examples import of_motion
 from lipmotion import Model, animate
-from lipmotion.types import Generation, StateTrace
+from lipmotion.types import Generation
 from meshes.speech import motion, units
 
 
 @pytest.fixture(scope="session")
 def generation() -> Generation:
     """The made-up sentence of ``meshes.speech``. Do not change it."""
-    moved = motion()
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
+    return of_motion(motion(), units())
 
 
 @pytest.fixture(scope="session")

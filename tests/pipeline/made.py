@@ -1,15 +1,18 @@
 """What tests of several rooms make: corpora of utterances, and sounds of noise."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
+import pytest
 from scipy.io import wavfile
 
 from lipmotion import Corpus
-from lipmotion.types import Timeline, Unit, Utterance
+from lipmotion.errors import MissingDependencyError
+from lipmotion.types import Timeline, Track, Unit, Utterance
+from lipmotion_faces.corpus import prepare
 from testing.toy import toy_sentences, toy_utterances
 
 
@@ -40,6 +43,18 @@ def true_phones(utterance: Utterance, names: Mapping[str, str] = MappingProxyTyp
     """Return the phones of a toy utterance, some of them under other names."""
     (units,) = (each.units for each in toy_sentences(12) if each.name == utterance.name)
     return Timeline(tuple(replace(s, label=Unit(names.get(s.label.phone, s.label.phone))) for s in units))
+
+
+def replace_tracking(monkeypatch: pytest.MonkeyPatch, track: Callable[..., Track] | None) -> None:
+    """Let a function track videos that are prepared; None: the packages for video are missing."""
+
+    def versions() -> dict[str, str]:
+        if track is None:
+            raise MissingDependencyError("pip install")
+        return {"mediapipe": "0", "opencv": "4", "av": "1"}
+
+    monkeypatch.setattr(prepare, "make_tracker", lambda _: SimpleNamespace(versions=versions))
+    monkeypatch.setattr(prepare, "track", track)
 
 
 def write_noise(path: Path, seconds: float = 1.0, seed: int = 0, rate_hz: int = 16_000) -> None:

@@ -166,12 +166,6 @@ def test_a_lexicon_gives_pronunciations(move, caplog, toy_sentence):
     assert not caplog.records
 
 
-def test_a_transcript_that_cannot_be_used(move):
-    for transcript, error, message in (("", InputError, "holds no word"), ("真", InputError, "how '真' is said")):
-        with pytest.raises(error, match=message):
-            move(transcript=transcript)
-
-
 def test_speech_that_cannot_be_used(toy_model, tmp_path):
     with pytest.raises(InputError, match="no such file"):
         animate(tmp_path / "speech.wav", model=toy_model)

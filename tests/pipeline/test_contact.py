@@ -6,27 +6,28 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from formats.examples import of_motion
 from lipmotion import Delivery, Staging, read_motion
 from lipmotion.articulation.contact import LEAST_GAP
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
-from lipmotion.formats.base import write_motion
+from lipmotion.formats import write_motion
 from lipmotion.formats.fap import FAP
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
-from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
-from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, make_curves
 from lipmotion.pipeline.outputs.deliver import deliver
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curves
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.stage import figure, head_mesh, lip_gap
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.portrait_rasteriser import face_poses
-from meshes.heads import head, lip_points, write_glb, write_obj
+from meshes.heads import VISEMES, head, lip_points, renamed, write_glb, write_obj
 from meshes.speech import motion, units
 
 Mask = NDArray[np.bool_]
@@ -34,12 +35,8 @@ Reader = Callable[[Generation, float], Mask]
 RATES = (24.0, 25.0, 30.0, 60.0, 100.0)
 FILES = ("a.vmd", "a.vrma")
 """Files of vowels that can be read, of one frame rate or any."""
+OWN_VOWELS = {"jawOpen": "A", "mouthPucker": "O", "mouthStretchLeft": "E"}
 TOUCHING_GAP = LEAST_GAP / 2
-
-
-def _generation(moved: Motion, said: Timeline[Unit]) -> Generation:
-    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
-    return Generation(moved, np.zeros(moved.values.shape), said, trace)
 
 
 def _sentence() -> Timeline[Unit]:
@@ -73,37 +70,20 @@ def _edited() -> Motion:
 
 
 KINDS: dict[str, Callable[[], Generation]] = {
-    "generated": lambda: _generation(motion(), units()),
-    "distances alone": lambda: _generation(motion(points=False), units()),
-    "edited by hand": lambda: _generation(_edited(), units()),
-    "imported at 25 Hz": lambda: _generation(_wandering(25.0, 1), _sentence()),
-    "imported at 100 Hz, no phones": lambda: _generation(_wandering(100.0, 2), Timeline(())),
-    "captured weights": lambda: _generation(_captured(), _sentence()),
-    "captured weights, no phones": lambda: _generation(_captured(), Timeline(())),
+    "generated": lambda: of_motion(motion(), units()),
+    "distances alone": lambda: of_motion(motion(points=False), units()),
+    "edited by hand": lambda: of_motion(_edited(), units()),
+    "imported at 25 Hz": lambda: of_motion(_wandering(25.0, 1), _sentence()),
+    "imported at 100 Hz, no phones": lambda: of_motion(_wandering(100.0, 2), Timeline(())),
+    "captured weights": lambda: of_motion(_captured(), _sentence()),
+    "captured weights, no phones": lambda: of_motion(_captured(), Timeline(())),
 }
-
-
-def _own_vowels() -> Mesh:
-    """A head with three blendshapes of its own."""
-    mesh = head()
-    names = {"jawOpen": "A", "mouthPucker": "O", "mouthStretchLeft": "E"}
-    kept = tuple(type(s)(names[s.name], s.rows, s.displacements) for s in mesh.shapes if s.name in names)
-    return Mesh(mesh.vertices, mesh.triangles, mesh.parts, kept)
-
-
-def _visemes() -> Mesh:
-    mesh = head()
-    names = {"jawOpen": "viseme_aa", "mouthPucker": "viseme_U", "mouthFunnel": "viseme_O", "mouthSmileLeft": "viseme_E"}
-    names |= {"mouthStretchLeft": "viseme_I", "mouthRollLower": "viseme_FF", "mouthPressLeft": "viseme_PP"}
-    names |= {"mouthLowerDownLeft": "viseme_DD", "mouthUpperUpLeft": "viseme_SS"}
-    kept = tuple(type(s)(names[s.name], s.rows, s.displacements) for s in mesh.shapes if s.name in names)
-    return Mesh(mesh.vertices, mesh.triangles, mesh.parts, kept)
 
 
 @pytest.fixture(scope="module")
 def characters(tmp_path_factory: pytest.TempPathFactory) -> dict[str, DrivenCharacter]:
     folder = tmp_path_factory.mktemp("characters")
-    for name, mesh in (("arkit", head()), ("visemes", _visemes()), ("vowels", _own_vowels())):
+    for name, mesh in (("arkit", head()), ("visemes", renamed(VISEMES)), ("vowels", renamed(OWN_VOWELS))):
         write_glb(folder / f"{name}.glb", mesh)
     plain = head(shapes=False)
     write_obj(folder / "points.obj", plain)
@@ -155,7 +135,7 @@ def _of_scene(character: DrivenCharacter) -> Reader:
 
 
 def _of_head_scene(generation: Generation, fps: float) -> Mask:
-    moved = _generation(with_mouth(generation.motion), generation.units)
+    moved = of_motion(with_mouth(generation.motion), generation.units)
     weights = head_scene(moved, fps).weights
     character = figure()
     mesh = head_mesh(character, moods=any(map(is_mood, generation.motion.names)))

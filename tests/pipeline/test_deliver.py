@@ -9,7 +9,6 @@ from lipmotion import Delivery, animate, read_motion, write
 from lipmotion.articulation.contact import find_closures
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, shift_prosody
@@ -18,6 +17,7 @@ from lipmotion.types import Prosody
 from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Face, Staging
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.scenes import delivered_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face

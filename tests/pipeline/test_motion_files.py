@@ -11,17 +11,18 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.rig_tables import RigRow, read_rig_table, write_rig_table
-from lipmotion.meshes.fitting.driven import load_character
+from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.mesh import ANGLES as HEAD
-from lipmotion.meshes.model.scene import Thinning
+from lipmotion.meshes.model.rig_tables import RigRow, read_rig_table, write_rig_table
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
-from lipmotion.pipeline.outputs.curve_sets import POSES, calibrate_rows, make_curves, pose_sources
+from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, read_generation, thin_keys
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
+from lipmotion_faces.characters.calibration import POSES, calibrate_rows, pose_sources
+from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import head, write_glb
 
 TAKE = Path("a.livelink.csv")

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
+from formats.examples import of_motion
 from lipmotion.pipeline.generate.explain import (
     COLOURS,
     LEFT_PX,
@@ -13,7 +14,7 @@ from lipmotion.pipeline.generate.explain import (
     TITLE_PX,
     draw_posteriors,
 )
-from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, Timeline, Unit
 
 FRAMES = 400
 
@@ -29,8 +30,7 @@ def generated(frames: int = FRAMES, name: str = "opening") -> Generation:
     values = 0.2 * np.sin(np.arange(frames) / 20)[:, None] ** 2
     half = frames / 200
     units = Timeline((Span(0.0, half, Unit("aa", "aa")), Span(half, 2 * half, Unit("m", "m"))))
-    motion = Motion(values, 100.0, (Channel(name),))
-    return Generation(motion, np.ones_like(values), units, StateTrace(("a",), np.zeros(frames, np.intp)))
+    return of_motion(Motion(values, 100.0, (Channel(name),)), units)
 
 
 def halves(frames: int = FRAMES) -> np.ndarray:

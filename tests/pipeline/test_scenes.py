@@ -1,3 +1,4 @@
+import sys
 from dataclasses import replace
 from functools import partial
 
@@ -7,21 +8,23 @@ import pytest
 from lipmotion import Delivery
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
-from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_document import GltfArrays, read_gltf_document
-from lipmotion.meshes.fitting.driven import load_character
-from lipmotion.meshes.model.scene import Scene, Thinning
+from lipmotion.errors import ExportError, InputError, MissingDependencyError
+from lipmotion.formats.keys import Thinning
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Pin, Timeline
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
+from lipmotion_faces.characters import fbx
+from lipmotion_faces.characters.character_files import load_character
+from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
+from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, delivered_scene, head_scene, write_scene
 from lipmotion_faces.outputs.shown_faces import shown_face
 from meshes.heads import head, write_glb
-from programs import convert_to_fbx, gltf_report, gltf_validator, python_with, run_with
+from programs import gltf_report, gltf_validator, python_with, run_with
 
 TIMES_S = (0.0, 0.31, 0.555, 0.75, 0.95, 1.15, 1.62, 2.0)
 """Times at which other programs are asked for values; most lie between two keys."""
@@ -231,14 +234,32 @@ def test_blender_plays_the_same_values(scene, suffix, tmp_path):
 
 @pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)")
 @pytest.mark.long
-def test_blender_makes_fbx_of_it(scene, tmp_path):
-    write_scene(tmp_path / "a.glb", scene)
-    convert_to_fbx(tmp_path / "a.glb", tmp_path / "a.fbx")
+def test_blender_makes_fbx_of_it(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(fbx, "find_blender", lambda: [python_with("bpy"), "-c", fbx.SCRIPT])
+    write_scene(tmp_path / "a.fbx", scene)
     times_s = [frame / 60 for frame in (0, 18, 45, 97)]
     found = run_with("bpy", "blender_scene.py", tmp_path / "a.fbx", *times_s)
     for wanted, values in zip(scene.weights.at(np.array(times_s)), found["values"], strict=True):
         held = dict(zip(scene.weights.names, wanted, strict=True))
         assert max(abs(values[name] - held[name]) for name in values if name in held) < 2e-3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="its programs are no scripts")
+@pytest.mark.parametrize(
+    ("lines", "error"),
+    [(None, MissingDependencyError), ("echo no room >&2; exit 1", ExportError), ("exit 0", ExportError)],
+)
+def test_an_fbx_that_blender_cannot_make_is_refused_and_leaves_no_file(own_head, lines, error, tmp_path, monkeypatch):
+    monkeypatch.setattr(fbx, "find_spec", lambda _: None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    program, target = tmp_path / "blender", tmp_path / "out" / "a.fbx"
+    target.parent.mkdir()
+    if lines is not None:
+        program.write_text(f"#!/bin/sh\n{lines}\n")
+        program.chmod(0o755)
+    with pytest.raises(error, match="no room" if lines and "room" in lines else "Blender"):
+        write_scene(target, own_head)
+    assert not list(target.parent.iterdir())
 
 
 def largest_error(scene: Scene, values: list[dict[str, float]]) -> float:

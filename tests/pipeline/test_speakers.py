@@ -82,14 +82,9 @@ def test_pins_hold_in_the_units_of_the_person(model, toy_sentence):
         for pin in pins:
             assert motion[pin.channel][round(pin.time_s * 100)] == pytest.approx(pin.value, abs=1e-9)
         assert motion["opening"].min() >= 0
-    for pin, message in (
-        (Pin(0.5, "opening", -0.01), r"-0\.01, required at least 0"),
-        (Pin(50.0, "opening", 0.1), "outside the recording"),
-        (Pin(0.5, "jaw", 0.1), "cannot pin 'jaw'"),
-        (Pin(0.5, "opening", float("nan")), "nan, required a finite number"),
-    ):
-        with pytest.raises(InputError, match=message):
-            animate(request(toy_sentence, "ben"), model=model, constraints=Constraints((pin,)))
+    below = Constraints((Pin(0.5, "opening", -0.01),))
+    with pytest.raises(InputError, match=r"-0\.01, required at least 0"):
+        animate(request(toy_sentence, "ben"), model=model, constraints=below)
 
 
 def test_unknown_speakers_are_refused(model, toy_model, toy_sentence):

@@ -52,13 +52,6 @@ def test_json_has_times_and_confidences(found, tmp_path):
     assert all(0 <= word["conf"] <= 1 for word in document["result"])
 
 
-def test_edited_words_win(found, tmp_path):
-    path = tmp_path / "words.txt"
-    write_words(found.words, [path])
-    path.write_text(path.read_text().replace("lips", "hips"))
-    assert "hips" in {span.label.word for span in animate(WELCOME, transcript=path).units}
-
-
 def test_files_that_cannot_be_written(found, tmp_path):
     for name in ("words.srt", "words", "nowhere/words.txt"):
         with pytest.raises(ExportError):

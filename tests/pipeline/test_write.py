@@ -1,7 +1,5 @@
 """``pipeline.outputs.output``: one result, several files, all or none."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

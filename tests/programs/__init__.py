@@ -42,18 +42,6 @@ def run_with(module: str, script: str, *arguments: object, folder: Path | None =
         return _json_of([python, str(FOLDER / script), *map(str, arguments)], own)
 
 
-def convert_to_fbx(source: Path, target: Path) -> None:
-    """Run ``examples/glb_to_fbx.py`` in Blender."""
-    python, script = python_with("bpy"), FOLDER.parents[1] / "examples" / "glb_to_fbx.py"
-    assert python is not None, "no Python with bpy"
-    run_child(
-        [python, str(script), str(source), str(target)],
-        variables=environment(PYTHONPATH=""),
-        limit_s=LONGEST_S,
-        check=True,
-    )
-
-
 @cache
 def node_package(name: str) -> str | None:
     """Return the folder of a package of npm, where Node is installed."""

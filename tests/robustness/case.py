@@ -5,7 +5,7 @@ import json
 import shutil
 import wave
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,18 +57,7 @@ class Bench:
         return ["animate", self.speech if speech is None else speech, *model, *whose, "-o", output, *more]
 
     def changed_model(self, changes: dict[str, bytes | None], of: Path | None = None, /, **header: object) -> Path:
-        """Return a copy of a model with other members (None: without them), or another header."""
-        path = self.folder / "changed.lipmotion"
-        with zipfile.ZipFile(of or self.model) as old, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
-            for name in old.namelist():
-                content = changes.get(name, old.read(name))
-                if name == "header.json" and content is not None and header:
-                    content = json.dumps(json.loads(content) | header).encode()
-                if content is not None:
-                    new.writestr(name, content)
-            for name in changes.keys() - set(old.namelist()):
-                new.writestr(name, changes[name] or b"")
-        return path
+        return changed_model(of or self.model, self.folder / "changed.lipmotion", changes, **header)
 
     def array(self, name: str, of: Path | None = None) -> NDArray[Any]:
         with zipfile.ZipFile(of or self.model) as file:
@@ -79,6 +68,18 @@ class Bench:
         path = self.folder / "corpus"
         shutil.copytree(self.corpus, path)
         return path
+
+
+def changed_model(source: Path, target: Path, changes: Mapping[str, bytes | None], **header: object) -> Path:
+    """Copy a model with some members replaced, added, or (None) left out, or with another header; return the copy."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
+        members = {name: old.read(name) for name in old.namelist()} | changes
+        if header:
+            members["header.json"] = json.dumps(json.loads(members["header.json"] or "") | header).encode()
+        for name, content in members.items():
+            if content is not None:
+                new.writestr(name, content)
+    return target
 
 
 def npy(array: NDArray[Any]) -> bytes:

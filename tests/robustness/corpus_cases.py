@@ -185,27 +185,9 @@ def _label_file(name: str, suffix: str, content: bytes | str, *messages: str) ->
 _label_file("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "is a binary TextGrid", "save it as plain text")
 _label_file("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
 _label_file("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the one ahead of it ends")
-_label_file("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 aa\n2000000 3000000 b\n3000000 4000000 qq\n",
-            "line 4 is 'qq', which is no phone")  # fmt: skip
-_label_file("a line of another form", ".lab", "0 1000000 p\nhello\n", "line 2 is 'hello'; required, as in line 1")
 _label_file("phones of another recording", ".lab", "0 900000000 p\n", "the sound lasts")
 _label_file("more phones than frames", ".lab", "".join(f"{i}0000 {i + 1}0000 p\n" for i in range(2000)),
             "2000 units in time, required at most 1276")  # fmt: skip
-_label_file("a backward label of Audacity", ".txt", "1.5\t0.5\tp\n", "before its start")
-_label_file(
-    "an end of 5,000 digits", ".lab", f"0 {'9' * 5000} p\n", "line 1 has the time '999", "required a finite one"
-)
-_label_file("many recordings in one", ".lab", '#!MLF!#\n"*/a.lab"\n0 1000000 p\n', "is a master label file")
-_label_file(
-    "damaged times", ".srt", "1\n00:00:01,000 --> 7\nhello\n", "a.srt: line 2 is '00:00:01,000 --> 7'; required"
-)
-_label_file("damaged JSON", ".json", '{"segments": [\n', "a.json: line 2: damaged JSON")
-_label_file("two recordings", ".ctm", "a 1 0.0 0.5 hi\nb 1 0.5 0.5 you\n", "a.ctm: line 2: words of two recordings")
-_label_file(
-    "a word processor's file", ".txt", "{\\rtf1\\ansi hello}", "is a rich-text file (RTF)", "save it as plain text"
-)
-_label_file("a file of 5 MB", ".txt", "a" * 5_000_000, "5000000 characters, required at most 4194304: is it a tran")
-_label_file("a file of 20 MB", ".TextGrid", b" " * 20_000_000, "20000000 bytes, required at most 16777216")
 
 
 def _motion_file(name: str, content: str, *messages: str) -> None:

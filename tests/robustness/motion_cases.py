@@ -43,11 +43,6 @@ _json("a time of 400 digits", {"units": [_unit(10**400, 0.4)]}, 3, *DAMAGED)
 _json("two million units", json.dumps(GOOD | {"units": []}).replace("[]", "[" + "0," * 2_000_000 + "0]"), 3, *DAMAGED,
       "a list of more than 1048576 items")  # fmt: skip
 _json("no units", {"units": []}, 3, "the units are an empty list", "or leave them out")
-_json("a unit without a phone", {"units": [{"start_s": 0}]}, 3, "end_s is missing")
-_json("a newer version", {"version": 2}, 3, "version 2, this lipmotion reads up to 1: upgrade lipmotion")
-_json("another format", {"format": "other"}, 3, "its 'format' must be 'lipmotion.motion'")
-_json("NaN among the values", {"values": [[0.1], [float("nan")]]}, 3, "the first is 'opening' in frame 1; interpolate")
-_json("rows that are too long", {"values": [[0.1, 0.2]]}, 3, "values have shape (1, 2), required (T, 1)")
 _json("an infinite rate", {"rate_hz": float("inf")}, 3, "rate_hz is inf, required a finite number")
 _json("a channel that is a spreadsheet's formula", {"channels": [{"name": "=1+1", "unit": "weight"}]}, 3,
       "the channel name '=1+1' begins as a spreadsheet's formula")  # fmt: skip
@@ -61,8 +56,6 @@ def _csv(name: str, content: str, *messages: str) -> None:
 
 
 _csv("a good one, which has no units", "time_s,opening\n0,1\n0.1,2\n", "the units are an empty list")
-_csv("uneven times", "time_s,a\n0,1\n1,1\n3,1\n", "must begin at 0 and rise in even steps")
-_csv("a line of a million fields", "time_s,a\n0,1\n" + "1," * 1_000_000, "not a table of numbers")
 
 
 def _npz(name: str, values: bytes, *messages: str, document: bytes | None = None) -> None:

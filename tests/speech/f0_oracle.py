@@ -10,19 +10,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from speech.mfcc_oracle import sample
+
 Array = NDArray[np.float64]
 
 
 def low_passed(samples: Array, at: int) -> float:
     """Return the band-passed signal, reflected at both ends, at sample ``at``."""
     return sum(tap * sample(samples, at + k) for k, tap in enumerate(TAPS, start=-127))
-
-
-def sample(samples: Array, i: int) -> float:
-    last = len(samples) - 1
-    while not 0 <= i <= last:
-        i = -i if i < 0 else 2 * last - i
-    return float(samples[i])
 
 
 def taps() -> list[float]:

@@ -1,7 +1,5 @@
 import shutil
 import struct
-from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +8,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.types import Audio
-from speech.sounds import LEVEL, ONSET_S, late_by, tone, write_pictures, write_sound, write_wave
+from speech.sounds import LEVEL, ONSET_S, late_by, tone, write_sound
 
 
 def onset_s(audio: Audio) -> float:
@@ -22,11 +20,6 @@ def level(audio: Audio, at_s: float) -> float:
     """Return the amplitude of the tone in 0.2 s."""
     part = audio.samples[round(at_s * audio.rate_hz) :][: audio.rate_hz // 5]
     return float(np.sqrt(2 * np.square(part).mean()))
-
-
-def test_sixteen_bits_at_16_khz_come_back_exactly(tmp_path: Path) -> None:
-    given = np.random.default_rng(0).integers(-32768, 32768, 16_000).astype(np.int16)
-    assert np.array_equal(read_audio(write_wave(tmp_path / "a.wav", given)).samples, given / np.float32(32768))
 
 
 def test_channels_are_averaged(tmp_path: Path) -> None:
@@ -54,42 +47,6 @@ def test_the_content_decides_not_the_name(tmp_path: Path) -> None:
     for name in ("sound", "sound.txt", "Ton ü 音.wav"):
         shutil.copy(tmp_path / "a.flac", tmp_path / name)
         assert read_audio(tmp_path / name).duration_s == 1
-
-
-def silence(path: Path, duration_s: float, value: float = 0.0) -> Path:
-    samples = np.full((1, round(16_000 * duration_s)), value, np.float32)
-    return write_sound(path, samples, 16_000, "pcm_f32le")
-
-
-WRONG: list[tuple[Callable[[Path], object], str]] = [
-    (lambda path: path.with_suffix(".mp3").touch(), r"a.wav: no such file"),
-    (lambda path: path.touch(), r"a.wav: the file is empty; give a recording"),
-    (lambda path: path.mkdir(), r"a.wav: is a folder; give one recording"),
-    (lambda path: path.write_text("words, not sound\n" * 50), "is text, required a recording"),
-    (lambda path: path.write_bytes(b"RIFF\x24\0\0\0WAVEfmt "), r"a.wav: "),
-    (lambda path: write_pictures(path.with_suffix(".mp4")).rename(path), r"has no sound track; give a recording"),
-    (lambda path: silence(path, 0.09), r"holds 90 ms of sound, required at least 100 ms"),
-    (lambda path: silence(path, 1, float("nan")), r"samples that are not finite \(NaN or infinite\)"),
-    (lambda path: silence(path, 1, float("inf")), r"samples that are not finite"),
-]
-
-
-def test_it_says_what_is_wrong(tmp_path: Path) -> None:
-    for number, (make, message) in enumerate(WRONG):
-        path = tmp_path / str(number) / "a.wav"
-        path.parent.mkdir()
-        make(path)
-        with pytest.raises(InputError, match=message):
-            read_audio(path)
-
-
-def test_a_recording_cut_short_is_shorter_or_refused(tmp_path: Path) -> None:
-    for name, codec in (("a.flac", "flac"), ("a.mp3", "libmp3lame"), ("a.m4a", "aac")):
-        content = write_sound(tmp_path / name, tone(16_000), 16_000, codec).read_bytes()
-        for share in (0.01, 0.6):
-            (tmp_path / name).write_bytes(content[: round(share * len(content))])
-            with suppress(InputError):  # any other error would be a traceback
-                assert read_audio(tmp_path / name).duration_s < 1.1
 
 
 @pytest.mark.recordings

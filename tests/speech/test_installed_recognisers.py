@@ -98,7 +98,6 @@ def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
 
 
 def check_words(transcript: TimedTranscript | None) -> None:
-    assert transcript is not None
     assert transcript.words == ("see", "five", "20", "foot")
     times = [time for word in transcript.lines[0].words for time in (word.start_s, word.end_s)]
     assert times == pytest.approx([0.1, 0.5, 0.6, 1.0, 1.0, 1.36, 1.36, 1.6])
@@ -117,7 +116,6 @@ def test_whisper_without_times_of_words_and_in_another_language(
 ) -> None:
     monkeypatch.setattr(whisper, "segments", [SimpleNamespace(start=0.5, end=2.0, text=" [Music] Hi!", words=None)])
     found = recognise_words(AUDIO, "whisper")
-    assert found is not None
     assert found.words == ("hi",)
     assert (found.lines[0].words[0].start_s, found.lines[0].end_s) == (None, 2.0)
     monkeypatch.setattr(whisper, "language", "fr")

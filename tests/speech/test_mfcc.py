@@ -14,13 +14,13 @@ from lipmotion.errors import InputError
 from lipmotion.speech.features import mfcc as module
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import ROUNDING_SHARE, mfcc, normalised, regression_delta
-from lipmotion.speech.sound.sound_offset import (
+from lipmotion.types import Audio, Features
+from lipmotion_faces.corpus.sound_offset import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     measured_opening_speed,
     predicted_opening_speed,
 )
-from lipmotion.types import Audio, Features
 from speech.mfcc_oracle import features as slow_features
 
 RATE_HZ = 16_000

@@ -11,15 +11,7 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.hmm.network import wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition import word_search
-from lipmotion.speech.recognition.network import posteriors
-from lipmotion.speech.recognition.network.beam_search import (
-    SOUNDS,
-    EnglishWords,
-    LanguageModel,
-    decoded_words,
-    scored,
-    word_tree,
-)
+from lipmotion.speech.recognition.network import beam_search, posteriors
 from lipmotion.speech.recognition.network.posteriors import (
     BLANK,
     WORD_BOUNDARY,
@@ -62,10 +54,10 @@ class Unigram:
         return -3.0 if words[0] != "plea" else -9.0
 
 
-def vocabulary(**words: str) -> EnglishWords:
-    spelt = [[bytes(SOUNDS.index(phone) for phone in phones.split())] for phones in words.values()]
-    language = LanguageModel(tuple(words), Unigram(), 1.0)
-    return EnglishWords(word_tree(spelt, np.full(len(words), -2.0)), language)
+def vocabulary(**words: str) -> beam_search.EnglishWords:
+    spelt = [[bytes(beam_search.SOUNDS.index(phone) for phone in phones.split())] for phones in words.values()]
+    language = beam_search.LanguageModel(tuple(words), Unigram(), 1.0)
+    return beam_search.EnglishWords(beam_search.word_tree(spelt, np.full(len(words), -2.0)), language)
 
 
 WORDS = vocabulary(be="b iy", blue="b l uw", bee="b iy", plea="p l iy", loop="l uw p")
@@ -73,32 +65,32 @@ WORDS = vocabulary(be="b iy", blue="b l uw", bee="b iy", plea="p l iy", loop="l 
 
 def test_words_that_begin_alike_share_nodes() -> None:
     tree = WORDS.tree
-    assert len(tree.sound) == 1 + 10 + len(SOUNDS)  # b-iy and b-l-uw share b; p-l-iy, l-uw-p
+    assert len(tree.sound) == 1 + 10 + len(beam_search.SOUNDS)  # b-iy and b-l-uw share b; p-l-iy, l-uw-p
     ends = {place: numbers for place, numbers in tree.ends.items() if place < tree.free}
     assert sorted(ends.values()) == [[0, 2], [1], [3], [4]]
     assert tree.arcs.sum() == len(tree.target)
 
 
 def test_words_are_found_in_their_order() -> None:
-    words = decoded_words(WORDS, scored(said("b", "l", "uː", WORD_BOUNDARY, "b", "iː")))
+    words = beam_search.decoded_words(WORDS, beam_search.scored(said("b", "l", "uː", WORD_BOUNDARY, "b", "iː")))
     assert [word.text for word in words] in (["blue", "be"], ["blue", "bee"])
     assert words[0].first == 0 < words[0].end <= words[1].first < words[1].end
 
 
 def test_the_language_decides_where_posteriors_do_not() -> None:
-    likely = decoded_words(WORDS, scored(said("b", "l", "iː", sure=0.5)))
+    likely = beam_search.decoded_words(WORDS, beam_search.scored(said("b", "l", "iː", sure=0.5)))
     assert [word.text for word in likely] in (["blue"], ["be"], ["bee"])
 
 
 def test_what_is_no_word_is_phones() -> None:
     rows = said("ŋ", "p", "ŋ", "l", "ŋ", sure=0.99)
-    words = decoded_words(WORDS, scored(rows))
+    words = beam_search.decoded_words(WORDS, beam_search.scored(rows))
     assert "".join(word.text for word in words) == ""
     assert [phone for word in words for phone in rows.phones_between(word.first, word.end)] == "ng p ng l ng".split()
 
 
 def test_nothing_is_said_in_blanks() -> None:
-    assert decoded_words(WORDS, scored(said())) == []
+    assert beam_search.decoded_words(WORDS, beam_search.scored(said())) == []
     assert spoken_items(said()) == []
     assert mean_posterior([PosteriorStretch(Stretch(0, 2), said())]) == 0
 

@@ -17,8 +17,7 @@ from lipmotion.speech.recognition import word_search
 from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Timeline, Unit
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import Audio, Timeline, Unit, silent_monitor
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
 from lipmotion.units.phones import SHORT_PAUSE_S
 from testing.formant_synthesiser import synthesise

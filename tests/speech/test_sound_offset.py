@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.speech.sound.sound_offset import ALIKE, BEEP, CLAP, sound_marks, sound_offset
 from lipmotion.types import Audio
+from lipmotion_faces.corpus.sound_offset import ALIKE, BEEP, CLAP, sound_marks, sound_offset
 from speech.recorded_twice import RATE_HZ, beep, clap, recorded_twice, speech_like
 
 MARK_S = 1.2

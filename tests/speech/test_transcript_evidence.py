@@ -8,16 +8,8 @@ from numpy.typing import NDArray
 from lipmotion import Model, load_model
 from lipmotion.corpora.folder import spell_name
 from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.recognition import agreement
 from lipmotion.speech.recognition import transcript_evidence as module
-from lipmotion.speech.recognition.agreement import (
-    DOUBTFUL_SCORE,
-    FRAME_STEP,
-    WORST_SCORE,
-    TranscriptFit,
-    _joined,
-    agreement_score,
-    transcript_fit,
-)
 from lipmotion.speech.recognition.general import PHONES as GENERAL_PHONES
 from lipmotion.speech.recognition.general import general_features, general_model
 from lipmotion.speech.recognition.recogniser import Recogniser
@@ -239,13 +231,13 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
         if span.start_s - 1e-8 <= n / 100 < span.end_s - 1e-8 and span.label.phone not in ("sil", "sp")
     ]
     wanted: dict[int, list[float]] = {}
-    for frame, number, phone in spoken[::FRAME_STEP]:
+    for frame, number, phone in spoken[:: agreement.FRAME_STEP]:
         row = GENERAL_PHONES.index(names.get(phone, phone.upper()))
         wanted.setdefault(number, []).append(
-            max(density[frame].reshape(len(GENERAL_PHONES), 3)[row].max(), WORST_SCORE)
+            max(density[frame].reshape(len(GENERAL_PHONES), 3)[row].max(), agreement.WORST_SCORE)
         )
     mean = np.mean([np.mean(scores) for scores in wanted.values()])
-    assert agreement_score(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
+    assert agreement.agreement_score(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
 
 
 @pytest.mark.long
@@ -254,22 +246,22 @@ def test_right_words_agree_and_wrong_ones_do_not(sentences: list[ToySentence], t
     for said in sentences:
         features = analysed(said.audio).mfcc()
         right, order, wrong = (
-            agreement_score(said.audio, phones.align(said.audio, features, words, Lexicon()))
+            agreement.agreement_score(said.audio, phones.align(said.audio, features, words, Lexicon()))
             for words in (said.words, said.words[::-1], ("squash", "six", "fish", "chefs"))
         )
-        assert right > DOUBTFUL_SCORE - 0.8 > wrong  # one voice of espeak-ng has -4.9
+        assert right > agreement.DOUBTFUL_SCORE - 0.8 > wrong  # one voice of espeak-ng has -4.9
         assert right > order
 
 
 def test_loud_silence_is_missing_speech(sentences: list[ToySentence]) -> None:
     audio, units = sentences[0].audio, sentences[0].units
-    fit = transcript_fit(audio, Timeline((Span(0.0, audio.duration_s, Unit("sil")),)))
+    fit = agreement.transcript_fit(audio, Timeline((Span(0.0, audio.duration_s, Unit("sil")),)))
     ((start_s, end_s),) = fit.missing
     spoken = [span for span in units if span.label.phone != "sil"]
     assert (start_s, end_s) == pytest.approx((spoken[0].start_s, spoken[-1].end_s), abs=0.2)
     assert fit.speech_s == pytest.approx(fit.missing_s)
     assert fit.share == pytest.approx(0)
-    assert transcript_fit(audio, units).missing == ()
+    assert agreement.transcript_fit(audio, units).missing == ()
 
 
 def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> None:
@@ -290,7 +282,7 @@ def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> 
     def missing(phone: str, gain: float = 1.0) -> tuple[tuple[float, float], ...]:
         audio = Audio(np.concatenate([samples[:stop], gain * vowel, samples[stop:]]), rate_hz)
         units = Timeline((*spans[:place], replace(spans[place], end_s=end_s, label=Unit(phone)), *later))
-        fit = transcript_fit(audio, units)
+        fit = agreement.transcript_fit(audio, units)
         assert (fit.share < 0.8) == bool(fit.missing)
         return fit.missing
 
@@ -300,11 +292,13 @@ def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> 
 
 
 def test_places_near_one_another_are_one_stretch() -> None:
-    assert _joined([(0.0, 1.0), (1.4, 2.0), (3.0, 3.5)]) == ((0.0, 2.0), (3.0, 3.5))
-    fit = TranscriptFit(-1.0, ((0.0, 2.0), (3.0, 3.5)), 10.0)
+    assert agreement._joined([(0.0, 1.0), (1.4, 2.0), (3.0, 3.5)]) == ((0.0, 2.0), (3.0, 3.5))
+    fit = agreement.TranscriptFit(-1.0, ((0.0, 2.0), (3.0, 3.5)), 10.0)
     assert fit.missing_s == pytest.approx(2.5)
     assert fit.share == pytest.approx(0.75)
-    assert TranscriptFit(DOUBTFUL_SCORE - 0.1, (), 10.0).share == pytest.approx(0)  # of something else
+    assert agreement.TranscriptFit(agreement.DOUBTFUL_SCORE - 0.1, (), 10.0).share == pytest.approx(
+        0
+    )  # of something else
 
 
 @pytest.mark.recordings
@@ -317,7 +311,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
         assert words is not None
         for said, kept in ((words, True), (words[:3], False)):
             units = phones.align(audio, analysed(audio).mfcc(), said, Lexicon())
-            noticed = bool(transcript_fit(audio, units).missing)
+            noticed = bool(agreement.transcript_fit(audio, units).missing)
             whole, half = whole + (kept and noticed), half + (noticed and not kept)
     assert whole == 0
     assert half > 0.7 * len(names)
@@ -335,9 +329,9 @@ def test_real_recordings(recordings: Path) -> None:
         for clip, found in ((name, right), (other, wrong)):
             words = spell_name(clip)
             assert words is not None
-            found.append(agreement_score(audio, phones.align(audio, features, words, Lexicon())))
-    assert min(right) > DOUBTFUL_SCORE
-    assert np.mean(np.array(wrong) < DOUBTFUL_SCORE) > 0.6
+            found.append(agreement.agreement_score(audio, phones.align(audio, features, words, Lexicon())))
+    assert min(right) > agreement.DOUBTFUL_SCORE
+    assert np.mean(np.array(wrong) < agreement.DOUBTFUL_SCORE) > 0.6
 
 
 @pytest.mark.long
@@ -349,7 +343,7 @@ def test_synthetic_voices_are_believed() -> None:
     for voice in installed_voices()[::2]:
         audio, _ = next(speak_sentences([texts[0]], voice))
         right, wrong = (
-            agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), split_words(text), Lexicon()))
+            agreement.agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), split_words(text), Lexicon()))
             for text in texts
         )
-        assert right > DOUBTFUL_SCORE - 0.5 > wrong  # one voice of espeak-ng has -4.4
+        assert right > agreement.DOUBTFUL_SCORE - 0.5 > wrong  # one voice of espeak-ng has -4.4

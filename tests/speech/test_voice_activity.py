@@ -10,21 +10,9 @@ from lipmotion import animate
 from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, average_power, find_spoken_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW, log_energy
+from lipmotion.speech.sound import voice_activity
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db, levels_db_at, quietest_s, spoken_spans
-from lipmotion.speech.sound.voice_activity import (
-    LONGEST_FRAMES,
-    MARGIN_FRAMES,
-    PASSAGE_MARGIN,
-    SAME_LEVEL,
-    Stretch,
-    apply_gain,
-    fill_gaps,
-    find_passages,
-    find_tones,
-    passage_gain,
-    stretches_of_sound,
-)
 from lipmotion.types import Audio
 from lipmotion.units import is_silent
 from testing.toy import toy_sentences
@@ -43,22 +31,22 @@ def energy(frames: int, *sounds: tuple[int, int]) -> np.ndarray:
 
 
 def test_sound_has_its_stretch_with_a_margin_that_ends_with_the_recording() -> None:
-    (found,) = stretches_of_sound(energy(1000, (300, 500)))
-    assert found == pytest.approx((300 - MARGIN_FRAMES, 500 + MARGIN_FRAMES), abs=5)
-    assert stretches_of_sound(energy(400, (10, 200), (230, 390))) == [Stretch(0, 400)]
+    (found,) = voice_activity.stretches_of_sound(energy(1000, (300, 500)))
+    assert found == pytest.approx((300 - voice_activity.MARGIN_FRAMES, 500 + voice_activity.MARGIN_FRAMES), abs=5)
+    assert voice_activity.stretches_of_sound(energy(400, (10, 200), (230, 390))) == [voice_activity.Stretch(0, 400)]
 
 
 def test_short_pauses_do_not_part_sound_and_clicks_and_constant_energy_are_none() -> None:
-    assert len(stretches_of_sound(energy(1000, (200, 300), (380, 500)))) == 1
-    assert len(stretches_of_sound(energy(1000, (200, 300), (600, 700)))) == 2
-    assert not stretches_of_sound(energy(1000, (300, 300 + LEAST_FRAMES // 3), (600, 602)))
-    assert not stretches_of_sound(np.full(500, -11.5, np.float32))
+    assert len(voice_activity.stretches_of_sound(energy(1000, (200, 300), (380, 500)))) == 1
+    assert len(voice_activity.stretches_of_sound(energy(1000, (200, 300), (600, 700)))) == 2
+    assert not voice_activity.stretches_of_sound(energy(1000, (300, 300 + LEAST_FRAMES // 3), (600, 602)))
+    assert not voice_activity.stretches_of_sound(np.full(500, -11.5, np.float32))
 
 
 def test_a_long_stretch_is_cut_where_it_is_quietest() -> None:
     values = energy(5000, (400, 4600))
     values[1000:1030] = QUIET_ENERGY
-    first, second, *_ = stretches_of_sound(values)
+    first, second, *_ = voice_activity.stretches_of_sound(values)
     assert 1000 <= first.end <= 1030
     assert second.first == first.end
 
@@ -70,9 +58,9 @@ def test_stretches_are_in_order_bounded_and_hold_all_sound() -> None:
         starts = np.sort(draw.integers(0, frames, draw.integers(1, 30)))
         sounds = [(int(start), int(start + draw.integers(1, 900))) for start in starts]
         values = energy(frames, *sounds) + draw.normal(0, 0.1, frames).astype(np.float32)
-        found = stretches_of_sound(values)
+        found = voice_activity.stretches_of_sound(values)
         assert all(0 <= stretch.first < stretch.end <= frames for stretch in found)
-        assert all(stretch.end - stretch.first <= LONGEST_FRAMES for stretch in found)
+        assert all(stretch.end - stretch.first <= voice_activity.LONGEST_FRAMES for stretch in found)
         assert all(before.end <= after.first for before, after in pairwise(found))
         inside = np.zeros(frames, bool)
         for stretch in found:
@@ -100,13 +88,13 @@ def louder(samples: Samples, decibels: float) -> Samples:
     return (samples * 10 ** (decibels / 20)).astype(np.float32)
 
 
-def passages(*parts: Samples) -> list[Stretch]:
+def passages(*parts: Samples) -> list[voice_activity.Stretch]:
     """Return the passages of sounds that follow one another."""
-    return find_passages(log_energy(np.concatenate(parts)))
+    return voice_activity.find_passages(log_energy(np.concatenate(parts)))
 
 
-def moved(found: list[Stretch], frames: int) -> list[Stretch]:
-    return [Stretch(first + frames, end + frames) for first, end in found]
+def moved(found: list[voice_activity.Stretch], frames: int) -> list[voice_activity.Stretch]:
+    return [voice_activity.Stretch(first + frames, end + frames) for first, end in found]
 
 
 @pytest.mark.parametrize(
@@ -124,8 +112,8 @@ def test_a_passage_is_the_same_whatever_silence_is_around_it(before_s: float, af
 def test_a_noise_as_loud_as_the_room_may_be_its_margin_and_nothing_more() -> None:
     (found,) = moved(passages(noise(5, 25), spoken(0), noise(5, 25)), -500)
     sound = np.flatnonzero(find_spoken_frames(log_energy(spoken(0))))
-    assert sound[0] - PASSAGE_MARGIN - 2 <= found.first <= sound[0] - 10
-    assert sound[-1] + 10 <= found.end <= sound[-1] + PASSAGE_MARGIN + 3
+    assert sound[0] - voice_activity.PASSAGE_MARGIN - 2 <= found.first <= sound[0] - 10
+    assert sound[-1] + 10 <= found.end <= sound[-1] + voice_activity.PASSAGE_MARGIN + 3
 
 
 @pytest.mark.parametrize("decibels", [-40, -20, -6])
@@ -168,7 +156,7 @@ def test_every_line_of_a_stem_of_ten_minutes_is_a_passage() -> None:
     starts = [300 + 4900 * number for number in range(12)]
     for start, values in zip(starts, energies, strict=True):
         stem[start : start + len(values)] = values
-    found = find_passages(stem)
+    found = voice_activity.find_passages(stem)
     assert len(found) == len(starts)
     for (first, end), start, values in zip(found, starts, energies, strict=True):
         sound = start + np.flatnonzero(find_spoken_frames(values))
@@ -201,8 +189,8 @@ def test_what_is_no_voice_is_no_passage(sound: NDArray[np.float64], units: float
 
 def level_passage(samples: Samples) -> Samples:
     """Return a passage at the level of all passages."""
-    gain = passage_gain(log_energy(samples))
-    return apply_gain(samples, np.arange(len(gain)), gain)
+    gain = voice_activity.passage_gain(log_energy(samples))
+    return voice_activity.apply_gain(samples, np.arange(len(gain)), gain)
 
 
 def loudness_db(samples: Samples, seconds: slice) -> float:
@@ -217,7 +205,7 @@ def test_a_passage_has_one_gain_and_the_level_of_all(decibels: float) -> None:
     levelled = level_passage(samples)
     heard = np.abs(samples) > np.abs(samples).max() / 100
     assert np.ptp(levelled[heard] / samples[heard]) < 1e-3 * np.mean(levelled[heard] / samples[heard])
-    assert loudness_db(levelled, slice(0, 9)) == pytest.approx(20 * np.log10(SAME_LEVEL), abs=0.1)
+    assert loudness_db(levelled, slice(0, 9)) == pytest.approx(20 * np.log10(voice_activity.SAME_LEVEL), abs=0.1)
 
 
 def test_a_voice_that_becomes_softer_is_raised() -> None:
@@ -227,7 +215,7 @@ def test_a_voice_that_becomes_softer_is_raised() -> None:
     falling = (samples * 10 ** (-fall_db / 20)).astype(np.float32)
     levelled = level_passage(falling)
     start, last = slice(0, 2), slice(5, 7)
-    assert loudness_db(levelled, start) == pytest.approx(20 * np.log10(SAME_LEVEL), abs=0.1)
+    assert loudness_db(levelled, start) == pytest.approx(20 * np.log10(voice_activity.SAME_LEVEL), abs=0.1)
     assert loudness_db(falling, start) - loudness_db(falling, last) > 24
     assert loudness_db(levelled, start) - loudness_db(levelled, last) < 14
 
@@ -304,9 +292,9 @@ def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:
 def test_noise_stands_in_the_gaps_of_a_noise_gate() -> None:
     """Beside digital silence all speech would look alike, and every voice like that of the training."""
     samples = toy_sentences(3)[0].audio.samples.copy()
-    assert fill_gaps(samples, log_energy(samples)) is samples
+    assert voice_activity.fill_gaps(samples, log_energy(samples)) is samples
     samples[16_000:20_000] = 0
-    filled = fill_gaps(samples, log_energy(samples))
+    filled = voice_activity.fill_gaps(samples, log_energy(samples))
     assert np.array_equal(filled[:15_800], samples[:15_800])
     assert np.array_equal(filled[20_200:], samples[20_200:])
     loud = average_power(log_energy(samples)).max()
@@ -320,7 +308,7 @@ def test_hours_of_silence_are_searched_for_tones_block_by_block() -> None:
     energy = log_energy(samples)
     tracemalloc.start()
     try:
-        assert find_tones(samples, energy) == []
+        assert voice_activity.find_tones(samples, energy) == []
         assert tracemalloc.get_traced_memory()[1] < 6 * samples.nbytes
     finally:
         tracemalloc.stop()

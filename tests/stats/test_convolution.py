@@ -3,7 +3,8 @@ import pytest
 
 from lipmotion.stats import convolution, network_training
 from lipmotion.stats.convolution import make_network
-from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
+from lipmotion.stats.network_training import TrainingSequence
+from stats.networks import slopes, trained
 
 
 def sequence(length: int = 40, seed: int = 0) -> TrainingSequence:
@@ -17,27 +18,11 @@ def sequence(length: int = 40, seed: int = 0) -> TrainingSequence:
 
 def test_gradients_are_those_of_differences() -> None:
     network = make_network(3, 5, 2, (1, 2), seed=1)
-    batch, weights = [sequence(9), sequence(6, 1)], np.array([0.3, 0.7], np.float32)
-    batch[0].valid[2] = False
-    _, gradients = network_training._differentiate(network, batch, weights, 0.0, 0)
     arrays = [array for layer in (*network.layers, network.output) for array in layer]
-    rng = np.random.default_rng(0)
-    differences, slopes = [], []
-    for array, gradient in zip(arrays, gradients, strict=True):
-        assert gradient.shape == array.shape
-        for index in [tuple(rng.integers(size) for size in array.shape) for _ in range(4)]:
-            step = 2e-3
-            before = array[index]
-            errors = []
-            for value in (before + step, before - step):
-                array[index] = value
-                errors.append(network_training._differentiate(network, batch, weights, 0.0, 0)[0])
-            array[index] = before
-            differences.append((errors[0] - errors[1]) / (2 * step))
-            slopes.append(float(gradient[index]))
+    gradients, differences = slopes(network, arrays, [sequence(9), sequence(6, 1)], 2e-3)
     # a step may cross a corner of max(0, x), where the difference is between two slopes
-    assert np.median(np.abs(np.array(differences) - slopes)) < 1e-3
-    assert np.corrcoef(differences, slopes)[0, 1] > 0.995
+    assert np.median(np.abs(np.array(differences) - gradients)) < 1e-3
+    assert np.corrcoef(differences, gradients)[0, 1] > 0.995
 
 
 def test_steps_beyond_the_reach_change_nothing_and_those_within_do() -> None:
@@ -60,22 +45,10 @@ def test_long_sequences_are_computed_in_blocks(monkeypatch: pytest.MonkeyPatch) 
     np.testing.assert_allclose(network(x), whole, atol=1e-5)
 
 
-def train(seed: int = 0) -> tuple[list[float], convolution.ConvolutionalNetwork]:
-    errors: list[float] = []
-    sequences = [sequence(seed=number) for number in range(8)]
-    network = fit_network(
-        make_network(3, 16, 2, (1, 1), seed),
-        lambda _, number: sequences[number],
-        len(sequences),
-        np.ones(2),
-        TrainingPlan(steps=150, batch_size=4, rate=1e-2, dropout=0.0, seed=seed),
-        lambda _, error: errors.append(error),
-    )
-    return errors, network
-
-
 def test_it_learns_what_depends_on_a_neighbour() -> None:
-    errors, network = train()
+    errors, network = trained(
+        make_network(3, 16, 2, (1, 1), 0), [sequence(seed=number) for number in range(8)], 150, 1e-2
+    )
     assert np.mean(errors[-10:]) < 0.05 * np.mean(errors[:5])
     unseen = sequence(seed=99)
     assert np.corrcoef(network(unseen.inputs.astype(np.float32))[:, 0], unseen.targets[:, 0])[0, 1] > 0.97

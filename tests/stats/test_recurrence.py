@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from lipmotion.stats import network_training, recurrence
-from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
+from lipmotion.stats.network_training import TrainingSequence
 from lipmotion.stats.recurrence import RecurrentNetwork, make_recurrent_network
 from oracles.recurrence import recurrent_outputs
+from stats.networks import slopes, trained
 
 
 def sequence(length: int = 30, seed: int = 0) -> TrainingSequence:
@@ -21,20 +22,9 @@ def test_it_is_what_its_equations_say() -> None:
 
 
 def test_gradients_are_those_of_differences() -> None:
-    network, weights = make_recurrent_network(2, 4, 2, 2, seed=1), np.array([0.3, 0.7], np.float32)
-    batch = [sequence(9), sequence(6, 1)]
-    batch[0].valid[2] = False
-    _, gradients = network_training._differentiate(network, batch, weights, 0.0, 0)
-    rng = np.random.default_rng(0)
-    for array, gradient in zip(network.parameters, gradients, strict=True):
-        assert gradient.shape == array.shape
-        for index in [tuple(rng.integers(size) for size in array.shape) for _ in range(4)]:
-            before, errors = array[index], []
-            for value in (before + 5e-3, before - 5e-3):
-                array[index] = value
-                errors.append(network_training._differentiate(network, batch, weights, 0.0, 0)[0])
-            array[index] = before
-            assert (errors[0] - errors[1]) / 1e-2 == pytest.approx(float(gradient[index]), abs=1e-3)
+    network = make_recurrent_network(2, 4, 2, 2, seed=1)
+    gradients, differences = slopes(network, network.parameters, [sequence(9), sequence(6, 1)], 5e-3)
+    assert differences == pytest.approx(gradients, abs=1e-3)
 
 
 def test_dropped_units_have_no_gradient() -> None:
@@ -63,17 +53,8 @@ def test_long_sequences_are_computed_in_pieces(monkeypatch: pytest.MonkeyPatch) 
 
 
 def train() -> tuple[list[float], RecurrentNetwork]:
-    errors: list[float] = []
-    sequences = [sequence(seed=number) for number in range(8)]
-    network = fit_network(
-        make_recurrent_network(2, 12, 2, 1, seed=0),
-        lambda _, number: sequences[number],
-        len(sequences),
-        np.ones(2),
-        TrainingPlan(steps=60, batch_size=4, rate=5e-2, dropout=0.0, seed=0),
-        lambda _, error: errors.append(error),
-    )
-    return errors, network
+    network = make_recurrent_network(2, 12, 2, 1, seed=0)
+    return trained(network, [sequence(seed=number) for number in range(8)], 60, 5e-2)
 
 
 def test_it_learns_what_it_must_remember_in_both_directions_and_always_the_same() -> None:

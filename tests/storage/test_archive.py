@@ -1,4 +1,3 @@
-import io
 import logging
 import zipfile
 from pathlib import Path
@@ -9,29 +8,24 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.storage.archive import Checkpoint, array_in, check_archive
-
-
-def saved(array: NDArray[Any]) -> bytes:
-    stream = io.BytesIO()
-    np.save(stream, array)
-    return stream.getvalue()
+from robustness.case import npy
 
 
 def test_an_array_comes_back() -> None:
     texts = np.array(["a", "näher 😀"]), np.array("one")
     for array in (np.arange(6.0).reshape(2, 3), np.zeros((0, 3)), *texts, np.eye(3).T):
-        found = array_in(saved(array))
+        found = array_in(npy(array))
         assert found.dtype == array.dtype
         np.testing.assert_array_equal(found, array)
 
 
 def test_an_array_is_exactly_as_long_as_its_header_says_and_of_letters_that_exist() -> None:
-    whole = saved(np.arange(6.0))
+    whole = npy(np.arange(6.0))
     for content in (whole[:-1], whole + b"\0", b"", b"\x93NUMPY\x09\x00"):
         with pytest.raises(ValueError, match=r"required 48 bytes|not an array"):
             array_in(content)
     with pytest.raises(ValueError, match="characters that do not exist"):
-        array_in(saved(np.array(["ab"]))[:-4] + b"\0\0\x11\0")
+        array_in(npy(np.array(["ab"]))[:-4] + b"\0\0\x11\0")
 
 
 def test_a_zip_may_not_grow_without_end(tmp_path: Path) -> None:

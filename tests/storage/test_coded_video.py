@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import read_archive, write_archive
-from lipmotion.storage.coded_video import (
+from lipmotion_faces.coded_video import (
     FrameGroups,
     decode_pictures,
     encode_pictures,
@@ -154,7 +154,7 @@ class TestDamage:
                 stored_video_from_arrays(wrong)
 
     def test_larger_pictures_than_allowed_are_not_decoded(self, monkeypatch):
-        from lipmotion.storage import coded_video
+        from lipmotion_faces import coded_video
 
         data = encode_pictures(film(4))
         monkeypatch.setattr(coded_video, "MAX_PICTURE_BYTES", 4 * 48 * 64 * 3 - 1)

@@ -10,20 +10,17 @@ import pytest
 
 from children import PIPE, child, run_child
 from lipmotion.errors import ExportError
-from lipmotion.storage import files
+from lipmotion.storage import files, locks
 from lipmotion.storage.files import (
-    LOCK,
     TEMPORARY,
     atomic_file,
     atomic_folder,
     check_distinct,
     check_target,
     confine,
-    lock_folder,
     portable_name,
-    remove_unfinished,
-    unfinished_work,
 )
+from lipmotion.storage.locks import LOCK, lock_folder, remove_unfinished, unfinished_work
 
 Context = Callable[[Path], AbstractContextManager[Path]]
 TOO_LONG = "x" * 300 + ".json"
@@ -142,7 +139,7 @@ def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_pat
 
 HOLD = (
     "import pathlib, sys\n"
-    "from lipmotion.storage.files import lock_folder\n"
+    "from lipmotion.storage.locks import lock_folder\n"
     "with lock_folder(pathlib.Path(sys.argv[1])):\n"
     "    print('held', flush=True)\n"
     "    sys.stdin.read()\n"
@@ -152,7 +149,6 @@ HOLD = (
 def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "work"
     with child([sys.executable, "-c", HOLD, folder], stdin=PIPE) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "held\n"
         with pytest.raises(ExportError, match=rf"work: another lipmotion \(process {process.pid}\) is at work on it"):
             lock_folder(folder).__enter__()
@@ -263,7 +259,7 @@ def interrupted(folder: Path, step: int) -> bool:
 
     def trace(frame: FrameType, event: str, _: object) -> Any:
         nonlocal seen
-        if frame.f_code.co_filename != files.__file__:
+        if frame.f_code.co_filename not in {files.__file__, locks.__file__}:
             return None
         seen += event == "line"
         if seen == step:

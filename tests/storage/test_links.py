@@ -10,21 +10,9 @@ import pytest
 from lipmotion import Corpus
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
+from lipmotion.storage import files
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.files import (
-    LOCK,
-    TEMPORARY,
-    atomic_file,
-    atomic_folder,
-    confine,
-    lock_folder,
-    make_folder,
-    open_own,
-    remove,
-    remove_unfinished,
-    temporary_folder,
-    unfinished_work,
-)
+from lipmotion.storage.locks import LOCK, lock_folder, remove_unfinished, temporary_folder, unfinished_work
 from lipmotion_faces.corpus.sync import sync
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST
@@ -41,7 +29,7 @@ def outside_of(tmp_path: Path) -> Path:
     """Return a folder that belongs to somebody else, with whatever names the verbs may look for."""
     outside = tmp_path / "outside"
     (outside / "folder").mkdir(parents=True)
-    for name in ("file", f"{TEMPORARY}left", "folder/file", "line.edits.json", "old.lipmotion.unfinished"):
+    for name in ("file", f"{files.TEMPORARY}left", "folder/file", "line.edits.json", "old.lipmotion.unfinished"):
         (outside / name).write_text("precious")
     (outside / "empty").touch()
     return outside
@@ -108,7 +96,10 @@ def train(folder: Path) -> None:
         *((pronounce, name) for name in ("lexicon.txt",)),
         *((train_voice, f"training/{name}") for name in ("", "recordings", "corpus", f"corpus/{LOCK}")),
         *((train_voice, name) for name in ("voices", "recordings")),
-        *((add_to_corpus, name) for name in ("corpus.json", "utterances", "utterances/toy00", f"{TEMPORARY}left")),
+        *(
+            (add_to_corpus, name)
+            for name in ("corpus.json", "utterances", "utterances/toy00", f"{files.TEMPORARY}left")
+        ),
         *((sync_corpus, name) for name in (LOCK, "utterances")),
         *((begin_batch, name) for name in (".batch", f".batch/{LOCK}", ".batch/work", "batch.jsonl", "report.csv")),
         *((answer_study, f"{ANSWERS}{suffix}") for suffix in ("", "-wal", "-shm", "-journal")),
@@ -124,7 +115,7 @@ def test_no_verb_follows_a_link_in_a_folder_of_a_stranger(tmp_path: Path, verb: 
         if verb in (add_to_corpus, sync_corpus):
             Corpus.create(folder.with_name(f"given-{number}.studio"))
         place.parent.mkdir(parents=True, exist_ok=True)
-        remove(place)
+        files.remove(place)
         if aim == "hard":
             os.link(outside / "file", place)
         else:
@@ -134,14 +125,14 @@ def test_no_verb_follows_a_link_in_a_folder_of_a_stranger(tmp_path: Path, verb: 
         assert content_of(outside) == before, aim
 
 
-@pytest.mark.parametrize("write", [atomic_file, atomic_folder])
+@pytest.mark.parametrize("write", [files.atomic_file, files.atomic_folder])
 def test_a_confined_folder_may_be_a_link_itself(
     tmp_path: Path, write: Callable[[Path], AbstractContextManager[Path]]
 ) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "given").symlink_to("there")
     with lock_folder(tmp_path / "given"):
-        make_folder(tmp_path / "given" / "a" / "b")
+        files.make_folder(tmp_path / "given" / "a" / "b")
         with write(tmp_path / "given" / "a" / "b" / "c") as new:
             new.touch()
     assert (tmp_path / "there" / "a" / "b" / "c").exists()
@@ -153,10 +144,10 @@ def test_what_is_removed_is_not_behind_a_link(tmp_path: Path) -> None:
     (tmp_path / "given").mkdir()
     for name, aim in (("one", outside), ("two", outside / "folder")):
         (tmp_path / "given" / name).symlink_to(aim)
-    with confine(tmp_path / "given"):
-        remove(tmp_path / "given" / "one" / "file")
+    with files.confine(tmp_path / "given"):
+        files.remove(tmp_path / "given" / "one" / "file")
         remove_unfinished(tmp_path / "given" / "one")
-        remove(tmp_path / "given" / "two")
+        files.remove(tmp_path / "given" / "two")
     assert content_of(outside) == before
     assert [path.name for path in (tmp_path / "given").iterdir()] == ["one"]
 
@@ -169,7 +160,7 @@ def test_a_file_that_is_added_to_is_nobody_elses(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for name in ("hard", "soft", "folder", "pipe"):
         with pytest.raises(ExportError, match="is a link, a folder, a pipe"):
-            open_own(tmp_path / name)
+            files.open_own(tmp_path / name)
     assert (tmp_path / "precious").read_text() == "precious"
 
 

@@ -13,10 +13,10 @@ import pytest
 
 from children import LIPMOTION, child, wait_until
 from lipmotion import load_model, save_model
-from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.model import shipped_path
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.sources import sha256_of
+from lipmotion_faces.characters.gltf_weights import read_gltf_motion
 from lipmotion_faces.video.mp4 import write_mp4
 from studio.test_recorded_videos import shifted
 from study.browser import (

@@ -19,7 +19,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from lipmotion import Model
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import read_edits
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.sources import sha256_of
 from lipmotion_studio.application import studio_application
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.project import digest_of

@@ -9,7 +9,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.sources import sha256_of
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata

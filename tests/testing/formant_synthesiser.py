@@ -9,8 +9,6 @@ of the table. D. H. and L. C. Klatt, JASA 87 (1990): the glottal pulse. Deviatio
 frication.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

@@ -55,7 +55,7 @@ def test_faces_that_break_it():
 
 
 def test_formats_that_keep_the_contract():
-    for name in MOTION_FORMATS.built_in:
+    for name in MOTION_FORMATS.names:
         check_exporter(MOTION_FORMATS.load(name))
 
 

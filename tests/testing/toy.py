@@ -1,7 +1,5 @@
 """The toy corpus: sentences of a synthesiser, and a drawn face; words, times of phones and motion are known exactly."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache

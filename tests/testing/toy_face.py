@@ -13,11 +13,11 @@ from lipmotion.motion.mouth_region import CORNER as MOUTH_CORNER
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.speech.sound.pauses import STEP_S, levels_db
-from lipmotion.storage.coded_video import encode_video
 from lipmotion.types import Audio, Motion
 from lipmotion_faces.appearance.lower_face import CORNER, HEIGHT, WIDTH, FaceShape
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import inverse_map
+from lipmotion_faces.coded_video import encode_video
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake, StoredBackground
 from testing.toy import CAMERA_HZ, INNER_WIDTH, INSIDE, LIPS, SKIN, ToySentence, toy_motion, toy_sentences
 

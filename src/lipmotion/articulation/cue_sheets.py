@@ -20,7 +20,7 @@ from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.paths import best_segments
 from lipmotion.types import CurveEdit, Generation, Hold, Motion, Span, Timeline, Unit
-from lipmotion.types.generation import Locked
+from lipmotion.types.edits import Locked
 from lipmotion.types.values import parse_clock, parse_number
 from lipmotion.units import SILENCE, VISEMES, group_words, is_silent, mark_closing_phones
 from lipmotion.units.phones import BLAIR, LETTERS, OPTIONAL, REST, SHAPES, choose_drawn_shape

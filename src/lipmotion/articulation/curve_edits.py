@@ -16,7 +16,7 @@ from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.types import WEIGHT, CurveEdit, DrawnCurve, Gain, Generation, Hold, Motion, Pin, Timeline, Unit, frame_of
-from lipmotion.types.generation import Locked
+from lipmotion.types.edits import Locked
 
 Curve = NDArray[np.float64]
 

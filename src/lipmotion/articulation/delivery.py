@@ -17,7 +17,7 @@ from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.types import EYE_DISTANCE, WEIGHT, CurveEdit, Generation, Motion, Pin, Span, StateTrace, Timeline, Unit
 from lipmotion.types.delivery import Delivery as Delivery  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.generation import Locked
+from lipmotion.types.edits import Locked
 from lipmotion.units import is_silent
 
 

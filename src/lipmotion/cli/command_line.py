@@ -22,9 +22,10 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
 from lipmotion.types.values import parse_number, parse_whole
 
-_VERBS = "animate batch live speak render edit explain cues words train adapt character"
+_VERBS = "animate batch live speak render edit explain cues words train"
 _PLACES = {name: f"lipmotion.cli.verbs.{name}:add" for name in _VERBS.split()}
 _PLACES |= {name: f"lipmotion.cli.verbs.about:add_{name}" for name in "addon info cite doctor completion".split()}
+_PLACES["adapt"] = "lipmotion.cli.verbs.train:add_adapt"
 VERBS: Registry[Callable[[Any], None]] = Registry("verb", "lipmotion.verbs", _PLACES)
 """What adds each verb to the parser; those of faces, studio and lab are entry points."""
 OF_OTHER_TOOLS = {

@@ -216,7 +216,7 @@ def _face_tracking() -> str:
 
 def _model() -> str:
     from lipmotion.pipeline.model import load_model, read_header, shipped_path
-    from lipmotion.storage.files import sha256_of
+    from lipmotion.storage.sources import sha256_of
 
     path = shipped_path()
     try:
@@ -282,7 +282,7 @@ def _main_path() -> str:
     from lipmotion.formats.sound import write_sound
     from lipmotion.pipeline.job import Job
     from lipmotion.pipeline.request import Outputs, Request
-    from lipmotion.storage.files import temporary_folder
+    from lipmotion.storage.locks import temporary_folder
     from lipmotion.types.delivery import Staging
 
     with temporary_folder() as folder:

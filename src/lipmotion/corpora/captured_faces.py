@@ -30,7 +30,7 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_files import find_labels
 from lipmotion.formats.markers import measure_markers, to_head_frame
 from lipmotion.storage.archive import array_in
-from lipmotion.storage.files import check_regular
+from lipmotion.storage.sources import check_regular
 from lipmotion.types import WEIGHT, Channel, Motion
 
 KIND = "VOCASET meshes"

@@ -26,7 +26,7 @@ from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.extensions import Registry
 from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.formats.tables import is_live_link_file
-from lipmotion.storage.files import check_listable, read_text_file
+from lipmotion.storage.sources import check_listable, read_text_file
 from lipmotion.units import split_words
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"

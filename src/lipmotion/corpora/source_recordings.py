@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lipmotion.errors import CorpusError, InputError, shorten
-from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import read_text_file
 from lipmotion.storage.text_table import read_table
 from lipmotion.types import Channel, Timeline, Unit
 

@@ -14,19 +14,11 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import (
-    TEMPORARY,
-    atomic_file,
-    atomic_folder,
-    check_regular,
-    confine,
-    make_folder,
-    portable_name,
-    read_text_file,
-    remove_unfinished,
-)
+from lipmotion.storage.files import TEMPORARY, atomic_file, atomic_folder, confine, make_folder, portable_name
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.locks import remove_unfinished
 from lipmotion.storage.schema import ArraySpec, check_sizes
+from lipmotion.storage.sources import check_regular, read_text_file
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Audio,

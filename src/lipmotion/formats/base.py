@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
-from lipmotion.meshes.model.scene import Thinning
+from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.storage.files import atomic_file, check_regular
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json
-from lipmotion.storage.sources import check_kind
+from lipmotion.storage.sources import check_kind, check_regular
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, Unit
 
 LOG = logging.getLogger("lipmotion")
@@ -90,7 +90,6 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "blender.py": "lipmotion.formats.blender:MOTION_FORMAT",
         "c3d": "lipmotion.formats.c3d:MOTION_FORMAT",
         "fap": "lipmotion.formats.fap:MOTION_FORMAT",
-        "vrma": "lipmotion.formats.vrm_animation:MOTION_FORMAT",
         "anim": "lipmotion.formats.game_engines:UNITY",
         "tres": "lipmotion.formats.game_engines:GODOT",
         "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
@@ -100,13 +99,12 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
     },
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
-_GLTF = "lipmotion.meshes.files.gltf_weights:read_gltf_motion"
 _CUES = "lipmotion.formats.cues:read_cue_motion"
 _FRAMES = "lipmotion.formats.weights_json:read_frames"
 MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
     "motion reader",
     "lipmotion.motion_readers",
-    {"glb": _GLTF, "gltf": _GLTF, **dict.fromkeys(("tsv", "xml", "dat", "pgo"), _CUES), "jsonl": _FRAMES},
+    {**dict.fromkeys(("tsv", "xml", "dat", "pgo"), _CUES), "jsonl": _FRAMES},
 )
 """Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
 OTHER_JSON = {

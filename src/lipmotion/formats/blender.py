@@ -1,7 +1,7 @@
 """Files for Blender: a script with motion in it, and the add-on that reads motion files.
 
 ``.blender.py``: a script that keys shape keys, bones and custom properties when it is run in Blender.
-``.zip``: the add-on (``addons.blender``), as Blender 4.2 and later installs it.
+``.zip``: the add-on (``extras/lipmotion_blender``; a wheel holds it as data), as Blender 4.2 and later installs it.
 
 The script is made of the modules of the add-on, one after another, the curves, and a call that keys them.
 """
@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Mapping
-from importlib import resources
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from lipmotion.errors import ExportError
@@ -25,6 +24,8 @@ SCRIPT_MODULES = ("takes.py", "curves.py", "keying.py", "script.py")
 COPIED = "# -- what follows is copied into scripts\n"
 PROGRAMS = ("blender",)
 FOLDER = "lipmotion_blender"
+ADDON_PLACES = (Path(__file__).parents[1] / "addons", Path(__file__).parents[3] / "extras")
+"""Where the add-on's folder is: in an installed package; in a copy of the repository."""
 MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py", "takes.py")
 OLDEST = (1980, 1, 1, 0, 0, 0)
 """The time of every file in an archive: the same version gives the same bytes."""
@@ -64,8 +65,7 @@ from __future__ import annotations
 def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write the code of the add-on, the curves, and a call that keys them; names are literals of Python in ASCII."""
     motion = generation.motion
-    folder = resources.files("lipmotion.addons.blender")
-    texts = [folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPT_MODULES]
+    texts = read_addon(SCRIPT_MODULES).values()
     *code, main = (_IMPORT.sub("", _BEGINNING.sub("", text)) for text in texts)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(_HEAD + "".join(each.strip() + "\n\n\n" for each in code))
@@ -82,6 +82,14 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
 MOTION_FORMAT = MotionFormat(write, curves="face", other_curves=True, names_sound=True)
 
 
+def read_addon(names: Iterable[str]) -> dict[str, str]:
+    """Return the text of modules of the add-on, by name. Raises ExportError: this installation lacks the add-on."""
+    folder = next((place / FOLDER for place in ADDON_PLACES if (place / FOLDER).is_dir()), None)
+    if folder is None:
+        raise ExportError("this installation of lipmotion lacks its add-on for Blender; install lipmotion again")
+    return {name: (folder / name).read_text(encoding="utf-8") for name in names}
+
+
 def write_addon(program: str, path: str | Path) -> None:
     """Write the add-on for a program to a file.
 
@@ -94,8 +102,7 @@ def write_addon(program: str, path: str | Path) -> None:
     if path.suffix.lower() != ".zip":
         raise ExportError(f"{path}: unknown format {path.suffix!r}; Blender installs a .zip")
     check_target(path)
-    source = resources.files("lipmotion.addons.blender")
-    texts = {name: source.joinpath(name).read_text(encoding="utf-8") for name in MODULES}
+    texts = read_addon(MODULES)
     version = re.match(r"\d+\.\d+\.\d+", installed_version())
     texts["blender_manifest.toml"] = MANIFEST.format(version=version[0] if version else NO_VERSION)
     with atomic_file(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -25,7 +25,7 @@ from lipmotion.articulation.lip_points import CHIN, mouth_template
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.markers import MARKER, MILLIMETRES, measure_markers, to_head_frame
-from lipmotion.meshes.files.steady_rate import exact_rate
+from lipmotion.formats.steady_rate import exact_rate
 from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]

@@ -24,8 +24,9 @@ from lipmotion.articulation.phone_targets import crossfade_phones
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import papagayo, rhubarb
 from lipmotion.printable import is_line
-from lipmotion.storage.files import atomic_file, read_text_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json
+from lipmotion.storage.sources import read_text_file
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE
 from lipmotion.units.phones import REST, SHAPES

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
-from lipmotion.meshes.files.steady_rate import exact_rate
+from lipmotion.formats.steady_rate import exact_rate
 from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 

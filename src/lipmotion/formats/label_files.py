@@ -34,7 +34,7 @@ from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_
 from lipmotion.formats.timed_lines import line_tiers
 from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, xml_tiers
 from lipmotion.printable import is_line
-from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, RecognisedPhone, find_phone, restore_confidences
 from lipmotion.units.mood_tags import parse_tagged_text, remove_known_tags

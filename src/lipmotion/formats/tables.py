@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat, format_rows
-from lipmotion.meshes.files.steady_rate import (
+from lipmotion.formats.steady_rate import (
     TIME_COLUMN,
     column_key,
     exact_rate,

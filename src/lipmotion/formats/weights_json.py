@@ -24,7 +24,7 @@ import numpy as np
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import MotionFormat, read_members, write_json
-from lipmotion.meshes.files.steady_rate import TIME_COLUMN, column_key, resample_rows, tabulate_frames, times_to_seconds
+from lipmotion.formats.steady_rate import TIME_COLUMN, column_key, resample_rows, tabulate_frames, times_to_seconds
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
 from lipmotion.storage.json_text import json_errors
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit

@@ -15,18 +15,20 @@ from lipmotion.errors import InputError
 from lipmotion.live.face import WEIGHT_NAMES, LiveFrame, ModelFace, between
 from lipmotion.live.idling import LARGEST_TURN_RAD, Idling
 from lipmotion.live.network import (
+    BLOCK,
     HEARD_S,
     LAGS,
     STEP_FRAMES,
     STEP_S,
     CausalSteps,
     LiveNetwork,
+    Resampler,
     SoundFeatures,
     answer_silence,
     live_network,
+    mono_samples,
     silent_step,
 )
-from lipmotion.live.sound import BLOCK, Resampler, mono_samples
 from lipmotion.live.timings import GivenPhones
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
 from lipmotion.motion.articulation import ARTICULATORS

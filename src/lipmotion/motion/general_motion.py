@@ -28,9 +28,9 @@ ENCODING_SCALE = np.float32(4)
 def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:
     """Return articulators, in deviations from the pose of the table of articulation [shape=(T, 8)].
 
-    None: training knows the voice, or the speech has no encoding.
+    None: the speech has no encoding, or its phones are given for a voice that training knows.
     """
-    if speech.encoding is None or speech.voice >= 1:
+    if speech.encoding is None or (speech.voice >= 1 and speech.units_known):
         return None
     steps = np.asarray(speech.encoding)[::STEP].astype(np.float32) * ENCODING_SCALE
     return interpolate_steps(shipped_network()(steps).astype(float), len(speech.features.values))

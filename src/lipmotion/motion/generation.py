@@ -97,8 +97,8 @@ class LearnedMotion:
 
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
-        Voices that training does not know part their lips to speak, follow what the general network hears, and have
-        typical talkers' range (``motion.unseen_speaker``).
+        Voices that training does not know part their lips to speak and have typical talkers' range; they, and known
+        ones in noise, follow what the general network hears (``motion.unseen_speaker``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
@@ -107,7 +107,8 @@ class LearnedMotion:
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
         voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
-        articulators  : what the general network hears in the sound [shape=(T, 8)], for voices not known to training
+        articulators  : what the general network hears in the sound [shape=(T, 8)], for voices not known to training and
+                        in noise
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
@@ -115,7 +116,7 @@ class LearnedMotion:
         scaling, ranges = self.scaling, find_closable_ranges(units, frames, closing_units)
         if self.prior is not None:
             statistics = self.prior.blend(statistics, units, frames, reliability, voice)
-            if voice < 1 and scaling is not None and self.closure is not None:
+            if (voice < 1 or articulators is not None) and scaling is not None and self.closure is not None:
                 speaker = UnseenSpeaker(self.prior, units, frames, reliability, voice)
                 statistics = speaker.raise_contrast(statistics)
                 statistics = speaker.open_before_speech(statistics)

@@ -29,6 +29,9 @@ Predict = Callable[[slice], Statistics]
 SOUND_SHARES = (0.75, 0.35)
 """Share of the motion that the general network hears, after all that is done for such a voice, where training knows it
 half or less: where phones cannot be relied on at all, and where they can (docs/results/voices.md)."""
+NOISY_SHARE = 0.3
+"""The same of a voice that training knows, where noise makes its phones unreliable; it has none where they can be
+relied on."""
 CONFIRMED = -0.5
 """A p, b or m that cannot be relied on closes the lips where the general network hears them less open than this, in
 standard deviations."""
@@ -61,7 +64,7 @@ class UnseenSpeaker:
     prior       : the table of articulation
     units       : phones in time, in T frames
     reliability : of the phones in time, 0 to 1 [shape=(T,)]
-    voice       : how well training knows the voice, 0 to 1; at 1 nothing changes
+    voice       : how well training knows the voice, 0 to 1; at 1 it only follows the sound in noise
     Every method takes and returns a function that returns means and precisions of a range of frames.
     """
 
@@ -83,7 +86,8 @@ class UnseenSpeaker:
                 spoken[max(first - NEAR_FRAMES, 0) : stop + NEAR_FRAMES] = 1
         unsure, sure = SOUND_SHARES
         reliability = np.broadcast_to(self.reliability, self.frames)[:, None, None]
-        share = unseen_share(self.voice) * (unsure + reliability * (sure - unsure))
+        strange = unseen_share(self.voice)
+        share = strange * (unsure + reliability * (sure - unsure)) + (1 - strange) * NOISY_SHARE * (1 - reliability)
         share = share * smooth_steps(spoken)[:, :, None]
         heard = self.prior.centre + articulators @ self.prior.matrix
 

@@ -16,15 +16,9 @@ from lipmotion.pipeline.edits import Edits, MoodStep, Step
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, locate_paths
 from lipmotion.pipeline.session import Session
-from lipmotion.storage.files import (
-    LARGEST_TEXT_BYTES,
-    atomic_file,
-    check_source,
-    read_text_file,
-    sha256_of,
-    sound_reference,
-)
+from lipmotion.storage.files import atomic_file, sound_reference
 from lipmotion.storage.json_text import as_json_rows, from_json, read_toml
+from lipmotion.storage.sources import LARGEST_TEXT_BYTES, check_source, read_text_file, sha256_of
 from lipmotion.types import Generation, Outlook, Timeline, Unit
 from lipmotion.types.values import as_tuple, describe_value, items, number, optional, require, text, value_of
 

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import load_provided
 from lipmotion.pipeline.request import Outputs, Request, locate_paths
-from lipmotion.storage.files import check_listable, portable_name
+from lipmotion.storage.files import portable_name
 from lipmotion.storage.json_text import read_toml
+from lipmotion.storage.sources import check_listable
 from lipmotion.types.configuration import Configuration, option
 from lipmotion.types.delivery import Delivery, Staging
 from lipmotion.types.progress import Monitor, silent_monitor, sub_monitor
@@ -162,14 +163,13 @@ def open_face(outputs: Outputs) -> ShownFace:
 
 def open_character(outputs: Outputs) -> DrivenCharacter:
     """Return the character that outputs name, from its files. Raises InputError: they cannot be read."""
-    from lipmotion.meshes.fitting.driven import load_character
-
-    return load_character(
+    character: DrivenCharacter = load_provided("load_character")(
         outputs.character or Path(),
         points=outputs.lip_points,
         binding=outputs.binding,
         by_points=outputs.control_points,
     )
+    return character
 
 
 def choose_curves(outputs: Outputs, face: ShownFace) -> str | DrivenCharacter | None:

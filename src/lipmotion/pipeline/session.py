@@ -6,12 +6,10 @@ Each stage is cached under the edits that it depends on.
 
 from __future__ import annotations
 
-import re
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from threading import RLock
@@ -22,19 +20,18 @@ from lipmotion.articulation.curve_edits import (
     apply_curve_edits,
     apply_gain,
     apply_stretch,
-    check_drawn,
     cut_locked_stretch,
-    find_pinned_frame,
     hold_mouth,
     mark_edited,
 )
 from lipmotion.articulation.phone_targets import GESTURES, SAID, with_gestures
-from lipmotion.errors import AlignmentError, InputError, shorten
+from lipmotion.errors import AlignmentError, InputError
 from lipmotion.kernels.compiler import numba_works, one_thread
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.analysis.language import resolve_language
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request
 from lipmotion.pipeline.analysis.speech_analysis import (
+    LATE_S,
     SpeechAnalysis,
     align_between,
     analyse_speech,
@@ -65,13 +62,10 @@ from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import (
     WEIGHT,
     Constraints,
-    CurveEdit,
-    DrawnCurve,
     Gain,
     Generation,
     Hold,
     Monitor,
-    Motion,
     Outlook,
     Pin,
     Progress,
@@ -81,7 +75,7 @@ from lipmotion.types import (
     Unit,
     silent_monitor,
 )
-from lipmotion.types.generation import Locked
+from lipmotion.types.edits import Locked
 from lipmotion.units import Pronunciation, group_words, split_words
 
 ResultT = TypeVar("ResultT")
@@ -90,9 +84,6 @@ ANALYSIS = 0.9
 """The share of the work that is recognition, in reports; the rest is the generation of motion."""
 MODELLED = ("opening", "width", "outer")
 """Channels, beside weights, that models generate as they are, so that motion runs smoothly through their pins."""
-LIP_POINT = re.compile(r"[xyz]_\d+")
-LATE_S = 0.1
-"""Seconds by which times of edits may lie after the end; editing programs round times."""
 USUAL_CACHED, MIN_CACHED = 4, 2
 """Results of each stage that are cached: the last ones that were used; motion of many frames less often."""
 MAX_CACHED = {"aligned": 1000, "locked": 1000}
@@ -371,34 +362,13 @@ class Session:
         if gestures := [edit.channel for edit in curves if edit.channel in GESTURES]:
             generation = generation.with_motion(with_gestures(generation.motion, generation.units, gestures))
         motion = mark_edited(apply_curve_edits(generation.motion, generation.units, curves), [*modelled, *curves])
-        for edit in edits:
-            self._check_edit(edit, motion)
+        if edits:
+            from lipmotion.pipeline.outputs.curve_sets import check_edit  # it loads characters
+
+            for edit in edits:
+                check_edit(edit, motion, self._curves)
         others = tuple(e for e in edits if isinstance(e, Hold) or (e in curves and e.channel not in motion.names))
         return replace(generation.with_motion(motion), curve_edits=others)
-
-    def _check_edit(self, edit: CurveEdit | Hold, motion: Motion) -> None:
-        """Raise InputError if an edit is of no curve that is known, or of no time of the recording."""
-        from lipmotion.pipeline.outputs.curve_sets import KNOWN_CURVES, WEIGHTS  # they load characters
-
-        known = (*motion.names, *GESTURES, *KNOWN_CURVES, *self._curves)
-        if edit.channel and edit.channel not in known:
-            verb = {Pin: "pin", DrawnCurve: "draw"}.get(type(edit), "change")
-            lower = {name.lower(): name for name in known}
-            near = get_close_matches(edit.channel.lower(), lower, 1)
-            others = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
-            name = shorten(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
-            raise InputError(
-                f"cannot {verb} {name}; channels that can be pinned: {others}; lip points, as y_14; curves, as "
-                "jawOpen, viseme_PP, open_jaw"
-            )
-        last_s = (len(motion.values) - 1) / motion.rate_hz
-        if isinstance(edit, Pin):
-            find_pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
-        elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
-            verb = {DrawnCurve: "draw", Hold: "hold"}.get(type(edit), "gain")
-            raise InputError(f"{verb} from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
-        if isinstance(edit, DrawnCurve):
-            check_drawn(edit, is_weight=edit.channel in WEIGHTS)
 
     def _with_pins(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         """Return the engine's motion after some edits of phones, through pins; while sketching, a sketch of it."""

@@ -1,135 +1,36 @@
-"""Files and folders that are written whole or not at all, checks of paths, and locks.
+"""Files and folders that are written whole or not at all, inside folders that may be confined.
 
 Everything is written under a temporary name beside its target, and renamed at the end.
 """
 
 from __future__ import annotations
 
-import codecs
 import errno
 import hashlib
-import logging
 import os
 import platform
 import re
 import shutil
 import stat
 import sys
-import tempfile
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.sources import Source, check_apart, check_kind, is_same
-
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
+from lipmotion.errors import ExportError
+from lipmotion.storage.sources import Source, check_apart, is_same
 
 TEMPORARY = ".part-"
 """Prefix of unfinished files' names; a killed run may leave such a file, which the next run removes."""
-LOCK = f"{TEMPORARY}lock"
-"""The file that a process locks while it works on a folder."""
-BRIEF = "lipmotion-"
-"""Prefix of folders in the system's place for temporary files."""
-UNFINISHED = ".unfinished"
-"""Suffix of a folder of unfinished work, after the name of the file that the work is for."""
-
-
-LARGEST_TEXT_BYTES = 1 << 26
-"""Most bytes of a text file: more than the words that a person speaks in a year."""
-
-
-def check_source(path: Path, kind: str) -> None:
-    """Raise InputError unless ``path`` is a file that is not empty; ``kind`` is what it should be, for the message."""
-    check_regular(path, kind)
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty; give a {kind}")
-    check_kind(path, kind)
-
-
-def sha256_of(path: Path) -> str:
-    """Return the SHA-256 digest of a file's content, in hexadecimal. Raises InputError: it is no file."""
-    check_regular(path, "file")
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
-
-
-def check_regular(path: Path, kind: str) -> None:
-    """Raise InputError for a folder, a pipe or a device, which may never end; a missing file is accepted."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give one {kind}")
-    if path.exists() and not path.is_file():
-        raise InputError(f"{path}: is a pipe or a device, required a file; save the {kind} first")
-
-
-def check_listable(folder: Path) -> None:
-    """Raise InputError if a folder may not be listed: a search for files in it would find none, without an error."""
-    try:
-        os.scandir(folder).close()
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
-
-
-LOG = logging.getLogger("lipmotion")
-MARKS_OF_TEXT = {
-    codecs.BOM_UTF8: "utf-8-sig",
-    codecs.BOM_UTF32_LE: "utf-32",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-}
-CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f\ufffd]")
-"""Characters that no text has."""
-
-
-def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, western: bool = False) -> str:
-    """Return the text of a file in UTF-8, UTF-16 or UTF-32, without a byte order mark.
-
-    UTF-16 may be without its mark, where every other byte of most letters is 0.
-    western : what is none of these is in the code page of Windows in western Europe and America; a warning says so
-    Raises InputError: no such file, not a file, larger than ``largest`` bytes, or no such text.
-    """
-    check_regular(path, f"{kind} file")
-    try:
-        size = path.stat().st_size
-        if size > largest:
-            raise InputError(f"{path}: {size} bytes, required at most {largest}: is it a {kind}?")
-        check_kind(path, "text", kind)
-        content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such {kind} file") from error
-    except OSError as error:
-        raise InputError(f"{path}: not a readable {kind} ({error.strerror or error})") from error
-    encoding = next((name for mark, name in MARKS_OF_TEXT.items() if content.startswith(mark)), "utf-8")
-    odd, even = content[1::2].count(0), content[::2].count(0)
-    if encoding == "utf-8" and max(odd, even) > len(content) // 4 > 4 * min(odd, even):
-        encoding = "utf-16-le" if odd > even else "utf-16-be"
-    try:
-        return content.decode(encoding)
-    except UnicodeDecodeError as error:
-        text = content.decode("cp1252", "replace") if western and encoding == "utf-8" else "\0"
-        if CONTROL.search(text):
-            raise InputError(
-                f"{path}: not a readable {encoding.upper()} {kind} ({error}); save it as UTF-8 text"
-            ) from error
-    LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
-    return text
 
 
 def check_target(target: Path, source: str | Path | None = None) -> None:
     """Raise ExportError unless a file can be written at ``target``; called before the work that leads to it."""
     try:
         is_folder = target.is_dir()
-        _check_parent(_place(target))
+        _check_parent(output_place(target))
     except OSError as error:  # a name too long, a folder that may not be looked into
         raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
     if is_folder:
@@ -254,7 +155,7 @@ def make_folder(folder: Path) -> None:
     except OSError as error:
         if isinstance(error, FileExistsError | NotADirectoryError) and os.path.lexists(folder):
             raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
-        raise _refused(folder, error) from error
+        raise write_error(folder, error) from error
 
 
 def put_in_place(temporary: Path, target: Path) -> None:
@@ -329,7 +230,7 @@ def _prefix(target: Path) -> str:
     return f"{first}{hashlib.sha256(name).hexdigest()[:8]}-"
 
 
-def _sweep(target: Path) -> None:
+def remove_left_files(target: Path) -> None:
     """Remove the unfinished files that killed runs on this machine left beside a target."""
     prefix = _prefix(target)
     with suppress(OSError):  # a folder that may be written to, but not listed
@@ -349,7 +250,7 @@ def _sweep(target: Path) -> None:
                 remove(left)
 
 
-def _place(target: Path) -> Path:
+def output_place(target: Path) -> Path:
     """Return the path that an output is written to; for a link, that of its target, so that the link remains."""
     if _confined_names(target):
         return target
@@ -357,7 +258,7 @@ def _place(target: Path) -> Path:
         place = Path(os.path.realpath(target)) if target.is_symlink() else target
         endless = place.is_symlink()
     except OSError as error:
-        raise _refused(target, error) from error
+        raise write_error(target, error) from error
     if endless:
         raise ExportError(f"{target}: is a link that leads back to itself; give the name of a file")
     return place
@@ -370,15 +271,15 @@ def atomic_file(target: Path) -> Iterator[Path]:
     Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
     Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
     """
-    place = _place(target)
+    place = output_place(target)
     temporary = _temporary(place, target.suffix)
     try:
         with _reached(place.parent):
-            _sweep(place)
+            remove_left_files(place)
         yield temporary
         put_in_place(temporary, place)
     except OSError as error:
-        raise _refused(target, error) from error
+        raise write_error(target, error) from error
     finally:
         with suppress(OSError):
             temporary.unlink()
@@ -397,7 +298,7 @@ def atomic_folder(target: Path) -> Iterator[Path]:
         yield temporary
         put_in_place(temporary, target)
     except OSError as error:
-        raise _refused(target, error) from error
+        raise write_error(target, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
@@ -424,166 +325,11 @@ def create_folders(folders: Iterable[Path]) -> Iterator[None]:
         raise
 
 
-def _refused(target: Path, error: OSError) -> ExportError:
+def write_error(target: Path, error: OSError) -> ExportError:
+    """Return the error that says why something cannot be written."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, None)  # None: NumPy, on a short write
     reason = error.strerror or ("No space left on device" if full else str(error))
     return ExportError(f"{target}: cannot be written: {reason}{'; make room, then run it again' if full else ''}")
-
-
-@contextmanager
-def lock_folder(folder: Path) -> Iterator[None]:
-    """Lock a folder, created if needed, for this process, and confine it (``confine``).
-
-    The system releases the lock when the process ends in any way: no lock is left behind.
-    Raises ExportError: another process has locked it, it cannot be created, or its lock is a link.
-    """
-    path = folder / LOCK
-    file = None
-    try:
-        try:
-            with confine(folder):
-                make_folder(folder)
-                try:
-                    file = _open_lock(folder / LOCK)
-                except OSError as error:
-                    raise _refused(folder, error) from error
-                yield
-        finally:
-            _release(path, file)
-    except BaseException:  # an interrupt may have come during the release; a second one does not follow at once
-        _release(path, file)
-        raise
-
-
-def _release(path: Path, file: IO[bytes] | None) -> None:
-    """Delete a lock: that of ``file``, or one that no process holds (after an interrupt while it was created)."""
-    with suppress(OSError, ExportError):  # there is none, it is no lock, or another process has it
-        is_held = file is not None and not file.closed
-        with file if file is not None and is_held else open_own(path, buffering=0) as lock:
-            if not is_held:
-                _lock(lock)
-            if sys.platform == "win32":
-                lock.close()
-            path.unlink()
-
-
-def _open_lock(path: Path) -> IO[bytes]:
-    """Return the lock file, open and locked. Raises ExportError: another process has locked it."""
-    while True:
-        file = None
-        try:
-            file = open_own(path, buffering=0)
-            _lock(file)
-            with suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(file.fileno()), path.stat()):  # it is still the one of that name
-                    with suppress(OSError):  # a full disk
-                        file.truncate(0)
-                        file.write(str(os.getpid()).encode())
-                    return file
-            file.close()  # the process that held it has just deleted it
-        except BlockingIOError as error:
-            owner = b""
-            if file is not None:
-                with file:
-                    file.seek(0)
-                    owner = file.read()
-            who = owner.decode(errors="replace") or "unknown"
-            raise ExportError(
-                f"{path.parent}: another lipmotion (process {who}) is at work on it; wait for it, or stop it"
-            ) from error
-        except BaseException:
-            if file is not None:
-                file.close()
-            raise
-
-
-if sys.platform == "win32":
-
-    def _lock(file: IO[bytes]) -> None:
-        file.seek(1 << 30)  # locked bytes cannot be read, and the owner's number must be readable
-        try:
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError as error:
-            raise BlockingIOError from error
-
-else:
-
-    def _lock(file: IO[bytes]) -> None:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise
-        except OSError:  # some network file systems have no locks
-            pass
-
-
-@contextmanager
-def temporary_folder() -> Iterator[Path]:
-    """Give a folder in the system's place for temporary files, which is removed at the end.
-
-    Those that killed runs have left there are removed first: nobody holds their locks.
-    """
-    place = Path(tempfile.gettempdir())
-    for left in place.glob(f"{BRIEF}*/{LOCK}"):
-        with suppress(ExportError, OSError), confine(place):  # it is in use, or another user's
-            with lock_folder(left.parent):
-                for path in left.parent.iterdir():
-                    if path != left:
-                        remove(path)
-            left.parent.rmdir()
-    with ExitStack() as kept:
-        for is_last in (False, False, True):
-            folder = Path(tempfile.mkdtemp(prefix=BRIEF))
-            kept.callback(shutil.rmtree, folder, ignore_errors=True)
-            try:
-                kept.enter_context(lock_folder(folder))
-                break
-            except ExportError:  # another process took it for one that was left, before it was locked
-                if is_last:
-                    raise
-        yield folder
-
-
-@contextmanager
-def unfinished_work(target: Path) -> Iterator[Path]:
-    """Give a locked folder beside ``target`` for the finished parts of the work on it.
-
-    The folder is deleted when the block ends without an error; after an error, or when the process is killed, a later
-    run finds the finished parts in it.
-    Raises ExportError: the target could not be written, or another process is at work on it.
-    """
-    check_target(target)
-    target = _place(target)
-    folder = work_folder(target)
-    if is_link(folder):
-        raise ExportError(f"{folder}: is a link, required a folder of unfinished work; remove it")
-    try:
-        with lock_folder(folder):
-            remove_unfinished(folder)
-            _sweep(target)
-            try:
-                yield folder
-            except ExportError as error:
-                raise ExportError(f"{error}; what is finished is kept in {folder}") from error
-            for path in folder.iterdir():
-                if path.name != LOCK:
-                    remove(path)
-    finally:
-        with suppress(OSError):  # it contains finished parts
-            folder.rmdir()
-
-
-def work_folder(target: Path) -> Path:
-    """Return the path of the folder that ``unfinished_work`` gives."""
-    target = _place(target)
-    return target.with_name(target.name + UNFINISHED)
-
-
-def remove_unfinished(folder: Path) -> None:
-    """Delete the unfinished files that a killed run left in ``folder``."""
-    for path in folder.glob(f"{TEMPORARY}*"):
-        if path.name != LOCK:
-            remove(path)
 
 
 def sound_reference(sound: Path, path: Path) -> str:

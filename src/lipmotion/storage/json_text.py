@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import read_text_file
 
 LONGEST_WHOLE = 300
 """Most digits of a whole number: one of 309 may be larger than any fraction."""

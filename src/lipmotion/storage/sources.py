@@ -1,8 +1,12 @@
-"""The inputs of a call: what a file is by its content, and that no output overwrites one."""
+"""The inputs of a call: reading them, what a file is by its content, and that no output overwrites one."""
 
 from __future__ import annotations
 
+import codecs
+import hashlib
+import logging
 import os
+import re
 import stat
 import zlib
 from collections.abc import Iterable
@@ -11,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
+
+LOG = logging.getLogger("lipmotion")
 
 
 @dataclass(frozen=True)
@@ -86,6 +92,88 @@ def _status(path: str | Path) -> os.stat_result | None:
         return Path(path).stat()
     except (OSError, ValueError):
         return None
+
+
+LARGEST_TEXT_BYTES = 1 << 26
+"""Most bytes of a text file: more than the words that a person speaks in a year."""
+MARKS_OF_TEXT = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f\ufffd]")
+"""Characters that no text has."""
+
+
+def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, western: bool = False) -> str:
+    """Return the text of a file in UTF-8, UTF-16 or UTF-32, without a byte order mark.
+
+    UTF-16 may be without its mark, where every other byte of most letters is 0.
+    western : what is none of these is in the code page of Windows in western Europe and America; a warning says so
+    Raises InputError: no such file, not a file, larger than ``largest`` bytes, or no such text.
+    """
+    check_regular(path, f"{kind} file")
+    try:
+        size = path.stat().st_size
+        if size > largest:
+            raise InputError(f"{path}: {size} bytes, required at most {largest}: is it a {kind}?")
+        check_kind(path, "text", kind)
+        content = path.read_bytes()
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such {kind} file") from error
+    except OSError as error:
+        raise InputError(f"{path}: not a readable {kind} ({error.strerror or error})") from error
+    encoding = next((name for mark, name in MARKS_OF_TEXT.items() if content.startswith(mark)), "utf-8")
+    odd, even = content[1::2].count(0), content[::2].count(0)
+    if encoding == "utf-8" and max(odd, even) > len(content) // 4 > 4 * min(odd, even):
+        encoding = "utf-16-le" if odd > even else "utf-16-be"
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError as error:
+        text = content.decode("cp1252", "replace") if western and encoding == "utf-8" else "\0"
+        if CONTROL.search(text):
+            raise InputError(
+                f"{path}: not a readable {encoding.upper()} {kind} ({error}); save it as UTF-8 text"
+            ) from error
+    LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
+    return text
+
+
+def check_source(path: Path, kind: str) -> None:
+    """Raise InputError unless ``path`` is a file that is not empty; ``kind`` is what it should be, for the message."""
+    check_regular(path, kind)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; give a {kind}")
+    check_kind(path, kind)
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 digest of a file's content, in hexadecimal. Raises InputError: it is no file."""
+    check_regular(path, "file")
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def check_regular(path: Path, kind: str) -> None:
+    """Raise InputError for a folder, a pipe or a device, which may never end; a missing file is accepted."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give one {kind}")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is a pipe or a device, required a file; save the {kind} first")
+
+
+def check_listable(folder: Path) -> None:
+    """Raise InputError if a folder may not be listed: a search for files in it would find none, without an error."""
+    try:
+        os.scandir(folder).close()
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
 
 
 HEAD, TAIL = 4096, 1 << 16

@@ -3,66 +3,22 @@
 A name is imported when it is first used: configurations alone need no arrays, and the command line starts at once.
 """
 
+# ruff: noqa: F403, F405 (what a type checker sees; a program imports each name by itself)
 from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from lipmotion.types.audio import (
-        ENERGY_FEATURE,
-        FRAME_RATE_HZ,
-        SPECTRUM_BANDS,
-        Audio,
-        Features,
-        JoinedRows,
-        Prosody,
-        TokenPosteriors,
-        VoiceEvent,
-        frame_of,
-        frames_of,
-        from_sixteen_bits,
-        to_sixteen_bits,
-    )
-    from lipmotion.types.configuration import Configuration, Rule, option
-    from lipmotion.types.delivery import Delivery, Staging
-    from lipmotion.types.explanation import (
-        ChainPosteriors,
-        ChainStates,
-        ChannelValue,
-        DominantGaussian,
-        Explanation,
-        NamedProbability,
-        RegressedMean,
-    )
-    from lipmotion.types.generation import (
-        ConditionSpectrum,
-        Constraints,
-        CurveEdit,
-        DrawnCurve,
-        Example,
-        Gain,
-        Generation,
-        Hold,
-        Outlook,
-        Pin,
-        PriorOutput,
-        ReducedVariance,
-        Speech,
-        SpeechPart,
-        SpokenText,
-        StateTrace,
-    )
-    from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
-    from lipmotion.types.progress import (
-        Item,
-        Monitor,
-        ParallelMap,
-        Progress,
-        silent_monitor,
-        sub_monitor,
-        with_progress,
-    )
-    from lipmotion.types.timeline import Span, SpeechKnowledge, Timeline, Unit
-    from lipmotion.types.utterance import TimedTranscript, TimedWord, Track, TranscriptLine, Utterance, sort_lines
+    from lipmotion.types.audio import *
+    from lipmotion.types.configuration import *
+    from lipmotion.types.delivery import *
+    from lipmotion.types.edits import *
+    from lipmotion.types.explanation import *
+    from lipmotion.types.generation import *
+    from lipmotion.types.motion import *
+    from lipmotion.types.progress import *
+    from lipmotion.types.speech import *
+    from lipmotion.types.timeline import *
+    from lipmotion.types.utterance import *
 
 __all__ = [
     "ENERGY_FEATURE", "EYE_DISTANCE", "FRAME_RATE_HZ", "GREY", "SPECTRUM_BANDS", "WEIGHT", "Audio", "ChainPosteriors",
@@ -78,7 +34,7 @@ __all__ = [
 
 _MODULES = (
     *("configuration", "delivery", "audio", "timeline", "motion"),
-    *("generation", "progress", "explanation", "utterance"),
+    *("edits", "speech", "generation", "progress", "explanation", "utterance"),
 )
 """Where the names are looked for, in this order."""
 

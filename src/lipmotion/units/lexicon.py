@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError, MissingDependencyError, shorten
-from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import read_text_file
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
 from lipmotion.units.spelling import guess_pronunciation, normalise_text, remove_accents

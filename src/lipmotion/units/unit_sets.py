@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import read_text_file
 from lipmotion.types import Unit
 from lipmotion.units.phones import (
     PAUSE,

@@ -17,11 +17,11 @@ from lipmotion.formats.tables import is_live_link_file, read_curve_table, speech
 from lipmotion.pipeline.outputs.motion_files import correct_rate
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.sound_offset import sound_offset
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.sources import sha256_of
 from lipmotion.types import Audio, Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
+from lipmotion_faces.corpus.sound_offset import sound_offset
 
 DIGESTS = ("sha256", "motion_sha256", "phones_sha256", "recorder_sha256")
 """Keys of the digests in the source of an utterance; if a digest changes, the recording is prepared again."""

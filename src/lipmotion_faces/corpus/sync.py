@@ -14,9 +14,9 @@ from lipmotion.measures.curves import Offset, best_offset, pooled_offset, shift_
 from lipmotion.motion.space import resample_to_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.sound.sound_offset import measured_opening_speed, predicted_opening_speed
-from lipmotion.storage.files import lock_folder
+from lipmotion.storage.locks import lock_folder
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
+from lipmotion_faces.corpus.sound_offset import measured_opening_speed, predicted_opening_speed
 
 REACH_S = 0.4
 """Largest offset that is considered, in seconds, in both directions."""

@@ -18,8 +18,8 @@ from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Mark, Outputs
 from lipmotion.speech.sound.pauses import levels_db_at
-from lipmotion.storage.files import check_source
 from lipmotion.storage.media import has_video
+from lipmotion.storage.sources import check_source
 from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
 from lipmotion.types.progress import with_reports
 from lipmotion_faces.appearance.person import FaceCodes
@@ -43,9 +43,7 @@ WHITE = 245
 
 
 def inset_box(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Return left, top, right and bottom, px, of the inset with its border, for heights and widths of frame and
-    picture.
-    """
+    """Return left, top, right and bottom, px, of the inset with its border; frame, picture: height and width."""
     height, width = frame
     shorter = min(height, width)
     factor = min(WIDTH_SHARE * width / picture[1], HEIGHT_SHARE * height / picture[0])

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.meshes.model.surface import compute_normals
-from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion_faces.base import rotate_head
+from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
 from lipmotion_faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth

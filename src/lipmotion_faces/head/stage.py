@@ -13,7 +13,7 @@ from lipmotion.meshes.fitting.eyes_and_brows import FULL_BROW_RISE, FULL_LOOK_RA
 from lipmotion.meshes.fitting.shape_weights import CurveCosts, fit_bounded_curves, part_opposed, with_gap
 from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
-from lipmotion.meshes.model.textures import encode_srgb
+from lipmotion_faces.characters.textures import encode_srgb
 from lipmotion_faces.head.figure import Figure
 from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.pose import CharacterPose, stack_poses

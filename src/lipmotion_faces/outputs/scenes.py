@@ -1,7 +1,9 @@
-"""Files for 3D programs: a character with its animation and a reference to the sound, as ``.glb`` or ``.usda``."""
+"""Files for 3D programs: a character with its animation, as ``.glb``, ``.usda`` or ``.fbx``; the first two name the
+sound."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -15,13 +17,11 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
 from lipmotion.articulation.mouth import frame_times, measure_mouth_at_rest, spoken_mouth
 from lipmotion.articulation.rest import add_rest
-from lipmotion.meshes.files.gltf_writer import write_animated_gltf, write_gltf_scene
-from lipmotion.meshes.files.usd_writer import asset, write_usda
+from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.mesh import Blendshape, head_quaternions
-from lipmotion.meshes.model.scene import HeadTurn, Scene, Thinning
 from lipmotion.pipeline.outputs.curve_sets import edit_weights
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
@@ -29,10 +29,16 @@ from lipmotion.storage.files import sound_reference
 from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
 from lipmotion.types.motion import WEIGHT
 from lipmotion_faces.base import Staging, stage_liveliness
+from lipmotion_faces.characters.fbx import convert_to_fbx, find_blender
+from lipmotion_faces.characters.gltf_writer import write_animated_gltf, write_gltf_scene
+from lipmotion_faces.characters.scene import HeadTurn, Scene
+from lipmotion_faces.characters.usd_writer import asset, write_usda
 from lipmotion_faces.outputs.drawn_video import check_drawable
 
-GLTF, USD = ".glb", ".usda"
-SCENE_SUFFIXES = (GLTF, USD)
+GLTF, USD, FBX = ".glb", ".usda", ".fbx"
+SCENE_SUFFIXES = (GLTF, USD, FBX)
+FBX_RATE_HZ = 60
+"""Frames a second of ``.fbx``, which are whole numbers; fewer where fewer keys are asked for."""
 KEPT = (GLTF, ".vrm")
 """Suffixes of files of characters that are kept as they are, with an animation more."""
 MARGIN, MOUTH_MARGIN = 10, 50
@@ -42,7 +48,7 @@ METRES = 0.09
 
 
 class SceneOutput(Output):
-    """``.glb``, ``.usda``: a character with its animation, for 3D programs."""
+    """``.glb``, ``.usda``, ``.fbx``: a character with its animation, for 3D programs."""
 
     @classmethod
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
@@ -50,6 +56,8 @@ class SceneOutput(Output):
 
     def check(self) -> None:  # noqa: D102
         sound = self.settings.recording
+        if self.path.suffix.lower() == FBX:
+            find_blender()
         if sound is not None and self.path.suffix.lower() == USD:
             asset(sound_reference(sound, self.path))  # refuses names that such a file cannot hold
 
@@ -80,11 +88,17 @@ def delivered_scene(performance: Performance, frames: slice | None = None) -> Sc
 
 
 def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
-    """Write a character with its animation as ``.glb`` or ``.usda``, by the suffix.
+    """Write a character with its animation as ``.glb``, ``.usda`` or ``.fbx``, by the suffix.
 
     A ``.glb`` of a character from a ``.glb`` or ``.vrm`` is that file with one animation more, where that is possible.
-    Raises ExportError: the file cannot be written.
+    Raises ExportError: the file cannot be written. Raises MissingDependencyError: an ``.fbx``, and no Blender.
     """
+    if path.suffix.lower() == FBX:
+        rate_hz = FBX_RATE_HZ if scene.weights is None else min(round(scene.weights.rate_hz), FBX_RATE_HZ)
+        with tempfile.TemporaryDirectory() as folder:
+            write_scene(Path(folder) / "scene.glb", scene)
+            convert_to_fbx(Path(folder) / "scene.glb", path, rate_hz)
+        return
     with_sound = replace(scene, sound="" if sound is None else sound_reference(sound, path))
     original, weights = scene.original, scene.weights
     if path.suffix.lower() == USD:

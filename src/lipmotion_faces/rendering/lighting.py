@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.textures import encode_srgb
+from lipmotion_faces.characters.textures import encode_srgb
 from lipmotion_faces.kernels.shading import shade
 
 Real = NDArray[np.float64]

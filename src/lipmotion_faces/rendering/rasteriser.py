@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.textures import decode_srgb
+from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.rendering.lighting import LEVELS, WHITE, tone_table
 

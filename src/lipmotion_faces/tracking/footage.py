@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.coded_video import MAX_DECODED_BYTES, FrameGroups
 from lipmotion.types import Track
+from lipmotion_faces.coded_video import MAX_DECODED_BYTES, FrameGroups
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan, nearest_indices, open_video, resample_to_constant_rate
 from lipmotion_faces.tracking.head_pose import face_to_image
 from lipmotion_faces.tracking.track import TrackedFrames, make_track, track_frames
@@ -103,7 +103,7 @@ def footage_groups(footage: Footage, most_bytes: int = MAX_DECODED_BYTES) -> Fra
     Reading a frame raises InputError: the video cannot be read, or has changed since it was tracked.
     Cost: forwards each picture is decoded once; backwards, those between the video's own key frame and a group of up to
     ``GROUP`` frames are decoded again for every group. A video that is played backwards often is better copied into a
-    ``storage.coded_video.StoredVideo``.
+    ``coded_video.StoredVideo``.
     """
     frame_bytes = footage.size[0] * footage.size[1] * 3
     length = min(GROUP, max(1, most_bytes // (3 * frame_bytes)))

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.files import check_source
 from lipmotion.storage.media import MAX_PIXELS, open_media, stated_duration_s, video_streams
+from lipmotion.storage.sources import check_source
 from lipmotion_faces.tracking.packages import import_opencv
 
 

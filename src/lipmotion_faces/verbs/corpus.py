@@ -126,7 +126,7 @@ def run_sync(options: argparse.Namespace) -> None:
 def run_offset(options: argparse.Namespace) -> None:
     """Call ``sound_offset``; print the offset and how it was found."""
     from lipmotion.speech.sound.audio_files import read_audio
-    from lipmotion.speech.sound.sound_offset import sound_offset
+    from lipmotion_faces.corpus.sound_offset import sound_offset
 
     offset = sound_offset(read_audio(options.camera), read_audio(options.recorder))
     print_line(f"--offset-ms {offset.late_s * 1000:.1f}  (by {offset.how}; levels correlate by {offset.alike:.2f})")

@@ -28,7 +28,7 @@ from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import FEWEST_TALKERS, NOISE_KINDS, noisy_audio
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
-from lipmotion.storage.files import check_listable
+from lipmotion.storage.sources import check_listable
 from lipmotion.types import (
     GREY,
     Audio,

@@ -18,7 +18,7 @@ from lipmotion.cli.terminal.printing import print_error
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.live.consumers import Consumer, LiveSound, json_line, read_address
-from lipmotion.live.sound import mono_samples
+from lipmotion.live.network import mono_samples
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection

@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.storage.files import atomic_file, read_text_file
+from lipmotion.storage.files import atomic_file
+from lipmotion.storage.sources import read_text_file
 from lipmotion.storage.text_table import as_field, from_field
 from lipmotion.types.values import parse_number, parse_whole
 

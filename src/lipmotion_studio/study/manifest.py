@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from lipmotion.errors import InputError
-from lipmotion.storage.files import read_text_file, sha256_of
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.sources import read_text_file, sha256_of
 from lipmotion.types.values import any_members, as_tuple, items, number, text, truth, value_of, whole
 from lipmotion_studio.study.answers import ANCHOR, FIRST, HIGHEST_RANK, KINDS, MOS, PAIRED, SECOND, is_possible
 from lipmotion_studio.study.settings import MATCH, PREFERENCE, SCALES

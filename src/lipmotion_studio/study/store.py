@@ -14,7 +14,8 @@ from secrets import token_urlsafe
 from typing import Any, TypeVar
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.files import check_own, sha256_of
+from lipmotion.storage.files import check_own
+from lipmotion.storage.sources import sha256_of
 from lipmotion_studio.study.manifest import MANIFEST
 
 ResultT = TypeVar("ResultT")
@@ -120,9 +121,7 @@ class StudyStore:
         return 0 if last is None else int(last) + 1
 
     def record(self, sheet: AnswerSheet) -> Future[bool]:
-        """Store the answers to a trial, the first ones only; the result: whether they are there (not of a forgotten
-        rater).
-        """
+        """Store the first answers to a trial; the result: whether they are there (not of a forgotten rater)."""
         rows = [
             {"rater": sheet.rater, "trial": sheet.trial, "item": item, "value": value}
             | {"seconds": sheet.seconds, "plays": sheet.plays}

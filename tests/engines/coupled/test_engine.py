@@ -17,8 +17,7 @@ from lipmotion.engines.coupled.explanation import (
 )
 from lipmotion.motion import generation
 from lipmotion.testing.examples import CHANNELS, examples, speech, timeline
-from lipmotion.types import Explanation, NamedProbability
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import Explanation, NamedProbability, silent_monitor
 from oracles import coupled as oracle
 
 KINDS = [

@@ -9,8 +9,7 @@ from lipmotion.engines.joint.engine import JointEngine, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import StreamWeights
 from lipmotion.testing.examples import example, examples, speech, timeline
-from lipmotion.types import Example, Generation, Span, Speech, Timeline, Unit
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import Example, Generation, Span, Speech, Timeline, Unit, silent_monitor
 from lipmotion.units import UNIT_SETS
 
 SOUND = speech(timeline(("t", "aa", "p", "iy", "m", "uw", "s", "aa")))
@@ -87,7 +86,6 @@ def test_recognised_units_may_be_given_and_come_back_as_they_are() -> None:
 def test_lips_meet_in_recognised_units_of_p_b_m_alone() -> None:
     closed, free = recognised().motion["opening"], recognised(closures=False).motion["opening"]
     closure = trained("eVis").closure
-    assert closure is not None
     lips = [slice(80, 90), slice(100, 110)]
     for span in lips:
         assert closed[span].min() <= closure.closed + 1e-9

@@ -82,7 +82,6 @@ def test_in_noise_the_sound_alone_chooses(model: SelectionModel, engine: Selecti
     unsure = replace(SPOKEN, units_known=False, confidence=0.0)
     assert not target_of(model, costs, unsure).by_sound
     guide = model.guide
-    assert guide is not None
     distorted = (guide.predict(unsure)[0], np.ones(len(unsure.features.values)))
     monkeypatch.setattr(type(guide), "predict", lambda *_: distorted)
     target = target_of(model, costs, unsure)

@@ -6,8 +6,7 @@ import pytest
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import CHANNELS, OPENINGS, examples, speech, timeline
-from lipmotion.types import WEIGHT, Channel, Constraints, Pin
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import WEIGHT, Channel, Constraints, Pin, silent_monitor
 
 ENGINE = engine_named("trajectory", {"silent_states": 7, "articulation": False})  # at rest from 0.24 s on
 MODEL = ENGINE.fit(examples(), silent_monitor).model

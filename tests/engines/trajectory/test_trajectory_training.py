@@ -8,7 +8,7 @@ from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, label_full_context
 from lipmotion.stats.trees import Question, Tree, fit_regression_node, fit_tree_regressions, ridge, zero_statistics
 from lipmotion.testing.examples import examples
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import silent_monitor
 
 OPTIONS = TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False)
 LAYOUT = OPTIONS.training_layout

@@ -9,8 +9,7 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.frame_labels import StateLayout, label_full_context
 from lipmotion.testing.examples import examples, speech, timeline
-from lipmotion.types import Generation
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import Generation, silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, load_unit_set
 
 PLAIN = {"articulation": False, "acoustic_regression": False, "silent_states": 7}

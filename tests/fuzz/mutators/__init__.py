@@ -5,35 +5,20 @@ from pathlib import PurePosixPath
 from random import Random
 
 from fuzz.inputs import Files
-from fuzz.mutators import arrays, boxes, documents, json_text, raw, riff, text, xml_text, zips
+from fuzz.mutators import arrays, documents, json_text, raw, riff, text, xml_text, zips
 
 Mutate = Callable[[Random, bytes], bytes]
 
+TEXTS = ".obj .mtl .csv .toml .txt .align .lab .TextGrid .dict".split()
 FORMS: dict[str, tuple[Mutate, ...]] = {
-    ".json": (json_text.change, json_text.change, text.change),
-    ".gltf": (json_text.change, json_text.change, text.change),
-    ".glb": (documents.change, documents.change, documents.change),
-    ".vrm": (documents.change, documents.change, documents.change),
-    ".binding": (zips.change, zips.change),
-    ".obj": (text.change, text.change, text.change),
-    ".mtl": (text.change, text.change, text.change),
-    ".npy": (arrays.change, arrays.change),
-    ".npz": (zips.change, zips.change),
-    ".lipmotion": (zips.change, zips.change),
-    ".face": (zips.change, zips.change),
-    ".wav": (riff.change, riff.change),
+    **dict.fromkeys(TEXTS, (text.change,) * 3),
+    **dict.fromkeys((".json", ".gltf"), (json_text.change, json_text.change, text.change)),
+    **dict.fromkeys((".glb", ".vrm"), (documents.change,) * 3),
+    **dict.fromkeys((".binding", ".npz", ".lipmotion", ".face"), (zips.change,) * 2),
+    ".npy": (arrays.change,) * 2,
+    ".wav": (riff.change,) * 2,
     ".avi": (riff.change,),
-    ".mp4": (boxes.change, boxes.change),
-    ".mov": (boxes.change, boxes.change),
-    ".m4a": (boxes.change, boxes.change),
-    ".csv": (text.change, text.change, text.change),
-    ".toml": (text.change, text.change, text.change),
-    ".txt": (text.change, text.change, text.change),
-    ".align": (text.change, text.change, text.change),
-    ".lab": (text.change, text.change, text.change),
-    ".TextGrid": (text.change, text.change, text.change),
     ".svg": (xml_text.change, xml_text.change, text.change),
-    ".dict": (text.change, text.change, text.change),
 }
 """By suffix; the bytes of any file are changed as well."""
 

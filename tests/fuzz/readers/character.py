@@ -12,10 +12,9 @@ from PIL import Image
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
-from lipmotion.meshes.files.binding_files import save_binding, write_weights
-from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.fitting.driven import load_character
 from lipmotion.pipeline.outputs.curve_sets import make_curves
+from lipmotion_faces.characters.binding_files import save_binding, write_weights
+from lipmotion_faces.characters.character_files import load_character, read_character
 from lipmotion_faces.mesh import MeshStage
 from lipmotion_faces.rendering.drawn_surface import drawn_surface
 from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from formats.examples import of_motion, written
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require, short_speech
 from lipmotion import Corpus, CueSheet
 from lipmotion.corpora.captured_faces import read_channels
 from lipmotion.corpora.source_recordings import MotionFile
-from lipmotion.formats.base import write_motion
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.cues import CUE_FORMATS
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
+from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline
 from lipmotion.units.phones import SHAPES
 from lipmotion_faces.corpus.supplied import read_supplied_track
 from meshes import gltf
@@ -61,9 +61,10 @@ def _captures() -> list[Files]:
     """Return the same second of motion as programs of motion capture write it."""
     values = np.linspace(0, 0.3, 3 * FRAMES).reshape(FRAMES, 3)
     names = ("x_13", "y_13", "z_13")
-    moving = _generation(values, tuple(map(Channel, names)))
+    moving = of_motion(Motion(values, RATE_HZ, tuple(map(Channel, names))))
     weights = Motion(values[:, :1], RATE_HZ, (Channel("jawOpen", WEIGHT),))
-    parameters = _generation(np.rint(900 * values[:, :2]), (Channel("fap3_open_jaw", "fap"), Channel("fap4", "fap")))
+    fap = (Channel("fap3_open_jaw", "fap"), Channel("fap4", "fap"))
+    parameters = of_motion(Motion(np.rint(900 * values[:, :2]), RATE_HZ, fap))
     markers = C3dFile(("EYE_L", "EYE_R", "chin"), np.stack([values + 45, values - 45, 2 * values], axis=1), RATE_HZ)
     cues = Timeline((Span(0.0, 0.3, "X"), Span(0.3, 0.5, "A"), Span(0.5, 0.75, "E")))
     frames_s = [n / RATE_HZ for n in range(FRAMES)]
@@ -77,20 +78,15 @@ def _captures() -> list[Files]:
         expression = {"node": 1, "path": "translation"}
         (folder / "a.vrma").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values, target=expression)))
         write_take(folder / "a.csv", weights)
-        write_motion(folder / "a.c3d", moving, source={}, model={})
+        written(folder / "a.c3d", moving)
         write_c3d(folder / "b.c3d", markers)
-        write_motion(folder / "a.fap", parameters, source={}, model={})
+        written(folder / "a.fap", parameters)
         vowels = (Channel("aa", WEIGHT), Channel("eyeBlinkLeft", WEIGHT), Channel("eyeBlinkRight", WEIGHT))
-        write_motion(folder / "a.vmd", _generation(values, vowels), source={}, model={})
-        write_motion(folder / "a.a2f.json", _generation(values[:, :1], weights.channels), source={}, model={})
+        written(folder / "a.vmd", of_motion(Motion(values, RATE_HZ, vowels)))
+        written(folder / "a.a2f.json", of_motion(weights))
         rows = [f"{1000 * n / RATE_HZ:.1f},{row[0]}" for n, row in enumerate(values)]
         (folder / "c.csv").write_text("\n".join(["time_ms,jawOpen", *rows]))
         return [{path.name: path.read_bytes()} for path in sorted(folder.iterdir())]
-
-
-def _generation(values: NDArray[np.float64], channels: tuple[Channel, ...]) -> Generation:
-    motion = Motion(values, RATE_HZ, channels)
-    return Generation(motion, values, Timeline(()), StateTrace(("a",), np.zeros(len(values), np.intp)))
 
 
 def read(folder: Path, good: Good) -> None:

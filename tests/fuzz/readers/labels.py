@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 from formats.test_reported_cases import LINES, OTHERS, SERVICES, SPEAKERS
+from formats.test_textgrid import TIERS, long_form
 from formats.test_transcripts import OF_LINES, OF_WORDS
 from formats.timing_samples import SAMPLES
 from fuzz.inputs import Files, Good
@@ -15,40 +16,8 @@ from lipmotion.formats.label_files import read_labels
 from lipmotion.types import TimedWord, TranscriptLine
 from lipmotion_faces.corpus.supplied import read_supplied_phones
 
-LONG = """File type = "ooTextFile"
-Object class = "TextGrid"
-
-xmin = 0
-xmax = 2
-tiers? <exists>
-size = 2
-item []:
-  item [1]:
-    class = "IntervalTier"
-    name = "phones"
-    xmin = 0
-    xmax = 2
-    intervals: size = 2
-    intervals [1]:
-      xmin = 0
-      xmax = 1.5
-      text = "P"
-    intervals [2]:
-      xmin = 1.5
-      xmax = 2
-      text = "AA1"
-  item [2]:
-    class = "TextTier"
-    name = "clicks"
-    xmin = 0
-    xmax = 2
-    points: size = 1
-    points [1]:
-      number = 1
-      mark = "x"
-"""
 TEXTS = {
-    "long.TextGrid": LONG,
+    "long.TextGrid": long_form(TIERS),
     "short.TextGrid": '"ooTextFile"\n"TextGrid"\n0\n2\n<exists>\n1\n"IntervalTier"\n"words"\n0\n2\n1\n0\n2\n"hi you"\n',
     "htk.lab": "0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n",
     "states.lab": "0 1000000 x^sil-p+aa=t[2]\n1000000 2000000 x^sil-p+aa=t[3]\n2000000 3500000 p-aa+t[2] -61.2 baby\n",

@@ -4,7 +4,7 @@ import json
 import tempfile
 from pathlib import Path
 
-from fuzz.inputs import Files, Good
+from fuzz.inputs import Files, Good, Reader
 from fuzz.readers.plausible import check_generation, good_model, require, short_speech
 from lipmotion import animate, load_model, read_motion, write
 from lipmotion.pipeline.request import Request
@@ -87,3 +87,11 @@ def read_transcript(folder: Path, good: Good) -> None:
     """Animate short speech with the transcript."""
     path = folder / "said.txt"
     check_generation(animate(Request(short_speech(good), transcript=path, recogniser="own"), model=good_model(good)))
+
+
+READERS = {
+    "model": Reader("model", seed_model, read_model),
+    "units": Reader("units", seed_units, read_units),
+    "lexicon": Reader("lexicon", seed_lexicon, read_lexicon),
+    "transcript": Reader("transcript", seed_transcript, read_transcript),
+}

@@ -16,7 +16,7 @@ from lipmotion.hmm.multistream.unit_states import (
     frames_to_units,
     units_to_frames,
 )
-from lipmotion.types import Span, Timeline, Unit
+from meshes.speech import said
 
 KNOWN = inventory()
 SIDES = [name for name in NAMES if name != "sp"]
@@ -108,23 +108,19 @@ def test_classes_of_other_units_are_left_out():
     assert names == {*CLASSES, *NAMES}
 
 
-def timeline(*spans):
-    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
-
-
 def test_every_frame_has_a_unit():
-    spoken = timeline((0.015, 0.05, "a"), (0.05, 0.054, "t"), (0.07, 0.1, "b"))
+    spoken = said((0.015, 0.05, "a"), (0.05, 0.054, "t"), (0.07, 0.1, "b"))
     units, bounds = units_to_frames(spoken, 13, "sil")
     assert units == ("sil", "a", "t", "sil", "b", "sil")
     assert bounds.tolist() == [0, 2, 5, 6, 7, 10, 13]
     assert units_to_frames(spoken, 4, "sil", lambda label: {"a": "open"}[label.phone])[0] == ("sil", "open")
-    assert units_to_frames(timeline(), 3, "sil")[0] == ("sil",)
+    assert units_to_frames(said(), 3, "sil")[0] == ("sil",)
     with pytest.raises(InputError):
         units_to_frames(spoken, 0, "sil")
 
 
 def test_a_unit_without_a_frame_is_left_out():
-    units, bounds = units_to_frames(timeline((0, 0.031, "a"), (0.031, 0.038, "t"), (0.038, 0.06, "b")), 6, "sil")
+    units, bounds = units_to_frames(said((0, 0.031, "a"), (0.031, 0.038, "t"), (0.038, 0.06, "b")), 6, "sil")
     assert units == ("a", "b")
     assert bounds.tolist() == [0, 4, 6]
 

@@ -7,16 +7,9 @@ import pytest
 from hmm.multistream.synthetic import CLASSES, config, inventory, random_joint, say, utterances
 from hmm.multistream.synthetic import observed as noise
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.hmm.multistream import multistream_training
 from lipmotion.hmm.multistream.densities import F0_STREAMS, STREAMS, ObservedStream, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.model import MOTION_ONLY
-from lipmotion.hmm.multistream.multistream_training import (
-    TrainingUtterance,
-    accumulate_statistics,
-    iterate_posteriors,
-    prepare_utterances,
-    reestimate_hmm,
-    train_joint,
-)
 from lipmotion.hmm.multistream.recognise import JointRecogniser, align
 from lipmotion.types import Progress
 from oracles import joint as slow
@@ -27,7 +20,7 @@ TRAIN, HELD_OUT = utterances(30), utterances(8, seed=1)
 
 def trained(data=TRAIN, **changes):
     events: list[Progress] = []
-    return train_joint(data, inventory(), CLASSES, config(**changes), events.append), events
+    return multistream_training.train_joint(data, inventory(), CLASSES, config(**changes), events.append), events
 
 
 @pytest.fixture(scope="module")
@@ -67,8 +60,8 @@ def test_posteriors_are_those_of_all_paths():
     for components in (1, 2):
         hmm = random_joint(1, states=2, components=components, training=StreamWeights(0.7, 1.2, 0.4, 1, 0.9))
         observed = only(noise(np.random.default_rng(0), 7), *(name for name in STREAMS if name != "f0_slope"))
-        prepared = prepare_utterances(hmm, [(observed, ("a", "sp", "b"))])
-        (found,) = iterate_posteriors(hmm, prepared)
+        prepared = multistream_training.prepare_utterances(hmm, [(observed, ("a", "sp", "b"))])
+        (found,) = multistream_training.iterate_posteriors(hmm, prepared)
         (item,) = prepared.items
         density = [
             [slow.log_density(hmm, observed, prepared.triphones[i], t, hmm.config.training) for i in item.triphones]
@@ -97,11 +90,11 @@ def test_a_stream_without_weight_is_as_good_as_absent():
 def test_a_step_improves_on_what_was_found():
     hmm = random_joint(2, units=("a", "b", "c", "d"), components=1)
     data = [(noise(np.random.default_rng(i), 40), ("sil", "a", "c", "sil")) for i in range(4)]
-    prepared, figures = prepare_utterances(hmm, data), []
+    prepared, figures = multistream_training.prepare_utterances(hmm, data), []
     for _ in range(4):
-        expected = accumulate_statistics(hmm, prepared)
+        expected = multistream_training.accumulate_statistics(hmm, prepared)
         figures.append(expected.mean_log_likelihood)
-        hmm = reestimate_hmm(hmm, expected)
+        hmm = multistream_training.reestimate_hmm(hmm, expected)
     assert (np.diff(figures) > 0).all()
 
 
@@ -162,7 +155,7 @@ def test_nothing_that_is_switched_on_was_observed():
 def test_too_short_for_its_units():
     observed = noise(np.random.default_rng(0), 5)
     with pytest.raises(CorpusError, match="room for the states"):
-        trained([TrainingUtterance(observed, ("sil", "a", "sil"))])
+        trained([multistream_training.TrainingUtterance(observed, ("sil", "a", "sil"))])
     with pytest.raises(CorpusError, match="no utterances"):
         trained([])
 
@@ -170,7 +163,7 @@ def test_too_short_for_its_units():
 def test_bounds_are_those_of_the_units_and_a_configuration_is_in_its_range():
     for bounds in ([0, 3], [0, 3, 4], [1, 3, 5], [0, 4, 3, 5]):
         with pytest.raises(InputError, match="bounds"):
-            TrainingUtterance(noise(np.random.default_rng(0), 5), ("a", "b"), np.array(bounds))
+            multistream_training.TrainingUtterance(noise(np.random.default_rng(0), 5), ("a", "b"), np.array(bounds))
     for changes in ({"mixtures": 0}, {"insertion": float("nan")}, {"training": StreamWeights(0, 0, 0, 0, 0)}):
         with pytest.raises(InputError):
             config(**changes)

@@ -8,8 +8,7 @@ from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.multistream import phone_recogniser as module
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.testing.examples import example, examples, speech, timeline
-from lipmotion.types import Features, Timeline
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import Features, Timeline, silent_monitor
 
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
 

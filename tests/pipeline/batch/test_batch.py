@@ -7,7 +7,7 @@ import shutil
 import signal
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,7 @@ import lipmotion
 from children import LIPMOTION, NOWHERE, Child, child, run_child, wait_until
 from lipmotion import Delivery, Job, Outputs, Request
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.formats.base import motion_suffixes
+from lipmotion.formats import motion_suffixes
 from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
@@ -173,12 +173,8 @@ def test_silence_can_have_every_form_that_speech_can(settings):
 def test_files_that_refer_to_the_sound(sounds, settings, tmp_path):
     """The outputs are written under other names first; what they refer to is found from where they end."""
     out = tmp_path / "out"
-    batch(
-        [BatchLine("deep/two", str(sounds / "deep/two.wav"))],
-        out,
-        replace(settings, outputs=Outputs(kinds=("usda",))),
-        jobs=1,
-    )
+    lines = [BatchLine("deep/two", str(sounds / "deep/two.wav"))]
+    batch(lines, out, replace(settings, outputs=Outputs(kinds=("usda",))), jobs=1)
     assert "@../../sounds/deep/two.wav@" in (out / "deep/two.usda").read_text()
     assert [path.name for path in (out / "deep").iterdir()] == ["two.usda"]
 
@@ -335,10 +331,14 @@ def many(folder: Path, speech: Path, count: int) -> Path:
     return folder
 
 
-def create_events(process: Child) -> Iterator[dict]:
-    assert process.stdout is not None
-    for text in process.stdout:
-        yield json.loads(text)
+def after_items(process: Child, count: int, act: Callable[[], None]) -> None:
+    """Wait for the process to end; act when that many lines are done."""
+    items = 0
+    for event in map(json.loads, process.stdout):
+        items += event["type"] == "item"
+        if items == count and event["type"] == "item":
+            act()
+    process.wait()
 
 
 @pytest.mark.long
@@ -350,12 +350,8 @@ def test_kills(toy_speech, settings, tmp_path, whom):
     batch(sounds, tmp_path / "whole", settings, jobs=1)
     how = [sounds, "--out", tmp_path / "out", "--model", settings.request.model, "--recogniser", "own", "--jobs", 2]
     with child(command(*how)) as process:
-        items = 0
-        for event in create_events(process):
-            items += event["type"] == "item"
-            if items == 10 and event["type"] == "item":
-                os.kill(process.pid if whom == "first process" else worker_of(process.pid), signal.SIGKILL)
-        process.wait()
+        killed = lambda: process.pid if whom == "first process" else worker_of(process.pid)  # noqa: E731
+        after_items(process, 10, lambda: os.kill(killed(), signal.SIGKILL))
     if whom == "first process":
         assert process.returncode == -signal.SIGKILL
         assert run_child(command(*how)).returncode == 0
@@ -403,17 +399,10 @@ def test_a_worker_of_a_cluster_is_killed(cluster, toy_speech, settings, tmp_path
     address, processes = cluster
     sounds = many(tmp_path / "sounds", toy_speech, 60)
     batch(sounds, tmp_path / "whole", settings, jobs=1)
-    how = [
-        sounds, "--out", tmp_path / "out", "--model", settings.request.model, "--recogniser", "own", "--cluster",
-        address,
-    ]  # fmt: skip
+    model = settings.request.model
+    how = [sounds, "--out", tmp_path / "out", "--model", model, "--recogniser", "own", "--cluster", address]
     with child(command(*how)) as process:
-        items = 0
-        for event in create_events(process):
-            items += event["type"] == "item"
-            if items == 15 and event["type"] == "item":
-                processes[1].kill()
-        process.wait()
+        after_items(process, 15, processes[1].kill)
     assert process.returncode == 0
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
     names = Counter(row["name"] for row in ledger_rows(tmp_path / "out"))

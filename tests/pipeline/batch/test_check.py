@@ -6,7 +6,7 @@ import pytest
 from scipy.io import wavfile
 
 from lipmotion import Job, Request
-from lipmotion.pipeline.batch import check
+from lipmotion.pipeline.batch import BatchLine, check
 from lipmotion.pipeline.batch.check import (
     FEWEST_LINES,
     CheckedLine,
@@ -16,7 +16,6 @@ from lipmotion.pipeline.batch.check import (
     count_letters,
     expected_s,
 )
-from lipmotion.pipeline.batch.lines import BatchLine
 
 pytest.importorskip("joblib")
 RATE_HZ = 16_000

@@ -27,7 +27,7 @@ from lipmotion.pipeline.batch.ledger import (
 )
 from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.report import write_reports
-from lipmotion.storage.files import LOCK
+from lipmotion.storage.locks import LOCK
 
 CONTENT = b"motion"
 DIGEST = hashlib.sha256(CONTENT).hexdigest()

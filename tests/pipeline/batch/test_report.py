@@ -1,5 +1,6 @@
 import csv
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -48,24 +49,26 @@ def rows_of(page: str) -> list[list]:
     return json.loads(page.partition('id="data">')[2].partition("</script>")[0])
 
 
+def reported(folder: Path, names: Sequence[str], *records: dict) -> tuple[list[dict[str, str]], str]:
+    """Write the reports of lines, of which the first have these records; return the rows of the table, and the page."""
+    lines = [BatchLine(name, f"/x/{name}.wav") for name in names]
+    base = GOOD | {"run": "1", "fingerprint": "f", "inputs": []}
+    with open_ledger(Place(str(folder), "1"), lines) as ledger:
+        for line, record in zip(lines, records, strict=False):
+            own = {"name": line.name, "recording": line.recording, "outputs": {f"{line.name}.json": "0"}}
+            ledger.append(base | own | record)
+        table, page = write_reports(lines, ledger, folder)
+    with table.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file)), page.read_text(encoding="utf-8")
+
+
 def test_both_reports_hold_all_lines(tmp_path):
     hostile = "</script><b>=1+1\u202e,\"'\n"
-    names = ["a", "b/c", "d"]
-    lines = [BatchLine(name, f"/x/{name}.wav") for name in names]
-    base = {"run": "1", "fingerprint": "f", "inputs": []}
-    with open_ledger(Place(str(tmp_path), "1"), lines) as ledger:
-        for line in lines[:2]:
-            outputs = {f"{line.name}.json": "0"} if line.name == "a" else {}
-            wrong = {} if line.name == "a" else {"outcome": "failed", "error": hostile}
-            ledger.append(GOOD | base | {"name": line.name, "recording": line.recording, "outputs": outputs} | wrong)
-        table, page = write_reports(lines, ledger, tmp_path)
-    with table.open(encoding="utf-8", newline="") as file:
-        read = list(csv.DictReader(file))
+    read, text = reported(tmp_path, ["a", "b/c", "d"], {}, {"outcome": "failed", "error": hostile, "outputs": {}})
     assert [row["name"] for row in read] == ["b/c", "d", "a"]
     assert [row["outcome"] for row in read] == ["failed", "missing", "done"]
     assert read[0]["error"] == hostile
     assert read[2]["outputs"] == "a.json"
-    text = page.read_text(encoding="utf-8")
     rows = rows_of(text)
     assert [row[COLUMNS.index("error")] for row in rows] == [printable(hostile), None, None]
     assert rows[2][COLUMNS.index("mark") + 1] == ["a.json"]
@@ -78,26 +81,16 @@ def test_both_reports_hold_all_lines(tmp_path):
 
 @pytest.mark.parametrize("name", ["=1+1", "+a", "-a", "@a"])
 def test_no_text_is_a_formula(tmp_path, name):
-    lines = [BatchLine(name, f"/x/{name}.wav")]
-    record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": name, "outputs": {f"{name}.json": "0"}}
-    with open_ledger(Place(str(tmp_path), "1"), lines) as ledger:
-        ledger.append(record | {"recording": lines[0].recording, "range_db": -3.0, "warnings": [name, "a"]})
-        table, page = write_reports(lines, ledger, tmp_path)
-    with table.open(encoding="utf-8", newline="") as file:
-        row = next(csv.DictReader(file))
+    (row,), page = reported(tmp_path, [name], {"range_db": -3.0, "warnings": [name, "a"]})
     assert (row["name"], row["outputs"], row["warnings"]) == (f"'{name}", f"'{name}.json", f"'{name} | a")
     assert row["range_db"] == "-3.0"
-    assert rows_of(page.read_text(encoding="utf-8"))[0][0] == name
+    assert rows_of(page)[0][0] == name
 
 
 @pytest.mark.parametrize("recording", ["", "/\ud800.wav"])
 def test_a_recording_without_an_address_is_not_played(tmp_path, recording):
-    lines = [BatchLine("a", "/a.wav")]
-    record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": "a", "outputs": {"a.json": "0"}}
-    with open_ledger(Place(str(tmp_path), "1"), lines) as ledger:
-        ledger.append(record | {"recording": recording})
-        page = write_reports(lines, ledger, tmp_path)[1]
-    assert rows_of(page.read_text(encoding="utf-8"))[0][COLUMNS.index("mark") + 2] is None
+    _, page = reported(tmp_path, ["a"], {"recording": recording})
+    assert rows_of(page)[0][COLUMNS.index("mark") + 2] is None
 
 
 def test_they_are_read_as_they_were_written(tmp_path):

@@ -2,7 +2,6 @@ import shutil
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
-from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -13,10 +12,10 @@ from lipmotion.errors import CorpusError
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Channel, Motion, Progress, Track
 from lipmotion_faces.corpus import long_videos
-from lipmotion_faces.corpus import prepare as module
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.video_scan import VideoScan
+from pipeline.made import replace_tracking
 
 RATE = 16_000
 SENTENCES = [(1.0 + 4.5 * n, 4.0 + 4.5 * n) for n in range(10)]
@@ -87,10 +86,7 @@ def scanned(monkeypatch) -> dict[str, tuple[float, ...]]:
         return Track(Motion(np.ones((count, 1)), 25.0, (Channel("opening"),)), np.ones(count, bool), images)
 
     monkeypatch.setattr(long_videos, "scan_video", scan)
-    monkeypatch.setattr(module, "track", track)
-    monkeypatch.setattr(
-        module, "make_tracker", lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
-    )
+    replace_tracking(monkeypatch, track)
     return told
 
 

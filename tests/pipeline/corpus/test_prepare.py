@@ -3,7 +3,6 @@ import shutil
 import signal
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +11,10 @@ from children import NOWHERE, child
 from lipmotion import Corpus, prepare
 from lipmotion.corpora.store import read_entry
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
-from lipmotion.storage.files import lock_folder
+from lipmotion.storage.locks import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Track
 from lipmotion_faces.corpus import prepare as module
-from pipeline.made import write_noise
+from pipeline.made import replace_tracking, write_noise
 
 
 @pytest.fixture
@@ -43,10 +42,7 @@ def tracked(monkeypatch) -> list[str]:
         notes = ("cut at 0.50 s",) if "cut" in path.stem else ()
         return Track(Motion(np.ones((25, 1)), 25.0, (Channel("opening"),)), np.arange(25) > 1, images, notes)
 
-    monkeypatch.setattr(module, "track", track)
-    monkeypatch.setattr(
-        module, "make_tracker", lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
-    )
+    replace_tracking(monkeypatch, track)
     return asked
 
 
@@ -152,10 +148,7 @@ def test_utterances_of_recordings_that_are_gone_are_named(studio, tmp_path, capl
 
 
 def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):
-    def missing() -> dict[str, str]:
-        raise MissingDependencyError("pip install")
-
-    monkeypatch.setattr(module, "make_tracker", lambda _: SimpleNamespace(versions=missing))
+    replace_tracking(monkeypatch, None)
     with pytest.raises(MissingDependencyError):
         prepare(studio, tmp_path / "corpus")
     assert not (tmp_path / "corpus").exists()

@@ -4,13 +4,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from formats.examples import of_motion, written
 from lipmotion import Corpus, prepare
 from lipmotion.corpora.source_recordings import SourceRecording
 from lipmotion.errors import CorpusError
-from lipmotion.formats.base import write_motion
 from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
+from lipmotion.types import Audio, Channel, Motion, Track
 from lipmotion_faces.corpus.supplied import SeparateSound, align_sound, separate_sound, trim_to_shared
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
@@ -21,8 +21,7 @@ CUT, BEFORE = 4_800, 12_345
 def write_ramp(path: Path, seconds: float) -> None:
     """Write a curve that says its own time."""
     motion = Motion(np.arange(int(seconds * RATE))[:, None] / RATE, RATE, (Channel("jaw", "weight"),))
-    trace = StateTrace(("x",), np.zeros(len(motion.values), int))
-    write_motion(path, Generation(motion, motion.values, Timeline(()), trace), source={}, model={})
+    written(path, of_motion(motion))
 
 
 @pytest.fixture

@@ -1,24 +1,23 @@
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from formats.examples import of_motion, written
 from lipmotion import Corpus, prepare
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
-from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.formats.base import write_motion
+from lipmotion.errors import InputError
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.tables import SPEECH_CURVES
-from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import Channel, Motion, Timeline, Unit
 from lipmotion.units import is_silent
-from lipmotion_faces.corpus import prepare as module
 from lipmotion_faces.corpus.supplied import read_supplied_phones, read_supplied_track, source_digests
 from meshes.live_link_app import write_take
-from pipeline.made import write_noise
+from meshes.speech import said
+from pipeline.made import replace_tracking, write_noise
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
 
@@ -26,19 +25,14 @@ CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
 def write_curves(path: Path, seconds: float = 2.0, rate_hz: float = 60.0, seed: int = 0) -> Motion:
     count = int(seconds * rate_hz)
     motion = Motion(np.random.default_rng(seed).uniform(size=(count, 2)), rate_hz, CHANNELS)
-    trace = StateTrace(("x",), np.zeros(count, int))
-    write_motion(path, Generation(motion, motion.values, Timeline(()), trace), source={}, model={})
+    written(path, of_motion(motion))
     return motion
 
 
 @pytest.fixture
 def studio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Three sounds with motion, and no packages for video."""
-
-    def missing() -> dict[str, str]:
-        raise MissingDependencyError("pip install")
-
-    monkeypatch.setattr(module, "make_tracker", lambda _: SimpleNamespace(versions=missing))
+    replace_tracking(monkeypatch, None)
     folder = tmp_path / "studio"
     (folder / "anna").mkdir(parents=True)
     for seed, (name, suffix) in enumerate((("a", ".npz"), ("b", ".json"), ("anna/c", ".csv"))):
@@ -106,17 +100,13 @@ def recording(phones: Timeline[Unit] | None) -> SourceRecording:
     return SourceRecording("a", Path("a.wav"), None, phones=phones)
 
 
-def spans(*rows: tuple[float, float, str]) -> Timeline[Unit]:
-    return Timeline(tuple(Span(start_s, end_s, Unit(phone)) for start_s, end_s, phone in rows))
-
-
 def test_silence_is_named_as_recognition_names_it():
-    labelled = spans(
+    labelled = said(
         *[(0.1, 0.2, "sp"), (0.2, 0.4, "aa"), (0.4, 0.5, "sil"), (0.5, 0.7, "m"), (0.7, 0.8, "sp")],
         *[(0.8, 1.0, "sil"), (1.0, 1.2, "b"), (1.2, float("inf"), "sil")],
     )
     found = read_supplied_phones(recording(labelled), 1.3)
-    assert found == spans(
+    assert found == said(
         *[(0.0, 0.2, "sil"), (0.2, 0.4, "aa"), (0.4, 0.5, "sp"), (0.5, 0.7, "m"), (0.7, 1.0, "sil")],
         *[(1.0, 1.2, "b"), (1.2, 1.3, "sil")],
     )
@@ -131,7 +121,7 @@ def test_silence_is_named_as_recognition_names_it():
 )
 def test_phones_tile_the_sound(phones, begin_s, longer_s):
     edges = begin_s + np.cumsum([0, *(length for _, length in phones)])
-    labelled = spans(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
+    labelled = said(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
     duration_s = max(float(edges[-1]) + longer_s, 0.1)
     found = read_supplied_phones(recording(labelled), duration_s)
     assert found[0].start_s == 0
@@ -146,15 +136,15 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
 
 def test_labels_that_go_on_after_the_sound():
     with pytest.raises(InputError, match="are they those of another recording"):
-        read_supplied_phones(recording(spans((0, 2, "aa"))), 1.8)
-    assert read_supplied_phones(recording(spans((0, 2, "aa"))), 1.95) == spans((0, 1.95, "aa"))
+        read_supplied_phones(recording(said((0, 2, "aa"))), 1.8)
+    assert read_supplied_phones(recording(said((0, 2, "aa"))), 1.95) == said((0, 1.95, "aa"))
 
 
 def test_a_source_is_not_touched(studio):
-    item = replace(recording(spans((0, 1, "aa"))), motion_file=MotionFile(studio / "a.npz"))
+    item = replace(recording(said((0, 1, "aa"))), motion_file=MotionFile(studio / "a.npz"))
     assert set(source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
     assert source_digests(item) == source_digests(item)
-    assert source_digests(item) != source_digests(replace(item, phones=spans((0, 1.001, "aa"))))
+    assert source_digests(item) != source_digests(replace(item, phones=said((0, 1.001, "aa"))))
 
 
 def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):

@@ -53,7 +53,7 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
     """Two collections: one in step, one whose sound is 120 ms late; loudness is all that their lips follow."""
     energy = np.zeros((11, 13))
     energy[4, 12], energy[6, 12] = -1, 1
-    monkeypatch.setattr("lipmotion.speech.sound.sound_offset._weights", energy.ravel)
+    monkeypatch.setattr("lipmotion_faces.corpus.sound_offset._weights", energy.ravel)
     made = Corpus.create(tmp_path / "corpus")
     for seed in range(COUNT):
         made.add(utterance(seed, 0.0, "here"), {"recipe": "9"})

@@ -12,7 +12,7 @@ from lipmotion_faces.film.build import Take, build_face
 from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
-from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
+from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video, write_videos
 from testing.toy import toy_sentences
 from testing.toy_face import toy_chin_px
 
@@ -23,20 +23,17 @@ Event = Progress | Item
 
 @pytest.fixture(scope="module")
 def videos(tmp_path_factory: pytest.TempPathFactory) -> Videos:
-    folder = tmp_path_factory.mktemp("filmed") / "anna"
-    folder.mkdir()
-    found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(SENTENCES)]
-    return {video.path.resolve(): video for video in found}
+    return write_videos(tmp_path_factory.mktemp("filmed") / "anna", SENTENCES)
 
 
 @pytest.fixture
 def tracker(videos: Videos, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Installs a tracker without errors; in some videos it sees only some frames."""
 
-    def start(seen: dict[Path, np.ndarray] | None = None, more: Videos | None = None) -> None:
+    def start(seen: dict[Path, np.ndarray] | None = None, more: Videos | None = None, least_s: float = 7.0) -> None:
+        monkeypatch.setattr(build, "LEAST_FOOTAGE_S", least_s)
         install(monkeypatch, videos | (more or {}), seen or {})
 
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 7.0)
     start()
     return start
 
@@ -115,34 +112,31 @@ def test_short_footage_is_refused(videos):
 
 
 @pytest.mark.long
-def test_what_is_not_enough_is_said(videos, tracker, caplog, monkeypatch):
+def test_what_is_not_enough_is_said(videos, tracker, caplog):
     """Frames in which the face is not seen do not count."""
     half = {path: np.arange(200) % 2 == 0 for path in list(videos)[:1]}
-    tracker(half)
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
+    tracker(half, least_s=5.0)
     face = build_face(folder_of(videos), workers=1)
     frames = sum(len(video.motion.values) for video in videos.values())
     first = len(next(iter(videos.values())).motion.values)
     assert face.about["footage_s"] == pytest.approx((frames - first / 2) / 25, abs=0.1)
     assert "s of footage with the face; with 60 s of varied speech the mouth would be truer" in caplog.text
     assert face.about["name"] == "anna"
-    tracker({path: np.arange(200) % 5 == 0 for path in videos})
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
+    tracker({path: np.arange(200) % 5 == 0 for path in videos}, least_s=5.0)
     with pytest.raises(InputError, match=r"1\.\d s of footage with the face, required 5 s or more"):
         build_face(folder_of(videos), workers=1)
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("tracker")
-def test_recordings_that_cannot_be_used_are_left_out(videos, monkeypatch):
+def test_recordings_that_cannot_be_used_are_left_out(videos, tracker, monkeypatch):
     def film(path: Path, *more: object) -> object:
         if path.name == "toy00.mp4":
             raise InputError(f"{path}: no face in 60 of 60 frames")
         return whole(path, *more)
 
+    tracker(least_s=5.0)
     whole: Callable[..., Footage] = vars(build)["track_footage"]  # that of the drawn person
     monkeypatch.setattr(build, "track_footage", film)
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
     events: list[Event] = []
     face = build_face(folder_of(videos), workers=1, monitor=events.append)
     assert face.about["recordings"] == SENTENCES - 1
@@ -156,10 +150,9 @@ def test_recordings_that_cannot_be_used_are_left_out(videos, monkeypatch):
 @pytest.mark.long
 def test_footage_without_sound(tracker, tmp_path, monkeypatch):
     """The face is built; its jaw cannot follow the energy, and other people's motion cannot be mapped onto it."""
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 2.0)
     monkeypatch.setattr(build, "read_sound", lambda _: None)
     video = write_video(tmp_path / "mute.mp4", toy_sentences(3)[0])
-    tracker(more={video.path.resolve(): video})
+    tracker(more={video.path.resolve(): video}, least_s=2.0)
     face = build_face(video.path, workers=1)
     assert face.takes == ()
     codes = face.appearance.predict_codes(footage_of(video).track.motion)
@@ -169,11 +162,10 @@ def test_footage_without_sound(tracker, tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-def test_fast_video_is_learned_from_in_part(tracker, tmp_path, monkeypatch):
+def test_fast_video_is_learned_from_in_part(tracker, tmp_path):
     """Of 60 frames a second every second is enough; seconds are counted, not frames."""
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 2.0)
     video = write_video(tmp_path / "fast.mp4", toy_sentences(3)[0], 60.0)
-    tracker(more={video.path.resolve(): video})
+    tracker(more={video.path.resolve(): video}, least_s=2.0)
     face = build_face(video.path, workers=1)
     seconds = len(video.motion.values) / 60
     assert face.about["footage_s"] == pytest.approx(seconds, abs=0.1)

@@ -6,7 +6,7 @@ import pytest
 
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.sources import sha256_of
 from lipmotion_faces.film import build as takes
 from lipmotion_faces.film.build import MOST_FOOTAGE_S, choose_takes
 from speech.sounds import tone, write_sound

@@ -12,7 +12,7 @@ from lipmotion_faces.film import background, build
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.video.mp4 import write_mp4
-from testing.toy import ToySentence, toy_motion
+from testing.toy import ToySentence, toy_motion, toy_sentences
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, SHAPE, toy_chin_px, toy_frames, toy_places
 
 EYES_PX = 90.0
@@ -32,6 +32,13 @@ def write_video(path: Path, sentence: ToySentence, rate_hz: float = 25.0, *, sil
     sound = sentence.audio
     write_mp4(path, frames, fps=rate_hz, audio=Audio(sound.samples * (not silent), sound.rate_hz))
     return ToyVideo(path, motion)
+
+
+def write_videos(folder: Path, count: int) -> dict[Path, ToyVideo]:
+    """Make a folder of the first toy sentences as videos; return them by their paths."""
+    folder.mkdir()
+    found = [write_video(folder / f"{sentence.name}.mp4", sentence) for sentence in toy_sentences(count)]
+    return {video.path.resolve(): video for video in found}
 
 
 def footage_of(video: ToyVideo, span: VideoSpan = WHOLE, seen: np.ndarray | None = None) -> Footage:

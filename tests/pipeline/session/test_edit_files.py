@@ -9,7 +9,7 @@ from lipmotion.errors import InputError
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.sources import sha256_of
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion.units import group_words
 

@@ -10,12 +10,13 @@ from lipmotion import Edits, Model, Session, cues
 from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.articulation.mouth import LIP_SPEED
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
-from lipmotion.meshes.fitting.driven import DrivenCharacter, load_character
+from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.request import Request
 from lipmotion.types import Delivery, Generation
 from lipmotion_faces.base import Staging
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths
@@ -70,7 +71,6 @@ def show(generation: Generation, character: DrivenCharacter) -> dict[str, Rows]:
         ("head.glb", head_scene(generation, staging=STILL)),
         ("character", character_scene(generation, character, staging=STILL)),
     ):
-        assert scene.weights is not None
         rows[name] = scene.weights.values
     return rows
 

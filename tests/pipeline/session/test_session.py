@@ -213,9 +213,15 @@ def test_a_locked_span_keeps_channels_that_are_added_later(session):
     assert locked.motion["tongue"][150] == pytest.approx(0.5)
 
 
-def test_many_locks_take_the_motion_once_each(session, monkeypatch):
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """One entry for every motion that a session makes from now on."""
     made: list[int] = []
     monkeypatch.setattr(session_module, "generate_motion", lambda *given: made.append(1) or generate_motion(*given))
+    return made
+
+
+def test_many_locks_take_the_motion_once_each(session, made):
     steps = [
         each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
     ]
@@ -225,9 +231,7 @@ def test_many_locks_take_the_motion_once_each(session, monkeypatch):
     assert len(made) <= 15
 
 
-def test_of_long_motion_less_is_kept(session, monkeypatch):
-    made: list[int] = []
-    monkeypatch.setattr(session_module, "generate_motion", lambda *given: made.append(1) or generate_motion(*given))
+def test_of_long_motion_less_is_kept(session, made, monkeypatch):
     monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generate().motion.values))
     found = [session.generate(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
     assert session.generate(edited("pin opening 0.1 at 0.5")) is found[1]

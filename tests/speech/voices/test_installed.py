@@ -14,17 +14,7 @@ from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
-from lipmotion.speech.voices import espeak_events, synthesiser
-from lipmotion.speech.voices.installed import (
-    SYNTHESISERS,
-    all_voices,
-    default_voice,
-    installed_voices,
-    parse_phone_ends,
-    speak_sentences,
-    voice_named,
-    voiced_sentences,
-)
+from lipmotion.speech.voices import espeak_events, installed, synthesiser
 from lipmotion.speech.voices.synthesiser import SyntheticVoice, program_output
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 
@@ -41,14 +31,14 @@ HARD = ['"Hello" \\ (sil) %s', "Hello; `ls` $HOME", "Helló"]
 
 @pytest.mark.usefixtures("faked")
 def test_voices_are_listed() -> None:
-    assert installed_voices() == all_voices()[: len(FAKED)] == tuple(FAKED)
-    assert [voice.language for voice in all_voices()[len(FAKED) :]] == ["de", "en", "en-gb", "en-us"]
+    assert installed.installed_voices() == installed.all_voices()[: len(FAKED)] == tuple(FAKED)
+    assert [voice.language for voice in installed.all_voices()[len(FAKED) :]] == ["de", "en", "en-gb", "en-us"]
 
 
 @pytest.mark.usefixtures("faked")
 def test_a_voice_says_phones_in_time() -> None:
     for voice in EACH:
-        audio, units = next(speak_sentences(["Hello"], voice))
+        audio, units = next(installed.speak_sentences(["Hello"], voice))
         assert audio.rate_hz == 16_000
         assert audio.duration_s == pytest.approx(1.0)
         found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
@@ -62,32 +52,32 @@ def test_a_voice_says_phones_in_time() -> None:
 @pytest.mark.usefixtures("faked")
 def test_any_letters_reach_the_synthesiser(voice: SyntheticVoice) -> None:
     lexicon = Lexicon({"helló": (("hh", "ax", "l", "ow"),)})
-    assert len(list(speak_sentences(HARD, voice, lexicon))) == len(HARD)
+    assert len(list(installed.speak_sentences(HARD, voice, lexicon))) == len(HARD)
 
 
 @pytest.mark.parametrize("voice", EACH)
 def test_errors_are_clear_and_nothing_stays(faked: Path, voice: SyntheticVoice) -> None:
     for text, message in (("they crash", "failed with 1 .no such sound"), ("nonsense", "nonsense")):
         with pytest.raises(InputError, match=message):
-            next(speak_sentences([text], voice))
+            next(installed.speak_sentences([text], voice))
         assert list(faked.iterdir()) == []
 
 
 def test_bytes_that_are_no_text_and_texts_without_words_are_refused(faked: Path) -> None:
     for text, message in (("no bytes", "cannot be run|nonsense"), ("... ", "holds no word")):
         with pytest.raises(InputError, match=message):
-            next(speak_sentences([text], FAKED[0]))
+            next(installed.speak_sentences([text], FAKED[0]))
     assert list(faked.iterdir()) == []
 
 
 def test_a_sentence_that_festival_leaves_out_is_missed(faked: Path) -> None:
     with pytest.raises(InputError, match="1 of 2 sentences"):
-        list(speak_sentences(["hello", "stop here"], FAKED[2]))
+        list(installed.speak_sentences(["hello", "stop here"], FAKED[2]))
     assert list(faked.iterdir()) == []
 
 
 def test_temporary_files_go_even_if_not_all_is_read(faked: Path) -> None:
-    said = speak_sentences(["hello", "hello"], FAKED[0])
+    said = installed.speak_sentences(["hello", "hello"], FAKED[0])
     next(said)
     assert len(list(faked.iterdir())) == 1
     said.close()
@@ -103,7 +93,7 @@ def test_voices_by_name() -> None:
         ("en-us+f2", "espeak-ng:en-us+f2"),
         ("de+f2", "espeak-ng:de+f2"),
     ):
-        assert voice_named(name).full_name == full_name
+        assert installed.voice_named(name).full_name == full_name
     for name, message in (
         ("dectalk:paul", "unknown synthesiser 'dectalk'; required one of: flite, festival, espeak-ng"),
         ("paul", "no voice 'paul' is installed; lipmotion speak --voices lists"),
@@ -111,44 +101,44 @@ def test_voices_by_name() -> None:
         ("de+robosoft", "no voice 'de.robosoft' is installed"),
     ):
         with pytest.raises(InputError, match=message):
-            voice_named(name)
+            installed.voice_named(name)
     with pytest.raises(InputError, match="no voice 'rms' here; it has: kal16, slt"):
-        next(speak_sentences(["Hello"], SyntheticVoice("rms", "flite", "rms")))
+        next(installed.speak_sentences(["Hello"], SyntheticVoice("rms", "flite", "rms")))
 
 
 @pytest.mark.usefixtures("bare")
 def test_without_synthesisers_it_says_what_to_install() -> None:
-    assert installed_voices() == ()
+    assert installed.installed_voices() == ()
     for voice in EACH:
         with pytest.raises(MissingDependencyError, match=f"apt install {voice.synthesiser}"):
-            next(speak_sentences(["Hello"], voice))
-    for find in (default_voice, lambda: voice_named("slt")):
+            next(installed.speak_sentences(["Hello"], voice))
+    for find in (installed.default_voice, lambda: installed.voice_named("slt")):
         with pytest.raises(MissingDependencyError, match=r'pip install ".*\[text\]", or: apt install flite'):
             find()
     with pytest.raises(MissingDependencyError, match="flite is not installed: apt install flite"):
-        voice_named("flite:slt")
+        installed.voice_named("flite:slt")
 
 
 def test_the_default_voice_is_the_first_that_there_is(faked: Path) -> None:
-    assert default_voice().full_name == "espeak-ng:en-us+f2"
+    assert installed.default_voice().full_name == "espeak-ng:en-us+f2"
     (faked.parent / "programs" / "espeak-ng").unlink()
-    assert default_voice().full_name == "flite:slt"
+    assert installed.default_voice().full_name == "flite:slt"
     (faked.parent / "programs" / "flite").unlink()
-    assert default_voice().full_name == "festival:cmu_us_slt_arctic_hts"
+    assert installed.default_voice().full_name == "festival:cmu_us_slt_arctic_hts"
 
 
 def test_a_synthesiser_that_does_not_work_is_left_out(faked: Path, caplog: pytest.LogCaptureFixture) -> None:
     (faked.parent / "programs" / "festival").write_text("#!/bin/sh\nexit 3\n")
-    assert [voice.synthesiser for voice in all_voices()] == ["flite", "flite", *["espeak-ng"] * 5]
-    assert voice_named("slt").full_name == "flite:slt"
+    assert [voice.synthesiser for voice in installed.all_voices()] == ["flite", "flite", *["espeak-ng"] * 5]
+    assert installed.voice_named("slt").full_name == "flite:slt"
     assert "festival is left out: festival failed with 3" in caplog.text
     with pytest.raises(InputError, match="festival failed with 3"):
-        voice_named("festival:kal_diphone")
+        installed.voice_named("festival:kal_diphone")
 
 
 @pytest.mark.usefixtures("faked")
 def test_a_sound_is_there_until_the_next() -> None:
-    with closing(voiced_sentences(["hello", "hello"], FAKED[0])) as said:
+    with closing(installed.voiced_sentences(["hello", "hello"], FAKED[0])) as said:
         first = next(said)
         assert first.own_sound().rate_hz == 16_000
         list(said)
@@ -157,7 +147,7 @@ def test_a_sound_is_there_until_the_next() -> None:
 
 
 def test_flite_begins_again_at_each_utterance() -> None:
-    phones = parse_phone_ends("pau:0.2 ay:0.5 \npau:0.1 y:0.3 \n")
+    phones = installed.parse_phone_ends("pau:0.2 ay:0.5 \npau:0.1 y:0.3 \n")
     found = [(span.label, span.start_s, span.end_s) for span in phones]
     assert found == [("pau", 0, 0.2), ("ay", 0.2, 0.5), ("pau", 0.5, 0.6), ("y", 0.6, 0.8)]
 
@@ -168,11 +158,11 @@ def test_without_the_library_the_program_says_what_to_install(monkeypatch: pytes
         espeak_events._library("")
 
 
-@pytest.fixture(params=sorted(SYNTHESISERS))
+@pytest.fixture(params=sorted(installed.SYNTHESISERS))
 def real(request: pytest.FixtureRequest) -> SyntheticVoice:
     """The last voice of each synthesiser that is installed."""
     try:
-        voices = SYNTHESISERS[request.param].voices()
+        voices = installed.SYNTHESISERS[request.param].voices()
     except LipMotionError:
         voices = ()
     if not voices:
@@ -185,7 +175,7 @@ TEXTS = ["Please put both blue bowls on the table.", "The judge measured the bei
 
 def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
     lexicon = Lexicon()
-    for text, (audio, units) in zip(TEXTS[:2], speak_sentences(TEXTS[:2], real), strict=True):
+    for text, (audio, units) in zip(TEXTS[:2], installed.speak_sentences(TEXTS[:2], real), strict=True):
         words = split_words(text)
         assert [span.label.word for span in units if not is_silent(span.label.phone)] != []
         assert list(dict.fromkeys(span.label.word for span in units if span.label.word)) == list(dict.fromkeys(words))
@@ -200,7 +190,7 @@ def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
 @pytest.mark.long
 def test_the_times_of_real_voices_are_those_of_the_aligner(real: SyntheticVoice, toy_model: Model) -> None:
     recogniser, late_s = Recogniser(toy_model.phones, "general"), []
-    for audio, units in speak_sentences(TEXTS, real):
+    for audio, units in installed.speak_sentences(TEXTS, real):
         room = noisy_audio(audio, "white", 50)
         placed = recogniser.align_phones(room, analysed(room).mfcc(), units)
         said, aligned = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))

@@ -39,7 +39,7 @@ class OutputArgument:
 
     name       : of the option in the namespace
     is_folder  : whether it is a folder
-    keeps_work : whether finished stages are kept in a folder beside it (``files.unfinished_work``)
+    keeps_work : whether finished stages are kept in a folder beside it (``locks.unfinished_work``)
     """
 
     name: str
@@ -81,7 +81,7 @@ def add_output(
 
 def check_paths(options: argparse.Namespace) -> None:
     """Raise ExportError if an output of a command is one of its inputs."""
-    from lipmotion.storage.files import work_folder
+    from lipmotion.storage.locks import work_folder
 
     declared: tuple[OutputArgument, ...] = getattr(options, "writes", ())
     written = [(output, path) for output in declared for path in _paths(getattr(options, output.name))]
@@ -148,7 +148,7 @@ def read_pipe(path: Path) -> Iterator[Path]:
         yield path
         return
     from lipmotion.errors import InputError
-    from lipmotion.storage.files import temporary_folder
+    from lipmotion.storage.locks import temporary_folder
 
     with temporary_folder() as folder:
         stored = folder / "standard-input"
@@ -173,7 +173,7 @@ def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], b
     if PIPE not in outputs:
         yield outputs, False
         return
-    from lipmotion.storage.files import temporary_folder
+    from lipmotion.storage.locks import temporary_folder
 
     with temporary_folder() as folder:
         motion = folder / f"motion.{options.format}"

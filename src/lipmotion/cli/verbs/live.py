@@ -45,8 +45,8 @@ def run(options: argparse.Namespace) -> None:
     """Push sound into a ``lipmotion.Stream`` and give its frames to all consumers."""
     from contextlib import ExitStack
 
-    from lipmotion.live.character import LiveCharacter
     from lipmotion.live.consumers import Listener, LiveSound, open_consumer
+    from lipmotion.live.face import LiveCharacter
     from lipmotion.live.stream import Stream
     from lipmotion.pipeline.model import load_model
 

@@ -79,10 +79,11 @@ def run(options: argparse.Namespace) -> None:
 
 def _find_sound(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
-    from lipmotion.meshes.files.gltf_writer import find_named_sound
+    from lipmotion.extensions import load_provided
     from lipmotion.storage.sources import is_file
 
-    named = find_named_sound(motion) if motion.suffix.lower() == ".glb" and is_file(motion) else None
+    has_name = motion.suffix.lower() == ".glb" and is_file(motion)
+    named = load_provided("find_named_sound")(motion) if has_name else None
     if named is None:
         return None
     sound, start_s = named

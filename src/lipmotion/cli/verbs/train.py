@@ -1,4 +1,4 @@
-"""``lipmotion train``: train a model on a corpus."""
+"""``lipmotion train``: train a model on a corpus; ``lipmotion adapt``: adapt its phone models to a voice."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from lipmotion.pipeline.request import Request
 if TYPE_CHECKING:
     from lipmotion.engines import Engine
     from lipmotion.pipeline.model import Model
+from lipmotion.cli.terminal.printing import print_line
 
 FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 NONE = "none"
@@ -75,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import GEOMETRY, save_model
     from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.storage.files import unfinished_work
+    from lipmotion.storage.locks import unfinished_work
     from lipmotion.units import Lexicon
 
     with report_progress(options) as report:
@@ -100,3 +101,27 @@ def run(options: argparse.Namespace) -> None:
         text = ", ".join(f"{value} {name}" for name, value in figures.items())
         text += f"; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
         report.finish(f"{options.output}: {text}", model=str(options.output), **figures)
+
+
+def add_adapt(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("adapt", help="adapt a model to a voice, from recordings without transcripts")
+    recordings: dict[str, Any] = {"nargs": "+", "metavar": "RECORDING", "help": "audio or video of this voice"}
+    add_input(parser, "recordings", what="recording", **recordings)
+    add_options(parser, Request, "model")
+    add_output(parser, "-o", "--output", force=True, required=True, metavar="MODEL")
+    parser.set_defaults(run=run_adapt)
+
+
+def run_adapt(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.adapt`` and ``lipmotion.save_model``; print how much speech was used."""
+    from lipmotion.pipeline.model import save_model
+    from lipmotion.pipeline.training.train import adapt
+    from lipmotion.storage.files import check_target
+
+    check_target(options.output)
+    model = adapt(options.model, options.recordings)
+    save_model(model, options.output)
+    used = model.about["adapted"]
+    text = f"{used['recordings']} recordings, {used['speech_s']} s of speech"
+    print_line(f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}")

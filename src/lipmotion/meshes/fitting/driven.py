@@ -16,51 +16,19 @@ from lipmotion.articulation.expression import read_moods
 from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
-from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_character_table, table_path, with_sources
 from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.meshes.fitting.lip_placement import (
     LipPlacement,
-    find_opening_shape,
-    part_named_lips,
-    place_lips_by_points,
-    place_lips_by_shape,
 )
 from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights, with_gap
-from lipmotion.meshes.model.binding import ControlBinding, bind, paint_weights
-from lipmotion.meshes.model.face_shapes import FaceShapes, find_face_shapes, measure_lip_parting, numbers_by_name
-from lipmotion.meshes.model.mesh import JAW, Blendshape, Mesh
+from lipmotion.meshes.model.binding import ControlBinding
+from lipmotion.meshes.model.face_shapes import FaceShapes, measure_lip_parting, numbers_by_name
+from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, table_path
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name, spoken_name
-from lipmotion.meshes.model.surface import build_surface
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
-
-
-JAW_OPEN = "jawOpen"
-WIDEST_RAD = np.radians(22.0)
-"""How far a jaw turns at weight 1."""
-
-
-def with_jaw(mesh: Mesh) -> Mesh:
-    """Return a mesh whose mouth opens: one with a jaw bone gets the blendshape ``jawOpen``, where it has none.
-
-    The blendshape is the movement of the jaw's vertices as the bone turns about the axis from ear to ear, on a straight
-    way. A mesh that has a blendshape that opens the mouth, or no jaw bone, is returned as it is.
-    """
-    bone = next((bone for bone in mesh.bones if bone.kind == JAW), None)
-    if bone is None:
-        return mesh
-    try:
-        find_opening_shape(mesh)
-    except InputError:
-        away = mesh.vertices[bone.rows] - bone.place
-        cosine, sine = np.cos(WIDEST_RAD), np.sin(WIDEST_RAD)
-        turned = away @ np.array([[1, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
-        shape = Blendshape(JAW_OPEN, bone.rows, bone.shares[:, None] * (turned - away))
-        return replace(mesh, shapes=(*(each for each in mesh.shapes if each.name != JAW_OPEN), shape))
-    return mesh
 
 
 def _solve_with_table(
@@ -303,40 +271,3 @@ class DrivenCharacter:
             for names in (self._mouth_names, self._other_names)
         )
         return mouth, others
-
-
-def load_character(
-    path: str | Path, *, points: Path | None = None, binding: Path | None = None, by_points: bool = False
-) -> DrivenCharacter:
-    """Return a character from its files, ready to be moved; with the table beside it, if there is one.
-
-    path      : ``.glb``, ``.gltf``, ``.vrm``, ``.obj``, or a folder of OBJ files
-    points    : a table of the vertices of lip points; None: they are found by the blendshape that opens the mouth
-    binding   : a binding file, or a table of painted weights (``.csv``); both mean control points
-    by_points : move it by control points, though it has blendshapes
-    Raises InputError: a file is damaged, or what moves the mouth is not found in it.
-    Raises ModelFormatError: the binding is damaged.
-    """
-    path, mesh = Path(path), with_jaw(read_character(path))
-    table = read_character_table(path, mesh)
-    mesh = with_sources(mesh, table)
-    try:
-        if binding is not None and binding.suffix.lower() == BINDING_SUFFIX:
-            stored = load_binding(binding, mesh)
-            return DrivenCharacter(mesh, stored.placement, None, stored, path, table)
-        if points is not None:
-            named = read_points(points)
-            surface = part_named_lips(mesh, named)
-            placement = place_lips_by_points(mesh, surface, named)
-        else:
-            surface = build_surface(mesh)
-            placement = place_lips_by_shape(mesh, surface)
-        if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(mesh, placement, find_face_shapes(mesh, placement), None, path, table)
-        bound = bind(mesh, surface, placement)
-        if binding is not None:
-            bound = paint_weights(bound, mesh, read_weights(binding))
-        return DrivenCharacter(mesh, placement, None, bound, path, table)
-    except InputError as error:
-        text = str(error)
-        raise InputError(text if str(path) in text else f"{path}: {text}") from error

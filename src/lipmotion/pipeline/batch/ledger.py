@@ -23,26 +23,16 @@ from lipmotion.extensions import installed_version, load_provided
 from lipmotion.formats.base import motion_suffixes
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.formats.label_files import LABEL_SUFFIXES, find_label_files
-from lipmotion.meshes.files.rig_tables import table_path
+from lipmotion.meshes.model.rig_tables import table_path
 from lipmotion.pipeline.batch.lines import CONTROL, OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import shipped_path
 from lipmotion.pipeline.outputs.cues import SHEET
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
-from lipmotion.storage.files import (
-    TEMPORARY,
-    atomic_file,
-    check_own,
-    check_source,
-    confine,
-    lock_folder,
-    make_folder,
-    open_own,
-    remove,
-    sha256_of,
-)
+from lipmotion.storage.files import TEMPORARY, atomic_file, check_own, confine, make_folder, open_own, remove
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.storage.sources import is_file
+from lipmotion.storage.locks import lock_folder
+from lipmotion.storage.sources import check_source, is_file, sha256_of
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, whole
 
 CUES = SHEET.removeprefix(".")

@@ -14,7 +14,8 @@ from pathlib import Path, PurePosixPath
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import motion_suffixes
-from lipmotion.storage.files import check_listable, portable_name, read_text_file
+from lipmotion.storage.files import portable_name
+from lipmotion.storage.sources import check_listable, read_text_file
 from lipmotion.storage.text_table import read_table
 
 LOG = logging.getLogger("lipmotion")

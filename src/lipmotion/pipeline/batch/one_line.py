@@ -44,15 +44,9 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.storage.files import (
-    check_target,
-    confine,
-    make_folder,
-    put_in_place,
-    remove,
-    sha256_of,
-    temporary_folder,
-)
+from lipmotion.storage.files import check_target, confine, make_folder, put_in_place, remove
+from lipmotion.storage.locks import temporary_folder
+from lipmotion.storage.sources import sha256_of
 from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
 from lipmotion.units.phone_timelines import group_words

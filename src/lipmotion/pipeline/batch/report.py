@@ -21,8 +21,9 @@ from lipmotion.pipeline.batch.ledger import FAILED, Ledger, Record
 from lipmotion.pipeline.batch.lines import LARGEST_LIST_BYTES, BatchLine
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
-from lipmotion.storage.files import as_text, atomic_file, read_text_file
+from lipmotion.storage.files import as_text, atomic_file
 from lipmotion.storage.json_text import as_json
+from lipmotion.storage.sources import read_text_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
 from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
 

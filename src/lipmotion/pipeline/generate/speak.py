@@ -24,7 +24,7 @@ from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import JoinedPieces, at_speech_rate, overlapped
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import read_text_file
 from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
 from lipmotion.types.delivery import MoodTag
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, split_words

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import EDITED, GAP, gap_to_opening, read_edited, read_gap
-from lipmotion.articulation.curve_edits import apply_curve_edits, edited_share
+from lipmotion.articulation.curve_edits import apply_curve_edits, check_drawn, edited_share, find_pinned_frame
 from lipmotion.articulation.expression import is_mood, read_moods
-from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import InputError, shorten
 from lipmotion.formats.fap import NAMES, PARAMETERS, move_faps
-from lipmotion.meshes.files.rig_tables import RigRow, apply_rig, read_rig_table, suggest_names
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import GROUPS, compute_living_curves
@@ -28,10 +28,24 @@ from lipmotion.meshes.fitting.shape_weights import (
     weigh_visemes,
 )
 from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, read_rig_table
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, arkit_name
-from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Hold, Motion, Prosody, Span, Timeline, Unit
+from lipmotion.pipeline.analysis.speech_analysis import LATE_S
+from lipmotion.types import (
+    WEIGHT,
+    Channel,
+    CurveEdit,
+    DrawnCurve,
+    Generation,
+    Hold,
+    Motion,
+    Pin,
+    Prosody,
+    Timeline,
+    Unit,
+)
 from lipmotion.types.delivery import Staging
-from lipmotion.types.generation import Locked
+from lipmotion.types.edits import Locked
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 VISEMES, HELD_VISEMES = "visemes", "held-visemes"
@@ -41,6 +55,7 @@ WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *VRM_VOWELS)
 FAPS = {name: NAMES[number] for number, name, *_ in PARAMETERS}
 KNOWN_CURVES = (*WEIGHTS, *FAPS)
 """Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
+LIP_POINT = re.compile(r"[xyz]_\d+")
 SETS_OF = {WHOLE_FACE: (*ARKIT_MOUTH, *ARKIT_OTHERS), VISEMES: VISEME_CHANNELS, VOWELS: VRM_VOWELS}
 """The curves that are edited in each set (``show_edited_curves``)."""
 GAP_CHANNELS = ("opening", "outer", GAP, EDITED["opening"])
@@ -145,6 +160,32 @@ def rename_edits(edits: Sequence[CurveEdit], named: Mapping[str, str]) -> tuple[
                 edit if isinstance(edit, Hold) else replace(edit, channel=named.get(edit.channel, edit.channel))
             )
     return tuple(renamed)
+
+
+def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) -> None:
+    """Raise InputError if an edit is of no curve that is known, or of no time of the recording.
+
+    others : names of curves that outputs will have besides
+    """
+    known = (*motion.names, *GESTURES, *KNOWN_CURVES, *others)
+    if edit.channel and edit.channel not in known:
+        verb = {Pin: "pin", DrawnCurve: "draw"}.get(type(edit), "change")
+        lower = {name.lower(): name for name in known}
+        near = get_close_matches(edit.channel.lower(), lower, 1)
+        pinned = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
+        name = shorten(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
+        raise InputError(
+            f"cannot {verb} {name}; channels that can be pinned: {pinned}; lip points, as y_14; curves, as "
+            "jawOpen, viseme_PP, open_jaw"
+        )
+    last_s = (len(motion.values) - 1) / motion.rate_hz
+    if isinstance(edit, Pin):
+        find_pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
+    elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
+        verb = {DrawnCurve: "draw", Hold: "hold"}.get(type(edit), "gain")
+        raise InputError(f"{verb} from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
+    if isinstance(edit, DrawnCurve):
+        check_drawn(edit, is_weight=edit.channel in WEIGHTS)
 
 
 def edit_curves(curves: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
@@ -262,107 +303,3 @@ def with_curves(
     if len(kept) < len(generation.motion.names):
         generation = generation.selected(kept)
     return generation.with_motion(join_channels(generation.motion, added)), added.names
-
-
-def describe_character(character: DrivenCharacter) -> Iterator[str]:
-    """Yield what was found in a character's files, line by line."""
-    mesh, placement = character.mesh, character.placement
-    parts = ", ".join(part.name or "(no name)" for part in mesh.parts)
-    yield f"{'vertices':14} {len(mesh.vertices)}, triangles {len(mesh.triangles)}"
-    yield f"{'parts':14} {parts}"
-    yield f"{'blendshapes':14} {len(mesh.shapes)}"
-    yield f"{'eye distance':14} {placement.scale:.6g} units of the mesh, by the width of the mouth"
-    if character.table:
-        yield f"{'table':14} {character.table_file}, {len(character.table)} rows"
-    if character.shapes is not None:
-        named = zip(character.shapes.names, character.shapes.known, strict=True)
-        listed = ", ".join(name if known in {"", name} else f"{name} = {known}" for name, known in named)
-        yield f"{'moved by':14} {character.shapes.style}: {listed}"
-        widest = int(character.shapes.gap.argmax())
-        opens = f"{character.shapes.names[widest]} opens the lips by {character.shapes.gap[widest]:.3g} eye distances"
-        yield f"{'opening':14} {opens}"
-    elif character.binding is not None:
-        yield f"{'moved by':14} {len(placement.points)} control points, {len(character.binding.rows)} vertices follow"
-
-
-Sources = Mapping[str, Sequence[float]]
-"""By the name of a curve its value in each of ``POSES``."""
-POSES = ("open", "closed", "rounded")
-PHONES = ("aa", "m", "uw")
-"""The phones whose mouths they are."""
-OPENINGS, WIDTHS = (0.25, 0.0, 0.06), (1.0, 0.98, 0.85)
-"""Their openings, in eye distances (the first is as wide as talkers open their mouths), and widths, that at rest 1."""
-RATE_HZ, PHONE_S, PAUSE_S = 100.0, 0.3, 0.5
-DIGITS = 6
-MIN_CHANGE = 1e-3
-"""A control that changes by less between two poses does not follow them."""
-
-
-def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:
-    """Return the rows of a table with gains and offsets by which controls have the stated values.
-
-    sources : of the curves that the rows follow
-    stated  : by pose the values of some controls; what is not stated of a control stays as it is, as far as the line
-              through what is stated allows
-    Raises InputError: no such control, or one that does not change between the poses.
-    """
-    values: dict[str, np.ndarray] = {}  # of each control in the poses, without its limits
-    for row in rows:
-        followed = np.array(sources.get(row.source, np.zeros(len(POSES))))
-        values[row.control] = values.get(row.control, 0.0) + row.offset + row.gain * followed
-    lines = {}
-    for control in dict.fromkeys(name for controls in stated.values() for name in controls):
-        if control not in values:
-            raise InputError(f"the table has no {shorten(control)!r}; {suggest_names(control, values)}")
-        now = values[control]
-        targets = {
-            number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})
-        }
-        if len(targets) == 1:
-            only = next(iter(targets))
-            other = int(np.abs(now - now[only]).argmax())
-            targets[other] = float(now[other])
-        before, wanted = now[list(targets)], np.array(list(targets.values()))
-        apart = before - before.mean()
-        if np.abs(apart).max() < MIN_CHANGE:
-            raise InputError(
-                f"{shorten(control)!r} follows no curve that tells these poses apart; give it another source in the "
-                "table"
-            )
-        gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
-        lines[control] = gain, round(float(wanted.mean() - gain * before.mean()), DIGITS)
-    calibrated, seen = [], set[str]()
-    for row in rows:
-        if row.control in lines:
-            gain, offset = lines[row.control]
-            first = offset if row.control not in seen else 0.0
-            row = replace(row, gain=gain * row.gain, offset=gain * row.offset + first)  # noqa: PLW2901
-            seen.add(row.control)
-        calibrated.append(row)
-    return calibrated
-
-
-def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
-    """Return the values of curves in ``POSES``: those of a character, or those that the rows of a rig follow.
-
-    Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.
-    """
-    edges = PAUSE_S + PHONE_S * np.arange(len(PHONES) + 1)
-    spans = [Span(0.0, PAUSE_S, Unit("sil"))]
-    spans += [Span(float(at), float(at + PHONE_S), Unit(phone)) for at, phone in zip(edges, PHONES, strict=False)]
-    spans.append(Span(float(edges[-1]), float(edges[-1] + PAUSE_S), Unit("sil")))
-    time_s = np.arange(round((edges[-1] + PAUSE_S) * RATE_HZ)) / RATE_HZ
-    inside = [at + share * PHONE_S for at in edges[:-1] for share in (0.3, 0.7)]
-    keys = [0.0, float(edges[0]), *inside, float(edges[-1]), float(time_s[-1])]
-    opening = np.interp(time_s, keys, [0, 0, *np.repeat(OPENINGS, 2), 0, 0])
-    width = np.interp(time_s, keys, [1, 1, *np.repeat(WIDTHS, 2), 1, 1]) * mouth_template().width
-    motion = Motion(np.stack([opening, width], axis=1), RATE_HZ, (Channel("opening"), Channel("width")))
-    units, frames = Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
-    if isinstance(curves, Path):
-        found = make_rig_sources(motion, units, rows)
-        return {name: curve[frames].tolist() for name, curve in found.items()}
-    if curves.shapes is None:
-        raise InputError("the character is moved by control points, which have no weights to calibrate")
-    solved = solve_shape_weights(motion, units, curves.shapes)
-    by_name = {name: solved[name][frames].tolist() for name in solved.names}
-    return {row.source: by_name[row.control] for row in curves.table_rows() if row.control in by_name}

@@ -26,12 +26,12 @@ from lipmotion.formats.base import (
 )
 from lipmotion.formats.cues import read_cue_motion
 from lipmotion.formats.fap import FAP
-from lipmotion.meshes.files.rig_tables import CONTROL
-from lipmotion.meshes.files.steady_rate import match_sound_rate
+from lipmotion.formats.keys import Thinning
+from lipmotion.formats.steady_rate import match_sound_rate
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
-from lipmotion.meshes.model.scene import Thinning
+from lipmotion.meshes.model.rig_tables import CONTROL
 from lipmotion.meshes.model.shape_names import arkit_name, is_known
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.outputs.curve_sets import (

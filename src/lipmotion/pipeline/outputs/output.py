@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -32,10 +32,6 @@ from lipmotion.speech.sound.resampling import decimated
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
-
-if TYPE_CHECKING:
-    from lipmotion.meshes.model.scene import Scene
-    from lipmotion.pipeline.model import Model
 
 Made = TypeVar("Made")
 
@@ -67,7 +63,7 @@ class ShownFace(ABC):
     @abstractmethod
     def scene(
         self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
-    ) -> Scene:
+    ) -> Any:
         """Return the character of files for 3D programs, with its animation.
 
         frames : of the motion: the only ones that are wanted; None: all
@@ -312,9 +308,9 @@ def write(  # noqa: PLR0913
 
     generation : from ``animate``
     outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.livelink.csv`` (a take of Live Link Face),
-               ``.glb``, ``.usda`` (a 3D character with its animation), ``.TextGrid`` (phones in time), ``.mp4``,
-               ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
-               ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
+               ``.glb``, ``.usda``, ``.fbx`` (a 3D character with its animation), ``.TextGrid`` (phones in time),
+               ``.mp4``, ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without
+               sound); where ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
     model    : the model that generated the motion, whose corpus and licence motion files name; None: those that the
                generation names

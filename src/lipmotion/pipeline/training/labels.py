@@ -27,7 +27,7 @@ from lipmotion.printable import printable
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE, transcript_fit
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.sources import sha256_of
 from lipmotion.types import Item, Monitor, ParallelMap, Progress, Span, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 

@@ -28,7 +28,7 @@ from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.storage.files import check_listable
+from lipmotion.storage.sources import check_listable
 from lipmotion.types import Audio, Features, Item, Monitor, ParallelMap, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import SILENCE, Lexicon, is_silent
 

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.files import check_source
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
-from lipmotion.storage.sources import is_text
+from lipmotion.storage.sources import check_source, is_text
 from lipmotion.types import Audio
 
 HOLE_S = 0.04

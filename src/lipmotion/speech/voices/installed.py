@@ -23,7 +23,7 @@ from lipmotion.speech.voices.synthesiser import (
     SyntheticVoice,
     program_output,
 )
-from lipmotion.storage.files import temporary_folder
+from lipmotion.storage.locks import temporary_folder
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
 

@@ -28,7 +28,7 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import _state_regressions, fit_coupled
 from lipmotion.testing.examples import example, examples, speech, timeline
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import silent_monitor
 from oracles import coupled as oracle
 
 KINDS = [

@@ -15,8 +15,7 @@ from lipmotion.engines.coupled.training.coupled_training import fit_coupled, fra
 from lipmotion.engines.coupled.training.em_steps import LatticeUtterance, e_step, m_step, variance_floors
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import examples
-from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit
-from lipmotion.types.progress import silent_monitor
+from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit, silent_monitor
 from oracles import coupled as oracle
 
 FLOORS = (np.full(2, 1e-3, np.float32), np.full(1, 1e-3, np.float32))

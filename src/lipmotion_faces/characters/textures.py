@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.file_limits import Budget
+from lipmotion.meshes.model.mesh import Texture
+from lipmotion_faces.characters.file_limits import Budget
 
 MAX_BYTES = 400_000_000
 """Most bytes that decoding a picture may take: a larger one is not looked at."""
@@ -23,52 +24,6 @@ PICTURES = ("PNG", "JPEG", "WEBP")
 MAX_COLUMNS = 1024
 """Textures are reduced to this many pixels across: a head of 720 rows shows no more."""
 FULL_SCALE = 65535
-
-
-Extremes = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-
-@dataclass(frozen=True, eq=False)
-class Texture:
-    """A picture on a surface: sRGB and opacity, 0 to 255, from the top [shape=(H, W, 4)]. Raises InputError: another
-    shape.
-    """
-
-    pixels: NDArray[np.uint8]
-
-    def __post_init__(self) -> None:
-        shape = self.pixels.shape
-        if self.pixels.dtype != np.uint8 or len(shape) != 3 or shape[2] != 4 or not self.pixels.size:
-            raise InputError(f"a texture has shape {shape} of {self.pixels.dtype}, required (H, W, 4) of uint8")
-
-    def range_of_opacity(
-        self, low: NDArray[np.float64], high: NDArray[np.float64], reach: NDArray[np.int64]
-    ) -> Extremes:
-        """Return least and largest opacity in boxes, v down [shape=(N, 2)], 0 to 1; those over an edge get 0 and 1."""
-        size = np.array(self.pixels.shape[1::-1])
-        shift = np.floor(low)
-        first = np.floor((low - shift) * size).astype(np.int64) - reach[:, None]
-        last = np.ceil((high - shift) * size).astype(np.int64) + reach[:, None]
-        inside = (first >= 0).all(axis=1) & (last <= size).all(axis=1)
-        low_opacity, high_opacity = np.zeros(len(low)), np.ones(len(low))
-        (x0, y0), (x1, y1) = first[inside].T, last[inside].T
-        count = (x1 - x0) * (y1 - y0)
-        for levels, result, solid in (((250, 242, 128), low_opacity, True), ((2, 13, 128), high_opacity, False)):
-            for level in levels[::-1]:  # the strictest one last
-                marked = self.pixels[..., 3] >= level if solid else self.pixels[..., 3] < level
-                table = np.pad(np.cumsum(np.cumsum(marked, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
-                all_of_it = table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] == count
-                rows = np.flatnonzero(inside)[all_of_it]
-                result[rows] = level / 255
-        return low_opacity, high_opacity
-
-    def at(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the nearest pixels at places, v down, repeated beyond 0 to 1, as 0 to 1 [shapes=(N, 4), (N, 2)]."""
-        height, width = self.pixels.shape[:2]
-        at = uv % 1.0 * (width, height)
-        column = np.minimum(at[:, 0].astype(int), width - 1)
-        row = np.minimum(at[:, 1].astype(int), height - 1)
-        return np.asarray(self.pixels[row, column] / 255.0)
 
 
 def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> Texture | None:

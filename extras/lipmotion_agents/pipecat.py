@@ -1,4 +1,4 @@
-"""Lip motion in a Pipecat pipeline: ``LipSync``, between the text-to-speech service and ``transport.output()``."""
+"""Lip motion in a Pipecat pipeline: ``LipSyncProcessor``, between text to speech and ``transport.output()``."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from inspect import isawaitable
 from typing import Any
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.live.conversation import LOOK_AHEAD_MS, REST_S, Conversation, OnFrames, Playout, list_messages
 from lipmotion.live.face import LiveFrame
 from lipmotion.pipeline.model import Model
+from lipmotion_agents.conversation import LOOK_AHEAD_MS, REST_S, Conversation, OnFrames, Playout, list_messages
 
 try:
     from pipecat.frames.frames import (
@@ -31,7 +31,7 @@ except ImportError as error:
     raise MissingDependencyError(f"Pipecat is not installed ({error}): pip install 'lipmotion[pipecat]'") from error
 
 
-class LipSync(FrameProcessor):
+class LipSyncProcessor(FrameProcessor):
     """Sends lip motion with the sound that it belongs to.
 
     look_ahead_ms, model : of ``lipmotion.Stream``

@@ -1,4 +1,4 @@
-"""Lip motion in a LiveKit agent: ``LipSync``, around the audio output of a session."""
+"""Lip motion in a LiveKit agent: ``LipSyncOutput``, around the audio output of a session."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from inspect import isawaitable
 from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.live.conversation import (
+from lipmotion.live.face import LiveFrame
+from lipmotion.live.stream import REST_STEPS
+from lipmotion.pipeline.model import Model
+from lipmotion_agents.conversation import (
     FRAMES_IN_MESSAGE,
     LOOK_AHEAD_MS,
     REST_S,
@@ -20,9 +23,6 @@ from lipmotion.live.conversation import (
     blend,
     list_messages,
 )
-from lipmotion.live.face import LiveFrame
-from lipmotion.live.stream import REST_STEPS
-from lipmotion.pipeline.model import Model
 
 try:
     from livekit.agents.types import USERDATA_TIMED_TRANSCRIPT
@@ -43,8 +43,8 @@ DISCARDED_S = 0.2
 """A pause discards what the room's audio source holds, which is this much while there is more to say."""
 
 
-class LipSync(AudioOutput):
-    """Sends lip motion in time with sound: ``session.output.audio = LipSync(session.output.audio, room=ctx.room)``.
+class LipSyncOutput(AudioOutput):
+    """Sends lip motion in time with the sound of ``session.output.audio``, in whose place it stands.
 
     next_in_chain        : takes the sound, unchanged, and calls ``on_playback_started``, as outputs of LiveKit do
     room                 : to whose participants motion goes, as data packets of topic ``lipmotion``
@@ -74,7 +74,7 @@ class LipSync(AudioOutput):
         if next_in_chain is None:
             raise InputError("there is no audio output yet; start the session first")
         if (room is None) == (on_frames is None):
-            raise InputError("where should motion go? give LipSync either a room or on_frames")
+            raise InputError("where should motion go? give LipSyncOutput either a room or on_frames")
         pause = AudioOutputCapabilities(pause=True)
         super().__init__(label="LipSync", next_in_chain=next_in_chain, capabilities=pause)
         self._sink: AudioOutput = self.next_in_chain or next_in_chain

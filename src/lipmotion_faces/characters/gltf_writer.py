@@ -11,21 +11,14 @@ from urllib.parse import quote, unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.files.gltf_document import read_gltf_document, write_container
-from lipmotion.meshes.files.gltf_scene import name_mesh_targets
+from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Blendshape, MeshPart
-from lipmotion.meshes.model.scene import (
-    EVERY_KEY,
-    HeadTurn,
-    Scene,
-    ShadingNormals,
-    Thinning,
-    compute_shading_normals,
-    place_keys,
-)
-from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion.storage.files import as_text
 from lipmotion.types import Motion
+from lipmotion_faces.characters.gltf_document import read_gltf_document, write_container
+from lipmotion_faces.characters.gltf_scene import name_mesh_targets
+from lipmotion_faces.characters.scene import HeadTurn, Scene, ShadingNormals, compute_shading_normals
+from lipmotion_faces.characters.textures import decode_srgb
 
 AUDIO = "audio"
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:|//")

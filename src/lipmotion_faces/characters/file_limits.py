@@ -9,7 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.storage.files import check_source
+from lipmotion.storage.sources import check_source
 
 ALLOWANCE = {
     "bytes of files": 1 << 28,

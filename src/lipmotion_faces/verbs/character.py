@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from lipmotion.meshes.files.rig_tables import RigRow
     from lipmotion.meshes.fitting.driven import DrivenCharacter
+    from lipmotion.meshes.model.rig_tables import RigRow
 
 CALIBRATION = {
     "open": "values at which the mouth is as wide open as speech opens it: A=0.8",
@@ -52,13 +52,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
     from lipmotion.extensions import load_provided
-    from lipmotion.meshes.files.binding_files import save_binding, write_points, write_weights
-    from lipmotion.meshes.files.character_files import read_character
-    from lipmotion.meshes.files.rig_tables import read_rig_table, table_path, write_rig_table
     from lipmotion.meshes.fitting.driven import list_rows
+    from lipmotion.meshes.model.rig_tables import read_rig_table, table_path, write_rig_table
     from lipmotion.pipeline.job import open_character
-    from lipmotion.pipeline.outputs.curve_sets import describe_character
     from lipmotion.storage.sources import is_file
+    from lipmotion_faces.characters.binding_files import save_binding, write_points, write_weights
+    from lipmotion_faces.characters.calibration import describe_character
+    from lipmotion_faces.characters.character_files import read_character
 
     stated, path = _read_values(options), options.character
     if path.suffix.lower() == ".csv":
@@ -96,8 +96,8 @@ def _write_table(
     path: Path, rows: Sequence[RigRow], curves: DrivenCharacter | Path, stated: dict[str, dict[str, float]]
 ) -> None:
     """Write a table with the gains and offsets by which its controls have the stated values; print those."""
-    from lipmotion.meshes.files.rig_tables import write_rig_table
-    from lipmotion.pipeline.outputs.curve_sets import calibrate_rows, pose_sources
+    from lipmotion.meshes.model.rig_tables import write_rig_table
+    from lipmotion_faces.characters.calibration import calibrate_rows, pose_sources
 
     changed = calibrate_rows(rows, pose_sources(curves, rows), stated) if stated else rows
     for row in changed:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.live.conversation import LOOK_AHEAD_MS, Conversation
 from lipmotion.live.face import WEIGHT_NAMES, LiveFrame
 from lipmotion.live.idling import Idling
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.types import Channel, Motion, Timeline
 from lipmotion.types.motion import RADIAN, WEIGHT
+from lipmotion_agents.conversation import LOOK_AHEAD_MS, Conversation
 from lipmotion_faces.base import DrawsSingly, Face, Staging
 from lipmotion_faces.registry import make_face, stage_face
 

@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.files.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
-from lipmotion.meshes.model.file_limits import ALLOWANCE, Budget
 from lipmotion.meshes.model.mesh import bone_kind
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
@@ -33,6 +31,8 @@ from lipmotion.types.values import (
     truth,
     whole,
 )
+from lipmotion_faces.characters.file_limits import ALLOWANCE, Budget
+from lipmotion_faces.characters.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}

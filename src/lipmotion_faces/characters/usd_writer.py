@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, shorten
 from lipmotion.meshes.model.mesh import Mesh, MeshPart
-from lipmotion.meshes.model.scene import Scene, ShadingNormals, compute_shading_normals
-from lipmotion.meshes.model.textures import decode_srgb
 from lipmotion.printable import is_line
 from lipmotion.storage.files import as_text, atomic_file
+from lipmotion_faces.characters.scene import Scene, ShadingNormals, compute_shading_normals
+from lipmotion_faces.characters.textures import decode_srgb
 
 INDENT = "    "
 _CONTROL = re.compile("[\x00-\x1f\x7f]")

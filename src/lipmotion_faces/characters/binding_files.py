@@ -12,13 +12,14 @@ from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError, shorten
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.binding import MAX_WEIGHTS, ControlBinding
-from lipmotion.meshes.model.file_limits import MOST_VERTICES
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
-from lipmotion.storage.files import atomic_file, check_source, read_text_file
+from lipmotion.storage.files import atomic_file
 from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors
+from lipmotion.storage.sources import check_source, read_text_file
 from lipmotion.storage.text_table import read_table
 from lipmotion.types.values import parse_whole
+from lipmotion_faces.characters.file_limits import MOST_VERTICES
 
 BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
 BINDING_SUFFIX = ".binding"

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import MotionFormat
-from lipmotion.meshes.files.gltf_document import write_container
-from lipmotion.meshes.files.gltf_weights import read_gltf_motion
-from lipmotion.meshes.files.gltf_writer import GltfBuffer, sound_extras
+from lipmotion.formats.keys import with_jumps
 from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
-from lipmotion.meshes.model.scene import with_jumps
 from lipmotion.meshes.model.shape_names import VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.types import Generation, Motion
+from lipmotion_faces.characters.gltf_document import write_container
+from lipmotion_faces.characters.gltf_weights import read_gltf_motion
+from lipmotion_faces.characters.gltf_writer import GltfBuffer, sound_extras
 
 Array = NDArray[np.float64]
 EXTENSION = "VRMC_vrm_animation"

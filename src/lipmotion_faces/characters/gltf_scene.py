@@ -15,7 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.files.gltf_document import (
+from lipmotion.meshes.model.mesh import (
+    OPAQUE,
+    Blendshape,
+    Bone,
+    Material,
+    Mesh,
+    MeshPart,
+    PartNames,
+    Texture,
+    merge_bones,
+)
+from lipmotion_faces.characters.gltf_document import (
     COMPONENTS,
     LARGEST_NUMBER,
     MOST_GROUPS,
@@ -27,8 +38,7 @@ from lipmotion.meshes.files.gltf_document import (
     plain_name,
     read_gltf_document,
 )
-from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Bone, Material, Mesh, MeshPart, PartNames, merge_bones
-from lipmotion.meshes.model.textures import Texture, decode_srgb, encode_srgb, read_texture
+from lipmotion_faces.characters.textures import decode_srgb, encode_srgb, read_texture
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

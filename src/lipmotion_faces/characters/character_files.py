@@ -1,4 +1,4 @@
-"""Files of characters: Wavefront OBJ, one mesh a file, or a folder of a neutral mesh and its blendshapes; all kinds."""
+"""A character from its files, ready to be moved: glTF, one or several OBJ files; bindings, lip points, a table."""
 
 from __future__ import annotations
 
@@ -13,12 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.model.file_limits import Budget
-from lipmotion.meshes.model.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.lip_placement import (
+    find_opening_shape,
+    part_named_lips,
+    place_lips_by_points,
+    place_lips_by_shape,
+)
+from lipmotion.meshes.model.binding import bind, paint_weights
+from lipmotion.meshes.model.face_shapes import find_face_shapes
+from lipmotion.meshes.model.mesh import JAW, MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart, Texture
+from lipmotion.meshes.model.rig_tables import read_character_table, with_sources
 from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.meshes.model.textures import Texture, read_texture
+from lipmotion.meshes.model.surface import build_surface
 from lipmotion.storage.sources import check_kind, is_file
+from lipmotion_faces.characters.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
+from lipmotion_faces.characters.file_limits import Budget
+from lipmotion_faces.characters.gltf_scene import read_gltf
+from lipmotion_faces.characters.textures import read_texture
 
 NEUTRAL = "neutral"
 """The file of a folder with this word in its name, in any case, is the mesh; the others are its blendshapes."""
@@ -297,3 +309,65 @@ def read_character(path: str | Path) -> Mesh:
     raise InputError(
         f"{path}: a character is one of {' '.join(CHARACTER_SUFFIXES)}, or a folder of .obj files; export it as .glb"
     )
+
+
+JAW_OPEN = "jawOpen"
+WIDEST_RAD = np.radians(22.0)
+"""How far a jaw turns at weight 1."""
+
+
+def with_jaw(mesh: Mesh) -> Mesh:
+    """Return a mesh whose mouth opens: one with a jaw bone gets the blendshape ``jawOpen``, where it has none.
+
+    The blendshape is the movement of the jaw's vertices as the bone turns about the axis from ear to ear, on a straight
+    way. A mesh that has a blendshape that opens the mouth, or no jaw bone, is returned as it is.
+    """
+    bone = next((bone for bone in mesh.bones if bone.kind == JAW), None)
+    if bone is None:
+        return mesh
+    try:
+        find_opening_shape(mesh)
+    except InputError:
+        away = mesh.vertices[bone.rows] - bone.place
+        cosine, sine = np.cos(WIDEST_RAD), np.sin(WIDEST_RAD)
+        turned = away @ np.array([[1, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
+        shape = Blendshape(JAW_OPEN, bone.rows, bone.shares[:, None] * (turned - away))
+        return replace(mesh, shapes=(*(each for each in mesh.shapes if each.name != JAW_OPEN), shape))
+    return mesh
+
+
+def load_character(
+    path: str | Path, *, points: Path | None = None, binding: Path | None = None, by_points: bool = False
+) -> DrivenCharacter:
+    """Return a character from its files, ready to be moved; with the table beside it, if there is one.
+
+    path      : ``.glb``, ``.gltf``, ``.vrm``, ``.obj``, or a folder of OBJ files
+    points    : a table of the vertices of lip points; None: they are found by the blendshape that opens the mouth
+    binding   : a binding file, or a table of painted weights (``.csv``); both mean control points
+    by_points : move it by control points, though it has blendshapes
+    Raises InputError: a file is damaged, or what moves the mouth is not found in it.
+    Raises ModelFormatError: the binding is damaged.
+    """
+    path, mesh = Path(path), with_jaw(read_character(path))
+    table = read_character_table(path, mesh)
+    mesh = with_sources(mesh, table)
+    try:
+        if binding is not None and binding.suffix.lower() == BINDING_SUFFIX:
+            stored = load_binding(binding, mesh)
+            return DrivenCharacter(mesh, stored.placement, None, stored, path, table)
+        if points is not None:
+            named = read_points(points)
+            surface = part_named_lips(mesh, named)
+            placement = place_lips_by_points(mesh, surface, named)
+        else:
+            surface = build_surface(mesh)
+            placement = place_lips_by_shape(mesh, surface)
+        if mesh.shapes and not by_points and binding is None:
+            return DrivenCharacter(mesh, placement, find_face_shapes(mesh, placement), None, path, table)
+        bound = bind(mesh, surface, placement)
+        if binding is not None:
+            bound = paint_weights(bound, mesh, read_weights(binding))
+        return DrivenCharacter(mesh, placement, None, bound, path, table)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if str(path) in text else f"{path}: {text}") from error

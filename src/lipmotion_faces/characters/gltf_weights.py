@@ -18,14 +18,20 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.gltf_document import GltfArrays, GltfDocument, place_nodes, plain_name, read_gltf_document
-from lipmotion.meshes.files.gltf_scene import name_mesh_targets
-from lipmotion.meshes.files.steady_rate import choose_columns, exact_rate
+from lipmotion.formats.steady_rate import choose_columns, exact_rate
 from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, bone_kind, head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.types.motion import RADIAN
+from lipmotion_faces.characters.gltf_document import (
+    GltfArrays,
+    GltfDocument,
+    place_nodes,
+    plain_name,
+    read_gltf_document,
+)
+from lipmotion_faces.characters.gltf_scene import name_mesh_targets
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")

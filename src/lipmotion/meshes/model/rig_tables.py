@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_52, CLOSED, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
-from lipmotion.storage.files import atomic_file, read_text_file
-from lipmotion.storage.sources import is_file
+from lipmotion.storage.files import atomic_file
+from lipmotion.storage.sources import is_file, read_text_file
 from lipmotion.storage.text_table import as_field, from_field, read_table
 from lipmotion.types import Channel, Motion
 from lipmotion.types.values import parse_number

@@ -1,0 +1,121 @@
+"""What was found in a character's files; and gains and offsets of its table, by values stated for some poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.errors import InputError, shorten
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
+from lipmotion.meshes.model.rig_tables import RigRow, suggest_names
+from lipmotion.pipeline.outputs.curve_sets import make_rig_sources
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+
+
+def describe_character(character: DrivenCharacter) -> Iterator[str]:
+    """Yield what was found in a character's files, line by line."""
+    mesh, placement = character.mesh, character.placement
+    parts = ", ".join(part.name or "(no name)" for part in mesh.parts)
+    yield f"{'vertices':14} {len(mesh.vertices)}, triangles {len(mesh.triangles)}"
+    yield f"{'parts':14} {parts}"
+    yield f"{'blendshapes':14} {len(mesh.shapes)}"
+    yield f"{'eye distance':14} {placement.scale:.6g} units of the mesh, by the width of the mouth"
+    if character.table:
+        yield f"{'table':14} {character.table_file}, {len(character.table)} rows"
+    if character.shapes is not None:
+        named = zip(character.shapes.names, character.shapes.known, strict=True)
+        listed = ", ".join(name if known in {"", name} else f"{name} = {known}" for name, known in named)
+        yield f"{'moved by':14} {character.shapes.style}: {listed}"
+        widest = int(character.shapes.gap.argmax())
+        opens = f"{character.shapes.names[widest]} opens the lips by {character.shapes.gap[widest]:.3g} eye distances"
+        yield f"{'opening':14} {opens}"
+    elif character.binding is not None:
+        yield f"{'moved by':14} {len(placement.points)} control points, {len(character.binding.rows)} vertices follow"
+
+
+Sources = Mapping[str, Sequence[float]]
+"""By the name of a curve its value in each of ``POSES``."""
+POSES = ("open", "closed", "rounded")
+PHONES = ("aa", "m", "uw")
+"""The phones whose mouths they are."""
+OPENINGS, WIDTHS = (0.25, 0.0, 0.06), (1.0, 0.98, 0.85)
+"""Their openings, in eye distances (the first is as wide as talkers open their mouths), and widths, that at rest 1."""
+RATE_HZ, PHONE_S, PAUSE_S = 100.0, 0.3, 0.5
+DIGITS = 6
+MIN_CHANGE = 1e-3
+"""A control that changes by less between two poses does not follow them."""
+
+
+def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:
+    """Return the rows of a table with gains and offsets by which controls have the stated values.
+
+    sources : of the curves that the rows follow
+    stated  : by pose the values of some controls; what is not stated of a control stays as it is, as far as the line
+              through what is stated allows
+    Raises InputError: no such control, or one that does not change between the poses.
+    """
+    values: dict[str, np.ndarray] = {}  # of each control in the poses, without its limits
+    for row in rows:
+        followed = np.array(sources.get(row.source, np.zeros(len(POSES))))
+        values[row.control] = values.get(row.control, 0.0) + row.offset + row.gain * followed
+    lines = {}
+    for control in dict.fromkeys(name for controls in stated.values() for name in controls):
+        if control not in values:
+            raise InputError(f"the table has no {shorten(control)!r}; {suggest_names(control, values)}")
+        now = values[control]
+        targets = {
+            number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})
+        }
+        if len(targets) == 1:
+            only = next(iter(targets))
+            other = int(np.abs(now - now[only]).argmax())
+            targets[other] = float(now[other])
+        before, wanted = now[list(targets)], np.array(list(targets.values()))
+        apart = before - before.mean()
+        if np.abs(apart).max() < MIN_CHANGE:
+            raise InputError(
+                f"{shorten(control)!r} follows no curve that tells these poses apart; give it another source in the "
+                "table"
+            )
+        gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
+        lines[control] = gain, round(float(wanted.mean() - gain * before.mean()), DIGITS)
+    calibrated, seen = [], set[str]()
+    for row in rows:
+        if row.control in lines:
+            gain, offset = lines[row.control]
+            first = offset if row.control not in seen else 0.0
+            row = replace(row, gain=gain * row.gain, offset=gain * row.offset + first)  # noqa: PLW2901
+            seen.add(row.control)
+        calibrated.append(row)
+    return calibrated
+
+
+def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
+    """Return the values of curves in ``POSES``: those of a character, or those that the rows of a rig follow.
+
+    Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.
+    """
+    edges = PAUSE_S + PHONE_S * np.arange(len(PHONES) + 1)
+    spans = [Span(0.0, PAUSE_S, Unit("sil"))]
+    spans += [Span(float(at), float(at + PHONE_S), Unit(phone)) for at, phone in zip(edges, PHONES, strict=False)]
+    spans.append(Span(float(edges[-1]), float(edges[-1] + PAUSE_S), Unit("sil")))
+    time_s = np.arange(round((edges[-1] + PAUSE_S) * RATE_HZ)) / RATE_HZ
+    inside = [at + share * PHONE_S for at in edges[:-1] for share in (0.3, 0.7)]
+    keys = [0.0, float(edges[0]), *inside, float(edges[-1]), float(time_s[-1])]
+    opening = np.interp(time_s, keys, [0, 0, *np.repeat(OPENINGS, 2), 0, 0])
+    width = np.interp(time_s, keys, [1, 1, *np.repeat(WIDTHS, 2), 1, 1]) * mouth_template().width
+    motion = Motion(np.stack([opening, width], axis=1), RATE_HZ, (Channel("opening"), Channel("width")))
+    units, frames = Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
+    if isinstance(curves, Path):
+        found = make_rig_sources(motion, units, rows)
+        return {name: curve[frames].tolist() for name, curve in found.items()}
+    if curves.shapes is None:
+        raise InputError("the character is moved by control points, which have no weights to calibrate")
+    solved = solve_shape_weights(motion, units, curves.shapes)
+    by_name = {name: solved[name][frames].tolist() for name in solved.names}
+    return {row.source: by_name[row.control] for row in curves.table_rows() if row.control in by_name}

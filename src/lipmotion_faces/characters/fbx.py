@@ -1,0 +1,74 @@
+"""FBX (Autodesk; no public specification, and no open library writes it): Blender makes it of a ``.glb``.
+
+Blender 4.2 or later does it, the program or the package ``bpy``. Its FBX has the meshes, their shape keys and joints,
+and one animation in whole frames. It holds no sound.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from lipmotion.errors import ExportError, MissingDependencyError
+from lipmotion.storage.files import atomic_file
+
+LONGEST_S = 1800
+"""Half an hour is far more than an hour of speech takes."""
+SCRIPT = """
+import os, sys
+import bpy
+source, target, rate = sys.argv[-3:]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+scene = bpy.context.scene
+scene.render.fps = int(rate)
+bpy.ops.import_scene.gltf(filepath=source)
+ends = [action.frame_range[1] for action in bpy.data.actions]
+scene.frame_start, scene.frame_end = 0, int(max(ends, default=0))
+bpy.ops.export_scene.fbx(
+    filepath=target,
+    bake_anim_use_all_actions=False,  # what is seen, as one animation
+    bake_anim_use_nla_strips=False,
+    bake_anim_simplify_factor=0,
+    add_leaf_bones=False,
+)
+sys.stdout.flush()
+os._exit(0)  # Blender as a Python module may crash when it is unloaded
+"""
+
+
+def find_blender() -> list[str]:
+    """Return a command that runs ``SCRIPT`` in Blender, without the script's arguments.
+
+    Raises MissingDependencyError: there is no Blender.
+    """
+    program = shutil.which("blender")
+    if program is not None:
+        return [program, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", SCRIPT, "--"]
+    if find_spec("bpy") is not None:
+        return [sys.executable, "-c", SCRIPT]
+    raise MissingDependencyError(
+        "an .fbx is made by Blender, which is not here; install it, so that 'blender' runs, or: pip install bpy; or "
+        "write a .glb, which game engines read too"
+    )
+
+
+def convert_to_fbx(source: Path, target: Path, rate_hz: int) -> None:
+    """Write a moving ``.glb`` as ``.fbx``, at so many whole frames a second.
+
+    Raises MissingDependencyError: there is no Blender. Raises ExportError: Blender cannot do it.
+    """
+    command = find_blender()
+    with atomic_file(target) as path:
+        arguments = [str(source.resolve()), str(path.resolve()), str(rate_hz)]
+        try:
+            done = subprocess.run(
+                command + arguments, stdin=subprocess.DEVNULL, capture_output=True, timeout=LONGEST_S, check=False
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise ExportError(f"{target}: Blender does not write it: {error}") from error
+        if done.returncode or not path.is_file() or not path.stat().st_size:
+            said = (done.stderr or done.stdout).decode(errors="replace").strip().rpartition("\n")[2]
+            raise ExportError(f"{target}: Blender does not write it (exit code {done.returncode}): {said[:300]}")
