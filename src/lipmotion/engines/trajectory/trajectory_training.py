@@ -1,9 +1,10 @@
-"""Training of the trajectory engine: decision trees, emission densities, variance scaling."""
+"""The options of the trajectory engine, and its training: decision trees, emission densities, variance scaling."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,15 @@ from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_pr
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, label_full_context
-from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import Predictor, PredictorTraining, choose_predictor, split_folds
+from lipmotion.motion.modulation_filter import STRENGTH, learn_filter
+from lipmotion.motion.predictors import (
+    AUTOMATIC,
+    Predictor,
+    PredictorTraining,
+    check_predictor,
+    choose_predictor,
+    split_folds,
+)
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
@@ -40,46 +48,88 @@ from lipmotion.stats.trees import (
     zero_statistics,
 )
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
+from lipmotion.types import Configuration, Example, Monitor, Progress, Rule, Speech, option, sub_monitor
+from lipmotion.units import UnitSet, load_unit_set
+
+POSITIVE, ODD = Rule(above=0), Rule(least=1, odd=True)
 
 
 @dataclass(frozen=True)
-class TrainingOptions:
-    """Options of the training, from a ``TrajectoryConfig``.
+class TrajectoryConfig(Configuration):
+    """Options of the trajectory engine; defaults were chosen on the validation list (docs/decisions/motion.md).
 
-    layout       : the states of phones and silences
-    components   : principal components that all point channels (``x_17``, ...) are reduced to
-    tree_factor  : gain that a split of a decision tree must have, in units of its description length
-    least_frames : smallest number of frames of a leaf
+    states, silent_states : states of a phone, and of a silence; odd numbers
+    edge_s     : longest duration of a state before or after the middle one, seconds
+    components : principal components that all point channels are reduced to
+    tree_factor : gain that a split of a decision tree must have, in units of its description length
+    least_frames : smallest number of frames of a leaf of a tree
     shrinkage, variance_shrinkage : weights, in frames, of the mean and of the variance of the parent node
-    acoustic_regression : regress the means on the acoustic features around the frame
-    acoustic_components : principal components that these features are reduced to
+    acoustic_regression : regress the means on the acoustic features around the frame (False: plain Gaussians)
+    acoustic_components : principal components that the acoustic features around a frame are reduced to
     ridge, shared_ridge : ridge parameters: of a regression towards that of the parent node, and of the regression that
-                   all nodes share towards zero
+                 all nodes share towards zero
     ridge_frames : smallest number of frames of a node with a regression of its own
-    joint_recogniser : train the joint model as well
-    epochs : how often the training of the predictor uses each recording
-    articulation : lean on the table of articulation
-    predictor : name of the predictor, or ``auto``
-    modulation_filter : strength of the filter of generated motion; 0: none
+    variance_scaling : scale generated movements to the variance of recorded ones
+    closures   : make the lips meet in every p, b and m, whatever their units are
+    joint_recogniser : train the joint model as well, where there is enough speech: it recognises the phones of
+                 speakers that it was trained on
+    conditions : acoustic conditions in which each recording is used in the training of the acoustic network; 0: no
+                 network
+    epochs     : how often the training of the network uses each recording
+    predictor  : name of the predictor beside the states (docs/extend/predictor.md); ``auto``: an acoustic network, or,
+                 where the model stands on another one, a regression on what that makes of the speech
+    articulation : lean on the table of English articulation in contexts that training saw little of
+    units      : name of a unit set, or path of a table of units (docs/unit-sets.md), which training reads
+    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: 0 not at all, 1
+                 wholly; more goes beyond it (docs/results/jerk.md)
     """
 
-    layout: StateLayout
-    components: int
-    tree_factor: float
-    least_frames: float
-    shrinkage: float
-    variance_shrinkage: float
-    acoustic_regression: bool
-    acoustic_components: int
-    ridge: float
-    shared_ridge: float
-    ridge_frames: float
-    joint_recogniser: bool
-    epochs: int
-    articulation: bool
-    predictor: str
-    modulation_filter: float
+    states: int = option(5, ODD)
+    silent_states: int = option(13, ODD)
+    edge_s: float = option(0.08, POSITIVE)
+    components: int = option(16, Rule(least=1))
+    tree_factor: float = option(0.2, POSITIVE)
+    least_frames: float = option(8.0, POSITIVE)
+    shrinkage: float = option(10.0, POSITIVE)
+    variance_shrinkage: float = option(20.0, POSITIVE)
+    acoustic_regression: bool = True
+    acoustic_components: int = option(150, Rule(least=1))
+    ridge: float = option(2000.0, POSITIVE)
+    shared_ridge: float = option(100.0, POSITIVE)
+    ridge_frames: float = option(100.0, POSITIVE)
+    variance_scaling: bool = True
+    closures: bool = True
+    joint_recogniser: bool = True
+    conditions: int = option(15, Rule(least=0))
+    epochs: int = option(100, Rule(least=1))
+    articulation: bool = True
+    units: str = "phone"
+    predictor: str = option(AUTOMATIC, omit_default=True)
+    modulation_filter: float = option(1.0, STRENGTH)
+
+    aliases: ClassVar[Mapping[str, str]] = {
+        "parts": "states",
+        "silent_parts": "silent_states",
+        "listens": "acoustic_regression",
+        "axes": "acoustic_components",
+        "full_range": "variance_scaling",
+        "joint": "joint_recogniser",
+    }
+    removed: ClassVar[Mapping[str, Any]] = {"trajectory_steps": 0}
+    default_if_missing: ClassVar[Mapping[str, Any]] = {"modulation_filter": 0.0}
+
+    def check_files(self) -> None:  # noqa: D102
+        load_unit_set(self.units)
+        check_predictor(self.predictor)
+
+    def layout(self, units: UnitSet) -> StateLayout:
+        """Return the states of phones and silences, for a unit set."""
+        return StateLayout(self.states, self.silent_states, self.edge_s, units)
+
+    @property
+    def training_layout(self) -> StateLayout:
+        """The states of the unit set that training reads. Raises InputError: no such unit set, or errors in a table."""
+        return self.layout(load_unit_set(self.units))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +171,7 @@ CLIPS_PER_BLOCK = 64
 """Examples of a block; the frames of a block are sorted by the node whose regression they belong to."""
 
 
-def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], options: TrainingOptions) -> Emission:
+def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], options: TrajectoryConfig) -> Emission:
     """Return the densities with means that are regressed on acoustic features, and variances around these means.
 
     Every node of the trees with enough frames has a linear regression on the features around the frame, shrunk towards
@@ -150,7 +200,7 @@ _Node = tuple[str, int]
 def _frames(
     emission: Emission,
     clips: Sequence[TrainingClip],
-    options: TrainingOptions,
+    options: TrajectoryConfig,
     context: AcousticContext,
     owners: Sequence[_Node | None],
 ) -> Iterator[tuple[_Node, NDArray[np.float32], NDArray[np.float32]]]:
@@ -159,7 +209,7 @@ def _frames(
     nodes, of_row = list(numbers), np.array([numbers[node] for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
         block = clips[start : start + CLIPS_PER_BLOCK]
-        rows = np.concatenate([density_rows(emission, clip.training_states, options.layout) for clip in block])
+        rows = np.concatenate([density_rows(emission, clip.training_states, options.training_layout) for clip in block])
         z = np.concatenate([context(clip.features, clip.frames) for clip in block])
         error = np.concatenate([clip.rows for clip in block]) - emission.means[rows]
         order = np.argsort(of_row[rows], kind="stable")
@@ -172,7 +222,7 @@ def _frames(
 
 
 def _coefficients(
-    emission: Emission, statistics: dict[_Node, RegressionStatistics], options: TrainingOptions
+    emission: Emission, statistics: dict[_Node, RegressionStatistics], options: TrajectoryConfig
 ) -> tuple[NDArray[np.float32], dict[_Node, int]]:
     """Return the coefficients of all regressions [shape=(R, F, 3·Q)], and the number of the regression of each node."""
     all_statistics = list(statistics.values())
@@ -188,12 +238,12 @@ def _coefficients(
 
 
 def _variances(
-    emission: Emission, regression: AcousticRegression, clips: Sequence[TrainingClip], options: TrainingOptions
+    emission: Emission, regression: AcousticRegression, clips: Sequence[TrainingClip], options: TrajectoryConfig
 ) -> NDArray[np.float32]:
     """Return the variances around the regressed means, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for clip in clips:
-        rows = density_rows(emission, clip.training_states, options.layout)
+        rows = density_rows(emission, clip.training_states, options.training_layout)
         means = emission.means[rows].astype(float)
         add_acoustic_regression(means, regression, rows, regression.context(clip.features, clip.frames))
         np.add.at(squares, rows, np.square(clip.rows - means))
@@ -212,7 +262,7 @@ LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
 
 
 def fit_trajectory(
-    examples: Sequence[Example], options: TrainingOptions, monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
+    examples: Sequence[Example], options: TrajectoryConfig, monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
 ) -> TrajectoryModel:
     """Return a model of the motion: densities of full-context states, tied by decision trees.
 
@@ -223,8 +273,8 @@ def fit_trajectory(
     if options.joint_recogniser:
         phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     monitor = sub_monitor(monitor, 0.3, 1)
-    clips = [training_clip(example, x, options.layout) for example, x in zip(examples, values, strict=True)]
-    layout = options.layout
+    layout = options.training_layout
+    clips = [training_clip(example, x, layout) for example, x in zip(examples, values, strict=True)]
     states = (state for clip in clips for state in clip.training_states)
     covered = {layout.name(state) for state in states if state.unit not in layout.units.silence}
     if len(covered) < layout.speech:
@@ -254,7 +304,7 @@ def fit_trajectory(
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure(space.direct_names, values, examples)
     return TrajectoryModel(
-        options.layout.units, space, emission, factors, closure, phone_recogniser, network, prior, share, modulation
+        layout.units, space, emission, factors, closure, phone_recogniser, network, prior, share, modulation
     )
 
 
@@ -262,7 +312,7 @@ _STAGE = "trees"
 
 
 def _share_of_predictor(
-    predictions: Sequence[Array], clips: Sequence[TrainingClip], options: TrainingOptions, direct: int
+    predictions: Sequence[Array], clips: Sequence[TrainingClip], options: TrajectoryConfig, direct: int
 ) -> float:
     """Return the weight of a predictor beside the states, by cross-validation: 0 to 1.
 
@@ -278,7 +328,7 @@ def _share_of_predictor(
             emission = fit_acoustic_regression(emission, [clips[number] for number in inside], options)
         for number in outside:
             clip = clips[number]
-            rows = density_rows(emission, clip.states, options.layout)
+            rows = density_rows(emission, clip.states, options.training_layout)
             states = solve_mlpg(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
             recorded, predicted = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
             spread = np.maximum(recorded.std(axis=0), 1e-6)
@@ -317,16 +367,16 @@ def training_clip(example: Example, values: Array, layout: StateLayout) -> Train
     return TrainingClip(example.speech, states, frames, dynamics)
 
 
-def _fit_emission(clips: Sequence[TrainingClip], options: TrainingOptions) -> Emission:
+def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig) -> Emission:
     """Return the Gaussians of all leaves; each mean and variance is shrunk towards that of its parent node."""
-    rest = options.layout.rest
+    rest = options.training_layout.rest
     moving = np.concatenate(
         [clip.rows[[state != rest for state in clip.training_states]] for clip in clips], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
     scale = np.sqrt(np.maximum(overall, least))
-    grouped = _context_moments(clips, options.layout, centre, scale)
+    grouped = _context_moments(clips, options.training_layout, centre, scale)
     forest = {name: _grow_tree(contexts, 2 * overall.size, options) for name, contexts in grouped.items()}
     leaves = [
         gaussian
@@ -340,13 +390,17 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrainingOptions) -> Em
     return Emission(forest, means.astype(np.float32), np.maximum(variances, least).astype(np.float32), None)
 
 
-def _grow_tree(contexts: _Contexts, parameters: int, options: TrainingOptions) -> Tree:
+def _grow_tree(contexts: _Contexts, parameters: int, options: TrajectoryConfig) -> Tree:
     """Return the decision tree of one state; a single leaf where no training frame is in this state."""
-    empty = {options.layout.rest.context: np.zeros(1 + parameters)}
+    empty = {options.training_layout.rest.context: np.zeros(1 + parameters)}
     return grow_tree(
         list(contexts or empty),
         np.array(list((contexts or empty).values())),
-        [Question(place, *unit_class) for place in range(3) for unit_class in options.layout.units.classes().items()],
+        [
+            Question(place, *unit_class)
+            for place in range(3)
+            for unit_class in options.training_layout.units.classes().items()
+        ],
         gaussian_log_likelihood,
         parameters=parameters,
         factor=options.tree_factor,
@@ -377,7 +431,7 @@ def _context_moments(
     return grouped
 
 
-def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: TrainingOptions) -> list[tuple[Array, Array]]:
+def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: TrajectoryConfig) -> list[tuple[Array, Array]]:
     """Return mean and variance [each shape=(3·Q,)] of every leaf, in standardised units."""
     totals = np.zeros((len(tree.asked), 1 + 2 * size))
     parents = np.full(len(tree.asked), -1)
@@ -396,14 +450,14 @@ def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: Trainin
 
 
 def _rest_gaussian(
-    clips: Sequence[TrainingClip], options: TrainingOptions, fallback: Array, overall: Array
+    clips: Sequence[TrainingClip], options: TrajectoryConfig, fallback: Array, overall: Array
 ) -> tuple[Array, Array]:
     """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech."""
     poses = [
         clip.rows[number, 0]
         for clip in clips
         for number, state in enumerate(clip.training_states)
-        if state == options.layout.rest
+        if state == options.training_layout.rest
     ]
     if not poses:
         return fallback, overall
