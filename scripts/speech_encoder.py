@@ -5,8 +5,10 @@
     python scripts/speech_encoder.py pipecat_ai-1.14.0-py3-none-any.whl CORPUS VOICES
 
 CORPUS is a prepared corpus (GRID speaker s1); the principal components are those of its training list. VOICES is a
-folder of recordings of other speakers, each named by its speaker (``speech-open``): what they sound like, in quiet and
-in random conditions, is what speakers are told apart from. The weights stay at eight bits, as they are stored there.
+folder of recordings of many other speakers, whose names begin with the speaker (LibriSpeech, one sentence of each of
+251 readers and ten of each of ten others, as Resemblyzer has them in ``audio_data``): what they sound like, in quiet
+and in random conditions, is what speakers are told apart from. The weights stay at eight bits, as they are stored
+there.
 """
 
 from __future__ import annotations
@@ -35,12 +37,8 @@ DIGEST = "2bb026316b14a660486a75b1733cd3fbab8c2fd0314dc9af7be49f8cca967e4f"
 OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
 QUERY_SCALE = 1 / 8
 """Scores of attention are divided by the root of the 64 values of a head."""
-NO_VOICES = ("mfa_", "dummy", "cold_corpus", "three")
-"""Recordings of ``speech-open`` that are no plain speech of one speaker, or have the same speaker as another one."""
-SPEAKER_LETTERS = 9
-"""Names of recordings of one speaker begin with the same letters."""
-VOICE_S, CONDITIONS, SHRINKAGE = 8, 8, 0.1
-"""Seconds of each, conditions of each, and the weight of the identity in the covariance."""
+VOICE_S, CONDITIONS, OTHERS, SHRINKAGE = 6, 4, 6, 0.1
+"""Seconds and conditions of each, voices in its noise, and the weight of the identity in the covariance."""
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -83,16 +81,16 @@ def measure_background(folder: Path) -> Arrays:
     plain = np.zeros(2 * COMPONENTS, np.float32), np.eye(2 * COMPONENTS, dtype=np.float32)
     speaker_similarity.speaker_background = lambda: plain  # type: ignore[assignment]
     sounds = {}
-    for path in sorted(folder.iterdir()):
-        if path.suffix in (".flac", ".wav", ".opus", ".mp3") and not path.stem.startswith(NO_VOICES):
-            audio = read_audio(path)
-            sounds[path.stem] = Audio(audio.samples[: VOICE_S * audio.rate_hz], audio.rate_hz)
+    for path in sorted(folder.rglob("*.flac")):
+        audio = read_audio(path)
+        sounds[path.stem] = Audio(audio.samples[: VOICE_S * audio.rate_hz], audio.rate_hz)
+    pool = list(sounds.values())
     speakers: dict[str, list[NDArray[np.float64]]] = {}
     for number, (name, audio) in enumerate(sounds.items()):
-        speaker = name[:SPEAKER_LETTERS]
-        others = [other for key, other in sounds.items() if not key.startswith(speaker)]
-        varied = (in_condition(audio, others, np.random.default_rng([number, k]))[0] for k in range(1, CONDITIONS))
-        speakers.setdefault(speaker, []).extend(speaker_vector(analysed(each)) for each in (audio, *varied))
+        rng = np.random.default_rng([5, number])
+        others = [pool[chosen] for chosen in rng.integers(len(pool), size=OTHERS)]
+        versions = (audio, *(in_condition(audio, others, rng)[0] for _ in range(1, CONDITIONS)))
+        speakers.setdefault(name.partition("-")[0], []).extend(speaker_vector(analysed(each)) for each in versions)
     means = {speaker: np.mean(vectors, axis=0) for speaker, vectors in speakers.items()}
     within = np.concatenate([np.array(vectors) - means[speaker] for speaker, vectors in speakers.items()])
     covariance = within.T @ within / len(within)

@@ -14,7 +14,7 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.hmm.multistream.densities import SPEECH
+from lipmotion.hmm.multistream.densities import MOTION, SPEECH
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
@@ -42,28 +42,35 @@ REFERENCE_SET = "phone"
 PRESET = "hofer2008"
 PINS = {"as printed": False, "lips made to meet on p b m": True}
 """Whether motion is generated with pins in p, b and m, by the name of the block of the table."""
+TWICE_DOUBLED = 4
 _ACC, _COUNTS = "table1/acc", "table1/gaussians"
 
 
 @dataclass(frozen=True)
 class Table1Options:
-    """What is trained: numbers of states a unit, and of Gaussians for speech, of which one is chosen on ``val``."""
+    """What is trained.
+
+    states   : numbers of states a unit
+    mixtures, motion_mixtures : numbers of Gaussians for speech, and then for motion, of which one is chosen on ``val``
+    channels : channels of motion that are modelled, as ``opening width``: the two features of the paper; empty: all
+    """
 
     states: Sequence[int] = (3, 5)
-    mixtures: Sequence[int] = (1, 2, 4, 8)
+    mixtures: Sequence[int] = (1, 2, 4, 8, 16, 32, 64)
+    motion_mixtures: Sequence[int] = (1, 2, 4, 8)
+    channels: str = ""
 
 
-FULL, QUICK = Table1Options(), Table1Options(mixtures=(1, 2))
+FULL, QUICK = Table1Options(), Table1Options(states=(5,), mixtures=(1, 2), motion_mixtures=(1, 2))
 
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """A trained system of one unit set, its Gaussians a state, and the ACC of all that were tried on ``val``."""
+    """A trained system of one unit set, and the ACC on ``val`` by its Gaussians a state: for speech, for motion."""
 
     engine: JointEngine
     model: JointModel
-    gaussians: int
-    acc: dict[int, float]
+    acc: dict[tuple[int, int], float]
 
     def generate(self, recordings: HeldOutRecordings) -> dict[tuple[str, str], Sequence[ComparedClip]]:
         """Return what it makes of held-out recordings, by condition and name of ``PINS``."""
@@ -96,7 +103,9 @@ def hofer2008(
     check_opening(corpus, held_out := corpus.required(split))  # before the long work
     validation, names = corpus.required("val"), tuple(sorted(corpus.required("train")))
     lexicon, config, monitor = settings.lexicon or Lexicon(), settings.recogniser or HmmConfig(), settings.monitor
-    checkpoint = open_parts(work, corpus, settings, PartKey(_engine(), (*names, *validation, *held_out)))
+    checkpoint = open_parts(
+        work, corpus, settings, PartKey(_engine(channels=options.channels), (*names, *validation, *held_out))
+    )
     with worker_pool(min(settings.workers, len(names) // UTTERANCES_PER_WORKER)) as team:
         phones, examples, _ = phones_and_examples(
             [corpus.utterance(name) for name in names],
@@ -125,14 +134,15 @@ def hofer2008(
     for number, (states, units) in enumerate(cells):
         start, end = (0.15 + 0.85 * (number + step) / len(cells) for step in (0, 1))
         part = sub_monitor(monitor, start, end, f"{units}, {states} states: ")
-        engine = _engine(units=units, states=states, mixtures=max(options.mixtures))
-        system = _train_system(engine, options.mixtures, examples, choosing, checkpoint, part)
+        engine = _engine(units=units, states=states, channels=options.channels)
+        system = _train_system(engine, options, examples, choosing, checkpoint, part)
         systems[states][units], generated[states, units] = system, system.generate(recordings)
         for (condition, pins), clips in generated[states, units].items():
             if not PINS[pins]:
                 settings.receive(f"{units}, {states} states", condition, recordings, clips)
     about = {"split": split or "all", "clips": len(recordings.utterances), "trained_on": len(examples)}
     about |= {"closed_under": recordings.closed_under, "mixtures": list(options.mixtures), "seed": settings.seed}
+    about |= {"channels": options.channels, "motion_mixtures": list(options.motion_mixtures)}
     tables = [
         {"condition": condition, "pins": pins}
         | _table(
@@ -155,37 +165,49 @@ def _engine(**options: Any) -> JointEngine:
 
 def _train_system(
     engine: JointEngine,
-    counts: Sequence[int],
+    options: Table1Options,
     examples: Sequence[Example],
     choosing: HeldOutRecordings,
     checkpoint: Checkpoint,
     monitor: Monitor,
 ) -> _System:
-    """Return a system with the number of Gaussians of the highest ACC. Raises InputError: training ends before any."""
-    stage = f"{engine.config.units}-{engine.config.states}-{'.'.join(map(str, counts))}"
-    arrays = checkpoint.load(stage)
-    if arrays is None:
-        tried: dict[int, float] = {}
-        arrays = {}
-        for model in engine.growing_models(examples, monitor):
-            gaussians = model.hmm.models[SPEECH].tied.mixtures.size[1]
-            if gaussians in counts:
-                clips = generate_clips(choosing, AUDIO_ONLY, engine, model)
-                tried[gaussians] = evaluate.correlation_statistic(*evaluate.opening_curves(choosing, clips)).value
-                if _best_count(tried) == gaussians:
-                    arrays = engine.to_arrays(model)
+    """Return a system with the numbers of Gaussians of the highest ACC: for speech, and with that number for motion.
+
+    A number is doubled until twice in a row that does not help. Raises InputError: training ends before any number.
+    """
+    config, tried, arrays = engine.config, dict[tuple[int, int], float](), dict[str, Any]()
+
+    def try_numbers(monitor: Monitor, **most: Any) -> None:
+        for model in JointEngine(replace(config, **most)).growing_models(examples, monitor):
+            sizes = (model.hmm.models[stream].tied.mixtures.size[1] for stream in (SPEECH, MOTION))
+            speech, motion = (1 << (size - 1).bit_length() for size in sizes)  # where data is short, not all are split
+            if (speech, motion) in tried or speech not in options.mixtures or motion not in options.motion_mixtures:
+                continue
+            clips = generate_clips(choosing, AUDIO_ONLY, engine, model)
+            tried[speech, motion] = evaluate.correlation_statistic(*evaluate.opening_curves(choosing, clips)).value
+            if _best_count(tried) == (speech, motion):
+                arrays.update(engine.to_arrays(model))
+            if speech * motion >= TWICE_DOUBLED * np.prod(_best_count(tried)):
+                return
+
+    stage = f"{config.units}-{config.states}-{options.mixtures}-{options.motion_mixtures}"
+    if (kept := checkpoint.load(stage)) is None:
+        try_numbers(sub_monitor(monitor, 0, 0.6), mixtures=max(options.mixtures))
         if not tried:
-            raise InputError(f"no state has data for {min(counts)} Gaussians; compare also fewer, from 1")
-        arrays |= {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
-        checkpoint.save(stage, arrays)
-    acc = dict(zip(arrays[_COUNTS].tolist(), arrays[_ACC].tolist(), strict=True))
-    model = engine.from_arrays({name: array for name, array in arrays.items() if name not in (_ACC, _COUNTS)})
-    return _System(engine, model, _best_count(acc), acc)
+            raise InputError(f"no state has data for {min(options.mixtures)} Gaussians; compare also fewer, from 1")
+        if max(options.motion_mixtures) > 1:
+            most = {"mixtures": _best_count(tried)[0], "motion_mixtures": max(options.motion_mixtures)}
+            try_numbers(sub_monitor(monitor, 0.6, 1), **most)
+        kept = arrays | {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
+        checkpoint.save(stage, kept)
+    acc = dict(zip(map(tuple, kept[_COUNTS].tolist()), kept[_ACC].tolist(), strict=True))
+    model = engine.from_arrays({name: array for name, array in kept.items() if name not in (_ACC, _COUNTS)})
+    return _System(engine, model, acc)
 
 
-def _best_count(acc: Mapping[int, float]) -> int:
-    """Return the number of Gaussians with the highest correlation; among equals the smallest."""
-    return max(acc, key=lambda count: (acc[count], -count))
+def _best_count(acc: Mapping[tuple[int, int], float]) -> tuple[int, int]:
+    """Return the numbers of Gaussians with the highest correlation; among equals the smallest."""
+    return max(acc, key=lambda counts: (acc[counts], -counts[0], -counts[1]))
 
 
 def _table(
@@ -205,8 +227,8 @@ def _table(
         rows[units] = opening_row(figures) | {
             "units": UNIT_SETS[units].count,
             "paper": PAPER_SCORES[units],
-            "gaussians": system.gaussians,
-            "acc_on_val": {str(count): value for count, value in system.acc.items()},
+            **dict(zip(("gaussians", "motion_gaussians"), _best_count(system.acc), strict=True)),
+            "acc_on_val": {f"{speech}, {motion}": value for (speech, motion), value in system.acc.items()},
             "jerk": figures["channels"][OPENING]["jerk"],
             "score_95": scores[units].interval(seed),
             "score_gain_95": scores[units].gain(scores[REFERENCE_SET], seed),

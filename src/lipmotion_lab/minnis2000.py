@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -17,8 +18,15 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
-from lipmotion.engines.selection.concatenation import pieces_of
-from lipmotion.engines.selection.costs import ABUTTING_JOIN, MINNIS_2000, SelectionConfig
+from lipmotion.engines.selection.concatenation import Piece, pieces_of
+from lipmotion.engines.selection.costs import (
+    ABUTTING_JOIN,
+    JOIN_BEFORE,
+    MINNIS_2000,
+    Costs,
+    SelectionConfig,
+    Target,
+)
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
@@ -31,7 +39,12 @@ from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab import runner
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
+from lipmotion_lab.evaluation.evaluate import (
+    correlation_statistic,
+    distance_statistic,
+    figures_of,
+    opening_curves,
+)
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
@@ -44,7 +57,7 @@ from lipmotion_lab.learning_curve import check_training_names
 Array = NDArray[np.float64]
 REACH = 4
 """Frames before and after a frame between which velocities are compared: 40 ms, a picture of a video."""
-PERCENTILES = (50, 75, 95)
+HALF = 0.5
 
 
 def join_figures(
@@ -52,13 +65,14 @@ def join_figures(
 ) -> dict[str, Any]:
     """Return how many joins some speech takes, and how much the velocity of the opening changes there.
 
-    ``hard`` is the share of joins in which units abut; ``smooth`` that of joins where the velocity changes by no more
-    than the 95th percentile of the recordings.
+    ``candidates`` is the median number of units that are looked up for a phone, ``single`` the share of phones that
+    have one alone; ``hard`` is the share of joins in which units abut; ``smooth`` that of joins where the velocity
+    changes by no more than the 95th percentile of the recordings.
     """
-    costs, kinds, changes, recorded = model.costs(engine.config), [], [], []
+    kinds, changes, recorded, candidates = [], [], [], list[int]()
     for utterance, spoken in zip(utterances, speech, strict=True):
-        target = target_of(model, costs, spoken)
-        pieces = pieces_of(costs, target, select(costs, target).units)
+        costs, target, pieces = select_pieces(engine, model, spoken)
+        candidates += [len(costs.candidates(target, number)) for number in range(len(target))]
         opening = engine.generate(model, spoken).motion[OPENING]
         frames = np.array([round(piece.start_s * FRAME_RATE_HZ) for piece in pieces[1:]], np.intp)
         changes.append(velocity_change(opening)[np.minimum(frames, len(opening) - 1)])
@@ -68,15 +82,28 @@ def join_figures(
         start_s, end_s = target.windows.times_s[0, 1], target.windows.times_s[-1, 0]
         recorded.append(velocity_change(original)[int(start_s * FRAME_RATE_HZ) : int(end_s * FRAME_RATE_HZ)])
     made, own = np.concatenate(changes), np.concatenate(recorded)
-    bound = float(np.percentile(own, PERCENTILES[-1])) if len(own) else float("nan")
+    bound = float(np.percentile(own, 95)) if len(own) else float("nan")
     return {
+        "candidates": float(np.median(candidates)),
+        "single": float(np.mean(np.array(candidates) == 1)),
         "joins": len(kinds),
         "per_clip": len(kinds) / len(utterances),
         "hard": kinds.count(ABUTTING_JOIN) / len(kinds) if kinds else float("nan"),
         "smooth": float(np.mean(made <= bound)) if kinds else float("nan"),
-        "changes": np.percentile(made, PERCENTILES).tolist() if kinds else None,
-        "recorded_changes": np.percentile(own, PERCENTILES).tolist() if len(own) else None,
     }
+
+
+def select_pieces(engine: SelectionEngine, model: SelectionModel, speech: Speech) -> tuple[Costs, Target, list[Piece]]:
+    """Return the costs of a system, the phones of some speech, and the pieces that it chooses for them."""
+    costs = model.costs(engine.config)
+    target = target_of(model, costs, speech)
+    return costs, target, pieces_of(costs, target, select(costs, target).units)
+
+
+def overlap_times_s(costs: Costs, target: Target, pieces: Sequence[Piece]) -> Array:
+    """Return start and end of the phones in which pieces overlap in other shares than halves [shape=(N, 2)]."""
+    shared = [piece.first - (piece.join == JOIN_BEFORE) for piece in pieces[1:] if piece.join != ABUTTING_JOIN]
+    return target.windows.times_s[[number for number in shared if costs.forward_share(target, number) != HALF]]
 
 
 def velocity_change(curve: NDArray[np.floating[Any]]) -> Array:
@@ -89,11 +116,11 @@ ENGINE = "selection"
 PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
 DEFAULTS = SelectionConfig().as_mapping()
 ADDITIONS: Mapping[str, tuple[str, ...]] = {
-    "300 candidates a bias": ("candidates",),
+    "300 candidates a bias, 25 searched": ("candidates", "beam"),
     "guide from the sound": ("guide",),
-    "300 candidates and the guide": ("candidates", "guide"),
+    "300 candidates and the guide": ("candidates", "beam", "guide"),
     "joins cost what motions differ by": ("join",),
-    "300 candidates and this": ("candidates", "join"),
+    "300 candidates and this": ("candidates", "beam", "join"),
     "durations count": ("duration",),
     "own phone recogniser": ("joint_recogniser",),
     "table of articulation": ("articulation",),
@@ -101,21 +128,26 @@ ADDITIONS: Mapping[str, tuple[str, ...]] = {
 }
 """Options of the preset that take the value of the default, by the name of the row."""
 VARIANTS: Mapping[str, Mapping[str, Any]] = {
+    "one candidate a bias": {"candidates": 1},
     "no phone invisible": {"suppressed": False, "invisible": ""},
     "t d g k l suppressed": {"invisible": "t d g k l"},
     "Table 1 symmetric: 73/27 for 77/23": {"overlap": "symmetric"},
+    "Table 1, forward is the phone after": {"overlap": "anticipatory"},
     "overlaps half and half": {"overlap": "middle"},
     "overlaps learned": {"overlap": "learned"},
     "window N = 3": {"window": 3},
     "window N = 7": {"window": 7},
 }
 """Other readings of the print, and what it leaves open."""
-_ROW, _SUMS = "row", "correlation"
+_ROW, _SUMS, _OVERLAP = "row", "correlation", "overlap"
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 
-def rows() -> dict[str, SelectionConfig]:
-    """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged."""
+def rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
+    """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged.
+
+    guided : with the rows whose models learn from the sound, a guide or phones of the speaker's own
+    """
     printed = SelectionConfig.parsed(MINNIS_2000)
     found = {PRINTED: printed}
     found |= {
@@ -124,7 +156,8 @@ def rows() -> dict[str, SelectionConfig]:
     }
     found |= {name: replace(printed, **changes) for name, changes in VARIANTS.items()}
     everything = SelectionConfig(closures=False)
-    return found | {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
+    found |= {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
+    return {name: each for name, each in found.items() if guided or not (each.guide or each.joint_recogniser)}
 
 
 @one_thread()
@@ -133,6 +166,7 @@ def minnis2000(
     *,
     models: Path | None = None,
     quick: bool = False,
+    guided: bool = True,
     work: Path | None = None,
     settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
@@ -140,6 +174,8 @@ def minnis2000(
 
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
+    quick  : only see that it runs: few epochs
+    guided : as of ``rows``; without, training takes a minute instead of twenty, and no model is kept
     work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
@@ -154,8 +190,10 @@ def minnis2000(
     monitor = settings.monitor
     training = replace(settings, monitor=sub_monitor(monitor, 0, 0.6))
     kept_in = models or (work and work / "model")
-    if quick:
-        start_s, model = perf_counter(), train_engine(corpus, engine_named(ENGINE, {"epochs": 20}), training)
+    if quick or not guided:
+        options = ({} if guided else {"guide": 0.0, "joint_recogniser": False}) | ({"epochs": 20} if quick else {})
+        start_s, engine = perf_counter(), engine_named(ENGINE, options)
+        model = train_engine(corpus, engine, training, work)
         trained = EngineModel(model, perf_counter() - start_s)
     else:
         trained = engine_models(corpus, kept_in, training, [ENGINE])[ENGINE]
@@ -163,21 +201,28 @@ def minnis2000(
     for number, (split, names) in enumerate(lists.items()):
         start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))
         part = replace(settings, monitor=sub_monitor(monitor, start, stop, f"{split}: "))
-        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(rows()))
+        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(rows(guided=guided)))
         kept = runner.open_parts(work and work / split, corpus, settings, key)
-        found[split] = _on_list(corpus, names, trained.model, kept, part)
+        found[split] = _on_list(corpus, names, trained.model, rows(guided=guided), kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
     printed = vars(SelectionConfig.parsed(MINNIS_2000))
-    options = {name: vars(config).items() for name, config in rows().items()}
     about |= {
-        "rows": {name: {key: value for key, value in of if value != printed[key]} for name, of in options.items()}
+        "rows": {
+            name: {key: value for key, value in vars(config).items() if value != printed[key]}
+            for name, config in rows(guided=guided).items()
+        }
     }
     return nan_as_null(about | {"lists": found})
 
 
 def _on_list(
-    corpus: Corpus, names: Sequence[str], model: Model, kept: Checkpoint, settings: runner.ExperimentSettings
+    corpus: Corpus,
+    names: Sequence[str],
+    model: Model,
+    systems: Mapping[str, SelectionConfig],
+    kept: Checkpoint,
+    settings: runner.ExperimentSettings,
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
     monitor = settings.monitor
@@ -190,22 +235,33 @@ def _on_list(
         monitor=sub_monitor(monitor, 0, 0.4),
     )
     conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
-    spoken: dict[tuple[str, bool], list[Speech]] = {}
-    reference: dict[str, NDArray[np.float64]] = {}
-    for name, config in with_progress(list(rows().items()), "comparing", sub_monitor(monitor, 0.4, 1)):
+    reference: dict[str, tuple[Array, Array]] = {}
+
+    @cache
+    def speak(condition: str, by_own_recogniser: bool) -> list[Speech]:
+        listening = SelectionConfig(joint_recogniser=by_own_recogniser)
+        return make_speech(recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening))
+
+    @cache
+    def find_overlaps(condition: str) -> list[NDArray[np.bool_]]:
+        """Return which frames of each recording ``overlap`` is about: where the system as printed overlaps units."""
+        system, masks = SelectionEngine(systems[PRINTED]), list[NDArray[np.bool_]]()
+        units = _of_the_row(model.learned, system.config)
+        for utterance, speech in zip(recordings.utterances, speak(condition, False), strict=True):
+            time_s = np.flatnonzero(utterance.track.seen) / utterance.track.motion.rate_hz
+            start_s, end_s = overlap_times_s(*select_pieces(system, units, speech)).T[:, :, None]
+            masks.append(((time_s >= start_s) & (time_s < end_s)).any(axis=0))
+        return masks
+
+    for name, config in with_progress(list(systems.items()), "comparing", sub_monitor(monitor, 0.4, 1)):
         learned = _of_the_row(model.learned, config)
         for condition, found in conditions.items():
             stage = f"{len(found)} {condition}"
             arrays = kept.load(stage)
             if arrays is None:
-                key = condition, config.joint_recogniser and condition == AUDIO_ONLY
-                if key not in spoken:
-                    listening = SelectionConfig(joint_recogniser=key[1])
-                    spoken[key] = make_speech(
-                        recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening)
-                    )
                 engine = SelectionEngine(config)
-                clips = generate_compared(recordings, spoken[key], engine, learned)
+                speech = speak(condition, config.joint_recogniser and condition == AUDIO_ONLY)
+                clips = generate_compared(recordings, speech, engine, learned)
                 settings.receive(name, condition, recordings, clips)
                 figures = figures_of(clips, recordings, settings.seed)
                 row = runner.opening_row_with_rates(figures)
@@ -213,13 +269,24 @@ def _on_list(
                     channel: {figure: values[figure] for figure in WHAT_IS_SHOWN}
                     for channel, values in figures["channels"].items()
                 }
-                row["joins"] = join_figures(engine, learned, spoken[key], recordings.utterances)
-                statistic = correlation_statistic(*opening_curves(recordings, clips))
-                printed = replace(statistic, sums=list(reference.get(condition, statistic.sums)))
-                row["acc_gain_95"] = statistic.gain(printed, settings.seed)
-                arrays = {_ROW: np.array(json.dumps(row)), _SUMS: np.stack(statistic.sums)}
+                row["joins"] = join_figures(engine, learned, speech, recordings.utterances)
+                both, inside = opening_curves(recordings, clips), find_overlaps(condition)
+                parts = ([x[mask] for x, mask in zip(each, inside, strict=True)] for each in both)
+                statistics = correlation_statistic(*both), distance_statistic(*parts)
+                sums = [np.stack(each.sums) for each in statistics]
+                gains = [
+                    each.gain(replace(each, sums=list(printed)), settings.seed)
+                    for each, printed in zip(statistics, reference.get(condition, sums), strict=True)
+                ]
+                row["acc_gain_95"] = gains[0]
+                row["overlap"] = {
+                    "frames": int(np.concatenate(inside).sum()),
+                    "error": statistics[1].value,
+                    "error_gain_95": gains[1],
+                }
+                arrays = {_ROW: np.array(json.dumps(row)), _SUMS: sums[0], _OVERLAP: sums[1]}
                 kept.save(stage, arrays)
-            reference.setdefault(condition, arrays[_SUMS])
+            reference.setdefault(condition, (arrays[_SUMS], arrays[_OVERLAP]))
             found[name] = json.loads(str(arrays[_ROW]))
     return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}
 

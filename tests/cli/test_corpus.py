@@ -3,9 +3,11 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from cli.conftest import is_one_error
+from cli.conftest import check_refused, is_one_error
 from lipmotion.formats.sound import write_sound
+from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.types import Item, Progress
 from lipmotion_faces.corpus import prepare
@@ -22,6 +24,17 @@ def test_info(run, toy_corpus):
     assert summary["utterances"] == "12 (8 train, 2 val, 2 test)"
     assert summary["transcribed"] == "12"
     assert summary["offset"].startswith("toy: ") or summary["offset"].startswith("corpus: ")
+
+
+def test_motion_that_was_tracked_is_written_as_files(run, toy_corpus, here):
+    done = run("corpus", "motion", toy_corpus.path, "-o", "natural", "--channels", "width,opening")
+    assert done == (0, ["natural: the motion of 2 recordings"], [])
+    for name in toy_corpus.names("test"):
+        tracked, motion = toy_corpus.utterance(name).track.motion, read_generation(f"natural/{name}.json").motion
+        assert (motion.names, motion.rate_hz) == (("width", "opening"), tracked.rate_hz)
+        assert motion.values == pytest.approx(tracked.selected(("width", "opening")).values, abs=1e-4)
+    check_refused(run("corpus", "motion", toy_corpus.path, "-o", "other", "--channels", "pucker"), 3, "pucker")
+    assert not (here / "other").exists()
 
 
 def test_sync(run, toy_corpus, here, monkeypatch):

@@ -19,7 +19,7 @@ from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
-TWO = Table1Options(states=(3,), mixtures=(1, 2))
+TWO = Table1Options(states=(3,), mixtures=(1, 2), motion_mixtures=(1, 2), channels="opening width outer")
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,8 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(figures, toy_corpus):
     for block in figures["tables"]:
         row = block["rows"]["eVis"]
         pins = "true" if block["pins"] != "as printed" else "false"
-        settings = ["states=3", f"mixtures={row['gaussians']}", f"closures={pins}"]
+        numbers = f"mixtures={row['gaussians']}", f"motion_mixtures={row['motion_gaussians']}"
+        settings = ["states=3", *numbers, f"closures={pins}", "channels=opening width outer"]
         if (pins, settings[1]) not in evaluated:
             engine = engine_from_settings(preset="hofer2008", settings=settings)
             model = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine)[0]
@@ -52,7 +53,8 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(figures, toy_corpus):
             [opening[key] for key in ("acc", "jerk", "global_variance")], abs=0.02
         )  # a kept model is stored at half precision
         assert row["score"] == pytest.approx(100 * of_condition["closures"]["score"], abs=1e-9)
-        assert row["acc_on_val"][str(row["gaussians"])] == max(row["acc_on_val"].values())
+        chosen = f"{row['gaussians']}, {row['motion_gaussians']}"
+        assert row["acc_on_val"][chosen] == max(row["acc_on_val"].values())
     assert json.loads(json.dumps(figures, allow_nan=False))
 
 

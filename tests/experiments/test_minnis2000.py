@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engines.selection.drawn_units import PHONE_S, costs_of, inventory, target_of
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
+from lipmotion.engines.selection.concatenation import pieces_of
 from lipmotion.engines.selection.costs import SelectionConfig
 from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
@@ -17,6 +19,7 @@ from lipmotion_lab.minnis2000 import (
     PRINTED,
     join_figures,
     minnis2000,
+    overlap_times_s,
     rows,
     velocity_change,
 )
@@ -29,9 +32,26 @@ PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 def test_all_additions_together_are_the_default():
     """Each row has an option of its own; without a row, an addition would be hidden in another one."""
     printed, everything = rows()[PRINTED], rows()[EVERYTHING]
-    alone = {key: getattr(everything, key) for keys in ADDITIONS.values() if len(keys) == 1 for key in keys}
+    pair = ("candidates", "beam")
+    options = {key for keys in ADDITIONS.values() if len(keys) == 1 or keys == pair for key in keys}
+    alone = {key: getattr(everything, key) for key in options}
     assert replace(printed, **alone) == everything == SelectionConfig(closures=False)
     assert len({str(config) for config in rows().values()}) == len(rows())
+
+
+def test_without_a_guide_nothing_is_learned_from_the_sound():
+    alone = rows(guided=False)
+    assert (PRINTED in alone, EVERYTHING in alone) == (True, False)
+    assert {(config.guide, config.joint_recogniser) for config in alone.values()} == {(0.0, False)}
+    assert alone.items() <= rows().items()
+
+
+def test_overlaps_count_where_table_1_leaves_the_middle():
+    costs = costs_of(inventory("s aa f", "f aa m", levels=(0, 1)), hard=1.0)
+    for text, inside in (("s aa m", [(PHONE_S, 2 * PHONE_S)]), ("m aa m", [])):
+        target = target_of(costs, text)
+        found = overlap_times_s(costs, target, pieces_of(costs, target, np.array([0, 1, 5])))
+        assert found == pytest.approx(np.reshape(inside, (-1, 2))), text
 
 
 def test_a_bend_is_the_change_of_the_velocity():

@@ -16,7 +16,7 @@ from lipmotion.kernels import paths as kernel_paths
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
 from lipmotion.kernels.network import ForwardBackwardNetwork
-from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, cheapest_arrivals, sample_paths, trace_back
+from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, cheapest_arrivals, trace_back
 from oracles import factorial as factorial_oracle
 from oracles import paths
 
@@ -220,19 +220,6 @@ def of_path(draw, spread, extreme, windowed=False):
     return bool(abs(own - best) <= rounding and abs(score - best) <= rounding)
 
 
-def of_sampling(draw, spread, extreme):
-    """Paths drawn from the posterior: their log likelihood, and that each is possible and not improbable."""
-    frames, states = int(draw.integers(1, 6)), int(draw.integers(1, 5))
-    arrays, arcs = network(draw, states, extreme)
-    columns, log_emission = draw.integers(3, size=states), log_densities(draw, frames, 3, spread)
-    given = NetworkArrays(emission=columns, **arrays)
-    drawn, log_likelihood = sample_paths(log_emission, given, draw.random((3, frames)))
-    ends = arrays["log_initial"], arrays["log_final"]
-    _, _, wanted = paths.posteriors(log_emission, columns, arcs, *ends)
-    scores = [paths.path_score(path, log_emission, columns, arcs, *ends) for path in drawn]
-    return near(log_likelihood, wanted, spread) and (np.isneginf(wanted) or min(scores) > wanted - 40)
-
-
 def of_trellis(draw, spread, extreme):
     """The cheapest path through a trellis."""
     states, frames = int(draw.integers(1, 4)), int(draw.integers(1, 6))
@@ -261,7 +248,6 @@ RECURSIONS: dict[str, Callable[..., bool]] = {
     "chains": of_chains,
     "best path": of_path,
     "best path in windows": lambda *case: of_path(*case, True),
-    "sampled paths": of_sampling,
     "trellis": of_trellis,
 }
 

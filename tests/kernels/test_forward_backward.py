@@ -1,12 +1,9 @@
-from collections import Counter
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors, log_forward_backward
-from lipmotion.kernels.paths import NetworkArrays, sample_paths
 from oracles import paths
 
 
@@ -95,42 +92,3 @@ def test_posteriors_of_every_frame_sum_to_one(seed, loudness):
         assert posterior[:frames, u].sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-6)
         moves = (7, 5, 7)[u]  # all other transitions are of states to themselves
         assert stay[u].sum() == pytest.approx(frames - moves, abs=1e-6)
-
-
-EMISSION = np.array([0, 1, 0, 2])
-ARCS = {(0, 0): -0.5, (0, 1): -1.0, (1, 1): -0.7, (1, 2): -0.3, (2, 2): -1.2, (2, 3): -0.4, (3, 0): -0.6, (3, 3): -2.0}
-INITIAL = np.array([-0.2, -np.inf, -1.5, -np.inf])
-FINAL = np.array([-np.inf, -0.1, -0.9, -0.3])
-
-
-def arrays() -> NetworkArrays:
-    ordered = sorted((target, source, log) for (source, target), log in ARCS.items())
-    targets, sources, logs = map(np.array, zip(*ordered, strict=True))
-    return NetworkArrays(EMISSION, sources, logs, np.searchsorted(targets, np.arange(4)), INITIAL, FINAL)
-
-
-def test_paths_come_as_often_as_they_are_probable():
-    log_emission = np.random.default_rng(0).normal(0, 1.2, (5, 3))
-    expected, total = paths.path_posterior(log_emission, EMISSION, ARCS, INITIAL, FINAL)
-    count = 6_000
-    drawn, log_likelihood = sample_paths(log_emission, arrays(), np.random.default_rng(1).random((count, 5)))
-    assert log_likelihood == pytest.approx(total, abs=1e-9)
-    found = Counter(map(tuple, drawn.tolist()))
-    assert set(found) <= set(expected)
-    chi = sum((found[p] - count * q) ** 2 / (count * q) for p, q in expected.items() if count * q > 5)
-    degrees = sum(count * q > 5 for q in expected.values())
-    assert degrees > 5
-    assert chi < degrees + 4 * np.sqrt(2 * degrees)
-
-
-def test_what_is_far_from_probable_on_the_way_may_be_all_that_is_left_or_nothing():
-    log_emission = np.zeros((4, 3))
-    log_emission[0, 0] = log_emission[1, 1] = -5000.0
-    drawn, log_likelihood = sample_paths(log_emission, arrays(), np.full((3, 4), 0.999))
-    assert np.isfinite(log_likelihood)
-    assert (drawn >= 0).all()
-    log_emission[1] = -np.inf
-    with np.errstate(invalid="raise"):
-        drawn, log_likelihood = sample_paths(log_emission, arrays(), np.zeros((2, 4)))
-    assert log_likelihood == -np.inf
-    assert (drawn == -1).all()

@@ -69,8 +69,8 @@ def test_long_vowels_are_more_open_short_ones_and_consonants_less(voice: float, 
     np.testing.assert_array_equal(kept, precisions[20:240])
 
 
-@pytest.mark.parametrize(("voice", "share"), [(0.0, 0.0), (0.5, 0.5), (1.0, 0.0)])
-def test_half_known_voices_open_before_they_speak(voice: float, share: float) -> None:
+@pytest.mark.parametrize(("voice", "share"), [(0.0, 0.5), (0.5, 0.5), (1.0, 0.0)])
+def test_voices_not_known_to_training_open_before_they_speak(voice: float, share: float) -> None:
     prior = load_model().learned.motion.prior
     units = Timeline((Span(0.0, 1.5, Unit("sil")), Span(1.5, 1.8, Unit("aa")), Span(1.8, 2.5, Unit("sil"))))
     means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
@@ -118,7 +118,7 @@ def test_movements_are_those_of_typical_talkers_about_the_same_rest(welcome: Spe
     own, typical = known.motion["opening"], unknown.motion["opening"]
     assert np.percentile(own, 98) < 0.18
     assert 0.2 < np.percentile(typical, 98) < 0.3
-    assert np.abs(typical[:10] - own[:10]).max() < 0.01
+    assert np.abs(typical[-10:] - own[-10:]).max() < 0.01
     for frames in find_closable_ranges(unknown.units, len(typical), reach_s=unseen_speaker.choose_closing_reach(0.0)):
         assert typical[frames].min() <= load_model().learned.closure.closed + 1e-9
     ratio = np.sqrt(unknown.variance[:, 0] / np.maximum(known.variance[:, 0], 1e-12))

@@ -44,8 +44,8 @@ CONSONANT_CLOSING = 0.25
 """Consonants are less open than the table says, by so many standard deviations of the speaker: a fifth to a third of
 the phones that it was measured on are wrong, so that it has vowels too closed and consonants too open."""
 BREATH_S = 0.6
-"""So long before the first phone the mouth of a voice that is half known is as open as in speech: people part their
-lips and breathe in."""
+"""So long before the first phone the mouth of such a voice is as open as in speech: people part their lips and breathe
+in."""
 SURE_PHONES = 5000
 """Models of so many phones in training, some twelve minutes, know their own speaker; those of 50 sentences take his
 voice for 0.85 of a known one (docs/results/jerk.md), no more than the large model some strangers of the same studio."""
@@ -130,19 +130,18 @@ class UnseenSpeaker:
         return predict
 
     def open_before_speech(self, statistics: Predict) -> Predict:
-        """Open the mouth before speech begins; at ``voice`` 0 nothing changes, either.
+        """Open the mouth before speech begins.
 
-        All dimensions are drawn towards their median in speech. A voice of which nothing is known may be a known one
-        in noise, and its recording may begin anywhere. A model of few phones half knows its own speaker's voice, too:
-        the fewer it was trained on, the less changes.
+        All dimensions are drawn towards their median in speech. A model of few phones half knows its own speaker's
+        voice, too: the fewer it was trained on, the less changes.
         Source: Scobbie, Schaeffler & Mennen 2011 (lips part and breath is taken before the first sound).
         """
         first_s = next((span.start_s for span in self.units if not is_silent(span.label.phone)), 0.0)
         time_s = np.arange(self.frames) / FRAME_RATE_HZ
         before = ((time_s >= first_s - BREATH_S) & (time_s < first_s))[:, None].astype(float)
         sure = min(sum(self.prior.contexts.values()) / SURE_PHONES, 1)
-        half_known = 2 * np.sqrt(self.voice) * unseen_share(self.voice) * sure
-        share = half_known * np.broadcast_to(self.reliability, self.frames)[:, None] * smooth_steps(before)
+        strange = max(2 * np.sqrt(self.voice), 1.0) * unseen_share(self.voice) * sure
+        share = strange * np.broadcast_to(self.reliability, self.frames)[:, None] * smooth_steps(before)
         pose = np.stack([self.prior.centre, *np.zeros((2, len(self.prior.centre)))])
 
         def predict(chosen: slice) -> Statistics:

@@ -1,11 +1,11 @@
-"""``lipmotion corpus prepare|info|sync|offset|prompts|coverage``: make a corpus of recordings, correct it."""
+"""``lipmotion corpus prepare|info|motion|sync|offset|prompts|coverage``: make a corpus of recordings, correct it."""
 
 from __future__ import annotations
 
 import argparse
 
 from lipmotion.cli.arguments.declared import add_options
-from lipmotion.cli.arguments.options import add_machine_readable, add_workers
+from lipmotion.cli.arguments.options import add_machine_readable, add_workers, list_or_all
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_error, print_json, print_line
 from lipmotion.pipeline.request import Request
@@ -30,6 +30,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     action = actions.add_parser("info", help="print what a corpus contains")
     add_input(action, "corpus", what="corpus")
     action.set_defaults(run=run_info)
+    action = actions.add_parser("motion", help="write tracked motion as files: to draw, or for a study")
+    add_input(action, "corpus", what="corpus")
+    add_output(action, "-o", "--output", is_folder=True, required=True, metavar="FOLDER")
+    action.add_argument("--split", default="test", help="of the list test, val, train or all (default: test)")
+    channels = "these channels alone, as opening,width (default: all)"
+    action.add_argument("--channels", default="", metavar="NAME,NAME", help=channels)
+    action.set_defaults(run=run_motion)
     action = actions.add_parser("sync", help="correct the offset between sound and lips of a corpus")
     add_input(action, "corpus", what="corpus")
     action.set_defaults(run=run_sync)
@@ -81,6 +88,26 @@ def run_info(options: argparse.Namespace) -> None:
     corpus = Corpus.open(options.corpus)
     for name, value in (*corpus.summary().items(), *(("offset", line) for line in offsets(corpus).lines())):
         print_line(f"{name:12} {value}")
+
+
+def run_motion(options: argparse.Namespace) -> None:
+    """Write the tracked motion of every recording of a list as ``FOLDER/NAME.json``."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.formats.base import write_motion
+    from lipmotion.pipeline.outputs.motion_files import as_generation
+    from lipmotion.storage.files import make_folder
+    from lipmotion.types import Timeline
+
+    corpus, chosen = Corpus.open(options.corpus), [name for name in options.channels.split(",") if name]
+    tracked = {}
+    for name in corpus.required(list_or_all(options.split)):
+        utterance = corpus.utterance(name)
+        motion = utterance.track.motion.selected(chosen) if chosen else utterance.track.motion
+        tracked[name] = as_generation(motion, utterance.phones or Timeline(()))
+    make_folder(options.output)
+    for name, generation in tracked.items():
+        write_motion(options.output / f"{name}.json", generation, source={"tracked": name}, model={})
+    print_line(f"{options.output}: the motion of {len(tracked)} recordings")
 
 
 def run_sync(options: argparse.Namespace) -> None:

@@ -271,7 +271,7 @@ def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
     """Return ``curves.mean_distance`` of clips [each shape=(T_i, P)]."""
     errors = [np.linalg.norm(g - o, axis=1) for g, o in zip(generated, original, strict=True)]
     sums = [np.array([error.sum(), len(error)]) for error in errors]
-    return ClipStatistic(sums, lambda total: float(total[0] / total[1]))
+    return ClipStatistic(sums, lambda total: float(total[0] / total[1]) if total[1] else float("nan"))
 
 
 def closing_score_statistic(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:

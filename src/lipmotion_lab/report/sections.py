@@ -47,6 +47,7 @@ HOFER_COLUMNS = (
     VARIANCE,
     Column("units", "units", ".0f", "how many the set has"),
     Column("gaussians", "K", ".0f", "Gaussians a state for speech, chosen on val"),
+    Column("motion_gaussians", "K, motion", ".0f", "and for motion"),
 )
 
 
@@ -75,7 +76,7 @@ def hofer_section(figures: Mapping[str, Any]) -> Section:
         f"Which set of units predicts closings of the mouth best: the system of the paper, trained on "
         f"{figures['trained_on']} recordings with each of {len(rows)} sets, compared on {figures['clips']} of "
         f"{figures['split']}.{_closings(figures, next(iter(rows.values())))} "
-        f"Shown first: sound alone, {AS_PRINTED}, {most} states."
+        f"Channels of motion: {figures['channels'] or 'all'}. Shown first: sound alone, {AS_PRINTED}, {most} states."
     )
     words = warn_of_few(figures["clips"]) | {"The paper's order": order.sentences()}
     others = [(block, _hofer_table(block)) for block in blocks if block is not main]
@@ -123,6 +124,13 @@ MINNIS_COLUMNS = (
         for channel in DISTANCES
         for each in RATIOS
     ),
+    Column("joins_candidates", "candidates", ".0f", "units that are looked up for a phone, median"),
+    Column(
+        "overlap_error",
+        "overlaps",
+        ".4f",
+        "error, in eye distances, where the print overlaps units other than in halves",
+    ),
     Column("joins_per_clip", "joins", ".1f", "a recording"),
     Column("joins_hard", "hard", ".0f", "joins at which units abut, in %"),
     Column("joins_smooth", "smooth", ".0f", "joins no rougher than 95 % of the speaker's own motion, in %"),
@@ -139,14 +147,17 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
             for system, row in rows.items():
                 joins = row["joins"]
                 shares = {key: None if joins[key] is None else 100 * joins[key] for key in ("hard", "smooth")}
-                own = {"joins_per_clip": joins["per_clip"], **{f"joins_{key}": share for key, share in shares.items()}}
+                own = {f"joins_{key}": joins.get(key) for key in ("per_clip", "candidates")}
+                own |= {f"joins_{key}": share for key, share in shares.items()}
+                overlap = row.get("overlap", {"error": None})
+                own |= {f"overlap_{key}": each for key, each in overlap.items()}
                 for channel, each in row["channels"].items():
                     own |= {f"{channel}_{ratio.key}": each[ratio.key] for ratio in RATIOS}
                 with_joins[system] = {**row, **own}
             tables[split, condition] = Table(name.replace(" ", "-"), caption, MINNIS_COLUMNS, with_joins, PRINTED)
     split, last = list(figures["lists"].items())[-1]
     main = tables[split, AUDIO_ONLY]
-    rows, everything = main.rows, main.rows[EVERYTHING]
+    rows, everything = main.rows, main.rows.get(EVERYTHING, main.rows[PRINTED])
     acc = figure_text(rows[PRINTED]["acc"], ".3f"), figure_text(everything["acc"], ".3f")
     gained = difference(everything["acc"], rows[PRINTED]["acc"])
     effect = ("leave open whether they change", "raise", "lower")[sign_of_difference(everything["acc_gain_95"])]
@@ -159,12 +170,14 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
         f"The paper prints no figures. All additions together {effect} the correlation of the opening: "
         f"{acc[0]} as printed, {acc[1]} with them ({gain})."
     )
+    if EVERYTHING not in rows:
+        verdict = f"The paper prints no figures. As printed, the correlation of the opening is {acc[0]}."
     words = warn_of_few(last["clips"]) | {
         "Each addition alone": _effects(rows, ADDITIONS),
         "Other readings of the print": _effects(rows, VARIANTS),
         "Lips in p, b and m": [
-            f"As printed, the lips close in {closed[0]} of {rows[PRINTED]['p_b_m']} p, b and m; with all additions in "
-            f"{closed[1]}; nothing is pinned."
+            f"As printed, the lips close in {closed[0]} of {rows[PRINTED]['p_b_m']} p, b and m"
+            f"{f'; with all additions in {closed[1]}' if EVERYTHING in rows else ''}; nothing is pinned."
         ],
     }
     about = (
@@ -182,7 +195,7 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
 
 def _effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
     """Return which of some rows are better than the system as printed, worse, and neither for sure."""
-    signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names}
+    signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names if name in rows}
     printed = rows[PRINTED]["acc"]
     described = {name: f"{name} ({figure_text(difference(rows[name]['acc'], printed), '+.3f')})" for name in signs}
     outcomes = ((1, "ACC is higher"), (-1, "ACC is lower"), (0, "The interval of the difference contains 0"))

@@ -92,7 +92,10 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
         "hofer2008", help="which unit set predicts closings of the mouth, by the paper's own system (Table 1)"
     )
     parser.add_argument("--split", default="test", help="compare on test, val, train or all (default: test)")
-    add_experiment_arguments(parser, quick="one or two Gaussians a state")
+    channels = "model these channels of motion alone; opening,width: the two features of the paper (default: all)"
+    parser.add_argument("--channels", default="", metavar="NAME,NAME", help=channels)
+    parser.add_argument("--states", type=numbers, metavar="N,N", help="states of a unit (default: 3,5; quick: 5)")
+    add_experiment_arguments(parser, quick="one or two Gaussians")
     parser.set_defaults(run=run_hofer2008)
 
 
@@ -100,7 +103,8 @@ def run_hofer2008(options: argparse.Namespace) -> None:
     """Call ``hofer2008`` and print its section."""
     from lipmotion_lab.hofer2008 import FULL, QUICK, hofer2008
 
-    chosen = QUICK if options.quick else FULL
+    usual = QUICK if options.quick else FULL
+    chosen = replace(usual, channels=options.channels.replace(",", " "), states=options.states or usual.states)
     run_experiment(options, partial(hofer2008, options=chosen, split=list_or_all(options.split)), "hofer2008")
 
 
@@ -207,6 +211,10 @@ def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]
     parser = actions.add_parser("minnis2000", help="unit selection as Minnis & Breen 2000 print it, and each addition")
     kept = "keep the model there, so that a run that was stopped goes on and a second one does not train"
     add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=kept)
+    unguided = (
+        "leave out the rows that learn from the sound: the paper's system and its readings, in a tenth of the time"
+    )
+    parser.add_argument("--no-guide", dest="guided", action="store_false", help=unguided)
     add_experiment_arguments(parser, quick="few epochs; the model is not kept")
     parser.set_defaults(run=run_minnis2000)
 
@@ -215,7 +223,8 @@ def run_minnis2000(options: argparse.Namespace) -> None:
     """Call ``minnis2000`` and print its section."""
     from lipmotion_lab.minnis2000 import minnis2000
 
-    run_experiment(options, partial(minnis2000, models=options.models, quick=options.quick), "minnis2000")
+    chosen = {"models": options.models, "quick": options.quick, "guided": options.guided}
+    run_experiment(options, partial(minnis2000, **chosen), "minnis2000")
 
 
 def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -42,7 +42,7 @@ def spans(units: Timeline[Unit]) -> list[tuple[float, float, str]]:
 
 
 def test_other_words_of_the_same_sound_move_the_lips_otherwise() -> None:
-    one, other = (generated(replace(SOUND, units=units), paths=5) for units in (SOUND.units, OTHER_WORDS))
+    one, other = (generated(replace(SOUND, units=units)) for units in (SOUND.units, OTHER_WORDS))
     assert np.abs(one.motion["opening"] - other.motion["opening"]).max() > 0.1
     assert (spans(one.units), spans(other.units)) == (spans(SOUND.units), spans(OTHER_WORDS))
 
@@ -157,6 +157,19 @@ def test_the_stages_of_a_training_are_trainings_of_their_own() -> None:
         stages[0].hmm.models["speech"].tied.mixtures.means, alone.hmm.models["speech"].tied.mixtures.means
     )
     assert np.array_equal(stages[0].hmm.durations, alone.hmm.durations)
+
+
+def test_the_two_features_of_the_paper_alone() -> None:
+    """§3: "only two features for the lips (mouth opening, pucker)"; the others are in no part of the model."""
+    alone = engine(channels="opening width", motion_mixtures=2)
+    model = alone.fit(examples(8), silent_monitor).model
+    assert model.space.dimensions == 2
+    made, every = alone.generate(model, SOUND).motion, generated(SOUND).motion
+    assert made.names == ("opening", "width")
+    assert np.corrcoef(made["opening"], every["opening"])[0, 1] > 0.9
+    assert set(every.names) > set(made.names)
+    with pytest.raises(InputError, match="pucker"):
+        engine(channels="opening pucker").fit(examples(2), silent_monitor)
 
 
 def test_the_preset_is_the_system_of_the_paper() -> None:

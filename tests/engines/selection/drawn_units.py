@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ def target_of(costs: Costs, text: str, stress: Sequence[int] | None = None) -> T
     return costs.target(replace(windows, stress=known.astype(np.int8)), None, None)
 
 
-def costs_of(units: RecordedUnits, config: SelectionConfig = FREE, **options: object) -> Costs:
+def costs_of(units: RecordedUnits, config: SelectionConfig = FREE, **options: Any) -> Costs:
     return Costs(units, replace(config, **options), np.ones(units.values.shape[1]))
 
 

@@ -177,6 +177,17 @@ def test_by_default_a_cut_in_a_cluster_and_a_merge_in_another_stress_cost_more()
         assert other > equal + 0.01
 
 
+def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
+    """§4: "smoothed for the last 5% of the first unit, and the first 5% of the second unit"."""
+    units = inventory("s iy", "uw n", levels=(0, 1), duration_s=1.0)
+    costs = costs_of(units)
+    target = costs.target(phone_windows([timeline("s iy uw n", 1.0)]), None, None)
+    motion = concatenated(units, target, pieces_of(costs, target, np.arange(4)), 401)[:, 0]
+    bent = np.flatnonzero((motion > 1e-9) & (motion < 1 - 1e-9))
+    assert (bent[0], bent[-1]) == pytest.approx((200 - 0.05 * 200, 200 + 0.05 * 200), abs=1)
+    assert np.diff(motion).min() >= 0
+
+
 def test_by_default_units_merge_in_a_vowel_rather_than_abut_behind_a_plosive() -> None:
     """§4: "/s p u/ and /u n/" rather than "/s p/ and /u n/"."""
     units = inventory("s p", "uw n", "s p uw", "uw n")

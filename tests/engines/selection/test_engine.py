@@ -125,7 +125,7 @@ def test_models_that_contradict_themselves_are_refused(model, engine, name, dama
         arrays["store_kept"] = arrays.pop(name)
     else:
         arrays[name] = damage(arrays[name])
-    with pytest.raises(ModelFormatError, match="train the model again" if damage is None else None):
+    with pytest.raises(ModelFormatError):
         engine.from_arrays(arrays)
 
 

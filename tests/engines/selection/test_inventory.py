@@ -1,19 +1,19 @@
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from engines.selection.drawn_units import recorded, timeline
 from lipmotion.engines.selection.engine import SelectionEngine
-from lipmotion.engines.selection.inventory import digits, standing_in
+from lipmotion.engines.selection.inventory import standing_in, unit_index
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, PHONE_NUMBER, SILENT, covering, phone_windows
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import PHONES as SPOKEN
 from lipmotion.testing.examples import examples
 from lipmotion.types import Span, Timeline, Unit, silent_monitor
+from oracles.biases import longest, matches
 
 
 def test_motion_that_is_not_stored_is_a_line_between_its_edges() -> None:
@@ -57,22 +57,35 @@ def test_gaps_are_silence() -> None:
     assert found == list(zip(edges_s, edges_s[1:], phones, strict=False))
 
 
-@settings(max_examples=20)
-@given(st.lists(st.sampled_from(SPOKEN), min_size=5, max_size=5), st.integers(1, 12), st.integers(0, 2))
-def test_the_index_finds_the_longest_agreement(
-    model: SelectionModel, engine, window: list[str], count: int, bias: int
-) -> None:
-    costs = model.costs(engine.config)
-    target = phone_windows([spoken(" ".join(window))]).contexts(engine.config.invisible_phones, 2)[2]
-    order = digits(bias, 5)
-    agree = costs.index.contexts[:, order] == target[order]
-    lengths = np.where(model.inventory.usable, np.cumprod(agree, axis=1).sum(axis=1), 0)
-    longest = np.sort(lengths)[::-1]
-    needed = longest[min(count, len(longest)) - 1]
-    found = costs.index.candidates(target, count)
-    assert (lengths[found] > 0).all()
-    better = np.flatnonzero(lengths > max(needed, 0)) if needed else np.flatnonzero(lengths > 0)
-    assert np.isin(better, found).all()
+AROUND = (("s", "f"), ("iy", "uw"), ("aa",), ("m", "n"), ("uw", "s"))
+"""A phone in every context in which each of four neighbours is the wanted one, the first of a pair, or another."""
+
+
+def test_each_bias_finds_the_longest_agreement_on_its_own_side_first() -> None:
+    """§3: "with reference to their left context match, their right context match and the complete (no bias) match"."""
+    contexts = list(product(*AROUND)) * 2
+    without = [context for context in contexts if context[1] != "iy" or context[3] != "m"]  # no match on both sides
+    for kept in (contexts, contexts[1:16], contexts[3:16], contexts[9:16], without):
+        units = recorded(*(spoken(" ".join(context)) for context in kept))
+        index, wanted = unit_index(units, (), 5), phone_windows([spoken("s iy aa m uw")]).contexts((), 2)[2]
+        windows = index.contexts.tolist()
+        for count in range(1, 12):
+            found, (must, may) = set(index.candidates(wanted, count).tolist()), longest(wanted, windows, count)
+            assert must <= found <= may, (len(kept), count)
+        every = set(index.candidates(wanted, 0).tolist())
+        assert every == matches(wanted.tolist(), windows)
+        assert len(every) > 1
+
+
+def test_where_matches_are_excluded_the_next_shorter_ones_enter() -> None:
+    units = recorded(*(spoken(text) for text in ("s iy aa m uw", "f iy aa n s", "f uw aa m s", "f uw aa n s")))
+    index, wanted = unit_index(units, (), 5), phone_windows([spoken("s iy aa m uw")]).contexts((), 2)[2]
+    excluded = np.zeros(len(units.windows), bool)
+    for left_out, entering in ((17, [2]), (2, [7, 12]), (7, [12]), (12, [])):
+        excluded[left_out] = True
+        assert index.candidates(wanted, 0, excluded).tolist() == entering
+    excluded[17] = False
+    assert index.candidates(wanted, 0, excluded).tolist() == [17]
 
 
 def test_excluded_units_are_not_found(model: SelectionModel, engine) -> None:

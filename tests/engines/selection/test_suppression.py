@@ -13,6 +13,7 @@ from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.engines.selection.windows import TABLE_1, phone_windows
 from lipmotion.testing.examples import examples, speech
 from lipmotion.testing.examples import timeline as spoken
@@ -74,6 +75,17 @@ def test_no_recorded_invisible_phone_is_played() -> None:
         assert joined(units, text, replace(PRINTED, suppressed=False))[1].max() > 8, text
 
 
+@pytest.mark.parametrize("guide", [0.0, 20.0])
+def test_a_recorded_sentence_costs_nothing_without_its_suppressed_phones(model: SelectionModel, guide: float) -> None:
+    """Neither the phones that are wanted nor the recorded ones have them, so that its units succeed one another."""
+    costs = model.costs(replace(PRINTED, guide=guide))
+    for one in examples(4):
+        target = target_of(model, costs, one.speech)
+        assert not {PHONES[phone] for phone in target.windows.phones} & {*INVISIBLE}
+        assert select(replace(costs, config=PRINTED), target).cost == pytest.approx(0)
+    assert {PHONES[phone] for phone in costs.inventory.windows.phones} <= {"sil", "b", "aa", "iy", "m", "uw", "s", "p"}
+
+
 def test_the_vowel_gives_the_shape() -> None:
     units = inventory("m iy", "t uw", levels=(0, 1))
     _, motion = joined(units, "m iy t uw")
@@ -96,7 +108,7 @@ def test_the_preset_needs_nothing_but_phones() -> None:
     assert isinstance(engine, SelectionEngine)
     needs = engine.inputs()
     assert (needs.prior, needs.posteriors, needs.conditions) == (False, False, 0)
-    assert engine.config.candidates == 1
+    assert (engine.config.candidates, engine.config.beam) == (0, 0)
     assert engine.without_closures() == engine
     changed = engine_from_settings(preset="minnis2000", settings=["candidates=300"])
     assert changed.config == replace(engine.config, candidates=300)  # type: ignore[attr-defined]

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.engines.trajectory.engine import TrajectoryConfig
+from lipmotion.engines.trajectory.model import TrajectoryConfig
 from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, fit_trajectory
 from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, label_full_context
@@ -11,8 +11,8 @@ from lipmotion.stats.trees import Question, Tree, fit_regression_node, fit_tree_
 from lipmotion.testing.examples import examples
 from lipmotion.types import silent_monitor
 
-OPTIONS = replace(TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False).training)
-LAYOUT = OPTIONS.layout
+OPTIONS = TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False)
+LAYOUT = OPTIONS.training_layout
 
 
 def fit(corpus, **changes):
@@ -45,7 +45,7 @@ def test_without_shrinkage_each_leaf_has_the_mean_and_variance_of_its_frames():
 
 def test_shrinkage_draws_leaves_together():
     corpus = examples(6)
-    apart, together = (fit(corpus, shrinkage=strength, tree_factor=0.2).emission for strength in (1e-9, 1e9))
+    apart, together = (fit(corpus, shrinkage=strength, tree_factor=0.2).emission for strength in (1e-9, 1e6))
     found = frames_by_density(corpus, apart)
     overall = np.concatenate([rows for density, rows in found.items() if density < len(apart.means) - 1])[:, 0].mean()
     assert np.ptp(apart.means[:-1, 0, 0]) > 0.2
@@ -93,7 +93,7 @@ def test_phones_without_training_frames_resolve_like_those_of_their_class():
 
 REGRESSION = TrajectoryConfig(
     states=3, silent_states=7, components=2, acoustic_components=20, ridge=10.0, ridge_frames=50.0
-).training
+)
 
 
 def moments_of(z, r):
@@ -176,8 +176,8 @@ def loud_and_soft(count):
 def error(model, corpus):
     squares = []
     for one in corpus:
-        states = label_full_context(one.speech.units, len(one.valid), REGRESSION.layout)
-        rows = np.array([model.emission.row(state, REGRESSION.layout) for state in states])
+        states = label_full_context(one.speech.units, len(one.valid), REGRESSION.training_layout)
+        rows = np.array([model.emission.row(state, REGRESSION.training_layout) for state in states])
         means, _ = model.emission.statistics(rows, one.speech.features.values, slice(None))
         squares.append((means[:, 0, 0] - one.motion["opening"])[60:-60] ** 2)
     return float(np.sqrt(np.concatenate(squares).mean()))

@@ -10,8 +10,6 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import MOTION, SPEECH
 from lipmotion.hmm.multistream.generate import (
     FrameDensities,
-    average_densities,
-    average_path_densities,
     select_densities,
     solve_trajectory,
 )
@@ -102,33 +100,6 @@ def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion():
     assert (found.precisions[[0, -1], :, 1:] == 0).all()
 
 
-def test_all_paths_together_maximise_the_expected_density():
-    hmm = random_joint(5, components=1)
-    draw = np.random.default_rng(6)
-    leaves = np.array([0, 1, 1, 2])
-    posterior = draw.dirichlet(np.ones(4), 10)
-    found = solve_trajectory(average_densities(hmm, leaves, posterior)).values
-    mixtures, scale = hmm.models[MOTION].tied.mixtures, hmm.models[MOTION].scale
-    for channel in range(2):
-        means = (mixtures.means[leaves, 0] * scale.deviation + scale.mean).reshape(4, 3, 2)[:, :, channel]
-        precisions = 1 / (mixtures.variances[leaves, 0] * scale.deviation**2).reshape(4, 3, 2)[:, :, channel]
-        P = np.einsum("ts,sw->tw", posterior, precisions)
-        m = np.einsum("ts,sw->tw", posterior, precisions * means) / P
-        assert found[:, channel] == pytest.approx(trajectories.generate(m, P)[0], abs=1e-6)
-
-
-def test_several_paths_count_as_often_as_they_are_given():
-    hmm, data = random_joint(3, components=1), observed(np.random.default_rng(4), 20)
-    one, other = (align(hmm, data, units) for units in (("sil", "a", "b", "sil"), ("sil", "b", "sil")))
-    leaves = [hmm.models[MOTION].forest.leaves(path.states.triphones) for path in (one, other)]
-    shares = [0.75 * np.eye(len(leaves[0]))[one.frames], 0.25 * np.eye(len(leaves[1]))[other.frames]]
-    wanted = solve_trajectory(average_densities(hmm, np.concatenate(leaves), np.concatenate(shares, axis=1)))
-    found = solve_trajectory(average_path_densities(hmm, [one, other, one, one]))
-    assert found.values == pytest.approx(wanted.values, abs=1e-9)
-    with pytest.raises(InputError, match="of the same length"):
-        average_path_densities(hmm, [])
-
-
 def test_what_was_learned_comes_back():
     hmm = train_joint(utterances(30), inventory(), CLASSES, config())
     for each in utterances(4, seed=9):
@@ -144,7 +115,5 @@ def test_what_cannot_be_generated():
         with pytest.raises(InputError, match="no motion, or it is switched off"):
             select_densities(model, align(model, data, ("a",)))
     hmm = replace(hmm, config=config())
-    with pytest.raises(InputError, match="one of each state"):
-        average_densities(hmm, np.array([0, 1]), np.ones((9, 3)))
     with pytest.raises(InputError, match="a pin at"):
         solve_trajectory(random_densities(0, 5, 1), {(5, 0): 1.0})

@@ -37,15 +37,6 @@ def state_posteriors(recogniser, data):
     return result
 
 
-def sampled_units(recogniser, data, count, seed):
-    """Return the units of sampled paths, each with its first frame."""
-    sequences = []
-    for path in recogniser.draw_paths(data, count, seed):
-        units = [context[1] for (context, state) in path.states.triphones if state == 0]
-        sequences.append(tuple(zip(units, path.bounds(len(units))[:-1].tolist(), strict=True)))
-    return sequences
-
-
 def candidates(hmm, frames):
     counts = {unit: hmm.inventory.count(unit) for unit in hmm.inventory.names}
     return sequences([unit for unit in hmm.inventory.names if unit != "sp"], counts, frames)
@@ -76,20 +67,6 @@ def uncertain():
     return JointRecogniser(hmm, SOFT), data, [(*way[1:], share) for way, share in zip(ways, shares, strict=True)]
 
 
-def test_sequences_are_drawn_as_often_as_they_are_probable(uncertain):
-    recogniser, data, ways = uncertain
-    expected: dict[tuple, float] = {}
-    for units, lengths, share in ways:
-        key = tuple(zip(units, np.cumsum([0, *lengths])[:-1:2].tolist(), strict=True))
-        expected[key] = expected.get(key, 0) + share
-    drawn = sampled_units(recogniser, data, 4000, 5)
-    assert set(drawn) <= set(expected)
-    likely = {key: share for key, share in expected.items() if share > 0.02}
-    assert len(likely) > 2
-    for key, share in likely.items():
-        assert drawn.count(key) / 4000 == pytest.approx(share, abs=5 * np.sqrt(share / 4000))
-
-
 def test_posteriors_are_the_shares_of_all_sequences(uncertain):
     recogniser, data, ways = uncertain
     known = recogniser.hmm.inventory
@@ -99,21 +76,6 @@ def test_posteriors_are_the_shares_of_all_sequences(uncertain):
     found = state_posteriors(recogniser, data)
     assert found == pytest.approx(expected, abs=1e-4)
     assert found.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-5)
-
-
-def test_paths_that_are_drawn_go_through_the_states_of_their_units():
-    hmm, data = random_joint(3, bigram_weight=0.3, insertion=2.0), observed(np.random.default_rng(5), 40)
-    recogniser = JointRecogniser(hmm, SOFT)
-    paths = recogniser.draw_paths(data, 400, 6)
-    for path, said in zip(paths, sampled_units(recogniser, data, 400, 6), strict=True):
-        assert set(np.diff(path.frames).tolist()) <= {0, 1}
-        assert (path.frames[0], path.frames[-1]) == (0, len(path.states.monophones) - 1)
-        assert [context[1] for context, state in path.states.triphones if state == 0] == [unit for unit, _ in said]
-        assert path.bounds(len(said))[:-1].tolist() == [first for _, first in said]
-    drawn = np.mean(
-        [np.eye(len(hmm.inventory.monophones))[path.states.monophones[path.frames]] for path in paths], axis=0
-    )
-    assert drawn == pytest.approx(state_posteriors(recogniser, data), abs=0.13)
 
 
 def test_speech_alone_is_the_plain_model():
@@ -144,12 +106,8 @@ def test_what_cannot_be_recognised():
         JointRecogniser(hmm, StreamWeights())
     with pytest.raises(InputError, match="switched on are"):
         JointRecogniser(hmm, StreamWeights(0, 0, 0, 0, 0)).recognise(data)
-    with pytest.raises(InputError, match="required one or more"):
-        JointRecogniser(hmm).draw_paths(data, 0, 0)
-    short = observed(np.random.default_rng(0), 2)
-    for attempt in (JointRecogniser(hmm).recognise, lambda given: JointRecogniser(hmm).draw_paths(given, 1, 0)):
-        with pytest.raises(AlignmentError):
-            attempt(short)
+    with pytest.raises(AlignmentError):
+        JointRecogniser(hmm).recognise(observed(np.random.default_rng(0), 2))
     wide = StreamObservations({SPEECH: ObservedStream(np.zeros((9, 4)), np.ones(9, bool))})
     with pytest.raises(InputError, match="has 4 dimensions"):
         JointRecogniser(hmm).recognise(wide)

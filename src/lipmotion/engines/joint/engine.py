@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, StreamWeights, stream_observations
-from lipmotion.hmm.multistream.generate import average_path_densities, merge_gaussians, select_densities
+from lipmotion.hmm.multistream.generate import merge_gaussians, select_densities
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, train_joint, with_durations
 from lipmotion.hmm.multistream.recognise import StatePath, align, joint_recogniser
@@ -85,6 +85,7 @@ class JointEngineConfig(Configuration):
     states     : states per unit, left to right, without skips
     mixtures, motion_mixtures : Gaussians per state of speech, and of motion (powers of two)
     components : principal components that all point channels are reduced to
+    channels   : channels of motion that are modelled, as ``opening width``; empty: all
     f0         : model the three streams of F0 (False: their weights are 0 everywhere)
     motion_in_training : the motion stream takes part when states are aligned in training (False: its weight is 0)
     speech_weight, f0_weight, motion_weight : of the streams when states are aligned in training
@@ -97,9 +98,6 @@ class JointEngineConfig(Configuration):
                  (False: use the phones of the shared recogniser)
     own_alignment : the model itself times the phones of given words (False: they have the times of the shared
                  aligner). Times that are given with the units stay as they are
-    paths      : number of state sequences, sampled from their posterior, from which motion is generated where units are
-                 recognised; 1: the best sequence. More than 1 needs ``recognise_units``
-    seed       : of the sampling
     closures   : make the lips meet in every p, b and m, and in every recognised unit that has no other phones
     articulation : lean on the table of English articulation in contexts that training saw little of
     modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: as of the
@@ -115,8 +113,6 @@ class JointEngineConfig(Configuration):
     motion_in_training: bool = True
     recognise_units: bool = False
     own_alignment: bool = option(False, omit_default=True)
-    paths: int = option(1, COUNT)
-    seed: int = option(0, Rule(least=0))
     closures: bool = True
     articulation: bool = True
     speech_weight: float = option(1.0, WEIGHT, omit_default=True)
@@ -129,17 +125,14 @@ class JointEngineConfig(Configuration):
     both_neighbours: bool = option(False, omit_default=True)
     flat_start: bool = option(False, omit_default=True)
     modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
+    channels: str = option("", omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"hofer2008": HOFER_2008}
+    removed: ClassVar[Mapping[str, Any]] = {"paths": 1, "seed": 0}
     aliases: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.paths > 1 and not self.recognise_units:
-            raise InputError(
-                f"paths is {self.paths}: several are sampled only where units are recognised (recognise_units)"
-            )
-
         if not self.hmm.recognition.active:
             raise InputError("no stream takes part in recognition; give speech or F0 a weight")
 
@@ -246,6 +239,7 @@ class JointEngine(Engine[JointModel]):
         monitor: Monitor,
         checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes two minutes
     ) -> Fit[JointModel]:
+        examples = self._with_channels(examples)
         learning = self._learning(examples)
         hmm = train_joint(learning.utterances, learning.inventory, learning.units.classes(), self.config.hmm, monitor)
         figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
@@ -257,10 +251,15 @@ class JointEngine(Engine[JointModel]):
         """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``. Raises
         as that.
         """
-        learning = self._learning(examples)
+        learning = self._learning(self._with_channels(examples))
         classes = learning.units.classes()
         for hmm in grow_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor):
             yield learning.model(with_durations(hmm, learning.utterances))
+
+    def _with_channels(self, examples: Sequence[Example]) -> Sequence[Example]:
+        """Return examples with the channels that are modelled. Raises InputError: there is no such channel."""
+        names = self.config.channels.split()
+        return [replace(each, motion=each.motion.selected(names)) for each in examples] if names else examples
 
     def _learning(self, examples: Sequence[Example]) -> _Learning:
         """Return what the joint model is trained on. Raises CorpusError: there is no speech."""
@@ -300,19 +299,15 @@ class JointEngine(Engine[JointModel]):
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         observations = self._observations(speech)
         if self.config.recognise_units and not speech.units_decide:
-            units, paths = speech.cached(
-                (model.hmm, self.config.paths, self.config.seed),
-                lambda: self._recognised(model, observations, speech.features.duration_s),
+            units, path = speech.cached(
+                model.hmm, lambda: self._recognised(model, observations, speech.features.duration_s)
             )
         else:
             units = speech.units
             if self.config.own_alignment and speech.units_known and not speech.times_given:
                 units = _own_times(model, observations, units, speech.features.duration_s)
-            paths = [_aligned(model, observations, units)]
-        densities = (
-            select_densities(model.hmm, paths[0]) if len(paths) == 1 else average_path_densities(model.hmm, paths)
-        )
-        means, precisions = merge_gaussians(densities)
+            path = _aligned(model, observations, units)
+        means, precisions = merge_gaussians(select_densities(model.hmm, path))
 
         def statistics(frames: slice) -> Statistics:
             return means[frames], precisions[frames]
@@ -329,7 +324,7 @@ class JointEngine(Engine[JointModel]):
             motion,
             variance,
             with_unit_names(units, model.units),
-            StateTrace(_density_names(model.hmm, paths[0]), paths[0].frames),
+            StateTrace(_density_names(model.hmm, path), path.frames),
         )
 
     def describe(self, model: JointModel) -> str:  # noqa: D102
@@ -369,15 +364,12 @@ class JointEngine(Engine[JointModel]):
 
     def _recognised(
         self, model: JointModel, observations: StreamObservations, duration_s: float
-    ) -> tuple[Timeline[Unit], list[StatePath]]:
-        """Return the recognised units in time, and the state sequences from which motion is generated."""
-        recogniser = joint_recogniser(model.hmm)
-        segments = recogniser.recognise(observations)
+    ) -> tuple[Timeline[Unit], StatePath]:
+        """Return the recognised units in time, and the state sequence from which motion is generated."""
+        segments = joint_recogniser(model.hmm).recognise(observations)
         units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
-        if self.config.paths > 1:
-            return units, recogniser.draw_paths(observations, self.config.paths, self.config.seed)
         bounds = np.array([*(segment.first for segment in segments), observations.frames])
-        return units, [align(model.hmm, observations, [segment.unit for segment in segments], bounds)]
+        return units, align(model.hmm, observations, [segment.unit for segment in segments], bounds)
 
 
 def _own_times(

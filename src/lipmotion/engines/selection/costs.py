@@ -38,7 +38,8 @@ from lipmotion.units.phones import CLASSES
 
 NOT_NEGATIVE = Rule(least=0)
 MINNIS_2000: Mapping[str, Any] = {
-    "candidates": 1,
+    "candidates": 0,
+    "beam": 0,
     "suppressed": True,
     "overlap": "printed",
     "duration": 0.0,
@@ -56,13 +57,13 @@ class SelectionConfig(Configuration):
     """Options of the unit selection engine; the default values were chosen on the validation list (docs/selection.md).
 
     window     : phones of a window, N: odd, 3 to 11
-    candidates : units that are looked up for each phone and each bias
-    beam       : of all these, so many of the least target costs are candidates in the search
+    candidates : units that are looked up for each phone and each bias; 0: every contextual match
+    beam       : of all these, so many of the least target costs are candidates in the search; 0: all
     invisible  : phones without a lip shape of their own, those of the print by default (add ``l`` for faces without a
                  tongue): they count as one phone, and their neighbours choose the unit; empty: none
     suppressed : leave invisible phones out: the vowel that follows gives the shape, and no recorded one is played
-    overlap    : how units overlap in a phone that they share: ``learned``, ``printed`` (Table 1),
-                 ``symmetric``, ``middle``
+    overlap    : how units overlap in a phone that they share: ``learned``, ``printed`` (Table 1), ``symmetric``,
+                 ``anticipatory`` (Table 1, where "forward" is the phone after), ``middle``
     context    : target cost of another phone beside the phone, ``farther`` times as much for each phone further away;
                  half as much where both are of one viseme
     farther    : see ``context``
@@ -90,8 +91,8 @@ class SelectionConfig(Configuration):
     """
 
     window: int = option(5, Rule(least=3, odd=True))
-    candidates: int = option(300, Rule(least=1))
-    beam: int = option(25, Rule(least=1))
+    candidates: int = option(300, Rule(least=0))
+    beam: int = option(25, Rule(least=0))
     invisible: str = "t d g k"
     overlap: str = option("printed", Rule(choices=tuple(OVERLAPS)))
     context: float = option(0.3, NOT_NEGATIVE)
@@ -317,6 +318,8 @@ class Costs:
 
     def _distances(self, left: UnitNumbers, at_left: float, right: UnitNumbers, at_right: float) -> Array:
         """Return the squared deviations between units at fractions of their durations, weighted."""
+        if not self.config.join:
+            return np.zeros((len(left), len(right)))
         a, b = self._states(at_left)[left], self._states(at_right)[right]
         squares = np.square(a).sum(axis=1)[:, None] + np.square(b).sum(axis=1)
         return self.config.join * np.maximum(squares - 2 * a @ b.T, 0)
@@ -332,7 +335,7 @@ class Costs:
 
     def nearest(self, target: Target, number: int, units: UnitNumbers) -> UnitNumbers:
         """Return those of some units whose mean pose is nearest to what is wanted, ``candidates`` of them at most."""
-        if target.guided is None or self._recorded is None or len(units) <= self.config.candidates:
+        if target.guided is None or self._recorded is None or not 0 < self.config.candidates < len(units):
             return units
         distance = np.square(self._mean_poses[units] - target.guided[number].mean(axis=0)).sum(axis=1)
         order = np.argpartition(distance, self.config.candidates)[: self.config.candidates]

@@ -155,16 +155,23 @@ class UnitIndex:
         """Return the units whose windows agree best with a window, in ascending order.
 
         window   : symbols [shape=(N,)]; the phone itself is in the middle
-        count    : for each bias so many of the longest agreement; of equally long ones those that cost least
+        count    : for each bias so many of the longest agreement; of equally long ones those that cost least. 0: every
+                   contextual match: all units of the longest agreement to the left, to the right, and equally far to
+                   both sides; where no neighbour agrees, all units of the phone
         excluded : units that are not wanted [shape=(U,)]
         costs    : what units cost [shape=(N,)]; where it is the same, or None, those of the lowest keys are taken
         Empty, if no unit has the phone.
         """
+        length = len(window)
+        sides = (range(length // 2 + 1, 1, -1), range(length // 2 + 1, 1, -1), range(length, 1, -2))
+        lengths = sides if not count else (range(length, 0, -1),) * 3
         found = [
             each
             for bias, (order, keys) in enumerate(zip(self.orders, self.keys, strict=True))
-            for each in _longest(order, keys, window[digits(bias, len(window))], count, excluded, costs)
+            for each in _longest(order, keys, window[digits(bias, length)], lengths[bias], count, excluded, costs)
         ]
+        if not found and not count:
+            found = [*_longest(self.orders[0], self.keys[0], window[digits(0, length)], (1,), 0, excluded, costs)]
         return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
 
 
@@ -212,13 +219,15 @@ def _longest(
     order: UnitNumbers,
     keys: NDArray[np.int64],
     symbols: NDArray[np.intp],
+    lengths: Iterable[int],
     count: int,
     excluded: NDArray[np.bool_] | None,
     costs: Callable[[UnitNumbers], Array] | None,
 ) -> Iterator[UnitNumbers]:
-    """Yield units in the order of the length of their agreement, until there are ``count``."""
+    """Yield units whose agreement has some falling lengths, until there are ``count``; 0: those of the first length."""
     inner: tuple[int, int] | None = None
-    for length in range(len(symbols), 0, -1):
+    found = 0
+    for length in lengths:
         low = int(_keys(symbols[None, :length])[0]) * SYMBOLS ** (len(symbols) - length)
         first, stop = np.searchsorted(keys, [low, low + SYMBOLS ** (len(symbols) - length)]).tolist()
         outside = [(first, stop)] if inner is None else [(first, inner[0]), (inner[1], stop)]
@@ -227,11 +236,13 @@ def _longest(
             units = order[begin:end]
             if excluded is not None:
                 units = units[~excluded[units]]
-            if costs is not None and len(units) > count:
+            if costs is not None and 0 < count - found < len(units):
                 units = units[np.argsort(costs(units), kind="stable")]
-            units = units[:count]
-            count -= len(units)
+            units = units[: count - found] if count else units
+            found += len(units)
             if len(units):
                 yield units
-            if count <= 0:
+            if 0 < count <= found:
                 return
+        if found and not count:
+            return

@@ -69,8 +69,6 @@ LONGEST_SILENCE_FRAMES = 100
 """At least one of so many frames is stored."""
 LATE_S = 1.0
 """Units end at most so long after the motion of their recording."""
-OLD_PREFIX = "store_"
-"""Beginning of the names of arrays of motion as it once was compressed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +137,6 @@ def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
     wrong.
     """
     with format_errors("the model of recorded units"):
-        if any(name.startswith(OLD_PREFIX) for name in arrays):
-            raise ValueError("its recorded motion is compressed, which is no longer read; train the model again")
         named = (name for name in arrays if name.startswith(JOINT_PREFIX))
         refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, list_predictor_arrays(arrays), UNITS, GUIDE, named)
         motion = learned_motion_from_arrays(arrays, filtered=filtered)

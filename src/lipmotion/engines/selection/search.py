@@ -94,7 +94,7 @@ def _candidates(
     each = costs.target_costs(target, number, units)
     if prune:
         kept = np.flatnonzero(each <= each.min() + 2 * costs.config.most)
-        if len(kept) > costs.config.beam:
+        if 0 < costs.config.beam < len(kept):
             kept = np.sort(kept[np.argsort(each[kept], kind="stable")[: costs.config.beam]])
         units, each = units[kept], each[kept]
     return units, each

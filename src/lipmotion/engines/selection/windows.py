@@ -35,10 +35,13 @@ TABLE_1: Overlaps = {
 """Table 1 as printed. Its rows (forward) are the phone before, its columns (backward) the phone after."""
 SYMMETRIC: Overlaps = {**TABLE_1, (NORMAL, INVISIBLE): 0.73}
 """Table 1 with the one entry changed that makes it symmetric: 73/27 opposite to 27/73."""
+ANTICIPATORY: Overlaps = {(before, after): 1 - TABLE_1[after, before] for before, after in TABLE_1}
+"""Table 1 with its rows for the phone after: the abstract calls the influence of the following segment forward."""
 MIDDLE: Overlaps = dict.fromkeys(TABLE_1, 0.5)
 LEARNED: Overlaps = {**MIDDLE, (NORMAL, PROTECTED): 0.1}
 """The shares with the least errors of joined motion on the training list of GRID s1 (docs/results/selection.md)."""
-OVERLAPS: Mapping[str, Overlaps] = {"learned": LEARNED, "printed": TABLE_1, "symmetric": SYMMETRIC, "middle": MIDDLE}
+OVERLAPS: Mapping[str, Overlaps] = {"learned": LEARNED, "printed": TABLE_1, "symmetric": SYMMETRIC,
+                                    "anticipatory": ANTICIPATORY, "middle": MIDDLE}  # fmt: skip
 
 
 def lip_reading_class(phone: str, invisible: Collection[str]) -> str:

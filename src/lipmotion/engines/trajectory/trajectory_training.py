@@ -1,4 +1,4 @@
-"""Training of the trajectory engine: decision trees, emission densities, variance scaling."""
+"""The options of the trajectory engine, and its training: decision trees, emission densities, variance scaling."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from lipmotion.engines.trajectory.model import (
     AcousticRegression,
     Emission,
     Experts,
+    TrajectoryConfig,
     TrajectoryModel,
     add_acoustic_regression,
 )
@@ -41,28 +42,6 @@ from lipmotion.stats.trees import (
 )
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
-
-
-@dataclass(frozen=True)
-class TrainingOptions:
-    """Options of the training: those of a ``TrajectoryConfig``, and the states of phones and silences."""
-
-    layout: StateLayout
-    components: int
-    tree_factor: float
-    least_frames: float
-    shrinkage: float
-    variance_shrinkage: float
-    acoustic_regression: bool
-    acoustic_components: int
-    ridge: float
-    shared_ridge: float
-    ridge_frames: float
-    joint_recogniser: bool
-    epochs: int
-    articulation: bool
-    predictor: str
-    modulation_filter: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +83,7 @@ CLIPS_PER_BLOCK = 64
 """Examples of a block; the frames of a block are sorted by the node whose regression they belong to."""
 
 
-def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], options: TrainingOptions) -> Emission:
+def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], options: TrajectoryConfig) -> Emission:
     """Return the densities with means that are regressed on acoustic features, and variances around these means.
 
     Every node of the trees with enough frames has a linear regression on the features around the frame, shrunk towards
@@ -133,7 +112,7 @@ _Node = tuple[str, int]
 def _frames(
     emission: Emission,
     clips: Sequence[TrainingClip],
-    options: TrainingOptions,
+    options: TrajectoryConfig,
     context: AcousticContext,
     owners: Sequence[_Node | None],
 ) -> Iterator[tuple[_Node, NDArray[np.float32], NDArray[np.float32]]]:
@@ -142,7 +121,7 @@ def _frames(
     nodes, of_row = list(numbers), np.array([numbers[node] for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
         block = clips[start : start + CLIPS_PER_BLOCK]
-        rows = np.concatenate([density_rows(emission, clip.training_states, options.layout) for clip in block])
+        rows = np.concatenate([density_rows(emission, clip.training_states, options.training_layout) for clip in block])
         z = np.concatenate([context(clip.features, clip.frames) for clip in block])
         error = np.concatenate([clip.rows for clip in block]) - emission.means[rows]
         order = np.argsort(of_row[rows], kind="stable")
@@ -155,7 +134,7 @@ def _frames(
 
 
 def _coefficients(
-    emission: Emission, statistics: dict[_Node, RegressionStatistics], options: TrainingOptions
+    emission: Emission, statistics: dict[_Node, RegressionStatistics], options: TrajectoryConfig
 ) -> tuple[NDArray[np.float32], dict[_Node, int]]:
     """Return the coefficients of all regressions [shape=(R, F, 3·Q)], and the number of the regression of each node."""
     all_statistics = list(statistics.values())
@@ -171,12 +150,12 @@ def _coefficients(
 
 
 def _variances(
-    emission: Emission, regression: AcousticRegression, clips: Sequence[TrainingClip], options: TrainingOptions
+    emission: Emission, regression: AcousticRegression, clips: Sequence[TrainingClip], options: TrajectoryConfig
 ) -> NDArray[np.float32]:
     """Return the variances around the regressed means, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for clip in clips:
-        rows = density_rows(emission, clip.training_states, options.layout)
+        rows = density_rows(emission, clip.training_states, options.training_layout)
         means = emission.means[rows].astype(float)
         add_acoustic_regression(means, regression, rows, regression.context(clip.features, clip.frames))
         np.add.at(squares, rows, np.square(clip.rows - means))
@@ -195,7 +174,7 @@ LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
 
 
 def fit_trajectory(
-    examples: Sequence[Example], options: TrainingOptions, monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
+    examples: Sequence[Example], options: TrajectoryConfig, monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
 ) -> TrajectoryModel:
     """Return a model of the motion: densities of full-context states, tied by decision trees.
 
@@ -206,8 +185,8 @@ def fit_trajectory(
     if options.joint_recogniser:
         phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     monitor = sub_monitor(monitor, 0.3, 1)
-    clips = [training_clip(example, x, options.layout) for example, x in zip(examples, values, strict=True)]
-    layout = options.layout
+    layout = options.training_layout
+    clips = [training_clip(example, x, layout) for example, x in zip(examples, values, strict=True)]
     states = (state for clip in clips for state in clip.training_states)
     covered = {layout.name(state) for state in states if state.unit not in layout.units.silence}
     if len(covered) < layout.speech:
@@ -237,7 +216,7 @@ def fit_trajectory(
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure(space.direct_names, values, examples)
     return TrajectoryModel(
-        options.layout.units, space, emission, factors, closure, phone_recogniser, network, prior, share, modulation
+        layout.units, space, emission, factors, closure, phone_recogniser, network, prior, share, modulation
     )
 
 
@@ -245,7 +224,7 @@ _STAGE = "trees"
 
 
 def _share_of_predictor(
-    predictions: Sequence[Array], clips: Sequence[TrainingClip], options: TrainingOptions, direct: int
+    predictions: Sequence[Array], clips: Sequence[TrainingClip], options: TrajectoryConfig, direct: int
 ) -> float:
     """Return the weight of a predictor beside the states, by cross-validation: 0 to 1.
 
@@ -261,7 +240,7 @@ def _share_of_predictor(
             emission = fit_acoustic_regression(emission, [clips[number] for number in inside], options)
         for number in outside:
             clip = clips[number]
-            rows = density_rows(emission, clip.states, options.layout)
+            rows = density_rows(emission, clip.states, options.training_layout)
             states = solve_mlpg(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
             recorded, predicted = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
             spread = np.maximum(recorded.std(axis=0), 1e-6)
@@ -300,16 +279,16 @@ def training_clip(example: Example, values: Array, layout: StateLayout) -> Train
     return TrainingClip(example.speech, states, frames, dynamics)
 
 
-def _fit_emission(clips: Sequence[TrainingClip], options: TrainingOptions) -> Emission:
+def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig) -> Emission:
     """Return the Gaussians of all leaves; each mean and variance is shrunk towards that of its parent node."""
-    rest = options.layout.rest
+    rest = options.training_layout.rest
     moving = np.concatenate(
         [clip.rows[[state != rest for state in clip.training_states]] for clip in clips], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
     scale = np.sqrt(np.maximum(overall, least))
-    grouped = _context_moments(clips, options.layout, centre, scale)
+    grouped = _context_moments(clips, options.training_layout, centre, scale)
     forest = {name: _grow_tree(contexts, 2 * overall.size, options) for name, contexts in grouped.items()}
     leaves = [
         gaussian
@@ -323,13 +302,17 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrainingOptions) -> Em
     return Emission(forest, means.astype(np.float32), np.maximum(variances, least).astype(np.float32), None)
 
 
-def _grow_tree(contexts: _Contexts, parameters: int, options: TrainingOptions) -> Tree:
+def _grow_tree(contexts: _Contexts, parameters: int, options: TrajectoryConfig) -> Tree:
     """Return the decision tree of one state; a single leaf where no training frame is in this state."""
-    empty = {options.layout.rest.context: np.zeros(1 + parameters)}
+    empty = {options.training_layout.rest.context: np.zeros(1 + parameters)}
     return grow_tree(
         list(contexts or empty),
         np.array(list((contexts or empty).values())),
-        [Question(place, *unit_class) for place in range(3) for unit_class in options.layout.units.classes().items()],
+        [
+            Question(place, *unit_class)
+            for place in range(3)
+            for unit_class in options.training_layout.units.classes().items()
+        ],
         gaussian_log_likelihood,
         parameters=parameters,
         factor=options.tree_factor,
@@ -360,7 +343,7 @@ def _context_moments(
     return grouped
 
 
-def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: TrainingOptions) -> list[tuple[Array, Array]]:
+def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: TrajectoryConfig) -> list[tuple[Array, Array]]:
     """Return mean and variance [each shape=(3·Q,)] of every leaf, in standardised units."""
     totals = np.zeros((len(tree.asked), 1 + 2 * size))
     parents = np.full(len(tree.asked), -1)
@@ -379,14 +362,14 @@ def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: Trainin
 
 
 def _rest_gaussian(
-    clips: Sequence[TrainingClip], options: TrainingOptions, fallback: Array, overall: Array
+    clips: Sequence[TrainingClip], options: TrajectoryConfig, fallback: Array, overall: Array
 ) -> tuple[Array, Array]:
     """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech."""
     poses = [
         clip.rows[number, 0]
         for clip in clips
         for number, state in enumerate(clip.training_states)
-        if state == options.layout.rest
+        if state == options.training_layout.rest
     ]
     if not poses:
         return fallback, overall

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,44 +58,6 @@ def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
     model, means, precisions = _motion_gaussians(hmm)
     chosen = model.forest.leaves(path.states.triphones)[path.frames]
     return _make_densities(model.tied.mixtures.log_weights[chosen].astype(float), means[chosen], precisions[chosen])
-
-
-def average_densities(hmm: JointHmm, leaves: NDArray[np.intp], posterior: Array) -> FrameDensities:
-    """Return one Gaussian for every frame, that of all states together, given their posteriors.
-
-    leaves    : of S states in the motion stream [shape=(S,)]
-    posterior : of the states in every frame [shape=(T, S)]
-    A trajectory that maximises the expected log density needs, in every frame, the expected precision, and the mean
-    weighted by precision. The Gaussians of a mixture count by their weights.
-    Raises InputError: as ``select_densities``, or the shapes do not fit.
-    """
-    model, means, precisions = _motion_gaussians(hmm)
-    if posterior.ndim != 2 or posterior.shape[1] != len(leaves):
-        raise InputError(f"posteriors of shape {posterior.shape}, required (T, {len(leaves)}): one of each state")
-    used, local = np.unique(leaves, return_inverse=True)
-    by_leaf = np.zeros((len(used), len(posterior)))
-    np.add.at(by_leaf, local, posterior.T)
-    weights = np.exp(model.tied.mixtures.log_weights[used].astype(float))[:, :, None, None]
-    precision = (weights * precisions[used]).sum(axis=1)
-    weighted = (weights * precisions[used] * means[used]).sum(axis=1)
-    shape = (len(posterior), 1, *precision.shape[1:])
-    total = (by_leaf.T @ precision.reshape(len(used), -1)).reshape(shape)
-    mean = (by_leaf.T @ weighted.reshape(len(used), -1)).reshape(shape) / np.maximum(total, np.finfo(float).tiny)
-    return _make_densities(np.zeros((len(posterior), 1)), mean, total)
-
-
-def average_path_densities(hmm: JointHmm, paths: Sequence[StatePath]) -> FrameDensities:
-    """Return one Gaussian for every frame, that of several equally probable paths. Raises InputError: as
-    ``average_densities``.
-    """
-    model, _, _ = _motion_gaussians(hmm)
-    if not paths or len({len(path.frames) for path in paths}) > 1:
-        raise InputError(f"{len(paths)} paths, required one or more of the same length")
-    chosen = np.stack([model.forest.leaves(path.states.triphones)[path.frames] for path in paths])
-    leaves, local = np.unique(chosen, return_inverse=True)
-    posterior = np.zeros((len(paths[0].frames), len(leaves)))
-    np.add.at(posterior, (np.arange(len(posterior)), local.reshape(chosen.shape)), 1 / len(paths))
-    return average_densities(hmm, leaves, posterior)
 
 
 def solve_trajectory(

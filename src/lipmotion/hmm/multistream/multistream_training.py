@@ -264,10 +264,9 @@ def train_joint(
     classes: Mapping[str, frozenset[str]],
     config: JointConfig,
     monitor: Monitor = silent_monitor,
-    validation: Sequence[TrainingUtterance] = (),
 ) -> JointHmm:
     """Return models of all streams, trained together: the last of ``grow_joint``, which says what it takes."""
-    *_, hmm = grow_joint(utterances, inventory, classes, config, monitor, validation)
+    *_, hmm = grow_joint(utterances, inventory, classes, config, monitor)
     return with_durations(hmm, utterances)
 
 
@@ -277,15 +276,12 @@ def grow_joint(
     classes: Mapping[str, frozenset[str]],
     config: JointConfig,
     monitor: Monitor = silent_monitor,
-    validation: Sequence[TrainingUtterance] = (),
 ) -> Iterator[JointHmm]:
     """Yield models of all streams, trained together, of 1, 2, 4 … Gaussians for speech, then of more for motion.
 
     Their durations are not measured (NaN): ``with_durations``.
 
-    classes    : sets of units, by name, that the trees ask about, besides single units
-    validation : mixtures of speech and motion are split as long as the likelihood of these utterances rises; without
-                 any, as often as the configuration allows
+    classes : sets of units, by name, that the trees ask about, besides single units
     A stream of weight 0 in training does not affect the alignment, but its densities are learned.
     Within each stage the likelihood never falls.
     Raises CorpusError: no utterance, or none with as many frames as its units have states.
@@ -302,10 +298,9 @@ def grow_joint(
     hmm = _tie_states(hmm, prepared, context_questions(inventory, classes), trees)
     hmm = _run_em(hmm, prepared, "units in context", config.iterations, tied)
     yield hmm
-    held_out = _prepare(hmm, validation)
     for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
         for part in _split_monitor(of_stream, [1] * count) if name in hmm.models else ():
-            split = _split(hmm, prepared, held_out, name, part)
+            split = _split(hmm, prepared, name, part)
             if split is None:
                 break
             hmm = split
@@ -414,26 +409,14 @@ def _tie_states(
     return replace(hmm, models=models)
 
 
-def _split(
-    hmm: JointHmm, prepared: PreparedUtterances, held_out: PreparedUtterances, name: str, monitor: Monitor
-) -> JointHmm | None:
-    """Return the models with a stream's Gaussians split, and trained; None: too little data, or no gain on held-out
-    speech.
-    """
+def _split(hmm: JointHmm, prepared: PreparedUtterances, name: str, monitor: Monitor) -> JointHmm | None:
+    """Return the models with a stream's Gaussians split, and trained; None: too little data."""
     model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared).leaves[name]
     if not model.tied.can_split(statistics):
         return None
     tied = model.tied.split(statistics)
     new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})
-    new = _run_em(new, prepared, f"{tied.mixtures.size[1]} Gaussians for {name}", hmm.config.iterations, monitor)
-    rises = not held_out.items or mean_log_likelihood(new, held_out) > mean_log_likelihood(hmm, held_out)
-    return new if rises else None
-
-
-def mean_log_likelihood(hmm: JointHmm, prepared: PreparedUtterances) -> float:
-    """Return the mean log likelihood per frame of utterances with as many frames as states; 0 where there are none."""
-    values = [(p.log_likelihood, prepared.items[p.utterance].frames) for p in iterate_posteriors(hmm, prepared)]
-    return sum(value for value, _ in values) / max(sum(frames for _, frames in values), 1)
+    return _run_em(new, prepared, f"{tied.mixtures.size[1]} Gaussians for {name}", hmm.config.iterations, monitor)
 
 
 def _prepare(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> PreparedUtterances:

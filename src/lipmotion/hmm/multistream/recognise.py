@@ -1,4 +1,4 @@
-"""Alignment and recognition with multi-stream models: the most probable units, or paths drawn from the posterior."""
+"""Alignment and recognition with multi-stream models: the most probable units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, MOTION, Stream
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.unit_states import RecognisedUnit, TriphoneStates, expand_triphones
 from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, UnitLoop, build_chain, decode_units
-from lipmotion.kernels.paths import sample_paths
 
 MIN_VARIANCE = 1.0
 """Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
@@ -248,24 +247,6 @@ class JointRecogniser:
         """
         units, starts = decode_units(self._loop.network, self._log_likelihoods(observed), beam)
         return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
-
-    def draw_paths(self, observed: StreamObservations, count: int, seed: int) -> list[StatePath]:
-        """Return ``count`` paths of states, drawn from their posterior. Memory: 20 kB a frame in GRID. Raises as
-        ``recognise``.
-        """
-        if count < 1:
-            raise InputError(f"{count} paths, required one or more")
-        uniform = np.random.default_rng(seed).random((count, observed.frames))
-        log_density = self._log_likelihoods(observed).log_density(0, observed.frames, None)
-        paths, log_likelihood = sample_paths(log_density, self._loop.network.network, uniform)
-        if not np.isfinite(log_likelihood):
-            raise AlignmentError(f"no units fit into {observed.frames} frames of 10 ms; give a longer recording")
-        drawn, loop = [], self._loop.network
-        for nodes in paths:  # one node of the loop is one state of its unit
-            changes = np.append(True, np.diff(nodes) != 0)
-            units = [loop.owners[node] for node in nodes[changes].tolist() if node in loop.entries]
-            drawn.append(StatePath(expand_triphones(self.hmm.inventory, units), np.cumsum(changes) - 1))
-        return drawn
 
     @property
     def _weights(self) -> StreamWeights:

@@ -304,9 +304,13 @@ def read_generation(
         else each
         for each in motion.channels
     )
-    states = np.zeros(len(motion.values), np.intp)
-    nothing = np.broadcast_to(0.0, motion.values.shape)
-    return Generation(replace(motion, channels=channels), nothing, phones, StateTrace((STATE,), states))
+    return as_generation(replace(motion, channels=channels), phones)
+
+
+def as_generation(motion: Motion, units: Timeline[Unit]) -> Generation:
+    """Return motion that no model made as ``write`` takes it, without variance."""
+    states = StateTrace((STATE,), np.zeros(len(motion.values), np.intp))
+    return Generation(motion, np.broadcast_to(0.0, motion.values.shape), units, states)
 
 
 def correct_rate(motion: Motion, duration_s: float, advice: str = "") -> Motion:

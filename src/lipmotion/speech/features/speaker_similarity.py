@@ -22,10 +22,9 @@ STRANGER_SCORE, OWN_SCORE = -9.0, -3.0
 """A model knows nothing of a voice with the first speaker similarity score; one with the second is its training's own.
 The score of another speaker in the same studio is -4 to -6 for GRID's models, of other voices in other rooms -7 to -15,
 and of the training's own in noise no more."""
-STRANGER_LIKENESS, OWN_LIKENESS = 0.2, 0.75
-"""The same of the likeness of speaker vectors, which noise and rooms change little (docs/results/voices.md)."""
-SURE_SCORE = 0.5
-"""A voice that is known so well by its score is judged by it alone."""
+STRANGER_LIKENESS, OWN_LIKENESS = (0.3, 0.6), (0.6, 0.9)
+"""The same of the likeness of speaker vectors: each where the score says nothing of the voice, as in noise, and where
+it half knows it (docs/results/voices.md)."""
 QUIET_SHARE = 0.4
 """So many of the frames, the most quiet, are not used for a speaker vector: pauses sound like the room alone."""
 JUDGED_RECORDINGS = 100
@@ -66,18 +65,17 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
 def voice_knowledge(hmm: UnitHmm, audio: AnalysedAudio) -> float:
     """Return how well a model knows the voice of a recording, 0 (as little as any) to 1 (its own).
 
-    By the speaker similarity; where that is low, by the likeness of speaker vectors, if it says more: noise makes
-    every voice dissimilar, and vectors in quiet do not tell the voices of one studio apart.
+    By the speaker similarity or the likeness of speaker vectors, whichever says more: noise makes every voice
+    dissimilar, and vectors of short recordings are unlike. In noise less likeness is needed.
     """
-    known = (STRANGER_SCORE, OWN_SCORE), (0.0, 1.0)
-    by_score = float(np.interp(speaker_similarity(hmm, audio).score, *known))
-    if hmm.speaker is None or by_score >= SURE_SCORE:
+    by_score = float(np.interp(speaker_similarity(hmm, audio).score, (STRANGER_SCORE, OWN_SCORE), (0, 1)))
+    if hmm.speaker is None:
         return by_score
     stretch = _longest_passage(audio)
     vector, own = stretch.cached("speaker vector", lambda: speaker_vector(stretch)), hmm.speaker.astype(float)
     likeness = float(vector @ own) / float(own @ own)
-    by_likeness = float(np.interp(likeness, (STRANGER_LIKENESS, OWN_LIKENESS), (0, 1)))
-    return by_score + (1 - by_score / SURE_SCORE) * max(by_likeness - by_score, 0.0)
+    limits = [np.interp(by_score, (0.0, 0.5), pair) for pair in (STRANGER_LIKENESS, OWN_LIKENESS)]
+    return max(by_score, float(np.interp(likeness, limits, (0, 1))))
 
 
 def speaker_vector(audio: AnalysedAudio) -> NDArray[np.float64]:
