@@ -102,13 +102,15 @@ def test_what_is_tried_for_which_structure():
         for system, options in SYSTEMS.items()
     }
     assert names["ph-HMM"] == ["audio_weight", "mixtures", "states"]
-    assert names["ph-MSHMM"] == names["ph-vi-CHMM"] == ["audio_weight", "mixtures", "visual_mixtures", "states"]
+    multistream = ["audio_weight", "mixtures", "visual_mixtures"]
+    assert names["ph-MSHMM"] == [*multistream, "states"]
+    assert names["ph-vi-CHMM"] == [*multistream, "moves_together", "states"]
     assert names["ph-FHMM"] == ["audio_weight", "mixtures", "unseen_loss", "start_asynchrony", "states"]
 
 
 def test_options_are_told_where_they_are_not_those_printed():
     for system, options in SYSTEMS.items():
-        changed = list_changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 0.0}))
+        changed = list_changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 3.0}))
         assert changed == {
-            "structure": options["structure"], "chains": options["chains"], "audio_weight": 0.3, "unseen_loss": 0.0,
+            "structure": options["structure"], "chains": options["chains"], "audio_weight": 0.3, "unseen_loss": 3.0,
         }, system  # fmt: skip

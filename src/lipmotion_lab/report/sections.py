@@ -205,7 +205,8 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     main = tables.pop(AUDIO_ONLY)
     words, verdict, by_amse = warn_of_few(figures["clips"]), "", []
     for ending, called in (("", "as printed"), (TUNED, "as tuned on val")):
-        pairs = [pair for pair in size["pairs"] if pair["better"].endswith(TUNED) == bool(ending)]
+        names = {name + ending for name in PAPER_FIGURES}
+        pairs = [pair for pair in size["pairs"] if {pair["better"], pair["worse"]} <= names]
         if pairs:
             by_acc, by_error = (_order_of_systems(main.rows, pairs, ending, *measure) for measure in MEASURES)
             words[f"Systems {called}, by ACC"] = [*([by_acc.verdict()] if verdict else []), *by_acc.sentences()]

@@ -67,6 +67,7 @@ from lipmotion_lab.xie_liu2007.systems import (
     COMPARED_SYSTEMS,
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
+    SPLIT,
     TUNED,
     TUNING,
     TrainedSystem,
@@ -139,7 +140,8 @@ def xieliu2007(  # noqa: PLR0913
     check_visual(options.visual)
     tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
-    held_out, validation = corpus.required(split), corpus.required("val") if tunes else ()
+    chosen_on_val = tunes or any(COMPARED_SYSTEMS[name].splits for name in names)
+    held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
     check_training_names(corpus, listed, (*held_out, *validation))
     steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
@@ -227,7 +229,8 @@ class _TrainingSetup:
                 trained[name] = system_from_arrays(found)
                 continue
             known = with_inputs_of(name, examples, self.corpus)
-            trained[name] = train_system(name, known, recordings.get("val"), trials, trained, part)
+            validation, tuning = recordings.get("val"), self.options.tuning
+            trained[name] = train_system(name, known, validation, trials, trained, tuning, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 found = system_to_arrays(trained[name])
                 kept.save(f"system-{name}", found)
@@ -312,10 +315,14 @@ def _paper_pairs(
     """Return how much better each system of the paper is than each that is worse in print, on the same clips."""
     by_acc = sorted(PAPER_FIGURES, key=lambda name: -PAPER_FIGURES[name][1])
     rows = []
-    for ending in ("", TUNED):
-        present = [name + ending for name in by_acc if name + ending in made]
-        statistics = {name: _statistics(recordings, made[name]) for name in present}
-        for better, worse in combinations(present, 2):
+    for ending in ("", SPLIT, TUNED):
+        compared = [name + ending for name in by_acc if name + ending in made]
+        pairs = [*combinations(compared, 2)]
+        if not ending:
+            helped = [(f"{name}, {more}", name) for name in compared for more in ("tied", "together")]
+            pairs += [(better, worse) for better, worse in helped if better in made]
+        statistics = {name: _statistics(recordings, made[name]) for name in {*compared, *(pair[0] for pair in pairs)}}
+        for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
                 own, other = statistics[better][key], statistics[worse][key]

@@ -40,8 +40,8 @@ SYSTEMS: dict[str, dict[str, Any]] = {
     "ph-vi-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone viseme"},
 }
 """Options of the coupled engine for each system. Source: Xie & Liu 2007, Table 2."""
-PRESETS: dict[str, dict[str, Any]] = SYSTEMS | {"xieliu2007": SYSTEMS["ph-vi-CHMM"]}
-"""The systems by name, and the one that the paper proposes (docs/papers/xieliu2007.md)."""
+PRESETS: dict[str, dict[str, Any]] = SYSTEMS | {"xieliu2007": AS_PRINTED}
+"""The systems by name, and what they share: alone it is the one that the paper proposes, ph-vi-CHMM."""
 
 
 @dataclass(frozen=True)
