@@ -132,7 +132,7 @@ UNUSABLE = [
     ("CORPUS -o m --engine coupled --units eVis", 3, '--set chains="phone viseme"'),
     ("CORPUS -o m --engine joint --system ph-HMM", 3, "not of 'joint'; leave out one of them"),
     ("CORPUS -o m --preset hofer2008 --system ph-HMM", 3, "not of 'joint'; leave out one of them"),
-    ("CORPUS -o m --preset ph-HMM --system ph-CHMM", 3, "structure is 'hmm' and 'coupled'; give one"),
+    ("CORPUS -o m --preset ph-HMM --system ph-CHMM", 3, "'hmm' and 'coupled'; give one of them"),
     ("CORPUS -o m --preset xieliu2007 --system ph-RNN", 3, "no preset 'ph-RNN'"),
     ("CORPUS -o m --set tree=1", 3, "no option 'tree'; there are: states, silent_states"),
     ("CORPUS -o m --engine joined", 3, "no engine 'joined'; there are: trajectory, coupled, joint"),

@@ -43,7 +43,7 @@ def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
 def test_arguments_that_are_not_allowed() -> None:
     for name, arguments, words in (
         ("joined", {}, "no engine 'joined'; there are: trajectory, coupled, joint"),
-        ("trajectory", {"preset": "ph-HMM"}, "of the engine 'coupled', not of 'trajectory'; leave out one of them"),
+        ("trajectory", {"preset": "ph-HMM"}, "of 'coupled', not of 'trajectory'; leave out one of them"),
         ("coupled", {"preset": "ph-hmm"}, "no preset 'ph-hmm'; there are: ph-HMM, ph-MSHMM"),
         ("coupled", {"units": "eVis"}, '--set chains="phone viseme"'),
         ("coupled", {"settings": ["state=3"]}, "no option 'state'; there are: structure, chains, states, "),

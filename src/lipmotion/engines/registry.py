@@ -49,8 +49,8 @@ def engine_from_settings(
     """Return an engine whose configuration is parsed from texts, as on the command line.
 
     name     : of the engine; None: that of the preset, otherwise ``trajectory``
-    preset   : a named configuration: ``hofer2008``, ``xieliu2007``, ``minnis2000``, or a system as ``ph-vi-CHMM``; several,
-               separated by blanks, if they agree on every option
+    preset   : a named configuration: ``hofer2008``, ``xieliu2007``, ``minnis2000``, or a system as ``ph-vi-CHMM``;
+               several, with blanks between, if they agree on every option
     units    : the unit set, for engines with an option ``units``
     settings : ``NAME=VALUE`` for any options; these override preset and units
     Raises InputError: no such engine, preset, unit set or option, or a value that is not allowed.
@@ -93,7 +93,7 @@ def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
 
 
 def _preset(name: str | None, preset: str) -> tuple[str, dict[str, Any]]:
-    """Return the engine and the options of presets. Raises InputError: no engine has one, or not ``name``, or two differ."""
+    """Return the engine and the options of presets. Raises InputError: no engine has one, or two differ."""
     engines = {known: engine for engine in ENGINES.names for known in _class_of(engine).Config.presets}
     options: dict[str, Any] = {}
     for each in preset.split() or [preset]:
@@ -101,9 +101,10 @@ def _preset(name: str | None, preset: str) -> tuple[str, dict[str, Any]]:
             raise InputError(f"no preset {each!r}; there are: {', '.join(engines)}")
         name = name or engines[each]
         if name != engines[each]:
-            raise InputError(f"{each} is a preset of the engine {engines[each]!r}, not of {name!r}; leave out one of them")
+            raise InputError(f"{each} is a preset of {engines[each]!r}, not of {name!r}; leave out one of them")
         more = _class_of(name).Config.presets[each]
-        if differing := [key for key in more if options.get(key, more[key]) != more[key]]:
-            raise InputError(f"presets {preset}: {differing[0]} is {options[differing[0]]!r} and {more[differing[0]]!r}; give one")
+        for key, value in options.items():
+            if more.get(key, value) != value:
+                raise InputError(f"presets {preset}: {key} is {value!r} and {more[key]!r}; give one of them")
         options |= more
     return name or DEFAULT, options

@@ -26,10 +26,10 @@ from lipmotion.pipeline.workers import worker_pool
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
-from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
-from lipmotion.types import Example, Monitor, sub_monitor, with_progress
+from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation.evaluate import (
     ClipStatistic,
@@ -44,8 +44,6 @@ from lipmotion_lab.evaluation.held_out import (
     OPENING,
     ComparedClip,
     HeldOutRecordings,
-    NoiseConditions,
-    add_noise,
     generate_clips,
     load_held_out,
 )
@@ -64,6 +62,7 @@ from lipmotion_lab.runner import (
 )
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
+    ALL_PATHS,
     COMPARED_SYSTEMS,
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
@@ -93,14 +92,12 @@ class ComparisonOptions:
     tuning      : how the settings of tuned systems are chosen, on the list ``val``
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
-    noise       : noise in which the systems trained on the largest size are compared as well
     """
 
     systems: Sequence[str] | None = None
     tuning: TuningOptions = TUNING
     visual: str = GEOMETRY
     transcripts: bool = False
-    noise: NoiseConditions | None = None
 
 
 DEFAULT_OPTIONS = ComparisonOptions()
@@ -150,7 +147,7 @@ def xieliu2007(  # noqa: PLR0913
     if plots is not None:
         check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
-    shares = np.cumsum([0.3 * sum(steps), *steps, 0.1 * sum(steps)]) / (1.4 * sum(steps))
+    shares = np.cumsum([0.3 * sum(steps), *steps]) / (1.3 * sum(steps))
     trials = (
         setup.tune(tunes, listed, sub_monitor(settings.monitor, 0, float(shares[0]), "choosing: ")) if tunes else {}
     )
@@ -160,12 +157,6 @@ def xieliu2007(  # noqa: PLR0913
         trained = setup.train(names, listed[:count], trials, part)
         kept = setup.checkpoint(listed[:count], held_out)
         rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
-    noise, noise_rows = options.noise or NoiseConditions(), []
-    noises = [(kind, ratio_db) for kind in noise.kinds for ratio_db in noise.ratios_db]
-    for kind, ratio_db in with_progress(noises, "comparing in noise", sub_monitor(settings.monitor, 0.9, 1)):
-        noisy = add_noise(trained.recordings, kind, ratio_db, noise.talkers, seed)
-        systems = _system_rows(noisy, _generate(noisy, AUDIO_ONLY, trained.systems), seed)
-        noise_rows.append({"kind": kind, "snr_db": ratio_db, "systems": systems})
     recordings = trained.recordings
     if plots is not None:
         draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
@@ -178,7 +169,7 @@ def xieliu2007(  # noqa: PLR0913
         "validation": len(validation),
     }
     chosen |= {"tried": {name: [as_row(trial) for trial in tried] for name, tried in trials.items()}}
-    return nan_as_null(about | {"tuning": chosen, "rows": rows, "noise": noise_rows})
+    return nan_as_null(about | {"tuning": chosen, "rows": rows})
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +287,7 @@ def _generate(
     recordings: HeldOutRecordings,
     condition: str,
     systems: Mapping[str, TrainedSystem],
-    kept: Checkpoint = NO_CHECKPOINT,
+    kept: Checkpoint,
 ) -> dict[str, list[ComparedClip]]:
     made = {}
     for name, system in systems.items():
@@ -319,9 +310,11 @@ def _paper_pairs(
         compared = [name + ending for name in by_acc if name + ending in made]
         pairs = [*combinations(compared, 2)]
         if not ending:
-            helped = [(f"{name}, {more}", name) for name in compared for more in ("tied", "together")]
-            pairs += [(better, worse) for better, worse in helped if better in made]
-        statistics = {name: _statistics(recordings, made[name]) for name in {*compared, *(pair[0] for pair in pairs)}}
+            helped = [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
+            pairs += [
+                pair for pair in (*helped, *combinations([n + ALL_PATHS for n in by_acc], 2)) if {*pair} <= {*made}
+            ]
+        statistics = {name: _statistics(recordings, made[name]) for name in {*sum(pairs, ())}}
         for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
@@ -402,8 +395,6 @@ def table(figures: Mapping[str, Any]) -> str:
                 changed.append(f"  {name:{WIDTH}}{', '.join(texts) or 'as printed'}")
         lines += ["", "settings, the best on val", *changed] if changed else []
         lines += _pair_lines(size["pairs"], amse_form)
-    for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
-        lines += ["", *_noise_lines(kind, figures, amse_form)]
     lines += [
         "",
         f"* differs from {REFERENCE_SYSTEM}: the 95 % interval of the difference on the same clips leaves out 0",
@@ -456,21 +447,3 @@ def _with_interval(row: Mapping[str, Any], name: str, form: str) -> str:
         return "–"
     low, high = (format(end, form) for end in row[f"{name}_95"])
     return f"{row[name]:{form}}{significance_mark(row[f'{name}_gain_95'])} ({low}–{high})"
-
-
-def _noise_lines(kind: str, figures: Mapping[str, Any], amse_form: str) -> list[str]:
-    """Return the lines of ACC and AMSE of every system, from clean sound to the loudest noise."""
-    in_noise = [row for row in figures["noise"] if row["kind"] == kind]
-    size = figures["rows"][-1]
-    clean = next(iter(size["conditions"].values()))
-    heads = ["clean", *(f"{row['snr_db']:g} dB" for row in in_noise)]
-    lines = [f"{kind} noise, audio only, trained on {size['used']} clips without noise: ACC / AMSE"]
-    lines.append(f"  {'system':{WIDTH}}" + "".join(f"{head:>17}" for head in heads))
-    for name in clean:
-        cells = [
-            f"{row['acc']:.3f}{significance_mark(row['acc_gain_95'])} / "
-            f"{row['amse']:{amse_form}}{significance_mark(row['amse_gain_95'])}"
-            for row in (clean[name], *(row["systems"][name] for row in in_noise))
-        ]
-        lines.append(f"  {name:{WIDTH}}" + "".join(f"{cell:>17}" for cell in cells))
-    return lines

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from itertools import chain
 from time import process_time
 from typing import Any
 
@@ -53,7 +52,7 @@ class TuningOptions:
     mixtures: int = 8
     visual_mixtures: int = 2
     pair_mixtures: int = 1
-    split: int = 4
+    split: int = 8
     states: tuple[int, ...] = (3,)
 
 
@@ -84,7 +83,7 @@ def list_alternatives(options: Options, tuning: TuningOptions) -> list[list[dict
     """Return the kinds of settings that are tried for a system, in order, each with its values."""
     factorial = options["structure"] == FACTORIAL
     most = tuning.pair_mixtures if factorial else tuning.mixtures
-    kinds = [[{"audio_weight": weight, "mixtures": most} for weight in tuning.weights]]
+    kinds: list[list[dict[str, Any]]] = [[{"audio_weight": weight, "mixtures": most} for weight in tuning.weights]]
     if options["structure"] != HMM and most > 1:
         kinds.append([{"visual_mixtures": tuning.visual_mixtures}])
     if factorial:
@@ -138,6 +137,16 @@ def judge_systems(
             yield trial, replace(system, engine=engine)
 
 
+def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
+    """Yield systems of 1, 2, 4, … Gaussians, up to the first that is no better than that before it."""
+    best = -np.inf
+    for trial, system in found:
+        yield trial, system
+        if trial.acc <= best:
+            return
+        best = trial.acc
+
+
 def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
     """Return the system of which something is highest, as the ACC of its trial; with all trials."""
     pairs = list(found)
@@ -171,7 +180,8 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
 """AMSE and ACC of the paper's Table 3: eigenlips of another speaker, so only their order compares."""
 BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
-TUNED, SPLIT = ", tuned", ", K on val"
+TUNED, SPLIT, ALL_PATHS = ", tuned", ", K on val", ", all paths"
+SOFT = {"start": "soft", "steps": 0}
 ABOUT = "about"
 MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
 
@@ -211,7 +221,7 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     MATCHED: ComparedSystem(options=SYSTEMS["ph-MSHMM"], tunes="ph-MSHMM"),
     **{f"{name}, tied": ComparedSystem(options=SYSTEMS[name] | TIED) for name in ("ph-FHMM", "ph-vi-FHMM")},
     **{f"{name}, together": ComparedSystem(options=SYSTEMS[name] | TOGETHER) for name in ("ph-CHMM", "ph-vi-CHMM")},
-    "ph-vi-CHMM, soft start": ComparedSystem(options={"start": "soft"}, same_model_as=REFERENCE_SYSTEM),
+    **{name + ALL_PATHS: ComparedSystem(options=SOFT, same_model_as=name) for name in PAPER_FIGURES},
     BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
     "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
     "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
@@ -223,10 +233,11 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
 }
 """The systems of the table, in its order.
 
-The paper's six are those of ``train --preset``, of one Gaussian a state; ``K on val``: with the number of Gaussians that
-was best on validation recordings; ``tuned``: with all settings that were best there;
+The paper's six are those of ``train --preset``, of one Gaussian a state; ``K on val``: with the number of Gaussians
+that was best on validation recordings; ``tuned``: with all settings that were best there;
 ``as large as``: with as many Gaussians as bring the number of parameters nearest to that of the tuned ph-vi-FHMM.
-``tied``, ``together``: chains as ``TIED`` and ``TOGETHER`` have them. ``best path``: means along the best path, no EM.
+``tied``, ``together``: chains as ``TIED`` and ``TOGETHER`` have them. ``all paths``: expected means given speech, no
+EM; ``best path``: means along the best path, no EM.
 ``own means``: no regression of the visual means on acoustic features.
 """
 
@@ -240,7 +251,8 @@ def select_systems(names: Sequence[str] | None) -> list[str]:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
     if BLSTM in names:
         import_torch()
-    needed = {REFERENCE_SYSTEM} | {COMPARED_SYSTEMS[name].tunes for name in names}
+    chosen = [COMPARED_SYSTEMS[name] for name in names]
+    needed = {REFERENCE_SYSTEM} | {name for system in chosen for name in (system.tunes, system.same_model_as)}
     if MATCHED in names:
         needed |= {"ph-vi-FHMM", "ph-vi-FHMM" + TUNED}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
@@ -291,9 +303,11 @@ def train_system(
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
     if system.splits and validation is not None:
-        alike = [{"visual_mixtures": tuning.split}, {}][: 1 if system.options["structure"] == HMM else 2]
-        grown = (train_stages({**system.options, "mixtures": tuning.split, **more}, examples, monitor) for more in alike)
-        return choose_by(lambda trial: trial.acc, judge_systems(chain.from_iterable(grown), validation))
+        found = []
+        for more in [{"visual_mixtures": tuning.split}, {}][: 1 if system.options["structure"] == HMM else 2]:
+            grown = train_stages({**system.options, "mixtures": tuning.split, **more}, examples, monitor)
+            found += split_while_better(judge_systems(grown, validation))
+        return choose_by(lambda trial: trial.acc, found)
     if not system.tunes or validation is None:
         *_, last = train_stages(system.options, examples, monitor)
         return last

@@ -47,7 +47,9 @@ def sentences(count: int, lag: int, seed: int) -> list[AlignedUtterance]:
 def trained(lag: int, kind: str, limit: int | None = 1, **more: object) -> tuple[Chains, float]:
     """Return chains, and the correlation of the lips that they make from speech alone, as the paper converts."""
     structure = Structure(kind, (THREE,) if kind == MULTISTREAM else (THREE, THREE), STATES, limit, **more)
-    *_, grown = growing_chains(structure, ("speech", "seen"), sentences(20, lag, 0), MixtureSchedule((1, 1), (1.0, 1.0)))
+    *_, grown = growing_chains(
+        structure, ("speech", "seen"), sentences(20, lag, 0), MixtureSchedule((1, 1), (1.0, 1.0))
+    )
     chains, pairs = grown.model, []
     for one in sentences(8, lag, 1):
         how = ConversionSettings(VITERBI, EXACT, 5)

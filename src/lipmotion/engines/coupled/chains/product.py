@@ -320,10 +320,10 @@ class Transitions:
         """Return the transitions with the most likely tables (M-step); rows without data stay as they are.
 
         counts : the expected count of each arc [shape=(E,)]
-        Where chains move together, no more is needed than the share of the counts; a row starts as so much as a frame.
-        Otherwise every arc uses one entry of each chain's table. While the other chains' tables are fixed, the likelihood is
+        Every arc uses one entry of each chain's table. While the other chains' tables are fixed, the likelihood is
         highest where the expected use of each entry equals its count. Iterative scaling does this chain after chain and
-        never lowers the likelihood. Without a mask one sweep is the usual closed form.
+        never lowers the likelihood. Without a mask one sweep is the usual closed form, and so it is where chains move
+        together (the row before counts as one more frame, so that chains that begin in step may fall out of step).
         Source: Darroch & Ratcliff 1972; the M-step of Xie & Liu 2007, Eq. A.16, is exact only without the mask.
         """
         if self.product.structure.moves_together:
