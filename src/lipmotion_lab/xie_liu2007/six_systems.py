@@ -310,11 +310,10 @@ def _paper_pairs(
         compared = [name + ending for name in by_acc if name + ending in made]
         pairs = [*combinations(compared, 2)]
         if not ending:
-            helped = [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
-            pairs += [
-                pair for pair in (*helped, *combinations([n + ALL_PATHS for n in by_acc], 2)) if {*pair} <= {*made}
-            ]
-        statistics = {name: _statistics(recordings, made[name]) for name in {*sum(pairs, ())}}
+            pairs += [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
+            pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
+        pairs = [pair for pair in pairs if {*pair} <= made.keys()]
+        statistics = {name: _statistics(recordings, made[name]) for pair in pairs for name in pair}
         for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):

@@ -303,7 +303,7 @@ def train_system(
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
     if system.splits and validation is not None:
-        found = []
+        found: list[tuple[Trial, TrainedSystem]] = []
         for more in [{"visual_mixtures": tuning.split}, {}][: 1 if system.options["structure"] == HMM else 2]:
             grown = train_stages({**system.options, "mixtures": tuning.split, **more}, examples, monitor)
             found += split_while_better(judge_systems(grown, validation))
