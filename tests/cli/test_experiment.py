@@ -88,7 +88,7 @@ def test_folds_of_the_training_list(run, toy_corpus, here):
 @pytest.mark.long
 def test_xieliu2007_of_some_systems(run, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
-    few = ("--systems", "ph-MSHMM;loudness", "--order", "order.txt")
+    few = ("--systems", "ph-MSHMM;mean pose", "--order", "order.txt")
     chosen = (*few, "--sizes", "3", "--plots", "pictures", "--workers", "1")
     done = run("experiment", "xieliu2007", toy_corpus.path, *chosen, "-o", "a.json")
     assert (done.code, done.err) == (0, [])

@@ -21,7 +21,7 @@ from lipmotion.engines.coupled.training.coupled_training import growing_models
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
-from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, LoudnessRegression, MeanPose, import_torch
+from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose, import_torch
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
 
@@ -228,7 +228,6 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
     BLSTM: ComparedSystem(BlstmBaseline, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),
-    "loudness": ComparedSystem(LoudnessRegression),
     "mean pose": ComparedSystem(MeanPose),
 }
 """The systems of the table, in its order.

@@ -7,7 +7,7 @@ import numpy as np
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import Grammar, initial_transitions, reachable
-from lipmotion.engines.coupled.chains.structures import COUPLED, HMM, Structure
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
 from lipmotion.units.unit_sets import CLOSED_UNIT
@@ -20,6 +20,11 @@ THREE = UnitSet(
 )
 TWO = UnitSet("two", {phone: CLOSED_UNIT if phone in SHUT else "open" for phone in PHONES})
 """On the second chain, round and open are one unit."""
+KINDS = [
+    (COUPLED, (THREE, TWO), 1), (COUPLED, (THREE, TWO), 0), (FACTORIAL, (THREE, TWO), 1),
+    (FACTORIAL, (THREE, TWO), None), (MULTISTREAM, (THREE,), 1), (HMM, (THREE,), 1),
+]  # fmt: skip
+"""Structures, the unit sets of their chains, and their limits of asynchrony."""
 
 
 def structure(kind=COUPLED, chains=(THREE, TWO), states=2, limit=1, cross_units=True) -> Structure:

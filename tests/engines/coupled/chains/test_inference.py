@@ -1,16 +1,12 @@
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observations, structure
+from engines.coupled.tiny import KINDS, THREE, TWO, chains, observations, structure
 from lipmotion.engines.coupled.chains.product import Transitions
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.conversion.em_conversion import precision_statistics
 from oracles import coupled as oracle
 
-KINDS = [
-    (COUPLED, (THREE, TWO), 1), (COUPLED, (THREE, TWO), 0), (FACTORIAL, (THREE, TWO), 1),
-    (FACTORIAL, (THREE, TWO), None), (MULTISTREAM, (THREE,), 1), (HMM, (THREE,), 1),
-]  # fmt: skip
 every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observations, structure
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
+from engines.coupled.tiny import KINDS, THREE, TWO, chains, observations, structure
+from lipmotion.engines.coupled.chains.structures import MULTISTREAM
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     PRINTED,
@@ -31,13 +31,6 @@ from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types.progress import silent_monitor
 from oracles import coupled as oracle
 
-KINDS = [
-    (COUPLED, (THREE, TWO), 1),
-    (FACTORIAL, (THREE, TWO), 1),
-    (FACTORIAL, (THREE, TWO), None),
-    (MULTISTREAM, (THREE,), 1),
-    (HMM, (THREE,), 1),
-]
 every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 
 
