@@ -71,7 +71,8 @@ def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0,
     return Chains(("speech", "seen"), transitions, tuple(groups))
 
 
-def observations(frames=4, sizes=(2, 1), seed=0, seen=True) -> AudioVisualObservations:
+def observations(frames=4, sizes=(2, 1), seed=0, seen: bool | float = True) -> AudioVisualObservations:
+    """Return speech, and what is seen in all frames (True), in none (False), or in every other (0.5)."""
     draw = np.random.default_rng([seed, 3])
     streams = tuple(draw.normal(0, 1, (frames, size)).astype(np.float32) for size in sizes)
-    return AudioVisualObservations(streams, (None, None if seen else np.zeros(frames, bool)))
+    return AudioVisualObservations(streams, (None, None if seen is True else np.arange(frames) % 2 < float(seen)))

@@ -15,7 +15,7 @@ def made(kind, sets, limit, **other):
 
 
 @every
-@pytest.mark.parametrize("seen", [True, False])
+@pytest.mark.parametrize("seen", [True, False, 0.5])
 def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
     model, data = made(kind, sets, limit), observations(seen=seen)
     lattice = model.full_lattice
