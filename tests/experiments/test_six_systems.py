@@ -24,12 +24,13 @@ from lipmotion_lab.xie_liu2007 import six_systems, systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_FILES
 from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, table, xieliu2007
 from lipmotion_lab.xie_liu2007.systems import (
+    ALL_PATHS,
     BEST_PATH,
     BLSTM,
     COMPARED_SYSTEMS,
-    MATCHED,
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
+    SPLIT,
     TUNED,
     TuningOptions,
     select_systems,
@@ -41,8 +42,16 @@ PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 MULTISTREAM = "ph-MSHMM"
 CHAINS = [MULTISTREAM, REFERENCE_SYSTEM, MULTISTREAM + TUNED, REFERENCE_SYSTEM + TUNED]
-SYSTEMS = [*CHAINS, BEST_PATH, "trajectory HMM", "mean pose"]
-BRIEF = TuningOptions(clips=3, judges=1, weights=(1.0, 0.3), mixtures=2, states=())
+SYSTEMS = [
+    *CHAINS[:2],
+    MULTISTREAM + SPLIT,
+    *CHAINS[2:],
+    MULTISTREAM + ALL_PATHS,
+    BEST_PATH,
+    "trajectory HMM",
+    "mean pose",
+]
+BRIEF = TuningOptions(clips=3, judges=1, weights=(1.0, 0.3), mixtures=2, split=2, states=())
 PICTURE = b"\x89PNG\r\n\x1a\n"
 
 
@@ -129,8 +138,13 @@ def test_a_tuned_system_is_the_best_that_was_tried(figures):
         assert row["tried"][0]["options"].keys() == {"structure", "chains"}  # as printed
     pairs = figures["rows"][-1]["pairs"]
     assert [(pair["better"], pair["worse"]) for pair in pairs] == [
-        (REFERENCE_SYSTEM + ending, MULTISTREAM + ending) for ending in ("", TUNED)
+        (REFERENCE_SYSTEM, MULTISTREAM),
+        (MULTISTREAM + ALL_PATHS, MULTISTREAM),
+        (REFERENCE_SYSTEM + TUNED, MULTISTREAM + TUNED),
     ]
+    split = figures["rows"][-1]["training"][MULTISTREAM + SPLIT]
+    assert {trial["options"].get("visual_mixtures", 1) for trial in split["tried"]} == {1, 2}
+    assert split["parameters"] == max(split["tried"], key=lambda trial: trial["acc"])["parameters"]
     rows = figures["rows"][-1]["conditions"]["audio only"]
     assert pairs[0]["acc"] == pytest.approx(rows[REFERENCE_SYSTEM]["acc"] - rows[MULTISTREAM]["acc"])
 
@@ -198,7 +212,7 @@ def test_eigenlips(visual, toy_corpus):
 
 def test_systems_in_the_order_of_the_table():
     assert select_systems(["mean pose", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "mean pose"]
-    assert select_systems([MATCHED]) == ["ph-MSHMM", "ph-vi-FHMM", REFERENCE_SYSTEM, "ph-vi-FHMM" + TUNED, MATCHED]
+    assert select_systems(["ph-CHMM" + ALL_PATHS]) == ["ph-CHMM", REFERENCE_SYSTEM, "ph-CHMM" + ALL_PATHS]
     assert list(PAPER_FIGURES) == list(COMPARED_SYSTEMS)[:6]
     with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
         select_systems(["ph-RNN"])

@@ -23,6 +23,7 @@ from lipmotion_lab.xie_liu2007.systems import (
     list_alternatives,
     list_changed_options,
     search_settings,
+    split_while_better,
     train_stages,
 )
 
@@ -90,6 +91,11 @@ def test_one_setting_after_another_from_the_best_so_far():
     ]
     assert best_trial(tried).options == {"states": 5, "audio_weight": 0.3, "mixtures": 1}
     assert best_trial([Trial({"a": 1}, 0.5, 0, 0), Trial({"a": 2}, 0.5, 0, 0)]).options == {"a": 1}
+
+
+def test_gaussians_are_split_while_that_is_better():
+    found = [(Trial({}, acc, 0.0, 0), None) for acc in (0.5, 0.6, 0.6, 0.9)]
+    assert [*split_while_better(found)] == found[:3]
 
 
 def test_what_is_tried_for_which_structure():

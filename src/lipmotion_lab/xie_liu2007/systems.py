@@ -183,7 +183,6 @@ BLSTM = "BLSTM"
 TUNED, SPLIT, ALL_PATHS = ", tuned", ", K on val", ", all paths"
 SOFT = {"start": "soft", "steps": 0}
 ABOUT = "about"
-MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
 
 
 @dataclass(frozen=True)
@@ -218,7 +217,6 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     **{name: ComparedSystem(options=SYSTEMS[name]) for name in PAPER_FIGURES},
     **{name + SPLIT: ComparedSystem(options=SYSTEMS[name], splits=True) for name in PAPER_FIGURES},
     **{name + TUNED: ComparedSystem(options=SYSTEMS[name], tunes=name) for name in PAPER_FIGURES},
-    MATCHED: ComparedSystem(options=SYSTEMS["ph-MSHMM"], tunes="ph-MSHMM"),
     **{f"{name}, tied": ComparedSystem(options=SYSTEMS[name] | TIED) for name in ("ph-FHMM", "ph-vi-FHMM")},
     **{f"{name}, together": ComparedSystem(options=SYSTEMS[name] | TOGETHER) for name in ("ph-CHMM", "ph-vi-CHMM")},
     **{name + ALL_PATHS: ComparedSystem(options=SOFT, same_model_as=name) for name in PAPER_FIGURES},
@@ -234,7 +232,6 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
 
 The paper's six are those of ``train --preset``, of one Gaussian a state; ``K on val``: with the number of Gaussians
 that was best on validation recordings; ``tuned``: with all settings that were best there;
-``as large as``: with as many Gaussians as bring the number of parameters nearest to that of the tuned ph-vi-FHMM.
 ``tied``, ``together``: chains as ``TIED`` and ``TOGETHER`` have them. ``all paths``: expected means given speech, no
 EM; ``best path``: means along the best path, no EM.
 ``own means``: no regression of the visual means on acoustic features.
@@ -252,8 +249,6 @@ def select_systems(names: Sequence[str] | None) -> list[str]:
         import_torch()
     chosen = [COMPARED_SYSTEMS[name] for name in names]
     needed = {REFERENCE_SYSTEM} | {name for system in chosen for name in (system.tunes, system.same_model_as)}
-    if MATCHED in names:
-        needed |= {"ph-vi-FHMM", "ph-vi-FHMM" + TUNED}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
 
 
@@ -311,15 +306,10 @@ def train_system(
         *_, last = train_stages(system.options, examples, monitor)
         return last
     options = best_trial(trials[system.tunes]).options
-    if name != MATCHED:
-        printed = trained[system.tunes]
-        same = CoupledConfig.parsed(options) == printed.engine.config
-        on_the_way = () if same else train_stages(options, examples, monitor)
-        return choose_by(lambda trial: trial.acc, judge_systems([printed, *on_the_way], validation))
-    wanted = trained["ph-vi-FHMM" + TUNED].model.chains.parameters
-    most = max(trial.options["mixtures"] for trial in trials[system.tunes])
-    larger = train_stages({**options, "mixtures": most, "visual_mixtures": most}, examples, monitor)
-    return choose_by(lambda trial: -abs(trial.parameters - wanted), judge_systems(larger, validation))
+    printed = trained[system.tunes]
+    same = CoupledConfig.parsed(options) == printed.engine.config
+    on_the_way = () if same else train_stages(options, examples, monitor)
+    return choose_by(lambda trial: trial.acc, judge_systems([printed, *on_the_way], validation))
 
 
 def system_to_arrays(system: TrainedSystem) -> dict[str, NDArray[Any]]:

@@ -58,21 +58,6 @@ def test_the_likelihood_rises_at_every_step(kind, sets):
             assert other.log_likelihood >= one.log_likelihood - 1e-5
 
 
-def test_statistics_of_utterances_are_those_of_all_paths():
-    model = chains()
-    data = [observations(3, seed=1), observations(4, seed=2)]
-    result = e_step(model, [LatticeUtterance(one, model.full_lattice) for one in data], workers=2)
-    joints = [oracle.posteriors(model, one)[0] for one in data]
-    group, statistics = model.groups[0], result.emissions[0]
-    for density in range(group.mixtures.size[0]):
-        first = 0
-        for one, joint in zip(data, joints, strict=True):
-            posterior = joint[:, group.tie == density].sum(axis=1)
-            first = first + posterior @ one.streams[0]
-        np.testing.assert_allclose(statistics.products[0][:, density, :2].sum(axis=0), first, atol=1e-3)
-    assert result.frames == 7
-
-
 def test_densities_are_weighted_means_and_variances():
     """Eqs. A.12 to A.15 of Xie & Liu 2007, by enumeration of paths and components."""
     model = chains()
