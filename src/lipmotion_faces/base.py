@@ -101,21 +101,6 @@ class Stageable(Protocol):
         """Return the same face with other settings, and the speech's prosody (None: not known) for brows and head."""
 
 
-@runtime_checkable
-class DrawsPlanes(Protocol):
-    """A face that draws in the colours of video encoders, which takes less time; a face has this ability if it has the
-    method."""
-
-    def render_planes(
-        self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
-    ) -> Iterator[NDArray[np.uint8]] | None:
-        """Return the frames of ``render`` as YUV 4:2:0 [shape=(H · 3 / 2, W)], or None where they are transparent.
-
-        Of each frame the brightness (Y) comes first [shape=(H, W)], then the colours U and V [shape=(H / 2, W / 2)]:
-        ITU-R BT.601, limited range. H and W are even.
-        """
-
-
 def rotate_head(yaw: float, pitch: float, roll: float = 0.0) -> NDArray[np.float64]:
     """Return the rotation to the character's left, upwards and to the left shoulder, in radians [shape=(3, 3)]."""
     (cy, sy), (cp, sp), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch, roll))

@@ -21,16 +21,7 @@ from lipmotion.meshes.model.mesh import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-from lipmotion_faces.base import (
-    SMALLEST_PX,
-    TRANSPARENT,
-    DrawnMotion,
-    Face,
-    Picture,
-    Staging,
-    rotate_head,
-    stage_liveliness,
-)
+from lipmotion_faces import base
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion_faces.rendering.rasteriser import Camera, flat
 
@@ -67,7 +58,7 @@ class MeshPose(NamedTuple):
 
 
 @final
-class MeshFace(Face):
+class MeshFace(base.Face):
     """A character from a file, head and shoulders from the front.
 
     character     : from ``load_character``
@@ -80,10 +71,10 @@ class MeshFace(Face):
         character: DrivenCharacter,
         width: int = WIDTH,
         height: int = HEIGHT,
-        staging: Staging | None = None,
+        staging: base.Staging | None = None,
         prosody: Prosody | None = None,
     ) -> None:
-        self.staging = staging or Staging()
+        self.staging = staging or base.Staging()
         self._character, self._prosody, self._size = character, prosody, (width, height)
 
     @property
@@ -91,20 +82,18 @@ class MeshFace(Face):
         """The character that is shown."""
         return self._character
 
-    def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> MeshFace:
-        """Return the same character with other settings, and the prosody (None: not known) for accents of brows and
-        head.
-        """
+    def with_staging(self, staging: base.Staging, prosody: Prosody | None = None) -> MeshFace:
+        """Return the same character with other settings, and prosody for accents of brows and head."""
         return MeshFace(self._character, *self._size, staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
         return iter(self.draw(motion, units, fps=fps))
 
-    def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[MeshPose]:  # noqa: D102
+    def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> base.DrawnMotion[MeshPose]:  # noqa: D102
         if not 0 < fps < np.inf:
             raise InputError(f"the frame rate is {fps}, required more than 0")
         time_s = frame_times(len(motion.values), motion.rate_hz, fps)
-        moved = stage_liveliness(time_s, with_mouth(motion), units, self.staging, self._prosody)
+        moved = base.stage_liveliness(time_s, with_mouth(motion), units, self.staging, self._prosody)
         rows = self._character.poses(motion, units, time_s, eye_and_brow_weights(moved))
         gaze = moved.gaze if not self._character.has_shape("eyeLookOutLeft") else np.zeros_like(moved.gaze)
         turns, looks = moved.turn.tolist(), gaze.tolist()
@@ -112,15 +101,15 @@ class MeshFace(Face):
             MeshPose(row, (yaw, pitch, roll), (across, up))
             for row, (yaw, pitch, roll), (across, up) in zip(rows, turns, looks, strict=True)
         ]
-        return DrawnMotion(poses, lambda: self._painter, FRAMES_AHEAD)
+        return base.DrawnMotion(poses, lambda: self._painter, FRAMES_AHEAD)
 
     @cached_property
-    def _painter(self) -> Callable[[MeshPose], Picture]:
+    def _painter(self) -> Callable[[MeshPose], base.Picture]:
         width, height = self._size
         if self.staging.size:
-            width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST_PX), self.staging.size
+            width, height = max(2 * round(self.staging.size * 8 / 9), base.SMALLEST_PX), self.staging.size
         stage = MeshStage(self._character, width, height, self.staging.colour)
-        draw = stage.cut_out if self.staging.background == TRANSPARENT else stage.picture
+        draw = stage.cut_out if self.staging.background == base.TRANSPARENT else stage.picture
         return lambda pose: draw(self._character.place_vertices(pose.row), pose.turn, pose.look)
 
 
@@ -134,9 +123,7 @@ def write_picture(path: Path, character: DrivenCharacter) -> None:
 
 
 class MeshStage:
-    """A mesh before the camera, in light, for several threads; ``colour`` of the background, 0 to 255 (None: a
-    gradient).
-    """
+    """A mesh before the camera, in light, for several threads; colour: of the background (None: a gradient)."""
 
     def __init__(
         self, character: DrivenCharacter, width: int, height: int, colour: tuple[int, int, int] | None = None
@@ -174,7 +161,7 @@ class MeshStage:
         self._light, self._shine = self._light_vertices(self._rest, normals, np.arange(len(self._drawn.rows)))
         self._still = self._canvas.picture(self._rest[self._drawn.rows], self._light, self._shine)
 
-    def picture(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> Picture:
+    def picture(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> base.Picture:
         """Return the picture of the mesh with its vertices at other places [shape=(H, W, 3)].
 
         vertices : in the frame and unit of the mesh [shape=(V, 3)]
@@ -189,7 +176,7 @@ class MeshStage:
         area = np.concatenate([places[drawn], self._rest[self._drawn.rows[drawn]]])
         return self._canvas.picture(places, light, shine, onto=self._still, moving=area)
 
-    def cut_out(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> Picture:
+    def cut_out(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> base.Picture:
         """Return the same picture without background, with straight alpha [shape=(H, W, 4)]."""
         places, light, shine, _ = self._pose(vertices, turn, gaze)
         return self._canvas.cut_out(places, light, shine)
@@ -205,13 +192,13 @@ class MeshStage:
             normals[rows] = compute_normals(self._join(places)[self._bent], self._bent_triangles)[inside]
             moved[rows] = True
         if any(gaze):
-            look = rotate_head(*gaze).T
+            look = base.rotate_head(*gaze).T
             for rows, share, centre in self._eyes:
                 places[rows] += share * ((places[rows] - centre) @ look + centre - places[rows])
                 normals[rows] += share * (normals[rows] @ look - normals[rows])
                 moved[rows] = True
         if any(turn):
-            rotation, share = rotate_head(*turn).T, self._share[:, None]
+            rotation, share = base.rotate_head(*turn).T, self._share[:, None]
             places += share * ((places - self._pivot) @ rotation + self._pivot - places)
             normals += share * (normals @ rotation - normals)
             moved |= self._share > 0

@@ -44,9 +44,7 @@ def is_drawings(face: str | Path, folder: Path = Path()) -> bool:
 
 
 def stage_face(face: str | Face, staging: Staging, prosody: Prosody | None = None) -> Face:
-    """Return a face, or the one of a name, with settings and prosody. Raises InputError: as ``make_face``, or it has
-    none.
-    """
+    """Return a face, or that of a name, with settings and prosody. Raises InputError: as ``make_face``; no settings."""
     if isinstance(face, str):
         face = make_face(face)
     if isinstance(face, Stageable):

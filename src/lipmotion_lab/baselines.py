@@ -30,6 +30,8 @@ from lipmotion.types import (
 
 Array = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
+Recording = tuple[Float32Array, Array, NDArray[np.bool_]]
+"""Features, reduced motion, and which frames are valid [shape=(T, 39), (T, Q), (T,)]."""
 COMPONENTS = 16
 """Dimensions that all point channels are reduced to, as in the engines."""
 REACH = 15
@@ -62,12 +64,12 @@ class Baseline(Animator[FrameRegressionModel]):
         checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - it takes seconds
     ) -> Fit[FrameRegressionModel]:
         space, values = fit_reduced_motion(examples, COMPONENTS)
-        features = [np.asarray(example.speech.features.values) for example in examples]
-        valid = [np.asarray(example.valid) for example in examples]
-        learned = self.fit_map(features, values, valid, monitor)
-        errors = [np.square(self.predict(learned, f) - x)[v] for f, x, v in zip(features, values, valid, strict=True)]
+        given = [(np.asarray(example.speech.features.values), np.asarray(example.valid)) for example in examples]
+        recordings = [(f, x, v) for (f, v), x in zip(given, values, strict=True)]
+        learned = self.fit_map(recordings, monitor)
+        errors = [np.square(self.predict(learned, f) - x)[v] for f, x, v in recordings]
         model = FrameRegressionModel(space, learned, np.concatenate(errors).mean(axis=0))
-        return Fit(model, {"frames": sum(int(mask.sum()) for mask in valid)})
+        return Fit(model, {"frames": sum(map(len, errors))})
 
     def generate(  # noqa: D102
         self,
@@ -81,14 +83,8 @@ class Baseline(Animator[FrameRegressionModel]):
         return Generation(motion, variance, speech.units, StateTrace(("all",), np.zeros(len(values), np.intp)))
 
     @abstractmethod
-    def fit_map(
-        self,
-        features: Sequence[Float32Array],
-        values: Sequence[Array],
-        valid: Sequence[NDArray[np.bool_]],
-        monitor: Monitor,
-    ) -> Any:
-        """Return a map from features to reduced motion, from valid frames [each shape=(T, 39), (T, Q), (T,)]."""
+    def fit_map(self, recordings: Sequence[Recording], monitor: Monitor) -> Any:
+        """Return a map from features to reduced motion, from the valid frames of recordings."""
 
     @abstractmethod
     def predict(self, learned: Any, features: Float32Array) -> Array:
@@ -104,15 +100,9 @@ class LinearBaseline(Baseline):
     def regressors(self, features: Float32Array) -> Array:
         """Return the regressors of each frame [shape=(T, F)]."""
 
-    def fit_map(  # noqa: D102
-        self,
-        features: Sequence[Float32Array],
-        values: Sequence[Array],
-        valid: Sequence[NDArray[np.bool_]],
-        monitor: Monitor,  # noqa: ARG002 - it takes seconds
-    ) -> Array:
+    def fit_map(self, recordings: Sequence[Recording], monitor: Monitor) -> Array:  # noqa: D102, ARG002 - takes seconds
         statistics, frames = None, 0
-        for inputs, targets, mask in zip(features, values, valid, strict=True):
+        for inputs, targets, mask in recordings:
             rows = self.regressors(inputs)[mask]
             statistics = statistics or zero_statistics(rows.shape[1], targets.shape[1])
             statistics.add(rows, targets[mask])
@@ -170,20 +160,14 @@ class BlstmBaseline(Baseline):
 
     seed: int = 0
 
-    def fit_map(  # noqa: D102
-        self,
-        features: Sequence[Float32Array],
-        values: Sequence[Array],
-        valid: Sequence[NDArray[np.bool_]],
-        monitor: Monitor,
-    ) -> TrainedNetwork:
+    def fit_map(self, recordings: Sequence[Recording], monitor: Monitor) -> TrainedNetwork:  # noqa: D102
         torch = import_torch()
         torch.manual_seed(self.seed)
-        everything = np.concatenate([x[mask] for x, mask in zip(values, valid, strict=True)])
+        everything = np.concatenate([x[mask] for _, x, mask in recordings])
         mean, deviation = everything.mean(axis=0), np.maximum(everything.std(axis=0), 1e-6)
         sequences = [
             (_stacked(f), _every_fourth(((x - mean) / deviation).astype(np.float32)), _every_fourth(mask))
-            for f, x, mask in zip(features, values, valid, strict=True)
+            for f, x, mask in recordings
         ]
         network = _network(torch, sequences[0][0].shape[1], everything.shape[1])
         epochs = max(EPOCHS, -(-LEAST_STEPS * BATCH_SIZE // len(sequences)))

@@ -12,16 +12,14 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import one_thread
-from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, describe_training, train
-from lipmotion.printable import printable
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.files import make_folder, unfinished_work
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves, significance_mark
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
 from lipmotion_lab.evaluation.held_out import (
     OPENING,
     ComparedClip,
@@ -106,54 +104,6 @@ def _check_model(path: Path, name: str, model: Model, required: Mapping[str, obj
         raise InputError(
             f"{path}: trained on {texts[0]}, required the training list of this corpus: {texts[1]}{way_out}"
         )
-
-
-NAME_WIDTH = 19
-HEAD = (
-    f"  {'system':{NAME_WIDTH}}{'ACC (95 %)':23}  nRMSE  variance  jerk  width | score  precision  p b m  false |"
-    "  no pins: score  precision  p b m  false"
-)
-LEGEND = (
-    "variance, jerk: by those of the recordings; width: its ACC; score, precision, p b m: %; false: closings outside "
-    "p b m, a minute of speech; no pins: lips not made to meet"
-)
-CLOSURES = (("score", "6.1f"), ("precision", "11.1f"), ("recall_p_b_m", "7.1f"), ("false_per_minute", "7.0f"))
-
-
-def table(figures: Mapping[str, Any]) -> str:
-    """Return the figures of ``comparison.engines`` as text."""
-    minutes = {row["minutes"] for row in figures["models"].values()}
-    lines = [
-        f"split {figures['split']}: {figures['clips']} clips; models of {' and '.join(map(str, sorted(minutes)))} "
-        f"minutes of train; closed under {figures['closed_under']:.4f}"
-    ]
-    for name, condition in figures["conditions"].items():
-        row = next(iter(condition["systems"].values()))
-        lines += [
-            "",
-            f"{name}: opening, with {row['p_b_m']} p b m and {row['closings']} closings recorded, "
-            f"{figure_text(row['original_per_minute'], '.0f')} a minute outside p b m",
-            HEAD,
-            *(_line(system, each, figures["reference"]) for system, each in condition["systems"].items()),
-        ]
-    lines += [
-        "",
-        f"* differs from {figures['reference']}: the 95 % interval of the difference on the same clips leaves out 0",
-        LEGEND,
-    ]
-    return "\n".join(map(printable, lines))
-
-
-def _line(name: str, row: Mapping[str, Any], reference: str) -> str:
-    acc = "{}{} ({}–{})".format(
-        figure_text(row["acc"], ".3f"),
-        significance_mark(row["acc_gain_95"][reference]),
-        *(figure_text(end, ".3f") for end in row["acc_95"]),
-    )
-    columns = (("nrmse", "7.3f"), ("global_variance", "10.2f"), ("jerk", "6.2f"), (f"{WIDTH}_acc", "7.3f"))
-    opening = "".join(figure_text(row[key], form) for key, form in columns)
-    pinned, free = ("".join(figure_text(of[key], form) for key, form in CLOSURES) for of in (row, row["unpinned"]))
-    return f"  {name:{NAME_WIDTH}}{acc:23}{opening} |{pinned} |{'':9}{free}"
 
 
 REFERENCE_ENGINE = "trajectory"

@@ -16,7 +16,6 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream.densities import SPEECH
 from lipmotion.kernels.compiler import one_thread
-from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
@@ -24,14 +23,7 @@ from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import UNIT_SETS, Lexicon
-from lipmotion_lab.evaluation.evaluate import (
-    closing_score_statistic,
-    correlation_statistic,
-    figures_of,
-    opening_curves,
-    sign_of_difference,
-    significance_mark,
-)
+from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
@@ -179,7 +171,7 @@ def _train_system(
             gaussians = model.hmm.models[SPEECH].tied.mixtures.size[1]
             if gaussians in counts:
                 clips = generate_clips(choosing, AUDIO_ONLY, engine, model)
-                tried[gaussians] = correlation_statistic(*opening_curves(choosing, clips)).value
+                tried[gaussians] = evaluate.correlation_statistic(*evaluate.opening_curves(choosing, clips)).value
                 if _best_count(tried) == gaussians:
                     arrays = engine.to_arrays(model)
         if not tried:
@@ -203,13 +195,13 @@ def _table(
     seed: int,
 ) -> dict[str, Any]:
     """Return the figures of all sets in one condition, and the intervals of the differences of every two of them."""
-    openings = {units: opening_curves(recordings, own) for units, own in clips.items()}
+    openings = {units: evaluate.opening_curves(recordings, own) for units, own in clips.items()}
     threshold = recordings.closed_under or 0.0
-    scores = {units: closing_score_statistic(*pair, threshold) for units, pair in openings.items()}
-    acc = {units: correlation_statistic(*pair) for units, pair in openings.items()}
+    scores = {units: evaluate.closing_score_statistic(*pair, threshold) for units, pair in openings.items()}
+    acc = {units: evaluate.correlation_statistic(*pair) for units, pair in openings.items()}
     rows = {}
     for units, system in systems.items():
-        figures = figures_of(clips[units], recordings, seed)
+        figures = evaluate.figures_of(clips[units], recordings, seed)
         rows[units] = opening_row(figures) | {
             "units": UNIT_SETS[units].count,
             "paper": PAPER_SCORES[units],
@@ -225,55 +217,3 @@ def _table(
         for better, worse in combinations(PAPER_SCORES, 2)
     ]
     return {"rows": rows, "paper_order": pairs}
-
-
-HEAD = (
-    f"  {'set':6} units  paper  {'score (95 %)':22}precision  p b m  timing  {'ACC (95 %)':22}"
-    "nRMSE   jerk  variance   K"
-)
-NOTES = (
-    f"* differs from {REFERENCE_SET}: the 95 % interval of the difference on the same clips leaves out 0",
-    "paper: its score, of another speaker, corpus and threshold of a closed mouth: only orders compare",
-    "score, precision, p b m: %; timing: ms; ACC to variance: of the opening, jerk and variance by the recordings",
-)
-
-
-def table(figures: Mapping[str, Any]) -> str:
-    """Return the tables of all conditions, each with a sentence on what held of the paper's order."""
-    lines = [
-        f"the system of Hofer 2008, trained on {figures['trained_on']} clips; split {figures['split']}: "
-        f"{figures['clips']} clips; closed under {figures['closed_under']:.4f}",
-        f"K: Gaussians a state for speech, of {', '.join(map(str, figures['mixtures']))}, chosen on val by ACC",
-    ]
-    for block in figures["tables"]:
-        lines += ["", f"{block['states']} states; {block['condition']}; {block['pins']}", HEAD]
-        lines += [_line(units, row) for units, row in block["rows"].items()]
-        lines += [f"  {what_held(block)}"]
-    return "\n".join([*lines, "", *NOTES])
-
-
-def _line(units: str, row: Mapping[str, Any]) -> str:
-    interval = "–".join(figure_text(end, ".1f") for end in row["score_95"])
-    score = f"{figure_text(row['score'], '.1f')}{significance_mark(row['score_gain_95'])} ({interval})"
-    acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], significance_mark(row["acc_gain_95"]), *row["acc_95"])
-    return (
-        f"  {units:6} {row['units']:5} {row['paper']:6.1f}  {score:22}{figure_text(row['precision'], '9.1f')}"
-        f"{figure_text(row['recall_p_b_m'], '7.1f')}{figure_text(row['timing_ms'], '+8.0f')}  {acc:22}"
-        f"{row['nrmse']:6.3f}{figure_text(row['jerk'], '7.2f')}{row['global_variance']:10.2f}{row['gaussians']:4}"
-    )
-
-
-def what_held(block: Mapping[str, Any]) -> str:
-    """Return how many of the pairs of sets that the paper orders by score are ordered so here, and which is best."""
-    signs = [sign_of_difference(pair["score_gain_95"]) for pair in block["paper_order"]]
-    against = [
-        f"{pair['worse']} over {pair['better']}"
-        for pair, sign in zip(block["paper_order"], signs, strict=True)
-        if sign < 0
-    ]
-    best = max(block["rows"], key=lambda units: block["rows"][units]["score"] or 0.0)
-    reversed_pairs = f" ({', '.join(against)})" if against else ""
-    return (
-        f"best: {best}; of the paper's {len(signs)} pairs hold {signs.count(1)}, reversed {len(against)}"
-        f"{reversed_pairs}, open {signs.count(0)}"
-    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,21 +15,10 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import one_thread
-from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor
+from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import figures_of
-from lipmotion_lab.runner import (
-    DEFAULT_SETTINGS,
-    ExperimentSettings,
-    HeldOutResult,
-    PartKey,
-    check_opening,
-    open_parts,
-    opening_row,
-    shuffled,
-    train_and_generate,
-)
 
 SIZES = (20, 50, 100, 200)
 """Default numbers of recordings: those of them that are smaller than the list; and the whole list."""
@@ -46,7 +35,7 @@ def learning_curve(
     sizes: Sequence[int] | None = None,
     split: str | None = "test",
     work: Path | None = None,
-    settings: ExperimentSettings = DEFAULT_SETTINGS,
+    settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Train on the first N utterances of a list, for every N of ``sizes``; return figures of each model on ``split``.
 
@@ -57,20 +46,20 @@ def learning_curve(
     Raises CorpusError: names that are not in the corpus, twice in the list or in the split; no utterances of this
     split; or motion without an opening.
     """
-    listed = tuple(order) if order is not None else shuffled(corpus.required("train"), settings.seed)
+    listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), settings.seed)
     held_out = corpus.required(split)
     steps = choose_sizes(sizes, len(listed))
     check_training_names(corpus, listed, held_out)
-    channels = check_opening(corpus, held_out)
+    channels = runner.check_opening(corpus, held_out)
     shares = np.cumsum([0, *steps]) / sum(steps)
-    kept = open_parts(work, corpus, settings, PartKey(engine_named("trajectory"), (*listed, *held_out)))
+    kept = runner.open_parts(work, corpus, settings, runner.PartKey(engine_named("trajectory"), (*listed, *held_out)))
     rows = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
         found = kept.load(str(count))
         if found is None:
             monitor = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
             part = replace(settings, monitor=monitor)
-            result = train_and_generate(corpus, listed[:count], held_out, channels, part, work)
+            result = runner.train_and_generate(corpus, listed[:count], held_out, channels, part, work)
             row = {"names": count} | _row(corpus, result, settings.seed)
             for condition, clips in result.clips.items():
                 settings.receive(f"{count} recordings", condition, result.recordings, clips)
@@ -84,9 +73,7 @@ def learning_curve(
 
 
 def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
-    """Return the sizes, or the usual ones, rising. Raises InputError: sizes under 1 or over ``listed``, or an empty
-    list.
-    """
+    """Return the sizes, or the usual ones, rising. Raises InputError: not from 1 to ``listed``, or an empty list."""
     if not listed:
         raise InputError("the list of utterances to train on is empty; give one name a line")
     steps = sorted(set(sizes)) if sizes is not None else [*(n for n in SIZES if n < listed), listed]
@@ -110,45 +97,17 @@ def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequen
             raise CorpusError(f"{corpus.path}: {len(names)} of {len(listed)} names to train on ({some}) {reason}")
 
 
-def _row(corpus: Corpus, result: HeldOutResult, seed: int) -> dict[str, Any]:
+def _row(corpus: Corpus, result: runner.HeldOutResult, seed: int) -> dict[str, Any]:
     """Return the figures of one model, by condition; None for channels that the corpus does not have."""
     conditions = {}
     for name, clips in result.clips.items():
         figures = figures_of(clips, result.recordings, seed)
         channels = figures["channels"]
         accs = {f"acc_{other}": channels[other]["acc"] if other in channels else None for other in OTHERS}
-        conditions[name] = opening_row(figures) | accs
+        conditions[name] = runner.opening_row(figures) | accs
     return {
         "used": len(result.used),
         "minutes": sum(corpus.utterance(name).audio.duration_s for name in result.used) / 60,
         "seconds": result.seconds,
         "conditions": conditions,
     }
-
-
-def table(figures: Mapping[str, Any]) -> str:
-    """Return the figures of ``learning_curve`` as text."""
-    order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
-    lines = [
-        f"trained on the first N clips of {order[figures['order']]}, with up to {figures['workers']} process(es); "
-        f"split {figures['split']}: {figures['clips']} clips"
-    ]
-    for condition in figures["rows"][0]["conditions"]:
-        lines += ["", condition, HEAD, *(_line(row, row["conditions"][condition]) for row in figures["rows"])]
-    return "\n".join([*lines, "", LEGEND])
-
-
-HEAD = f"      N  used  minutes  seconds  {'ACC (95 %)':20}  nRMSE  variance  width  outer"
-LEGEND = (
-    "used, minutes: of the N clips what training could use; seconds: of training; ACC, nRMSE, variance: of the "
-    "opening, the last by that of the recordings; width, outer: their ACC"
-)
-
-
-def _line(row: Mapping[str, Any], opening: Mapping[str, Any]) -> str:
-    acc = "{:.3f} ({:.3f}–{:.3f})".format(opening["acc"], *opening["acc_95"])
-    others = "".join(f"  {figure_text(opening[f'acc_{name}'], '5.3f')}" for name in OTHERS)
-    return (
-        f"  {row['names']:5}{row['used']:6}{row['minutes']:9.1f}{row['seconds']:9.1f}  {acc:20}"
-        f"{opening['nrmse']:7.3f}{opening['global_variance']:10.2f}{others}"
-    )

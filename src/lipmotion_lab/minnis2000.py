@@ -24,66 +24,22 @@ from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.kernels.compiler import one_thread
-from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
+from lipmotion_lab import runner
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves, significance_mark
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
-    DISTANCES,
     OPENING,
     generate_compared,
     load_held_out,
     make_speech,
 )
 from lipmotion_lab.learning_curve import check_training_names
-from lipmotion_lab.runner import (
-    DEFAULT_SETTINGS,
-    ExperimentSettings,
-    PartKey,
-    check_opening,
-    open_parts,
-    opening_row_with_rates,
-)
-
-WIDTH = 36
-HEAD = f"  {'':{WIDTH}}{'ACC (95 %)':23}p b m  elsewhere  joins  hard  smooth  variance and jerk: opening, width, outer"
-NOTE = (
-    "* differs from the system as printed: the 95 % interval of the difference on the same clips leaves out 0\n"
-    "p b m: share closed, without pins, %; elsewhere: closings outside p b m a minute; joins: a clip; hard: share that "
-    "abuts, %;\nsmooth: share where the velocity changes by no more than the speaker's own 95th percentile, %; "
-    "variance and jerk: by those of the recordings\nThe paper prints no figures of its own."
-)
-
-
-def table(figures: Mapping[str, Any]) -> str:
-    """Return the figures of ``minnis2000`` as text."""
-    quick = "; quick: few clips, few epochs, only to see that it runs" if figures["quick"] else ""
-    lines = [f"trained on {figures['utterances']} clips, {figures['minutes']} minutes{quick}"]
-    for split, found in figures["lists"].items():
-        for condition, systems in found["conditions"].items():
-            lines += ["", f"{split}, {found['clips']} clips, {condition}", HEAD]
-            lines += [_line(name, row) for name, row in systems.items()]
-    return "\n".join([*lines, "", NOTE])
-
-
-def _line(name: str, row: Mapping[str, Any]) -> str:
-    joins, channels = row["joins"], [row["channels"].get(each) for each in DISTANCES]
-    acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], significance_mark(row["acc_gain_95"]), *row["acc_95"])
-    shares = [figure_text(None if joins[key] is None else 100 * joins[key], ".0f") for key in ("hard", "smooth")]
-    ratios = [
-        "/".join(figure_text(each[key], ".2f") for each in channels if each) for key in ("global_variance", "jerk")
-    ]
-    return (
-        f"  {name:{WIDTH}}{acc:23}{figure_text(row['recall_p_b_m'], '5.1f')}"
-        f"{figure_text(row['false_per_minute'], '11.1f')}{joins['per_clip']:7.1f}{shares[0]:>6}{shares[1]:>8}  "
-        f"{'  '.join(ratios)}"
-    )
-
 
 Array = NDArray[np.float64]
 REACH = 4
@@ -178,7 +134,7 @@ def minnis2000(
     models: Path | None = None,
     quick: bool = False,
     work: Path | None = None,
-    settings: ExperimentSettings = DEFAULT_SETTINGS,
+    settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Return the figures of the paper's system and of its variants on ``val``, if the corpus has it, and ``test``.
 
@@ -207,8 +163,8 @@ def minnis2000(
     for number, (split, names) in enumerate(lists.items()):
         start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))
         part = replace(settings, monitor=sub_monitor(monitor, start, stop, f"{split}: "))
-        key = PartKey(trained.model.engine, names, model=trained.model, others=str(rows()))
-        kept = open_parts(work and work / split, corpus, settings, key)
+        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(rows()))
+        kept = runner.open_parts(work and work / split, corpus, settings, key)
         found[split] = _on_list(corpus, names, trained.model, kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
@@ -221,7 +177,7 @@ def minnis2000(
 
 
 def _on_list(
-    corpus: Corpus, names: Sequence[str], model: Model, kept: Checkpoint, settings: ExperimentSettings
+    corpus: Corpus, names: Sequence[str], model: Model, kept: Checkpoint, settings: runner.ExperimentSettings
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
     monitor = settings.monitor
@@ -229,7 +185,7 @@ def _on_list(
         corpus,
         cached_recogniser(model.phones),
         selection=Selection(names=names),
-        channels=check_opening(corpus, names),
+        channels=runner.check_opening(corpus, names),
         lexicon=settings.lexicon,
         monitor=sub_monitor(monitor, 0, 0.4),
     )
@@ -252,7 +208,7 @@ def _on_list(
                 clips = generate_compared(recordings, spoken[key], engine, learned)
                 settings.receive(name, condition, recordings, clips)
                 figures = figures_of(clips, recordings, settings.seed)
-                row = opening_row_with_rates(figures)
+                row = runner.opening_row_with_rates(figures)
                 row["channels"] = {
                     channel: {figure: values[figure] for figure in WHAT_IS_SHOWN}
                     for channel, values in figures["channels"].items()

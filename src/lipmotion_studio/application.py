@@ -17,6 +17,7 @@ from starlette.routing import Route
 
 from lipmotion_studio.folder import RevisionError
 from lipmotion_studio.page_replies import ProjectReplies, RecordingReplies
+from lipmotion_studio.recording import OpenRecording
 from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.web.files import read_page
@@ -50,8 +51,8 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         post("/api/lines", project.dropped),
         Route(one, recordings.recording),
         post(f"{one}/edits", recordings.edits),
-        post(f"{one}/undo", recordings.undo),
-        post(f"{one}/redo", recordings.redo),
+        post(f"{one}/undo", recordings.stepping(OpenRecording.undo)),
+        post(f"{one}/redo", recordings.stepping(OpenRecording.redo)),
         post(f"{one}/settle", recordings.settle),
         post(f"{one}/transcript", recordings.transcript),
         post(f"{one}/restore", recordings.restore),

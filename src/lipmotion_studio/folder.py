@@ -198,9 +198,7 @@ class ProjectFolder:
         return InputError(f"the edits of the recording are damaged, and are left as they are: {error}; {way_out}")
 
     def read_edits(self, recording: ProjectRecording) -> EditFile:
-        """Return a recording's file of edits. Raises InputError: it is damaged (and where a copy is), or of another
-        sound.
-        """
+        """Return a recording's edits. Raises InputError: damaged (and where a copy is), or of another sound."""
         with self.lock:
             try:
                 file = read_edits(self.edits(recording))
@@ -265,9 +263,7 @@ class ProjectFolder:
             return False
 
     def restore_edits(self, recording: ProjectRecording) -> None:
-        """Replace a damaged file of edits by its copy, and keep it beside. Raises InputError: no damage or copy.
-        ExportError: no write.
-        """
+        """Put the copy in place of damaged edits, which stay beside. Raises InputError: no damage or copy."""
         with self.lock:
             if not self.is_restorable(recording):
                 self.read_edits(recording)  # says what is damaged
@@ -275,9 +271,7 @@ class ProjectFolder:
             restore_copy(self.edits(recording), self._copy(recording))
 
     def change(self, changed: Callable[[Project], Project], *, save: bool = True) -> None:
-        """Replace the project by what a function makes of it; ``save``: at once. Raises ExportError: not written, and
-        as before.
-        """
+        """Replace the project by what a function makes of it. Raises ExportError: not written; it stays as it was."""
         with self.lock:
             before = self.project
             self.project = changed(before)
@@ -306,9 +300,7 @@ class ProjectFolder:
                 temporary.write_text(text, encoding="utf-8")
 
     def add(self, source: Path) -> list[int]:
-        """Add new recordings, also of folders or lists, where they are; return their numbers. Raises InputError.
-        ExportError.
-        """
+        """Add new recordings, also of folders or lists; return their numbers. Raises InputError, ExportError."""
         with self.lock:
             listed = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
             sources = [(Path(each.recording), each.name, each.transcript) for each in listed]

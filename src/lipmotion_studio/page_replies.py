@@ -61,13 +61,15 @@ class RecordingReplies:
         commands = self._studio.add_phones(steps)
         return await self._state_after(number, lambda recording: recording.edit(revision, commands, instead))
 
-    async def undo(self, request: Request) -> Response:
-        """Edits to be taken back."""
-        return await self._step(request, OpenRecording.undo)
+    def stepping(self, step: Callable[[OpenRecording, int, int], Changed]) -> Callable[[Request], Awaitable[Response]]:
+        """Return what replies once so many edits were taken back, or made again."""
 
-    async def redo(self, request: Request) -> Response:
-        """Edits to be made again."""
-        return await self._step(request, OpenRecording.redo)
+        async def reply(request: Request) -> Response:
+            number, content, revision = await self._change(request)
+            count = whole(content, "count", 1, least=1)
+            return await self._state_after(number, lambda recording: step(recording, revision, count))
+
+        return reply
 
     async def settle(self, request: Request) -> Response:
         """The full motion to be made, after edits of a long recording."""
@@ -157,7 +159,11 @@ class RecordingReplies:
         def reply(recording: OpenRecording) -> Response:
             motion = self._studio.vary(number, recording, by).numbers("variance" if of == "deviation" else of)
             if names is not None:
-                motion = _choose_channels(motion, [name for name in names if name in motion.names] if by else names)
+                chosen = [name for name in names if name in motion.names or not by]
+                if unknown := [name for name in chosen if name not in motion.names]:
+                    known = ", ".join(motion.names)
+                    raise InputError(f"names: there is no {shorten(repr(unknown[0]))}, required some of: {known}")
+                motion = motion.selected(chosen)
             frames = stretch(query, motion.rate_hz, len(motion.values))
             values = motion.values[frames]
             if of == "deviation":
@@ -235,12 +241,6 @@ class RecordingReplies:
         content = await read_content(request)
         return self._number(request), content, whole(content, "revision")
 
-    async def _step(self, request: Request, step: Callable[[OpenRecording, int, int], Changed]) -> Response:
-        """Return the state of a recording after so many of its edits were taken back, or made again."""
-        number, content, revision = await self._change(request)
-        count = whole(content, "count", 1, least=1)
-        return await self._state_after(number, lambda recording: step(recording, revision, count))
-
     async def _change_versions(
         self, number: int, revision: int, changed: Callable[[ProjectRecording, OpenRecording], ProjectRecording]
     ) -> Response:
@@ -280,14 +280,6 @@ class RecordingReplies:
         parts = {"sound": "sound.wav"} | ({"video": "recorded"} if video else {})
         addresses = {name: self._access.with_key(f"/api/lines/{number}/{path}") for name, path in parts.items()}
         return addresses | ({"sound_begins_s": video[1]} if video else {})
-
-
-def _choose_channels(motion: Motion, names: list[str]) -> Motion:
-    """Return some channels of a motion, in the order of their names. Raises InputError: it has none of a name."""
-    for name in names:
-        if name not in motion.names:
-            raise InputError(f"names: there is no {shorten(repr(name))}, required some of: {', '.join(motion.names)}")
-    return motion.selected(names)
 
 
 def _numbers_reply(motion: Motion, first: int, more: dict[str, str]) -> Response:

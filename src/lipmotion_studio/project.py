@@ -13,21 +13,7 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
 from lipmotion.pipeline.outputs.output import OutputSettings, output_suffixes
-from lipmotion.types.values import (
-    SchemaError,
-    any_members,
-    as_tuple,
-    describe_value,
-    items,
-    members,
-    number,
-    one_of,
-    optional,
-    path,
-    text,
-    value_of,
-    whole,
-)
+from lipmotion.types import values
 from lipmotion_faces.outputs.shown_faces import shown_face
 
 FORMAT, VERSION = "lipmotion.project", 1
@@ -186,11 +172,11 @@ def parse_project(content: Any) -> Project:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f'not a project: required "format": "{FORMAT}"')
     if content.get("version") != VERSION:
-        version = describe_value(content.get("version"))
+        version = values.describe_value(content.get("version"))
         raise InputError(f"a project of version {version}, required {VERSION}; update lipmotion")
     try:
         members = _PROJECT({name: value for name, value in content.items() if name not in HEADER})
-    except SchemaError as error:
+    except values.SchemaError as error:
         raise InputError(f"not a project that can be read ({error})") from error
     recordings = members.pop("lines", [])
     if len({recording.number for recording in recordings}) < len(recordings):
@@ -200,21 +186,40 @@ def parse_project(content: Any) -> Project:
     return project
 
 
-_TEXT, _STEPS, _NUMBERED = text(1000), as_tuple(items(text(MAX_TEXT))), whole(1, 1 << 53)
-_EXPORT = {"files": any_members(_TEXT)} | dict.fromkeys(("preset", "edits", "steps", "model", "version"), _TEXT)
+_TEXT, _STEPS, _NUMBERED = (
+    values.text(1000),
+    values.as_tuple(values.items(values.text(MAX_TEXT))),
+    values.whole(1, 1 << 53),
+)
+_EXPORT = {"files": values.any_members(_TEXT)} | dict.fromkeys(("preset", "edits", "steps", "model", "version"), _TEXT)
 _VERSION = {"number": _NUMBERED, "steps": _STEPS}
 _RECORDING = {
-    **{"number": _NUMBERED, "name": path, "sound": path, "sha256": text(64), "transcript": text(MAX_TEXT)},
-    **{"duration_s": optional(number(0, 1e6)), "doubt": optional(number(-1, 1)), "mark": one_of(MARKS)},
-    **{"marked": text(64), "exports": as_tuple(items(value_of(ExportRecord, _EXPORT, _EXPORT)))},
-    "versions": as_tuple(items(value_of(EditVersion, _VERSION, _VERSION), most=MAX_VERSIONS)),
+    **{
+        "number": _NUMBERED,
+        "name": values.path,
+        "sound": values.path,
+        "sha256": values.text(64),
+        "transcript": values.text(MAX_TEXT),
+    },
+    **{
+        "duration_s": values.optional(values.number(0, 1e6)),
+        "doubt": values.optional(values.number(-1, 1)),
+        "mark": values.one_of(MARKS),
+    },
+    **{
+        "marked": values.text(64),
+        "exports": values.as_tuple(values.items(values.value_of(ExportRecord, _EXPORT, _EXPORT))),
+    },
+    "versions": values.as_tuple(values.items(values.value_of(EditVersion, _VERSION, _VERSION), most=MAX_VERSIONS)),
 }
-_PROJECT = members(
+_PROJECT = values.members(
     {
-        "lines": items(value_of(partial(ProjectRecording, sha256=""), _RECORDING, ("number", "name", "sound"))),
-        **dict.fromkeys(("model", "recordings", "given_model"), path),
+        "lines": values.items(
+            values.value_of(partial(ProjectRecording, sha256=""), _RECORDING, ("number", "name", "sound"))
+        ),
+        **dict.fromkeys(("model", "recordings", "given_model"), values.path),
         **dict.fromkeys(("language", "recogniser", "preset"), _TEXT),
-        **{"characters": any_members(path), "next_number": _NUMBERED},
+        **{"characters": values.any_members(values.path), "next_number": _NUMBERED},
     },
     alone=True,
 )

@@ -81,9 +81,7 @@ class OpenRecording:
         self.session.generate(file.edits)
 
     def with_model(self, model: Model, onto: FilmedFace | None) -> OpenRecording:
-        """Return it, to be read, with another model or mapped onto a person. Raises InputError: an edit fails, or no
-        such person.
-        """
+        """Return it with another model, or mapped onto a person. Raises InputError: an edit fails; no such person."""
         key = id(model), id(onto)
         if key not in self._others:
             self._others[key] = OpenRecording(self.file, self.folder, self.number, model, self.audio, onto)
@@ -157,9 +155,7 @@ class OpenRecording:
         return changed | {"guessed": rows}
 
     def restore_version(self, revision: int, version: str) -> dict[str, Any]:
-        """Go back to a kept version; the edits as they are become one. Raises as ``edit``; InputError: no such version,
-        too many.
-        """
+        """Go back to a kept version; keep the edits as they are, too. Raises as ``edit``; InputError: no version."""
         check_revision("the recording", self.revision, revision)
         recording, now = self.folder.recording(self.number), self.file.edits.sentences
         recording.with_version(now)  # refuses one too many before anything has changed
@@ -251,9 +247,7 @@ class OpenRecording:
         write_mp4(path, pictures, fps=DRAWN_HZ, audio=sound)
 
     def write_film(self, path: Path, start_s: float, end_s: float, person: ShownPerson) -> None:
-        """Write a stretch as a video of a filmed face. Raises InputError: as ``write_video``, or edits that it cannot
-        show.
-        """
+        """Write a stretch as a film. Raises InputError: as ``write_video``, or edits that it cannot show."""
         performance = self.performance(person)
         person.check(performance.settings)
         person.check_video(path, performance.settings)
@@ -410,9 +404,7 @@ def analyse_recording(
 def open_recording(
     folder: ProjectFolder, recording: ProjectRecording, model: Model, audio: AnalysedAudio | None = None
 ) -> OpenRecording:
-    """Open an analysed recording (``audio``: if read); note its length and doubt. Raises InputError: unreadable.
-    ExportError.
-    """
+    """Open an analysed recording; note its length and doubt. Raises InputError: unreadable. ExportError."""
     file = folder.read_edits(recording)
     audio = audio or load_sound(folder, replace(recording, sha256=recording.sha256 or file.sha256))
     file = folder.adopt(recording, file)

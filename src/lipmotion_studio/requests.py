@@ -83,9 +83,7 @@ def seconds(given: Mapping[str, Any], name: str, usual: float | None = None) -> 
 
 
 def stretch(given: Mapping[str, Any], rate_hz: float, frames: int) -> slice:
-    """Return the frames from ``start_s`` to ``end_s`` of a request, or all. Raises InputError: no times of the
-    recording.
-    """
+    """Return the frames from ``start_s`` to ``end_s`` of a request, or all. Raises InputError: no such times."""
     last_s = (frames - 1) / rate_hz
     start_s, end_s = seconds(given, "start_s", 0.0), min(seconds(given, "end_s", last_s), last_s)
     first, last = math.ceil(start_s * rate_hz - 1e-6), math.floor(end_s * rate_hz + 1e-6)

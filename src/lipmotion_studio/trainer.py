@@ -19,18 +19,7 @@ from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.pipeline.workers import start_process
 from lipmotion.storage.files import UNFINISHED, atomic_file, make_folder, read_text_file, remove, work_folder
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.types.values import (
-    any_members,
-    as_tuple,
-    items,
-    members,
-    number,
-    one_of,
-    optional,
-    text,
-    value_of,
-    whole,
-)
+from lipmotion.types import values
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
 from lipmotion_studio.folder import ProjectFolder, clean_name, copy_file, restore_copy, write_with_copy
 from lipmotion_studio.project import ProjectRecording
@@ -138,9 +127,7 @@ class Trainer:
         return {path.stem: path for path in paths if path.is_file() and not path.name.startswith(".")}
 
     def begin(self, kind: str, name: str, numbers: Sequence[int], options: VoiceOptions) -> None:
-        """Begin to make a voice or a face. Raises InputError: busy, or no such kind, name or videos. ExportError: no
-        write.
-        """
+        """Begin to make a voice or a face. Raises InputError: busy; no such kind, name or videos. ExportError."""
         if kind not in KINDS:
             raise InputError(f"no kind {shorten(repr(kind))}; required {' or '.join(KINDS)}")
         plain = clean_name(name, "")
@@ -312,9 +299,7 @@ class Trainer:
             return False
 
     def restore(self) -> None:
-        """Replace a damaged file by its copy, and keep it beside. Raises InputError: no damage or copy. ExportError: no
-        write.
-        """
+        """Put the copy in place of a damaged file, which stays beside. Raises InputError: no damage or copy."""
         with self._lock:
             if not self.damage or not self.is_restorable:
                 raise InputError(self.damage or "what is known of the training is not damaged; nothing is restored")
@@ -340,15 +325,29 @@ def _read_jobs(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
         raise InputError(f"{file}: {error}") from error
 
 
-_TEXT, _ANY = text(1 << 20), any_members(lambda value: value)
-_REQUEST = {"kind": one_of(KINDS), "name": _TEXT, "lines": as_tuple(items(whole(0, 1 << 31))), "options": _ANY}
-_STATUS = {
-    **{"state": one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)), "stage": _TEXT, "share": number(0, 1)},
-    **{"warnings": items(_TEXT), "skipped": items(_ANY), "error": _TEXT, "report": optional(_ANY)},
+_TEXT, _ANY = values.text(1 << 20), values.any_members(lambda value: value)
+_REQUEST = {
+    "kind": values.one_of(KINDS),
+    "name": _TEXT,
+    "lines": values.as_tuple(values.items(values.whole(0, 1 << 31))),
+    "options": _ANY,
 }
-_JOB = {"wanted": value_of(TrainingRequest, _REQUEST, _REQUEST), "told": members(_STATUS, ["state"])}
-_STATE = members(
-    _JOB | {"format": one_of([FORMAT]), "version": one_of([VERSION]), "made": items(members(_JOB, _JOB))},
+_STATUS = {
+    **{
+        "state": values.one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)),
+        "stage": _TEXT,
+        "share": values.number(0, 1),
+    },
+    **{"warnings": values.items(_TEXT), "skipped": values.items(_ANY), "error": _TEXT, "report": values.optional(_ANY)},
+}
+_JOB = {"wanted": values.value_of(TrainingRequest, _REQUEST, _REQUEST), "told": values.members(_STATUS, ["state"])}
+_STATE = values.members(
+    _JOB
+    | {
+        "format": values.one_of([FORMAT]),
+        "version": values.one_of([VERSION]),
+        "made": values.items(values.members(_JOB, _JOB)),
+    },
     ("format", "version", *_JOB),
 )
 

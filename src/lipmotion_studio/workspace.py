@@ -163,9 +163,7 @@ class Workspace:
         return work
 
     async def run(self, number: int, do: Callable[[OpenRecording], ResultT]) -> ResultT:
-        """Do something with an open recording, in its thread. Raises NotReadyError: in analysis. LipMotionError: it
-        failed.
-        """
+        """Do something with an open recording, in its thread. Raises NotReadyError: in analysis. LipMotionError."""
         work = self.open(number)
         recording, thread = work.recording, work.thread
         if work.status == FAILED:

@@ -8,7 +8,7 @@ from lipmotion.errors import InputError
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import Motion
 from lipmotion_faces.appearance import person
-from lipmotion_faces.appearance.candidates import CANDIDATES, STEADY
+from lipmotion_faces.appearance.candidates import CANDIDATES
 from lipmotion_faces.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relight, replaced_part
 from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
 from lipmotion_faces.filmed.face import FilmedFace
@@ -131,16 +131,6 @@ def test_jaws_differ_in_the_jaw_alone(appearance: Appearance) -> None:
     reach = np.nonzero(inside)
     for found, wanted in ((rows, reach[0]), (columns, reach[1])):
         assert (found.min(), found.max()) == (wanted.min() - EDGE_PX, wanted.max() + EDGE_PX)
-
-
-def test_candidates_are_restored_as_recorded(appearance: Appearance) -> None:
-    """The eigenlips of a recorded mouth with its own detail are that mouth."""
-    mouths = appearance.mouth_refiner(STEADY), appearance.mouth_codes, appearance.mouths, 7
-    jaws = appearance.jaw_refiner(), appearance.jaw_codes, appearance.jaws, 1
-    for refiner, codes, recorded, step in (mouths, jaws):
-        chosen = np.arange(0, len(recorded), step)
-        made = refiner.pictures(codes[chosen], np.repeat(chosen[:, None], 3, axis=1))
-        assert np.abs(made.astype(int) - recorded[chosen]).max() <= 1
 
 
 @pytest.mark.long

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from lipmotion.errors import InputError
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion_faces.appearance import poisson
-from lipmotion_faces.appearance.poisson import CLEARANCE, GridFiller, cloning_system, nested_grids
+from lipmotion_faces.appearance.poisson import CLEARANCE, CloningSystem, GridFiller, cloning_system, nested_grids
 from oracles.membranes import cloned
 
 
@@ -32,6 +32,14 @@ MASKS = {
     "smallest picture": np.ones((3, 3), bool),
     "scattered": np.random.default_rng(3).random((30, 40)) < 0.6,
 }
+
+
+def correct(system: CloningSystem, source: np.ndarray, background: np.ndarray) -> np.ndarray:
+    """Return what cloning adds to the source: the membrane in the region, else the background minus the source."""
+    result = np.subtract(background, source, dtype=np.float32)
+    for frames, membrane in system._membranes(source, background):
+        np.copyto(result[(frames, *system.box)], membrane, where=system.grids.region[..., None])
+    return result
 
 
 def noise(shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
@@ -64,7 +72,7 @@ def test_mouths_of_a_film_are_within_one_grey_level_of_the_printed_equation() ->
     exact = cloned(system.mask, source, background)
     assert np.abs(exact - source)[system.mask].max() > 20
     assert np.abs(system.clone(source[None], background[None])[0] - np.clip(np.rint(exact), 0, 255)).max() <= 1
-    assert np.abs(source + system.correction(source[None], background[None])[0] - exact).max() < 0.25
+    assert np.abs(source + correct(system, source[None], background[None])[0] - exact).max() < 0.25
 
 
 def test_constants_and_linear_functions_are_reproduced() -> None:
@@ -75,7 +83,7 @@ def test_constants_and_linear_functions_are_reproduced() -> None:
         y, x = np.mgrid[:height, :width] / max(height, width)
         linear = np.stack([np.full_like(x, 40), 90 * x - 30 * y, 120 * y], axis=-1)[None]
         source = noise(linear.shape)
-        assert system.correction(source.astype(float), source + linear) == pytest.approx(linear, abs=2e-3)
+        assert correct(system, source.astype(float), source + linear) == pytest.approx(linear, abs=2e-3)
         assert (system.clone(source, source) == source).all()
 
 
@@ -102,9 +110,9 @@ def test_many_pictures_give_what_each_gives_alone() -> None:
     system = cloning_system(ellipse(20, 24))
     count = poisson.BATCH + 7
     source, background = (noise((count, 20, 24, 3), seed) for seed in (1, 2))
-    together = system.correction(source, background)
+    together = correct(system, source, background)
     for t in (0, 31, poisson.BATCH - 1, poisson.BATCH, count - 1):
-        alone = system.correction(source[t : t + 1], background[t : t + 1])[0]
+        alone = correct(system, source[t : t + 1], background[t : t + 1])[0]
         assert together[t] == pytest.approx(alone, abs=1e-2)
 
 
@@ -117,7 +125,7 @@ def test_the_membrane_lies_between_its_edge_values(seed: int, height: int, width
     mask[1, 1] = True
     system = cloning_system(mask)
     source, background = (draw.integers(0, 256, (1, height, width, 3), np.uint8) for _ in range(2))
-    correction = system.correction(source, background)[0]
+    correction = correct(system, source, background)[0]
     exact = cloned(system.mask, source[0], background[0]) - source[0]
     assert np.abs(correction - exact).max() < 1
     outside = correction[~system.mask]

@@ -1,6 +1,7 @@
 import json
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -9,11 +10,11 @@ from cli.conftest import check_refused, is_one_error
 from lipmotion import Corpus
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.curves import bootstrap_interval
-from lipmotion_lab import engine_comparison as text
-from lipmotion_lab import folds, learning_curve, runner
 from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab import minnis2000 as minnis_2000
+from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate as evaluation_figures
+from lipmotion_lab.report import sections
 from lipmotion_lab.report.report import PARTS
 from lipmotion_lab.xie_liu2007 import six_systems
 
@@ -34,7 +35,7 @@ def test_the_table_is_that_of_the_figures(run, toy_corpus, here):
     )
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == table1.table(figures)
+    assert "\n".join(done.out) == sections.hofer_section(figures).as_text()
     assert (figures["split"], figures["clips"], figures["mixtures"]) == ("val", 2, [1, 2])
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
@@ -46,11 +47,14 @@ def test_quick_runs_of_all_experiments_are_of_the_same_recordings(run, toy_corpu
         taken.append(corpus.names())
         return {"rows": []}
 
+    def command(figures: Any) -> Any:
+        return SimpleNamespace(as_text=lambda: figures["stamp"]["command"])
+
     monkeypatch.setattr(runner, "QUICK_CLIPS", {"train": 3, "val": 1, "test": 1})
     for module, name in ((table1, "hofer2008"), (six_systems, "xieliu2007"), (minnis_2000, "minnis2000")):
         monkeypatch.setattr(module, name, taking)
-    for module in (table1, six_systems, minnis_2000):
-        monkeypatch.setattr(module, "table", lambda figures: figures["stamp"]["command"])
+    for name in ("hofer2008", "xieliu2007", "minnis2000"):
+        monkeypatch.setitem(PARTS, name, replace(PARTS[name], section=command))
     monkeypatch.setitem(PARTS, "folds", replace(PARTS["folds"], run=lambda given: taking(given.corpus)))
     for name in ("hofer2008", "xieliu2007", "minnis2000"):
         done = run("experiment", name, toy_corpus.path, "--quick", "-o", "a.json")
@@ -71,7 +75,7 @@ def test_the_learning_curve_of_a_list(run, toy_corpus, here):
     done = run("experiment", "learning-curve", toy_corpus.path, *chosen, "-o", "a.json", "--workers", "1")
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == learning_curve.table(figures)
+    assert "\n".join(done.out) == sections.learning_section(figures).as_text()
     assert (figures["split"], figures["order"], figures["workers"]) == ("val", "given", 1)
     assert [row["names"] for row in figures["rows"]] == [3]
 
@@ -81,7 +85,7 @@ def test_folds_of_the_training_list(run, toy_corpus, here):
     done = run("experiment", "folds", toy_corpus.path, "--folds", "2", "-o", "a.json", "--workers", "1")
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == folds.table(figures)
+    assert "\n".join(done.out) == sections.folds_section(figures).as_text()
     assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
 
 
@@ -93,7 +97,7 @@ def test_xieliu2007_of_some_systems(run, toy_corpus, here):
     done = run("experiment", "xieliu2007", toy_corpus.path, *chosen, "-o", "a.json")
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == six_systems.table(figures)
+    assert "\n".join(done.out) == sections.xie_liu_section(figures).as_text()
     assert [row["names"] for row in figures["rows"]] == [3]
     assert (figures["order"], figures["tuning"]["tried"]) == ("given", {})
     assert len(list((here / "pictures").iterdir())) == 3
@@ -106,7 +110,7 @@ def test_all_engines(run, toy_corpus, here):
     done = run("experiment", "engines", toy_corpus.path, *chosen)
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == text.table(figures)
+    assert "\n".join(done.out) == sections.engines_section(figures).as_text()
     assert (figures["split"], figures["clips"]) == ("test", 2)
     kept = sorted(path.name for path in (here / "models").iterdir())
     assert kept == ["coupled.lipmotion", "selection.lipmotion", "trajectory.lipmotion"]

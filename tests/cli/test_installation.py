@@ -99,7 +99,7 @@ def test_whatever_a_part_raises(monkeypatch):
 @pytest.mark.parametrize(("version", "told"), [("4.10.0", "4.10.0, MediaPipe"), ("5.1.0", "another OpenCV lies over")])
 def test_face_tracking(monkeypatch, version, told):
     monkeypatch.setattr("lipmotion_faces.tracking.packages.import_opencv", lambda: SimpleNamespace(__version__=version))
-    monkeypatch.setattr("lipmotion_faces.tracking.packages.import_face_mesh", lambda: None)
+    monkeypatch.setattr("lipmotion_faces.tracking.packages.import_solution", lambda _: None)
     monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
     found = doctor_module.look_at("face tracking")
     assert found.state == "works"

@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion import Corpus
-from lipmotion.testing.examples import examples
-from lipmotion.types import Channel, Example, Utterance
+from lipmotion.types import Channel, Utterance
 
 
 def copied(corpus: Corpus, folder: Path, change: Callable[[Utterance], Utterance]) -> Corpus:
@@ -27,14 +26,3 @@ def renamed(corpus: Corpus, folder: Path, *names: str) -> Corpus:
         )
 
     return copied(corpus, folder, change)
-
-
-def partly_valid(count: int, hidden: int) -> list[Example]:
-    """Return sentences whose last frames are not valid, and have wrong values."""
-    made = []
-    for one in examples(count):
-        valid = one.valid.copy()
-        valid[-hidden:] = False
-        one.motion.values[-hidden:] = 9
-        made.append(replace(one, valid=valid))
-    return made

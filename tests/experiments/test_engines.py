@@ -15,7 +15,7 @@ from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.testing.examples import speech, timeline
 from lipmotion.types import Progress
-from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines, table
+from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines
 from lipmotion_lab.runner import ExperimentSettings
 
 LONG = pytest.mark.long
@@ -121,10 +121,3 @@ def test_recordings_of_the_training_are_not_compared(toy_corpus):
     for split in ("train", None):
         with pytest.raises(CorpusError, match="are in the split that is compared with"):
             engines(toy_corpus, split=split, settings=SMALL)
-
-
-@LONG
-def test_the_table_has_every_system(figures):
-    lines = table(figures).splitlines()
-    for name in ENGINES_COMPARED:
-        assert sum(line.startswith(f"  {name} ") for line in lines) == 2

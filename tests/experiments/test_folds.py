@@ -14,8 +14,10 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
+from lipmotion_lab import runner
 from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
-from lipmotion_lab.folds import folds, table
+from lipmotion_lab.folds import folds
+from lipmotion_lab.report.sections import folds_section
 from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -87,9 +89,9 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
         clips = {condition: [f"{name} {condition}" for name in held_out] for condition in conditions}
         return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1, utterances=[]))
 
-    monkeypatch.setattr(module, "train_and_generate", result)
+    monkeypatch.setattr(runner, "train_and_generate", result)
     monkeypatch.setattr(module, "figures_of", lambda clips, *_: sorted(clips))
-    monkeypatch.setattr(module, "opening_row_with_rates", lambda figures: {"clips": figures})
+    monkeypatch.setattr(runner, "opening_row_with_rates", lambda figures: {"clips": figures})
     figures = folds(toy_corpus, count=3)
     assert sorted(name for held_out in cut for name in held_out) == sorted(toy_corpus.names("train"))
     assert [len(held_out) for held_out in cut] == [3, 3, 2]
@@ -120,9 +122,9 @@ def test_finished_parts_are_not_generated_again(toy_corpus, tmp_path, monkeypatc
     def as_lists(clips: Sequence[ComparedClip], *_: object) -> list[Any]:
         return [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
 
-    monkeypatch.setattr(module, "train_and_generate", result)
+    monkeypatch.setattr(runner, "train_and_generate", result)
     monkeypatch.setattr(module, "figures_of", as_lists)
-    monkeypatch.setattr(module, "opening_row_with_rates", lambda figures: {"clips": figures})
+    monkeypatch.setattr(runner, "opening_row_with_rates", lambda figures: {"clips": figures})
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path)
     again = run(tmp_path)
@@ -149,16 +151,17 @@ def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypat
         recordings = SimpleNamespace(closed_under=0.1, utterances=[corpus.utterance(name) for name in held_out])
         return SimpleNamespace(used=names, clips={CONDITIONS[0]: clips}, recordings=recordings)
 
-    monkeypatch.setattr(module, "train_and_generate", result)
+    monkeypatch.setattr(runner, "train_and_generate", result)
     row = dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6], "false_per_minute": 1.0, "original_per_minute": 2.0}
     monkeypatch.setattr(module, "figures_of", lambda *_: {})
-    monkeypatch.setattr(module, "opening_row_with_rates", lambda _: row)
+    monkeypatch.setattr(runner, "opening_row_with_rates", lambda _: row)
     figures = folds(corpus, by_speaker=True)
     assert sorted(map(sorted, left_out)) == [[""], ["anna"], ["ben"], ["eve"]]
     assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(
         {"anna": 1, "ben": -1, "eve": 1, "unknown": 1}
     )
-    assert "4 speakers unknown to the model: mean ACC 0.500, -1.000 (ben) to 1.000 (unknown)" in table(figures)
+    told = ["4 speakers: mean ACC 0.500, -1.000 (ben) to 1.000 (unknown)."]
+    assert folds_section(figures).words["Speakers unknown to the model"] == told
     left_out.clear()
     folds(corpus, by_speaker=True, count=2)
     assert [len(each) for each in left_out] == [2, 2]

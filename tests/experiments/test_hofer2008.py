@@ -13,7 +13,8 @@ from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import hofer2008 as table1
-from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options, hofer2008, table, what_held
+from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options, hofer2008
+from lipmotion_lab.report.sections import hofer_section
 from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -60,7 +61,7 @@ def test_what_was_finished_is_not_trained_again(figures, toy_corpus, work, monke
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
     monkeypatch.setattr(JointEngine, "growing_models", None)
     again = hofer2008(toy_corpus, TWO, work=work, settings=SMALL)
-    assert table(again) == table(figures)
+    assert hofer_section(again).as_text() == hofer_section(figures).as_text()
 
 
 @pytest.mark.long
@@ -70,23 +71,6 @@ def test_pins_move_the_lips_of_the_same_units(figures):
     assert pinned["recall_p_b_m"] == 100
     assert pinned["nrmse"] != printed["nrmse"]
     assert pinned["gaussians"] == printed["gaussians"]
-
-
-def test_what_held_of_the_order_is_told_in_words():
-    gains = [("eVis", "pbVis", (1.0, 3.0)), ("eVis", "phone", (-2.0, -1.0)), ("pbVis", "phone", (-1.0, 1.0))]
-    pairs = [{"better": better, "worse": worse, "score_gain_95": gain} for better, worse, gain in gains]
-    block = {"rows": {"eVis": {"score": 70.0}, "phone": {"score": 71.0}}, "paper_order": pairs}
-    assert what_held(block) == ("best: phone; of the paper's 3 pairs hold 1, reversed 1 (phone over eVis), open 1")
-
-
-def test_a_star_is_that_of_its_own_interval():
-    results = Path(__file__).parents[2] / "docs" / "results" / "hofer2008.json"
-    figures = json.loads(results.read_text(encoding="utf-8"))
-    row = figures["tables"][0]["rows"]["eVis"] | {"score_gain_95": [1.0, 2.0], "acc_gain_95": [-1.0, 1.0]}
-    figures["tables"] = [figures["tables"][0] | {"rows": {"eVis": row}}]
-    (line,) = [line for line in table(figures).split("\n") if line.startswith("  eVis")]
-    assert f"{row['score']:.1f}* (" in line
-    assert f"{row['acc']:.3f} (" in line
 
 
 def test_nothing_to_train_on_or_to_compare_with(toy_corpus, tmp_path):

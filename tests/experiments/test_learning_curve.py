@@ -11,7 +11,8 @@ from lipmotion import Corpus, Selection, evaluate, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import learning_curve as module
-from lipmotion_lab.learning_curve import learning_curve, table
+from lipmotion_lab.learning_curve import learning_curve
+from lipmotion_lab.report.sections import learning_section
 from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -65,7 +66,7 @@ def test_channels_that_are_not_there_are_dashes(toy_corpus, tmp_path):
     made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SMALL)
     row = made["rows"][0]["conditions"]["audio only"]
     assert (row["acc_width"], row["acc_outer"]) == (None, None)
-    assert table(made).splitlines()[4].split()[-2:] == ["–", "–"]
+    assert learning_section(made).table.as_lines()[1].split()[-2:] == ["–", "–"]
 
 
 def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_trained_again(
@@ -83,7 +84,7 @@ def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_traine
         return SimpleNamespace(recordings=SimpleNamespace(closed_under=0.1), clips={"audio only": []})
 
     monkeypatch.setattr(module, "SIZES", (3, 9))
-    monkeypatch.setattr(module, "train_and_generate", result)
+    monkeypatch.setattr("lipmotion_lab.runner.train_and_generate", result)
     monkeypatch.setattr(module, "_row", lambda *_: {})
     received: list[tuple[str, str]] = []
     settings = ExperimentSettings(seed=1, receive=lambda *given: received.append(given[:2]))

@@ -18,7 +18,6 @@ from lipmotion_lab.minnis2000 import (
     join_figures,
     minnis2000,
     rows,
-    table,
     velocity_change,
 )
 from lipmotion_lab.runner import ExperimentSettings
@@ -98,14 +97,3 @@ def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path, monkeypat
     assert len(made) == 1 + sum(
         len(systems) for found in figures["lists"].values() for systems in found["conditions"].values()
     )
-
-
-@LONG
-def test_every_row_stands_in_the_table(figures):
-    text = table(figures)
-    for found in figures["lists"].values():
-        for systems in found["conditions"].values():
-            assert list(systems) == list(rows())
-            for name, row in systems.items():
-                assert f"  {name:36}{row['acc']:.3f}" in text
-                assert row["joins"]["per_clip"] > 0

@@ -42,9 +42,3 @@ def test_the_same_seed_gives_the_same(examples, monkeypatch):
     made = [BlstmBaseline().generate(each, examples[0].speech).motion.values for each in (one, same, other)]
     assert np.array_equal(made[0], made[1])
     assert not np.allclose(made[0], made[2])
-
-
-def test_epochs_are_counted(model, stages):
-    assert model
-    assert (stages[0].share, stages[-1].share) == (0, 1)
-    assert stages[-1].steps == 40

@@ -14,7 +14,7 @@ from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
 from lipmotion.kernels.forward_backward import chain_posteriors
 from lipmotion.kernels.normals import normal_sums
-from lipmotion_faces.kernels import affine, painting, planes
+from lipmotion_faces.kernels import affine, painting
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.kernels.shading import shade
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
@@ -84,13 +84,9 @@ def pictures() -> list[np.ndarray]:
     painting.paint_band(layer, heights, heights + 4, np.linspace(0, 1, 16), random.uniform(0, 1, (3, 4, 4)))
     painting.warp(layer, *shifts, 4, target)
     painting.warp_bytes(random.integers(0, 256, (12, 16, 4), np.uint16), *shifts, 4, moved)
-    stacked, packed = np.zeros((12, 16, 4), np.uint16), np.zeros((3, 12, 16), np.uint32)
+    stacked = np.zeros((12, 16, 4), np.uint16)
     painting.stack(layer, layer, np.dstack([layer, layer[..., 0]]) / 255, target, stacked)
-    for number, plane in enumerate(packed):
-        planes.pack(plain[..., number], 0, 0, 12, 16, number > 0, plane)
-    luma, colours, grid = np.zeros((12, 16), np.uint8), np.zeros((2, 6, 8), np.uint8), random.normal(0, 2, (2, 3, 3))
-    planes.warp_planes(packed, 0, 0, 12, 16, *grid, luma, *colours)
-    drawn = [light, plain, textured, opacity, frame, layer, target, moved, stacked, packed, luma, colours]
+    drawn = [light, plain, textured, opacity, frame, layer, target, moved, stacked]
     return [*drawn, affine.resample(plain[None], to_source, (5, 6)), normal_sums(points, triangles)]
 
 
@@ -122,7 +118,7 @@ np.savez(sys.argv[1], *sequences(), *pictures())
     [
         "import lipmotion",
         "from lipmotion.cli import command_line",
-        "from lipmotion.kernels import banded, factorial, network, paths; from lipmotion_faces.kernels import planes",
+        "from lipmotion.kernels import banded, factorial, network, paths; from lipmotion_faces.kernels import painting",
         "import lipmotion; lipmotion.animate('examples/welcome.flac')",
     ],
 )

@@ -10,13 +10,9 @@ from study.hostile import Hostile
 FOREIGN = "nobody may read this"
 LINES = ("1", "2", "0", "-1", "01", "1.0", "9" * 500, "../1", "%2e%2e", "1/../../foreign", "é", "1%00", "true")
 LINE_PARTS = (
-    "",
-    *(
-        "/edits /undo /redo /settle /transcript /mark /export /video /sound.wav /recorded /votes /versions "
-        "/versions/back /versions/forget /motion /weights /picture /why /doubts /../../project.json "
-        "/edits/../../../foreign.txt /remove/x"
-    ).split(),
-)
+    " /edits /undo /redo /settle /transcript /mark /export /video /sound.wav /recorded /votes /versions /versions/back "
+    "/versions/forget /motion /weights /picture /why /doubts /../../project.json /edits/../../../foreign.txt /remove/x"
+).split(" ")
 PATHS = (
     *(
         "/ /../project.json /project.json /studio.html /vendor/../../project.json //etc/passwd "
@@ -25,13 +21,10 @@ PATHS = (
         "/api/training /api/training/again /api/training/restore /api/training/../../foreign.txt /api/voice "
         "/voices/../../foreign.txt /api/faces/../../foreign.txt.glb /api/faces/head.glb/.. "
         "/api/faces/%2e%2e%2fforeign.glb /api/faces/portrait.glb /api/lines?name=../../foreign.txt "
-        "/api/lines?name=%00.wav"
+        "/api/lines?name=%00.wav /static /%ff%fe /api/lines/1/sound.wav?key=0 /application.py"
     ).split(),
-    "/api/lines?name=" + "a" * 600 + ".wav",
-    *("/static").split(),
-    "/" + "a/" * 500,
-    *("/%ff%fe /api/lines/1/sound.wav?key=0 /application.py").split(),
-)
+    "/api/lines?name=" + "a" * 600 + ".wav", "/" + "a/" * 500,
+)  # fmt: skip
 QUERIES = (
     "", "?time=nan", "?time=-1", "?time=1e999", "?time=0.5&face=../../foreign", "?face=/etc/passwd", "?names=",
     "?names=opening,../../foreign", "?names=" + "opening," * 3000, "?start_s=2&end_s=1", "?of=__class__", "?by=other",
@@ -39,57 +32,31 @@ QUERIES = (
     "?order=;drop", "?key=", "?key=é", "?" + "a=1&" * 900, "?time=" + "1" * 5000, "?end_s=0.5&start_s=0.4",
 )  # fmt: skip
 BODIES = (
-    b"",
-    b"{",
-    b"null",
-    b"[]",
-    b"[" * 5000,
-    b'"' * 100,
-    b"\xff\xfe\x00",
-    b'{"revision": NaN}',
-    b'{"a": ' * 3000,
-    b"x" * 20_000,
-    b"1" * 4400,
-    *(
-        json.dumps(each).encode()
-        for each in (
-            {"revision": 0, "steps": ["phone 999999999999999999999 is p"]},
-            {"revision": 0, "steps": ["pin opening 1e308 at 0.5", "gain 3 from 0 to 1"]},
-            {"revision": 0, "steps": ["say " + "a " * 900 + "from 0 to 1"]},
-            {"revision": 0, "steps": ["draw opening " + "1 " * 990 + "from 0 to 1e300"]},
-            {"revision": 0, "steps": ["set background ../../foreign.txt"]},
-            {"revision": 0, "steps": ["phone 1 is p"] * 1001},
-            {"revision": 0, "steps": [["phone 1 is p"]], "instead": -1},
-            {"revision": 10**400, "count": 10**400},
-            {"revision": "0", "steps": "phone 1 is p"},
-            {"revision": 0, "count": -1},
-            {"mark": "../../foreign"},
-            {"mark": ["approved"]},
-            {"text": "\ud800", "revision": 0, "start_s": 0, "end_s": 1},
-            {"text": "mama", "revision": 0, "start_s": 1e300, "end_s": -1},
-            {"shown": ["a", "../../foreign"], "better": "a"},
-            {"shown": ["a"] * 3, "better": {}},
-            {"start_s": 0, "end_s": 1, "face": "head", "by": "other"},
-            {"preset": "../x"},
-            {"files": ["/../../foreign.txt", ".csv"]},
-            {"files": [".csv/../../../foreign"]},
-            {"files": [".%05d.png"]},
-            {"preset": 3, "only": {}},
-            {"lines": [99]},
-            {"kind": "voice", "name": "../../foreign", "lines": [1]},
-            {"kind": "face", "name": "/etc/passwd"},
-            {"kind": "../voice", "name": 3, "options": {"engine": "../../foreign"}},
-            {"kind": "voice", "name": "x", "lines": ["../../foreign.wav"], "options": {"path": "/etc"}},
-            {"voice": "../../foreign.txt"},
-            {"voice": ["x"]},
-            {"lines": "some"},
-            {"word": "a", "phones": ["../x"]},
-            {"word": "\n# a\nb", "phones": ["b"]},
-            {"start_s": 0, "end_s": 1e9, "face": "head"},
-            {"start_s": 0.2, "end_s": 0.1, "face": "/etc/passwd"},
-        )
-    ),
-)
+    b"", b"{", b"null", b"[]", b"[" * 5000, b'"' * 100, b"\xff\xfe\x00", b'{"revision": NaN}', b'{"a": ' * 3000,
+    b"x" * 20_000, b"1" * 4400,
+    *(json.dumps(each).encode() for each in (
+        {"revision": 0, "steps": ["phone 999999999999999999999 is p"]},
+        {"revision": 0, "steps": ["pin opening 1e308 at 0.5", "gain 3 from 0 to 1"]},
+        {"revision": 0, "steps": ["say " + "a " * 900 + "from 0 to 1"]},
+        {"revision": 0, "steps": ["draw opening " + "1 " * 990 + "from 0 to 1e300"]},
+        {"revision": 0, "steps": ["set background ../../foreign.txt"]},
+        {"revision": 0, "steps": ["phone 1 is p"] * 1001},
+        {"revision": 0, "steps": [["phone 1 is p"]], "instead": -1}, {"revision": 10**400, "count": 10**400},
+        {"revision": "0", "steps": "phone 1 is p"}, {"revision": 0, "count": -1}, {"mark": "../../foreign"},
+        {"mark": ["approved"]}, {"text": "\ud800", "revision": 0, "start_s": 0, "end_s": 1},
+        {"text": "mama", "revision": 0, "start_s": 1e300, "end_s": -1},
+        {"shown": ["a", "../../foreign"], "better": "a"}, {"shown": ["a"] * 3, "better": {}},
+        {"start_s": 0, "end_s": 1, "face": "head", "by": "other"}, {"preset": "../x"},
+        {"files": ["/../../foreign.txt", ".csv"]}, {"files": [".csv/../../../foreign"]}, {"files": [".%05d.png"]},
+        {"preset": 3, "only": {}}, {"lines": [99]}, {"kind": "voice", "name": "../../foreign", "lines": [1]},
+        {"kind": "face", "name": "/etc/passwd"},
+        {"kind": "../voice", "name": 3, "options": {"engine": "../../foreign"}},
+        {"kind": "voice", "name": "x", "lines": ["../../foreign.wav"], "options": {"path": "/etc"}},
+        {"voice": "../../foreign.txt"}, {"voice": ["x"]}, {"lines": "some"}, {"word": "a", "phones": ["../x"]},
+        {"word": "\n# a\nb", "phones": ["b"]}, {"start_s": 0, "end_s": 1e9, "face": "head"},
+        {"start_s": 0.2, "end_s": 0.1, "face": "/etc/passwd"},
+    )),
+)  # fmt: skip
 METHODS = ("GET", "GET", "POST", "POST", "POST", "PUT", "DELETE", "HEAD", "OPTIONS", "PATCH", "TRACE", "LOCK")
 RANGES = ("bytes=0-", "bytes=-1", "bytes=5-1", "bytes=9999999-", "bytes=a-b", "lines=1-2", "bytes=" + "0-1," * 900)
 TOKENS = ("{token}",) * 6 + ("", "x", "é", "' OR 1=1 --", "a" * 6000, "\t{token}")

@@ -94,16 +94,6 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
     assert collect_answers(folder) == []
 
 
-@pytest.mark.long
-def test_a_server_that_is_interrupted_ends_by_itself(tmp_path):
-    folder, errors = tmp_path / "study", tmp_path / "errors.txt"
-    small_study(folder)
-    with served(folder, errors) as server:
-        server.process.terminate()
-        assert server.process.wait(60) == 143
-    assert "Traceback" not in errors.read_text(encoding="utf-8")
-
-
 def test_a_port_that_is_taken_is_said(tmp_path):
     small_study(tmp_path / "study")
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(InputError, match="another --port"):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion_faces.tracking import face_follower as follow
 from lipmotion_faces.tracking.trackers import TRACKED_POINTS, FaceBox, LandmarkTracker
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
@@ -64,4 +63,4 @@ def script(monkeypatch: pytest.MonkeyPatch, answers: Sequence[NDArray[np.float64
         def boxes(self) -> NoFinder:
             return NoFinder()
 
-    monkeypatch.setattr(follow, "make_tracker", lambda _: Scripted())
+    monkeypatch.setattr("lipmotion_faces.tracking.trackers.make_tracker", lambda _: Scripted())

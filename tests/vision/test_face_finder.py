@@ -80,10 +80,10 @@ def test_parts_cover_the_picture(height, width):
 
 
 def test_missing_mediapipe_is_named_when_it_is_first_needed(monkeypatch):
-    def missing() -> None:
+    def missing(_: str) -> None:
         raise MissingDependencyError("MediaPipe")
 
-    monkeypatch.setattr(face_finder, "import_face_detection", missing)
+    monkeypatch.setattr(face_finder, "import_solution", missing)
     with FaceFinder() as finder, pytest.raises(MissingDependencyError):
         finder.boxes(np.zeros((48, 64, 3), np.uint8))
 

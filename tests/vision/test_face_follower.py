@@ -101,7 +101,7 @@ Show = Callable[..., tuple[FaceFollower, list[float | None]]]
 def show(monkeypatch: pytest.MonkeyPatch) -> Show:
     """Shows frames (faces, place); returns the follower, and where the face was followed to."""
     pytest.importorskip("cv2")
-    monkeypatch.setattr(follow, "make_tracker", lambda _: Shown())
+    monkeypatch.setattr("lipmotion_faces.tracking.trackers.make_tracker", lambda _: Shown())
     monkeypatch.setattr(follow, "WindowedMesh", SmallMesh)
 
     def run(

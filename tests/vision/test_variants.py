@@ -9,7 +9,7 @@ from lipmotion.types import Track
 from lipmotion_faces.tracking.mediapipe import FaceMesh
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS
-from vision.variants import Image, covered, frames_of, half_size, in_a_room, side_by_side, write_frames, zoomed
+from vision.variants import Image, covered, frames_of, in_a_room, write_frames, zoomed
 
 pytestmark = [pytest.mark.video, pytest.mark.recordings]
 
@@ -62,15 +62,6 @@ def unseen(found: Track) -> list[int]:
     return np.flatnonzero(~found.seen).tolist()
 
 
-def test_variable_frame_rate(tmp_path: Path, frames: list[Image], usual: Track) -> None:
-    draw = np.random.default_rng(0)
-    kept = [n for n in range(COUNT) if draw.random() > 0.25 or n in (0, COUNT - 1)]
-    found = track(write_frames(tmp_path / "a.mp4", [frames[n] for n in kept], ticks=kept), crops=False)
-    assert found.motion.rate_hz == 25
-    assert unseen(found) == sorted(set(range(COUNT)) - set(kept))
-    assert alike(found, usual) > 0.99
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("size", "scale", "least"),
@@ -108,15 +99,6 @@ def test_something_before_the_mouth(
     assert any("15 frames" in note for note in found.notes)
 
 
-def test_a_cut_to_somebody_else(
-    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
-) -> None:
-    found = track(write_frames(tmp_path / "a.mp4", [*frames[:65], *stranger[0][65:75]]), crops=False)
-    assert unseen(found) == list(range(65, 75))
-    assert alike(found, usual) > 0.99
-    assert found.notes == ("cut at 2.60 s", "another face, or one that is not recognised, in 10 frames")
-
-
 def test_somebody_else_between(
     tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
 ) -> None:
@@ -140,17 +122,6 @@ def test_a_jump_cut_to_the_same_person_is_followed(tmp_path: Path, frames: list[
     assert unseen(found) == []
     assert alike(found, usual) > 0.98
     assert found.notes == ("cut at 1.52 s",)
-
-
-@pytest.mark.long
-def test_of_two_people_the_larger_is_followed(
-    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
-) -> None:
-    for large, small, expected in ((frames, stranger[0], usual), (stranger[0], frames, stranger[1])):
-        pair = large, half_size(small)
-        found = track(write_frames(tmp_path / "a.mp4", side_by_side(*pair)), crops=False)
-        assert unseen(found) == []
-        assert alike(found, expected) > 0.98
 
 
 def test_damage_is_told(tmp_path: Path, frames: list[Image], usual: Track) -> None:

@@ -47,17 +47,6 @@ def write_frames(
     return path
 
 
-def side_by_side(left: Sequence[Image], right: Sequence[Image]) -> list[Image]:
-    """Return two clips in one picture."""
-    return [np.concatenate(pair, axis=1) for pair in zip(left, right, strict=False)]
-
-
-def half_size(frames: Sequence[Image]) -> list[Image]:
-    """Return the pictures at half their size, on black."""
-    height, width = frames[0].shape[0] // 4, frames[0].shape[1] // 4
-    return [np.pad(frame[::2, ::2], ((height, height), (width, width), (0, 0))) for frame in frames]
-
-
 def in_a_room(
     frames: Sequence[Image], size: tuple[int, int], scale: float, at: Callable[[int], tuple[float, float]]
 ) -> list[Image]:

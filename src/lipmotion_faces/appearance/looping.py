@@ -255,19 +255,8 @@ def loop_order(
     return min(orders, key=plan.blemish)
 
 
-@dataclass(frozen=True, eq=False)
-class _Joins:
-    """Joins that are possible: the last frame before each, its cost, and the frame after it, -1 for a turn."""
-
-    ends: Numbers
-    costs: Array
-    nexts: Numbers
-
-
 class _Plan:
-    """A background, its scenes (first frame, end), and the cost of turning, beginning or ending at each frame
-    [shape=(T,)].
-    """
+    """A background, its scenes, and the cost of turning, beginning or ending at each frame [shape=(T,)]."""
 
     def __init__(
         self, descriptors: FrameDescriptors, rate_hz: float, allowed: NDArray[np.bool_], cuts: Sequence[int]
@@ -306,20 +295,20 @@ class _Plan:
         runs: list[tuple[int, int, int]] = []
         joins: list[Join] = []
         while shown < count:
-            options = self._list_joins(at, way)
-            lengths = np.abs(options.ends - at) + 1
-            following = options.nexts[:, None] + way * np.arange(self._least)
+            ends, join_costs, nexts = self._list_joins(at, way)
+            lengths = np.abs(ends - at) + 1
+            following = nexts[:, None] + way * np.arange(self._least)
             seen = last_shown[np.clip(following, 0, len(last_shown) - 1)].max(axis=1)  # -inf: never
-            ages = np.where(options.nexts < 0, 0, shown + lengths - seen)
-            costs = options.costs + self._usual / lengths + REPEAT_COST * np.exp(-ages / self._repeat)
+            ages = np.where(nexts < 0, 0, shown + lengths - seen)
+            costs = join_costs + self._usual / lengths + REPEAT_COST * np.exp(-ages / self._repeat)
             chosen = int(draws.choice(np.flatnonzero(costs <= costs.min() + CHOICE_COST_RANGE)))
-            end, after = int(options.ends[chosen]), int(options.nexts[chosen])
+            end, after = int(ends[chosen]), int(nexts[chosen])
             runs.append((at, way, abs(end - at) + 1))
             shown += runs[-1][2]
             last_shown[at : end + way if end + way >= 0 else None : way] = shown
             if shown >= count:
                 break
-            joins.append(Join(shown, "turn" if after < 0 else "jump", float(options.costs[chosen])))
+            joins.append(Join(shown, "turn" if after < 0 else "jump", float(join_costs[chosen])))
             if after < 0:
                 way = -way
                 after = end + way if self._room(end, way) else end
@@ -333,18 +322,16 @@ class _Plan:
         again = (np.diff(order.first[shown]) == 0) & (np.diff(shown) < self._repeat)
         return worst + REPEATS_COST * float(again.sum()) / len(order)
 
-    def _list_joins(self, at: int, way: int) -> _Joins:
+    def _list_joins(self, at: int, way: int) -> tuple[Numbers, Array, Numbers]:
+        """Return possible joins: the last frame before each, its cost, and the frame after it, -1 for a turn."""
         room = self._room(at, way)
         least = min(self._least, max(room, 1))
         lengths = np.arange(least, room + 1) if room >= least else np.array([room])
         ends = at + way * lengths
         targets, costs = (table[ends] for table in self._jumps[way])
         row, scene = np.nonzero(targets >= 0)
-        return _Joins(
-            np.concatenate([ends, ends[row]]),
-            np.concatenate([self.restless[ends], costs[row, scene]]),
-            np.concatenate([np.full(len(ends), -1), targets[row, scene]]),
-        )
+        nexts = np.concatenate([np.full(len(ends), -1), targets[row, scene]])
+        return np.concatenate([ends, ends[row]]), np.concatenate([self.restless[ends], costs[row, scene]]), nexts
 
     def _room(self, at: int, way: int) -> int:
         """Return how many frames there are behind a frame, in its scene."""

@@ -58,25 +58,21 @@ def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
     return FaceShape(half, float(np.clip(highest - MARGIN_PX, LEAST_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
 
 
-def region_map(face_to_frame: Array, scale: float, corner: tuple[float, float] = CORNER) -> Array:
-    """Return the affine maps from a pixel of a picture of the lower face, or of another part, to its position in the
-    frame.
+def region_map(face_to_frame: Array, scale: float) -> Array:
+    """Return the affine maps from a pixel of a picture of the lower face to its position in the frame.
 
     face_to_frame : maps from px of the face to those of the frame [shape=(..., 2, 3)], of
                     ``tracking.head_pose.face_to_image``
     scale         : samples a pixel
-    corner        : upper left corner of the part, px of the face
     Pixel (0, 0) is a centre. Returns an array of the same shape.
     """
     turn = face_to_frame[..., :2]
-    first = np.array(corner) + 0.5 / scale
+    first = np.array(CORNER) + 0.5 / scale
     return np.concatenate([turn / scale, (face_to_frame[..., 2] - 0.5 + turn @ first)[..., None]], axis=-1)
 
 
 def best_scale(face_to_frame: Array) -> int:
-    """Return the samples a pixel, 1 to ``LARGEST_SCALE``, with which footage of these maps [shape=(T, 2, 3)] loses
-    nothing.
-    """
+    """Return the samples a pixel, 1 to ``LARGEST_SCALE``, with which footage [maps: shape=(T, 2, 3)] loses nothing."""
     size = np.sqrt(np.abs(np.linalg.det(face_to_frame[:, :, :2])))
     return int(np.clip(np.floor(np.median(size) + 0.25), 1, LARGEST_SCALE))
 
@@ -104,9 +100,7 @@ def mouth_ellipse(scale: int) -> Mask:
 
 
 def cheek_light(mouths: NDArray[Any]) -> Array:
-    """Return the mean red, green, blue of the corners of mouth pictures [shape=(T, 3)]. Raises InputError: another
-    size.
-    """
+    """Return the mean colours of the corners of mouth pictures [shape=(T, 3)]. Raises InputError: another size."""
     scale = mouths.shape[1] // mouth_region.HEIGHT if mouths.ndim == 4 else 0
     required = (mouth_region.HEIGHT * scale, mouth_region.WIDTH * scale, 3)
     if not scale or mouths.shape[1:] != required:
@@ -197,11 +191,8 @@ def move_chin(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pictures:
     scale = pictures.shape[1] // HEIGHT
     result = pictures.copy()
     room = np.maximum(chin_px - ABOVE_PX - STILL_PX, 0)
-    highest, lowest = (
-        -np.minimum(LARGEST_PX, LARGEST_RISE_SHARE * room),
-        np.minimum(LARGEST_PX, LARGEST_DROP_SHARE * room),
-    )
-    drops = np.clip(drops_px, highest, lowest)
+    highest = -np.minimum(LARGEST_PX, LARGEST_RISE_SHARE * room)
+    drops = np.clip(drops_px, highest, np.minimum(LARGEST_PX, LARGEST_DROP_SHARE * room))
     across = (np.arange(WIDTH * scale) + 0.5) / scale + CORNER[0]
     share = np.maximum(1 - (across / HINGE_PX) ** 2, 0) * (1 - _rise(np.abs(across), *SIDE_PX))
     columns = np.flatnonzero(share > 0)

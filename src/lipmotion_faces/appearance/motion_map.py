@@ -121,9 +121,7 @@ def motion_map_arrays(fitted: MotionMap) -> dict[str, NDArray[Any]]:
 
 
 def motion_map_from_arrays(arrays: Arrays, values: int) -> MotionMap:
-    """Deserialise a regression with ``values`` targets. Raises ModelFormatError: an array is missing, unknown or does
-    not fit.
-    """
+    """Return the regression with ``values`` targets in arrays. Raises ModelFormatError: they do not fit."""
     with format_errors("the map from motion to pictures", "build the face again"):
         refuse_undeclared(arrays, MOTION_MAP)
         stored = check_arrays(arrays, MOTION_MAP, V=values)

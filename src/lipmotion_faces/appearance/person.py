@@ -28,46 +28,12 @@ from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.coded_video import decode_pictures, encode_pictures
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
+from lipmotion_faces.appearance import candidates, lower_face, motion_map
 from lipmotion_faces.appearance.camera_noise import (
     CameraNoise,
     camera_noise_arrays,
     camera_noise_from_arrays,
     estimate_noise,
-)
-from lipmotion_faces.appearance.candidates import (
-    CANDIDATES,
-    LARGEST_COEFFICIENT,
-    LARGEST_DETAIL,
-    Candidates,
-    RefinementOptions,
-    Refiner,
-    choose_candidates,
-    draw_to_recorded,
-    make_candidates,
-    measure_details,
-    squared_distances,
-)
-from lipmotion_faces.appearance.lower_face import (
-    CORNER,
-    HEIGHT,
-    LARGEST_SCALE,
-    NARROWEST_PX,
-    WIDEST_PX,
-    WIDTH,
-    FaceShape,
-    cheek_light,
-    mouth_ellipse,
-    mouth_part,
-    relight,
-    replaced_part,
-)
-from lipmotion_faces.appearance.motion_map import (
-    LEAST_DEVIATION,
-    MotionMap,
-    channel_values,
-    fit_motion_map,
-    motion_map_arrays,
-    motion_map_from_arrays,
 )
 
 Array = NDArray[np.float64]
@@ -82,7 +48,7 @@ JAW_COMPONENTS = 12
 """Principal components of the jaw, of each colour."""
 JAW_CANDIDATES = 120
 """Recorded lower faces whose detail the jaw has."""
-JAW_OPTIONS = RefinementOptions(steadiness=0.3)
+JAW_OPTIONS = candidates.RefinementOptions(steadiness=0.3)
 PICTURES_PER_BLOCK = 256
 EDGE_PX = 3
 """The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
@@ -118,7 +84,7 @@ class FootagePictures:
     channels: tuple[Channel, ...]
     levels_db: Array
     chin_px: Array
-    shape: FaceShape
+    shape: lower_face.FaceShape
     scale: int
     finer: Callable[[Index], Pictures]
 
@@ -157,7 +123,7 @@ class Appearance:
     too, so that it moves smoothly; the paper shows recorded ones.
     """
 
-    shape: FaceShape
+    shape: lower_face.FaceShape
     scale: int
     light: Array
     mouth: Eigenlips
@@ -167,29 +133,29 @@ class Appearance:
     jaw: Eigenlips
     jaws: Pictures
     jaw_codes: Floats
-    from_motion: MotionMap
+    from_motion: motion_map.MotionMap
     from_mouth: Floats
     from_sound: Floats
     noise: CameraNoise
 
     @cached_property
-    def mouth_candidates(self) -> Candidates:
+    def mouth_candidates(self) -> candidates.Candidates:
         """The recorded mouths as eigenlips and detail."""
-        return make_candidates(enlarge(self.mouth, self.scale), self.mouths, self.mouth_codes)
+        return candidates.make_candidates(enlarge(self.mouth, self.scale), self.mouths, self.mouth_codes)
 
     @cached_property
-    def jaw_candidates(self) -> Candidates:
+    def jaw_candidates(self) -> candidates.Candidates:
         """The recorded lower faces as components and detail."""
-        details, _ = measure_details(enlarge(self.jaw, self.scale), self.jaws, self.jaw_codes)
-        return Candidates(self.jaw_codes, details)
+        details, _ = candidates.measure_details(enlarge(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        return candidates.Candidates(self.jaw_codes, details)
 
-    def mouth_refiner(self, options: RefinementOptions) -> Refiner:
+    def mouth_refiner(self, options: candidates.RefinementOptions) -> candidates.Refiner:
         """Return what makes pictures of the mouth from eigenlips."""
-        return Refiner(enlarge(self.mouth, self.scale), self.mouth_candidates, options)
+        return candidates.Refiner(enlarge(self.mouth, self.scale), self.mouth_candidates, options)
 
-    def jaw_refiner(self, options: RefinementOptions = JAW_OPTIONS) -> Refiner:
+    def jaw_refiner(self, options: candidates.RefinementOptions = JAW_OPTIONS) -> candidates.Refiner:
         """Return what makes pictures of the lower face from components of the jaw."""
-        return Refiner(enlarge(self.jaw, self.scale), self.jaw_candidates, options)
+        return candidates.Refiner(enlarge(self.jaw, self.scale), self.jaw_candidates, options)
 
     def predict_codes(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
         """Return the lower face for motion of tracked points.
@@ -206,16 +172,16 @@ class Appearance:
         """Return recorded mouths, mixed to look as predicted and be as open and wide as the motion [shape=(T, 90)]."""
         measured = self.mouth_distances
         if measured is None:
-            return draw_to_recorded(predicted, self.mouth_codes)
+            return candidates.draw_to_recorded(predicted, self.mouth_codes)
         middle = measured.mean(axis=0)
-        wanted = middle + DISTANCE_GAINS * (channel_values(motion, LIP_DISTANCES) - middle)
+        wanted = middle + DISTANCE_GAINS * (motion_map.channel_values(motion, LIP_DISTANCES) - middle)
         wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
-        weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), LEAST_DEVIATION)
+        weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), motion_map.LEAST_DEVIATION)
         sought, recorded = (
             np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
             for codes, distances in ((predicted, wanted), (self.mouth_codes, measured))
         )
-        mouths = draw_to_recorded(sought, recorded)[:, : predicted.shape[1]]
+        mouths = candidates.draw_to_recorded(sought, recorded)[:, : predicted.shape[1]]
         if contact is None:
             return mouths
         ends = np.flatnonzero(np.diff(np.concatenate([[False], contact >= 1, [False]]))).reshape(-1, 2)
@@ -223,7 +189,7 @@ class Appearance:
             if stop - first > max(1, LONGEST_CLOSURE_S * motion.rate_hz):
                 continue
             closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
-            apart = squared_distances(sought[first:stop], recorded).mean(axis=0)
+            apart = candidates.squared_distances(sought[first:stop], recorded).mean(axis=0)
             pressed = self.mouth_codes[np.argmin(np.where(closed, apart, np.inf))]
             around = slice(max(first - 1, 0), stop + 1)
             mouths[around] += contact[around, None].astype(np.float32) * (pressed - mouths[around])
@@ -231,7 +197,9 @@ class Appearance:
 
     def measure_codes(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
-        codes = self.mouth.project(relight(mouths, self.light / np.maximum(cheek_light(mouths), 1.0)))
+        codes = self.mouth.project(
+            lower_face.relight(mouths, self.light / np.maximum(lower_face.cheek_light(mouths), 1.0))
+        )
         values = codes @ self.from_mouth[1:] + self.from_mouth[0]
         return FaceCodes(codes, values[:, :-1], values[:, -1])
 
@@ -247,7 +215,7 @@ class Appearance:
 def learn_appearance(footage: FootagePictures) -> Appearance:
     """Return the appearance of a person, in 10 s for four minutes. Raises InputError: no pictures, or other motion."""
     pictures, light, reference = _equalise_light(footage)
-    mouths = pictures[(slice(None), *mouth_part(1))]
+    mouths = pictures[(slice(None), *lower_face.mouth_part(1))]
     training = choose_evenly(TRAINING_PICTURES, len(pictures))
     mouth = fit_eigenlips(mouths[training], COMPONENTS)
     codes = mouth.project(mouths)
@@ -255,16 +223,16 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     jaw = fit_eigenlips(_isolate_jaw(pictures[training], around, footage.shape), JAW_COMPONENTS)
     blocks = (pictures[start : start + PICTURES_PER_BLOCK] for start in range(0, len(pictures), PICTURES_PER_BLOCK))
     jaw_codes = np.concatenate([jaw.project(_isolate_jaw(block, around, footage.shape)) for block in blocks])
-    chosen = choose_candidates(codes, CANDIDATES)
-    undamaged = measure_details(mouth, mouths[chosen], codes[chosen])[1] <= LARGEST_DETAIL
+    chosen = candidates.choose_candidates(codes, candidates.CANDIDATES)
+    undamaged = candidates.measure_details(mouth, mouths[chosen], codes[chosen])[1] <= candidates.LARGEST_DETAIL
     chosen = chosen[undamaged] if undamaged.any() else chosen
-    chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
+    chosen_jaws = candidates.choose_candidates(jaw_codes, JAW_CANDIDATES)
     names = [channel.name for channel in footage.channels]
 
     def recorded(frames: Index) -> Pictures:
         if footage.scale == 1:
             return pictures[frames]
-        return relight(footage.finer(frames), reference / light[frames])
+        return lower_face.relight(footage.finer(frames), reference / light[frames])
 
     chosen_faces = recorded(chosen_jaws)
     jaw_and_chin = np.concatenate([jaw_codes, footage.chin_px[:, None]], axis=1)
@@ -274,13 +242,13 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         footage.scale,
         reference,
         mouth,
-        np.ascontiguousarray(recorded(chosen)[(slice(None), *mouth_part(footage.scale))]),
+        np.ascontiguousarray(recorded(chosen)[(slice(None), *lower_face.mouth_part(footage.scale))]),
         codes[chosen],
         footage.motion[chosen][:, [names.index(name) for name in LIP_DISTANCES]],
         jaw,
         _isolate_jaw(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
         jaw_codes[chosen_jaws],
-        fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1)),
+        motion_map.fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1)),
         _fit_regression(codes, jaw_and_chin),
         _fit_regression(footage.levels_db[:, None], jaw_and_chin),
         estimate_noise(np.split(mouths, ends)),
@@ -295,23 +263,25 @@ def _equalise_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
             f"{count} pictures, {len(footage.motion)} frames of motion and {len(footage.levels_db)} of sound; required "
             "as many of each"
         )
-    part = (slice(None), *mouth_part(1))
-    light = np.maximum(np.concatenate([cheek_light(clip[part]) for clip in footage.clips]), 1.0)
+    part = (slice(None), *lower_face.mouth_part(1))
+    light = np.maximum(np.concatenate([lower_face.cheek_light(clip[part]) for clip in footage.clips]), 1.0)
     reference = np.median(light, axis=0)
     pictures, start = np.empty((count, *footage.clips[0].shape[1:]), np.uint8), 0
     for clip in footage.clips:
         inside = slice(start, start + len(clip))
-        pictures[inside] = relight(clip, reference / light[inside])
+        pictures[inside] = lower_face.relight(clip, reference / light[inside])
         start += len(clip)
     return pictures, light, reference
 
 
-def _isolate_jaw(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
+def _isolate_jaw(pictures: Pictures, mean: Floats, shape: lower_face.FaceShape) -> Pictures:
     """Return lower faces that differ in the jaw alone: mouth and surroundings are the mean ones [shape=(H, W, 3)]."""
     from scipy.ndimage import binary_dilation
 
-    scale = pictures.shape[1] // HEIGHT
-    other = mouth_ellipse(scale) | ~binary_dilation(replaced_part(shape, scale), iterations=EDGE_PX * scale)
+    scale = pictures.shape[1] // lower_face.HEIGHT
+    other = lower_face.mouth_ellipse(scale) | ~binary_dilation(
+        lower_face.replaced_part(shape, scale), iterations=EDGE_PX * scale
+    )
     result = pictures.copy()
     result[:, other] = np.rint(mean[other]).astype(np.uint8)
     return result
@@ -366,7 +336,7 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
     parts = {
         "mouth": eigenlips_to_arrays(appearance.mouth),
         "jaw": eigenlips_to_arrays(appearance.jaw),
-        "from_motion": motion_map_arrays(appearance.from_motion),
+        "from_motion": motion_map.motion_map_arrays(appearance.from_motion),
         "noise": camera_noise_arrays(appearance.noise),
     }
     arrays = {f"{part}/{name}": array for part, inner in parts.items() for name, array in inner.items()}
@@ -393,15 +363,18 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
         refuse_undeclared(named, APPEARANCE)
         mouth, jaw = (eigenlips_from_arrays(inner[part], REMEDY) for part in ("mouth", "jaw"))
         _check_size("mouth", mouth, (MOUTH_HEIGHT, MOUTH_WIDTH))
-        _check_size("jaw", jaw, (HEIGHT, WIDTH))
+        _check_size("jaw", jaw, (lower_face.HEIGHT, lower_face.WIDTH))
         codes, jaw_codes = len(mouth.channels), len(jaw.channels)
         stored = check_arrays(named, APPEARANCE, C=codes, K=jaw_codes, F=codes + 1, J=jaw_codes + 1)
         scale = int(stored["scale"])
         half_width_px, bottom_px = stored["shape"].tolist()
-        if not NARROWEST_PX <= half_width_px <= WIDEST_PX or not CORNER[1] < bottom_px < CORNER[1] + HEIGHT:
+        if (
+            not lower_face.NARROWEST_PX <= half_width_px <= lower_face.WIDEST_PX
+            or not lower_face.CORNER[1] < bottom_px < lower_face.CORNER[1] + lower_face.HEIGHT
+        ):
             raise ValueError(f"a lower face of {half_width_px:g} px to {bottom_px:g} px below the eyes")
         return Appearance(
-            FaceShape(half_width_px, bottom_px),
+            lower_face.FaceShape(half_width_px, bottom_px),
             scale,
             stored["light"],
             mouth,
@@ -409,9 +382,9 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
             stored["mouth_codes"],
             stored.arrays.get("mouth_distances"),
             jaw,
-            _decode(stored["jaws"], len(stored["jaw_codes"]), HEIGHT * scale, WIDTH * scale),
+            _decode(stored["jaws"], len(stored["jaw_codes"]), lower_face.HEIGHT * scale, lower_face.WIDTH * scale),
             stored["jaw_codes"],
-            motion_map_from_arrays(inner["from_motion"], codes + jaw_codes + 1),
+            motion_map.motion_map_from_arrays(inner["from_motion"], codes + jaw_codes + 1),
             stored["from_mouth"],
             stored["from_sound"],
             camera_noise_from_arrays(inner["noise"]),
@@ -420,15 +393,15 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
 
 APPEARANCE = {
     "shape": ArraySpec(np.float64, "2", 0, 1000),
-    "scale": ArraySpec(np.intp, "", 1, LARGEST_SCALE),
+    "scale": ArraySpec(np.intp, "", 1, lower_face.LARGEST_SCALE),
     "light": ArraySpec(np.float64, "3", 1, 255),
     "mouths": ArraySpec(np.uint8, "A", 0, 255),
-    "mouth_codes": ArraySpec(np.float32, "N C", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+    "mouth_codes": ArraySpec(np.float32, "N C", -candidates.LARGEST_COEFFICIENT, candidates.LARGEST_COEFFICIENT),
     "mouth_distances": ArraySpec(np.float64, "N 3", -100, 100, optional=True),
     "jaws": ArraySpec(np.uint8, "B", 0, 255),
-    "jaw_codes": ArraySpec(np.float32, "M K", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
-    "from_mouth": ArraySpec(np.float32, "F J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
-    "from_sound": ArraySpec(np.float32, "2 J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+    "jaw_codes": ArraySpec(np.float32, "M K", -candidates.LARGEST_COEFFICIENT, candidates.LARGEST_COEFFICIENT),
+    "from_mouth": ArraySpec(np.float32, "F J", -candidates.LARGEST_COEFFICIENT, candidates.LARGEST_COEFFICIENT),
+    "from_sound": ArraySpec(np.float32, "2 J", -candidates.LARGEST_COEFFICIENT, candidates.LARGEST_COEFFICIENT),
 }
 
 

@@ -186,19 +186,6 @@ class CloningSystem:
     grids: NestedGrids
     response: NDArray[np.float32]
 
-    def correction(self, source: Pictures, background: Pictures) -> NDArray[np.float32]:
-        """Return what cloning adds to the source: float32 array [shape=(T, h, w, 3)], grey levels.
-
-        In the region this is the membrane; outside it, the background minus the source.
-        Raises InputError: as ``clone``.
-        """
-        self._check(source, background)
-        result = np.subtract(background, source, dtype=np.float32)
-        part = result[(slice(None), *self.box)]
-        for frames, membrane in self._membranes(source, background):
-            np.copyto(part[frames], membrane, where=self.grids.region[..., None])
-        return result
-
     def clone(self, source: Pictures, background: Pictures, largest_difference: float = np.inf) -> NDArray[np.uint8]:
         """Return the background with the region cloned from the source: uint8 array [shape=(T, h, w, 3)].
 

@@ -182,9 +182,7 @@ HELD_OUT_SHARE = 0.1
 
 
 def find_transcript(video: Path) -> TimedTranscript | None:
-    """Return the transcript beside a video, one with times if there is any, or None. Raises InputError: labels cannot
-    be read.
-    """
+    """Return the transcript beside a video, best one with times; None: none. Raises InputError: unreadable labels."""
     transcript = find_labels(video).transcript
     if transcript is None or transcript.has_times:
         return transcript

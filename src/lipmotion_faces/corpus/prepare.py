@@ -27,16 +27,8 @@ from lipmotion.storage.files import confine, lock_folder, portable_name, remove_
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
+from lipmotion_faces.corpus import supplied
 from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, divide_long_videos, single_video
-from lipmotion_faces.corpus.supplied import (
-    DIGESTS,
-    read_supplied_phones,
-    read_supplied_track,
-    separate_sound,
-    shift_phones,
-    source_digests,
-    trim_to_shared,
-)
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import UNSEEN_LIMIT, track
@@ -253,7 +245,7 @@ def _process(job: _Job) -> _Outcome:
     try:
         sound = job.recording.file
         source = job.source | {"sha256": _digest(sound), "bytes": str(sound.stat().st_size)}
-        source |= source_digests(job.recording)
+        source |= supplied.source_digests(job.recording)
         entry = _read_if_current(job, source)
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
@@ -287,24 +279,24 @@ def _read_if_current(job: _Job, source: dict[str, str]) -> dict[str, Any] | None
     except CorpusError:
         return None
     words = None if job.recording.words is None else list(job.recording.words)
-    digests = [source.get(key) for key in DIGESTS]
+    digests = [source.get(key) for key in supplied.DIGESTS]
     required = (digests, words, job.recording.split, job.recording.speaker, job.settings)
-    stored_digests = [entry["source"].get(key) for key in DIGESTS]
+    stored_digests = [entry["source"].get(key) for key in supplied.DIGESTS]
     stored = (stored_digests, entry["words"], entry["split"], entry.get("speaker", ""), entry["settings"])
     return entry if stored == required else None
 
 
 def _make_utterance(job: _Job, source: dict[str, str]) -> Utterance:
     recording = job.recording
-    separate = None if job.part else separate_sound(recording)
+    separate = None if job.part else supplied.separate_sound(recording)
     if separate is None:
         audio = job.part.sound if job.part else read_audio(recording.file)
         motion = _track(job, audio.duration_s)
     else:
         own_s = None if recording.recorder is None else read_audio(recording.file, warn=False).duration_s
-        audio, motion, begin_s = trim_to_shared(separate, _track(job, own_s))
+        audio, motion, begin_s = supplied.trim_to_shared(separate, _track(job, own_s))
         labelled_s = begin_s if recording.recorder is not None else begin_s + separate.late_s
-        recording = replace(recording, phones=shift_phones(recording.phones, labelled_s))
+        recording = replace(recording, phones=supplied.shift_phones(recording.phones, labelled_s))
         source = source | {"sound_late_ms": f"{separate.late_s * 1000:.3f}", "sound_found_by": separate.how}
     audio = quantise(audio)
     check_words(recording.words or (), audio.duration_s)
@@ -317,13 +309,13 @@ def _make_utterance(job: _Job, source: dict[str, str]) -> Utterance:
         split=recording.split,
         source=source,
         speaker=recording.speaker,
-        phones=read_supplied_phones(recording, audio.duration_s),
+        phones=supplied.read_supplied_phones(recording, audio.duration_s),
     )
 
 
 def _track(job: _Job, duration_s: float | None) -> Track:
     if job.recording.motion_file is not None:
-        return read_supplied_track(job.recording.motion_file, duration_s)
+        return supplied.read_supplied_track(job.recording.motion_file, duration_s)
     recording, crops = job.recording, job.settings["crops"] == "yes"
     if job.part is None or recording.end_s is None:
         return track(recording.file, crops=crops, tracker=job.tracker)

@@ -15,18 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.coded_video import FrameGroups, encode_video
-from lipmotion_faces.appearance.looping import (
-    JUMP_LIMIT,
-    LoopOrder,
-    describe_frames,
-    fade_frames,
-    loop_order,
-    row_distances,
-    scenes_of,
-)
-from lipmotion_faces.appearance.lower_face import HEIGHT as REGION_HEIGHT
-from lipmotion_faces.appearance.lower_face import SAME_PERSON_LIKENESS, face_signature, likeness, region_map
-from lipmotion_faces.appearance.lower_face import WIDTH as REGION_WIDTH
+from lipmotion_faces.appearance import looping, lower_face
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.appearance.placing import cut, feather, inverse_map
 from lipmotion_faces.filmed.face import StoredBackground
@@ -110,7 +99,7 @@ class BackgroundSequence:
             one, other = (self._frame(groups, int(number)) for number in (first, second))
             yield one if weight == 0 else mix_frames(one, other, float(weight))
 
-    def order(self, groups: FrameGroups, count: int) -> LoopOrder:
+    def order(self, groups: FrameGroups, count: int) -> looping.LoopOrder:
         """Return which frames are shown, at the background's own rate.
 
         They are the first ones, if these are as many and show the face without a cut; others are in ``loop_order``,
@@ -120,9 +109,9 @@ class BackgroundSequence:
         is_whole = count <= total and self.usable[:count].all() and not any(0 < cut < count for cut in self.cuts)
         if self.in_time or is_whole:
             shown = np.minimum(np.arange(count), total - 1)
-            return LoopOrder(shown, shown, np.zeros(count), ())
-        descriptors = describe_frames((groups.frame(number) for number in range(total)), self.face_to_frame)
-        return loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
+            return looping.LoopOrder(shown, shown, np.zeros(count), ())
+        descriptors = looping.describe_frames((groups.frame(number) for number in range(total)), self.face_to_frame)
+        return looping.loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
 
     def _frame(self, groups: FrameGroups, number: int) -> Background:
         frame = groups.frame(number)
@@ -176,14 +165,14 @@ def _chain_parts(parts: Sequence[_Part]) -> list[_Part]:
     rate_hz, scenes = parts[0][0].rate_hz, _spans(parts)
     shown = chain.from_iterable(footage_frames(*part) for part in parts)
     maps = np.concatenate([footage.face_to_image[start:stop] for footage, start, stop in parts])
-    descriptors = describe_frames(shown, maps)
+    descriptors = looping.describe_frames(shown, maps)
     blemishes = []
     for scene in scenes:  # how visible the worst join is if a part is shown for a minute; short ones are worse
-        order = loop_order(descriptors.part(*scene), round(SHOWN_S * rate_hz), rate_hz)
+        order = looping.loop_order(descriptors.part(*scene), round(SHOWN_S * rate_hz), rate_hz)
         missing = max(0.0, 1 - (scene[1] - scene[0]) / rate_hz / SHORT_S)
         blemishes.append(max((join.cost for join in order.joins), default=0.0) + SHORT_COST * missing)
     part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in scenes])[::COMPARED_STEP]
-    distances = row_distances(descriptors.standardise(scenes, fade_frames(rate_hz))[::COMPARED_STEP])
+    distances = looping.row_distances(descriptors.standardise(scenes, looping.fade_frames(rate_hz))[::COMPARED_STEP])
     chosen = [int(np.argmin(blemishes))]
     while True:
         nearest = distances[np.isin(part_of, chosen)].min(axis=0)
@@ -194,7 +183,7 @@ def _chain_parts(parts: Sequence[_Part]) -> list[_Part]:
             if number not in chosen and _duration_s(parts[number]) <= left_s
         }
         best = min(apart, key=lambda number: apart[number], default=-1)
-        if best < 0 or apart[best] > JUMP_LIMIT:
+        if best < 0 or apart[best] > looping.JUMP_LIMIT:
             return [parts[number] for number in chosen]
         chosen.append(best)
 
@@ -203,7 +192,7 @@ def divide_footage(footage: Footage) -> list[_Part]:
     """Return the parts of some footage that show the face without a cut: first frame, and the one after the last."""
     longest = max(1, round(MOST_PART_S * footage.rate_hz))
     parts = []
-    for first, last in scenes_of(_usable(footage), footage.cuts):
+    for first, last in looping.scenes_of(_usable(footage), footage.cuts):
         count = -(-(last - first) // longest)
         ends = np.linspace(first, last, count + 1).astype(int).tolist()
         parts += [(footage, start, stop) for start, stop in pairwise(ends)]
@@ -218,7 +207,7 @@ def _duration_s(part: _Part) -> float:
 def _usable(footage: Footage) -> NDArray[np.bool_]:
     """Return the frames that show the face undamaged, and those of gaps up to ``LONGEST_GAP_S`` [shape=(T,)]."""
     usable = np.array(footage.track.seen)
-    for start, stop in scenes_of(~usable, ()):
+    for start, stop in looping.scenes_of(~usable, ()):
         if start > 0 and stop < len(usable) and stop - start <= LONGEST_GAP_S * footage.rate_hz:
             usable[start:stop] = True
     return usable if footage.damaged is None else usable & ~footage.damaged
@@ -233,22 +222,22 @@ def open_stored_background(background: StoredBackground) -> BackgroundSequence:
 
 
 def open_background(path: Path, appearance: Appearance | None = None, *, in_time: bool = False) -> BackgroundSequence:
-    """Return a video as a background; others than ``appearance`` are warned about. Raises InputError: no video, no
-    face.
-    """
+    """Return a video as a background; warn where it is not ``appearance``'s. Raises InputError: no video, no face."""
     footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
     if appearance is not None:
         frame = int(np.flatnonzero(footage.track.seen)[0])
         shown = next(footage_frames(footage, frame, frame + 1))
-        picture = cut(shown, region_map(footage.face_to_image[frame], 1), (REGION_HEIGHT, REGION_WIDTH))
-        recorded = appearance.jaw.mean.T.reshape(REGION_HEIGHT, REGION_WIDTH, 3)
-        likely = likeness(face_signature(picture), face_signature(recorded))
-        if likely < SAME_PERSON_LIKENESS:
+        picture = cut(
+            shown, lower_face.region_map(footage.face_to_image[frame], 1), (lower_face.HEIGHT, lower_face.WIDTH)
+        )
+        recorded = appearance.jaw.mean.T.reshape(lower_face.HEIGHT, lower_face.WIDTH, 3)
+        likely = lower_face.likeness(lower_face.face_signature(picture), lower_face.face_signature(recorded))
+        if likely < lower_face.SAME_PERSON_LIKENESS:
             warning = (
                 "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
             )
             warning += "footage of the same person"
-            LOG.warning(warning, footage.path, likely, SAME_PERSON_LIKENESS)
+            LOG.warning(warning, footage.path, likely, lower_face.SAME_PERSON_LIKENESS)
     groups, maps = partial(footage_groups, footage), steady_face(footage)
     return BackgroundSequence(groups, footage.rate_hz, maps, chin_px(footage), _usable(footage), footage.cuts, in_time)
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +24,7 @@ from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
-from lipmotion_faces.appearance.lower_face import (
-    HEIGHT,
-    SAME_PERSON_LIKENESS,
-    WIDTH,
-    best_scale,
-    face_shape,
-    face_signature,
-    mouth_part,
-    region_map,
-)
+from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import best_background, chin_px
@@ -135,27 +125,21 @@ def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[
     for name in corpus.names("train") or corpus.names():
         entry = read_entry(corpus.folder(name))
         stated = entry["source"]
-        file = _find_file(files.get(str(stated.get("file", "")), []), stated)
-        if file is None:
+        size, known = stated.get("bytes"), files.get(str(stated.get("file", "")), [])
+        same = [file for file in known if size is None or str(file.stat().st_size) == str(size)]
+        if len(same) > 1 and "sha256" in stated:  # people of a corpus may share names of files
+            same = [file for file in same if sha256_of(file) == stated["sha256"]]
+        if not same:
             continue
         rights = {key: str(stated[key]) for key in RIGHTS if key in stated}
         start_s, end_s = float(stated.get("start_s", 0.0)), stated.get("end_s")
-        item = SourceRecording(name, file, None, rights=rights, speaker=str(entry.get("speaker", "")))
+        item = SourceRecording(name, same[0], None, rights=rights, speaker=str(entry.get("speaker", "")))
         items.append(replace(item, start_s=start_s, end_s=None if end_s is None else float(end_s)))
         collections[name] = str(stated.get("collection", ""))
     if not items:
         raise InputError(f"{recordings}: holds none of the videos of {corpus.path}; give the folder that they are in")
     chosen = _select_person(items, speaker, str(corpus.path))
     return [_make_take(item, recordings, collections[item.name]) for item in chosen]
-
-
-def _find_file(files: Sequence[Path], stated: Mapping[str, Any]) -> Path | None:
-    """Return the file of an utterance, of those of its name: people of a corpus may share names of files."""
-    size = stated.get("bytes")
-    same = [file for file in files if size is None or str(file.stat().st_size) == str(size)]
-    if len(same) > 1 and "sha256" in stated:
-        same = [file for file in same if sha256_of(file) == stated["sha256"]]
-    return next(iter(same), None)
 
 
 def _make_take(
@@ -283,15 +267,16 @@ def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Fi
                 filmed.append(result)
     if not filmed:
         raise InputError(f"none of {len(takes)} recordings can be used; the first: {problems[0]}")
-    signatures = np.stack([face_signature(take.pictures) for take in filmed])
+    signatures = np.stack([lower_face.face_signature(take.pictures) for take in filmed])
     alike = signatures @ signatures.T
-    person = int((alike >= SAME_PERSON_LIKENESS).sum(axis=1).argmax())
+    person = int((alike >= lower_face.SAME_PERSON_LIKENESS).sum(axis=1).argmax())
     of_person = []
     for take, value in zip(filmed, alike[person].tolist(), strict=True):
-        if value >= SAME_PERSON_LIKENESS:
+        if value >= lower_face.SAME_PERSON_LIKENESS:
             of_person.append(take)
             continue
-        reason = f"shows another face than most recordings (likeness {value:.2f}, required {SAME_PERSON_LIKENESS})"
+        wanted = lower_face.SAME_PERSON_LIKENESS
+        reason = f"shows another face than most recordings (likeness {value:.2f}, required {wanted})"
         monitor(Item(take.footage.path.name, "skipped", reason))
     of_person = _leave_out_damaged(of_person, monitor)
     sizes = sorted({take.footage.size for take in of_person})
@@ -302,7 +287,7 @@ def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Fi
 
 def _leave_out_damaged(filmed: Sequence[_Filmed], monitor: Monitor) -> list[_Filmed]:
     """Return takes without damaged pictures; those with too many are reported. Raises InputError: none is left."""
-    seen, (rows, columns) = [np.ones(len(take.used), bool) for take in filmed], mouth_part(1)
+    seen, (rows, columns) = [np.ones(len(take.used), bool) for take in filmed], lower_face.mouth_part(1)
     mouths = [partial(np.asarray, take.pictures[:, rows, columns]) for take in filmed]
     result = []
     rates = [take.footage.rate_hz / _step(take.footage) for take in filmed]
@@ -356,8 +341,8 @@ def _step(footage: Footage) -> int:
 
 def _cut_lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDArray[np.uint8]:
     """Return pictures of the lower face in some frames, rising [shape=(n, 128 · scale, 128 · scale, 3)]."""
-    size = HEIGHT * scale, WIDTH * scale
-    maps = region_map(footage.face_to_image, scale)
+    size = lower_face.HEIGHT * scale, lower_face.WIDTH * scale
+    maps = lower_face.region_map(footage.face_to_image, scale)
     result = np.empty((len(frames), *size, 3), np.uint8)
     if not len(frames):
         return result
@@ -378,7 +363,7 @@ def _gather_pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
     right, left = (motion[:, names.index(name)] for name in JAW_ENDS)
     chin = np.concatenate([chin_px(take.footage)[take.used] for take in filmed])
     maps = np.concatenate([take.footage.face_to_image[take.used] for take in filmed])
-    scale = best_scale(maps)
+    scale = lower_face.best_scale(maps)
     starts = np.cumsum([0, *(len(take.used) for take in filmed)])
     levels = [
         np.full(len(take.used), QUIETEST_DB)
@@ -401,7 +386,7 @@ def _gather_pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
         tuple(channels[n] for n in used),
         np.concatenate(levels),
         chin,
-        face_shape(float(np.median(left - right)) / 2, chin),
+        lower_face.face_shape(float(np.median(left - right)) / 2, chin),
         scale,
         read_finer,
     )

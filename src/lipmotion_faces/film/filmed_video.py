@@ -43,9 +43,7 @@ WHITE = 245
 
 
 def inset_box(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Return left, top, right and bottom, px, of the inset with its border, for heights and widths of frame and
-    picture.
-    """
+    """Return left, top, right and bottom, px, of the inset with its border; frame, picture: height and width."""
     height, width = frame
     shorter = min(height, width)
     factor = min(WIDTH_SHARE * width / picture[1], HEIGHT_SHARE * height / picture[0])

@@ -11,19 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.storage import schema
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.storage.coded_video import STORED_VIDEO, StoredVideo, stored_video_from_arrays, stored_video_to_arrays
 from lipmotion.storage.files import check_source
-from lipmotion.storage.schema import (
-    LARGEST_NUMBER,
-    POSITIVE,
-    Arrays,
-    ArraySpec,
-    arrays_under,
-    check_arrays,
-    format_errors,
-    refuse_undeclared,
-)
 from lipmotion.types import Audio, Channel, Motion
 from lipmotion_faces.appearance.person import Appearance, appearance_arrays, appearance_from_arrays
 
@@ -141,13 +132,13 @@ def load_face(path: str | Path) -> FilmedFace:
     header = read_face_header(path)
     try:
         arrays = read_archive(path)
-        with format_errors("the face", "build it again"):
+        with schema.format_errors("the face", "build it again"):
             count = int(header["takes"])
             if not 0 <= count <= MOST_TAKES:
                 raise ValueError(f"{count} takes, required 0 to {MOST_TAKES}")
             folders = ("appearance", "background", *(f"take{number}" for number in range(count)))
-            inner = {folder: arrays_under(arrays, f"{folder}/") for folder in folders}
-            refuse_undeclared(arrays, (f"{folder}/{key}" for folder, part in inner.items() for key in part))
+            inner = {folder: schema.arrays_under(arrays, f"{folder}/") for folder in folders}
+            schema.refuse_undeclared(arrays, (f"{folder}/{key}" for folder, part in inner.items() for key in part))
             channels = tuple(Channel(str(item["name"]), str(item["unit"])) for item in header["channels"])
             takes = tuple(_take(inner[f"take{number}"], channels) for number in range(count))
             about = header["about"]
@@ -182,23 +173,23 @@ def read_face_header(path: Path) -> dict[str, Any]:
 
 MOST_TAKES = 1000
 BACKGROUND = {
-    "face_to_frame": ArraySpec(np.float64, "T 2 3", -1e5, 1e5),
-    "chin_px": ArraySpec(np.float64, "T", 0, 1000),
-    "cuts": ArraySpec(np.intp, "c", 1, LARGEST_NUMBER, optional=True),
+    "face_to_frame": schema.ArraySpec(np.float64, "T 2 3", -1e5, 1e5),
+    "chin_px": schema.ArraySpec(np.float64, "T", 0, 1000),
+    "cuts": schema.ArraySpec(np.intp, "c", 1, schema.LARGEST_NUMBER, optional=True),
 }
 TAKE = {
-    "sound": ArraySpec(np.int16, "S", -FULL_SCALE - 1, FULL_SCALE),
-    "sound_rate_hz": ArraySpec(np.intp, "", 8000, 48_000),
-    "motion": ArraySpec(np.float32, "T C"),
-    "rate_hz": ArraySpec(np.float64, "", POSITIVE, 1000),
-    "seen": ArraySpec(np.bool_, "T"),
+    "sound": schema.ArraySpec(np.int16, "S", -FULL_SCALE - 1, FULL_SCALE),
+    "sound_rate_hz": schema.ArraySpec(np.intp, "", 8000, 48_000),
+    "motion": schema.ArraySpec(np.float32, "T C"),
+    "rate_hz": schema.ArraySpec(np.float64, "", schema.POSITIVE, 1000),
+    "seen": schema.ArraySpec(np.bool_, "T"),
 }
 
 
-def _background(arrays: Arrays) -> StoredBackground:
-    refuse_undeclared(arrays, BACKGROUND, STORED_VIDEO)
+def _background(arrays: schema.Arrays) -> StoredBackground:
+    schema.refuse_undeclared(arrays, BACKGROUND, STORED_VIDEO)
     video = stored_video_from_arrays({name: array for name, array in arrays.items() if name not in BACKGROUND})
-    stored = check_arrays(arrays, BACKGROUND, T=len(video))
+    stored = schema.check_arrays(arrays, BACKGROUND, T=len(video))
     maps = stored["face_to_frame"]
     if (np.abs(np.linalg.det(maps[:, :, :2])) < LEAST_DETERMINANT).any() or any(length % 2 for length in video.size):
         raise ValueError("flat places of the face, or frames of odd sizes")
@@ -212,9 +203,9 @@ LEAST_DETERMINANT = 1e-6
 """A map with a smaller determinant has no inverse."""
 
 
-def _take(arrays: Arrays, channels: tuple[Channel, ...]) -> SpokenTake:
-    refuse_undeclared(arrays, TAKE)
-    stored = check_arrays(arrays, TAKE, C=len(channels))
+def _take(arrays: schema.Arrays, channels: tuple[Channel, ...]) -> SpokenTake:
+    schema.refuse_undeclared(arrays, TAKE)
+    stored = schema.check_arrays(arrays, TAKE, C=len(channels))
     sound = Audio(stored["sound"].astype(np.float32) / np.float32(FULL_SCALE), int(stored["sound_rate_hz"]))
     motion = Motion(stored["motion"].astype(np.float64), float(stored["rate_hz"]), channels)
     return SpokenTake(sound, motion, stored["seen"])

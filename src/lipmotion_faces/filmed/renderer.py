@@ -11,28 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion_faces.appearance import candidates, lower_face
 from lipmotion_faces.appearance.camera_noise import NoiseSource
-from lipmotion_faces.appearance.candidates import (
-    PAPER,
-    SHARPENING,
-    STEADY,
-    RefinementOptions,
-    Refiner,
-    moving_average,
-    sharpen,
-)
-from lipmotion_faces.appearance.lower_face import (
-    HEIGHT,
-    WIDTH,
-    cheek_light,
-    mouth_ellipse,
-    mouth_part,
-    move_chin,
-    moved_part,
-    region_map,
-    relight,
-    replaced_part,
-)
 from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
 from lipmotion_faces.appearance.placing import cut, feather, place
 from lipmotion_faces.appearance.poisson import CloningSystem, cloning_system
@@ -79,19 +59,17 @@ class StitchingOptions:
     """
 
     jaw: bool = True
-    mouth: RefinementOptions | None = STEADY
-    sharpening: float = SHARPENING
+    mouth: candidates.RefinementOptions | None = candidates.STEADY
+    sharpening: float = candidates.SHARPENING
     average: int = 1
-    jaw_detail: RefinementOptions = JAW_OPTIONS
+    jaw_detail: candidates.RefinementOptions = JAW_OPTIONS
     noise: bool = True
     seed: int = 0
 
 
 STITCHING = StitchingOptions()
-AS_PRINTED = StitchingOptions(mouth=PAPER, sharpening=0, average=3)
-"""The mean of three pictures, then the nearest of 500 candidates for every colour and picture: Xie & Liu 2007, §6.1 and
-Eqs. 14–16.
-"""
+AS_PRINTED = StitchingOptions(mouth=candidates.PAPER, sharpening=0, average=3)
+"""The mean of three pictures, then the nearest of 500 candidates: Xie & Liu 2007, §6.1 and Eqs. 14–16."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,18 +94,23 @@ class Stitcher:
                 count = first + len(batch)
                 raise InputError(f"{count} frames of background, required {len(codes)}; give longer footage")
             mouths = self._draw_mouths(codes.mouth[part], mouth_chosen[part], first)
-            maps = region_map(np.stack([each.face_to_frame for each in batch]), scale)
+            maps = lower_face.region_map(np.stack([each.face_to_frame for each in batch]), scale)
             aligned = [
-                cut(each.frame, to, (HEIGHT * scale, WIDTH * scale)) for each, to in zip(batch, maps, strict=True)
+                cut(each.frame, to, (lower_face.HEIGHT * scale, lower_face.WIDTH * scale))
+                for each, to in zip(batch, maps, strict=True)
             ]
             behind = np.clip(np.rint(np.stack(aligned)), 0, 255).astype(np.uint8)
             if self.options.jaw:
                 jaws = self._jaws.pictures(codes.jaw[part], jaw_chosen[part])
                 chins = np.array([each.chin_px for each in batch])
-                behind = move_chin(behind, chins, codes.chin_px[part] - chins)
-                behind = self._lower_face.clone(relight(jaws, self._gains(behind)), behind, LARGEST_DIFFERENCE)
-            source, mouth = behind.copy(), (slice(None), *mouth_part(scale))
-            source[mouth] = sharpen(relight(mouths, self._gains(behind)), self.options.sharpening, scale)
+                behind = lower_face.move_chin(behind, chins, codes.chin_px[part] - chins)
+                behind = self._lower_face.clone(
+                    lower_face.relight(jaws, self._gains(behind)), behind, LARGEST_DIFFERENCE
+                )
+            source, mouth = behind.copy(), (slice(None), *lower_face.mouth_part(scale))
+            source[mouth] = candidates.sharpen(
+                lower_face.relight(mouths, self._gains(behind)), self.options.sharpening, scale
+            )
             patches = self._mouth_alone.clone(source, behind)
             for each, patch, to in zip(batch, patches, maps, strict=True):
                 frame = each.frame.copy()
@@ -147,7 +130,7 @@ class Stitcher:
         """Return codes whose mouth is the mean of some pictures."""
         if self.options.average == 1:
             return codes
-        return replace(codes, mouth=moving_average(codes.mouth, self.options.average).astype(np.float32))
+        return replace(codes, mouth=candidates.moving_average(codes.mouth, self.options.average).astype(np.float32))
 
     def _draw_mouths(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
         if self.options.mouth is None:
@@ -158,15 +141,15 @@ class Stitcher:
 
     def _gains(self, behind: Pictures) -> Array:
         """Return how much lighter the footage is than the pictures of the person, in each colour [shape=(T, 3)]."""
-        part = (slice(None), *mouth_part(self.appearance.scale))
-        return np.maximum(cheek_light(behind[part]), 1.0) / self.appearance.light
+        part = (slice(None), *lower_face.mouth_part(self.appearance.scale))
+        return np.maximum(lower_face.cheek_light(behind[part]), 1.0) / self.appearance.light
 
     @cached_property
-    def _mouths(self) -> Refiner:
-        return self.appearance.mouth_refiner(self.options.mouth or STEADY)
+    def _mouths(self) -> candidates.Refiner:
+        return self.appearance.mouth_refiner(self.options.mouth or candidates.STEADY)
 
     @cached_property
-    def _jaws(self) -> Refiner:
+    def _jaws(self) -> candidates.Refiner:
         return self.appearance.jaw_refiner(self.options.jaw_detail)
 
     @cached_property
@@ -175,14 +158,14 @@ class Stitcher:
 
     @cached_property
     def _lower_face(self) -> CloningSystem:
-        return cloning_system(replaced_part(self.appearance.shape, self.appearance.scale))
+        return cloning_system(lower_face.replaced_part(self.appearance.shape, self.appearance.scale))
 
     @cached_property
     def _mouth_alone(self) -> CloningSystem:
-        return cloning_system(mouth_ellipse(self.appearance.scale))
+        return cloning_system(lower_face.mouth_ellipse(self.appearance.scale))
 
     @cached_property
     def _weight(self) -> Floats:
         scale = self.appearance.scale
-        mask = moved_part(scale) if self.options.jaw else mouth_ellipse(scale)
+        mask = lower_face.moved_part(scale) if self.options.jaw else lower_face.mouth_ellipse(scale)
         return feather(mask, FEATHER_PX * scale)

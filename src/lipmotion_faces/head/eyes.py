@@ -9,18 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates, spline_filter
 
-from lipmotion_faces.head import palette
-from lipmotion_faces.head.part import (
-    EYE,
-    EYEBALL_RADIUS,
-    Part,
-    grid_triangles,
-    head,
-    join_parts,
-    part,
-    seen_from_front,
-    tube,
-)
+from lipmotion_faces.head import palette, part
 from lipmotion_faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]
@@ -54,17 +43,17 @@ class Eyelids:
     """The skin around the left eye, rings that slide over the eyeball with the lids; the right eye's is mirrored."""
 
     def __init__(self) -> None:
-        self._x = np.linspace(EYE[0] - 0.3, EYE[0] + 0.3, 61)
+        self._x = np.linspace(part.EYE[0] - 0.3, part.EYE[0] + 0.3, 61)
         self._y = np.linspace(-0.28, 0.3, 59)
         grid = np.meshgrid(self._x, self._y, indexing="ij")
-        depth = seen_from_front(head, grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
+        depth = part.seen_from_front(part.head, grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
         self._depth = spline_filter(depth, order=3)
 
     def edge(self) -> Real:
         """Return the outermost ring, which never moves [shape=(LID_COLUMNS, 3)]."""
         angle = np.where(LID_SIDE > 0, np.arccos(LID_ACROSS), -np.arccos(LID_ACROSS))
         up = np.where(LID_SIDE > 0, _EDGE_UP, _EDGE_DOWN)
-        return self._lift(EYE[0] + _EDGE_X * np.cos(angle), up * np.sin(angle))
+        return self._lift(part.EYE[0] + _EDGE_X * np.cos(angle), up * np.sin(angle))
 
     def opening(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return column and height of the edge of the lids [shape=(LID_COLUMNS,), both]."""
@@ -77,7 +66,7 @@ class Eyelids:
         upper = upper + (WIDE_RISE * mood.wide - SQUINT_FALL * mood.squint - SLANT * slant) * bow
         lower = lower + SQUINT_RISE * max(mood.squint, 0.7 * mood.cheek) * (1 - pose.shut) * bow
         upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (lower - upper), lower)
-        return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
+        return part.EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 
     def rings(self, pose: CharacterPose) -> Real:
         """Return all rings but the outermost, from the eyeball outwards [shape=(LID_RINGS, LID_COLUMNS, 3)]."""
@@ -88,8 +77,8 @@ class Eyelids:
         rings = rings.reshape(LID_RINGS - 1, LID_COLUMNS, 3)
         fold = np.exp(-(((share - 0.2) / 0.05) ** 2)) * np.where(LID_SIDE > 0, 1 - LID_ACROSS**2, 0) * (1 - pose.shut)
         rings[..., 2] -= 0.018 * fold
-        away = rings[0] - EYE
-        inner = EYE + away / np.linalg.norm(away, axis=1, keepdims=True) * (EYEBALL_RADIUS - 0.004)
+        away = rings[0] - part.EYE
+        inner = part.EYE + away / np.linalg.norm(away, axis=1, keepdims=True) * (part.EYEBALL_RADIUS - 0.004)
         inner[:, 1] = rings[0][:, 1] + 0.1 * (inner[:, 1] - rings[0][:, 1])
         return np.concatenate([inner[None], rings])
 
@@ -110,14 +99,14 @@ LASHES = 33
 """Columns of the lashes: those of the upper lid."""
 
 
-def eyeball() -> Part:
+def eyeball() -> part.Part:
     """Return the left eyeball, its middle at (0, 0, 0), looking along +z."""
     inner = [0, 0.022, PUPIL - 0.004, PUPIL, 0.068, 0.083, 0.098, IRIS - 0.006, IRIS, IRIS + 0.006, 0.138]
     radii = np.array([*inner, 0.162, 0.19, 0.215])
-    angle = np.arcsin(np.clip(radii / EYEBALL_RADIUS, 0, 0.999))
+    angle = np.arcsin(np.clip(radii / part.EYEBALL_RADIUS, 0, 0.999))
     angle = np.concatenate([angle, np.linspace(angle[-1] + 0.15, 2.0, 5)])
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
-    dome = EYEBALL_RADIUS + 0.007 * np.maximum(1 - (np.concatenate([radii, np.full(5, 1.0)]) / 0.125) ** 2, 0)
+    dome = part.EYEBALL_RADIUS + 0.007 * np.maximum(1 - (np.concatenate([radii, np.full(5, 1.0)]) / 0.125) ** 2, 0)
     down = angle[:, None]
     across, up, forward = np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down) * np.ones(_SIDES)
     ring = np.stack([across, up, forward], axis=-1)
@@ -138,38 +127,36 @@ def eyeball() -> Part:
             colours[n] = palette.IRIS_RIM
         else:
             colours[n] = palette.EYE_WHITE
-    triangles = grid_triangles(len(angle), _SIDES, closed=True)
-    return part("eye", places, triangles, colours.reshape(-1, 3), palette.EYE_FINISH)
+    triangles = part.grid_triangles(len(angle), _SIDES, closed=True)
+    return part.part("eye", places, triangles, colours.reshape(-1, 3), palette.EYE_FINISH)
 
 
-def catchlights() -> Part:
+def catchlights() -> part.Part:
     """Return the reflections of lamp and window in the left eye, its middle at (0, 0, 0)."""
     discs = []
     for (x, y), radius, white in (((-0.045, 0.05), 0.026, 1.0), ((0.038, -0.045), 0.012, 0.8)):
         around = 2 * np.pi * np.arange(16) / 16
         flat = np.concatenate([[[x, y]], np.stack([x + radius * np.cos(around), y + radius * np.sin(around)], axis=1)])
-        away = EYEBALL_RADIUS + 0.010
+        away = part.EYEBALL_RADIUS + 0.010
         z = np.sqrt(away**2 - (flat**2).sum(axis=1))
         fan = np.stack([np.zeros(16, int), 1 + np.arange(16), 1 + (np.arange(16) + 1) % 16], axis=1).astype(np.int32)
-        discs.append(part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))
-    lights = join_parts("catchlights", discs)
+        discs.append(part.part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))
+    lights = part.join_parts("catchlights", discs)
     return replace(lights, colours=CATCHLIGHT * lights.colours)
 
 
 def lash_triangles() -> NDArray[np.int32]:
     """Return the triangles of the lashes, two rows of ``LASHES`` vertices, seen from both sides [shape=(F, 3)]."""
-    front = grid_triangles(3, LASHES)
+    front = part.grid_triangles(3, LASHES)
     return np.concatenate([front, front[:, ::-1]])
 
 
 def lashes(edge: Real, shut: float) -> Real:
-    """Return the places of the left lashes [shape=(3 * LASHES, 3)], a wedge along the upper lid's edge [shape=(LASHES,
-    3)].
-    """
+    """Return the left lashes [shape=(3 * LASHES, 3)], a wedge along the lid's edge [shape=(LASHES, 3)]."""
     share = np.linspace(0, 1, LASHES)
     thick = 0.004 + 0.018 * np.sin(np.pi * (0.12 + 0.8 * share)) ** 0.7 * share**0.4
     length = (0.012 + 0.045 * share**1.5) * np.clip((1 - share) / 0.03 + 0.35, 0, 1)
-    out = edge - EYE
+    out = edge - part.EYE
     out = out / np.linalg.norm(out, axis=1, keepdims=True)
     sweep = np.stack([0.75 * share, (0.75 - 1.2 * shut) * np.ones(LASHES), 0.55 + 0 * share], axis=1)
     sweep /= np.linalg.norm(sweep, axis=1, keepdims=True)
@@ -179,16 +166,16 @@ def lashes(edge: Real, shut: float) -> Real:
     return np.concatenate([tip, 0.5 * (upper + edge) + 0.012 * out, below])
 
 
-def brow() -> Part:
+def brow() -> part.Part:
     """Return the left brow."""
     share = np.linspace(0, 1, 30)
     x = 0.135 + 0.40 * share
     y = 0.279 + 0.006 * share + 0.026 * np.sin(np.pi * share**1.3)
-    path = np.stack([x, y, seen_from_front(head, x, y) + 0.004], axis=1)
+    path = np.stack([x, y, part.seen_from_front(part.head, x, y) + 0.004], axis=1)
     wide = 0.033 * np.clip(1.02 - share, 0.01, 1) ** 0.6 * np.clip(share / 0.4, 0.02, 1) ** 0.6
     upward = np.broadcast_to([0.25, 0.1, 1.0], path.shape)
-    places, triangles, strands = tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)
-    return part("brow", places, triangles, palette.BROW, palette.BROW_FINISH, strands)
+    places, triangles, strands = part.tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)
+    return part.part("brow", places, triangles, palette.BROW, palette.BROW_FINISH, strands)
 
 
 INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.12, 0.1, (0.1, 0.03), 0.055

@@ -158,9 +158,7 @@ def head(p: Real) -> Real:
 
 
 def along_rays(form: Form, start: Real, direction: Real, *, steps: int = 70) -> Real:
-    """Return how far rays from outside [shape=(N, 3)], in a direction of length 1, go until they meet a form
-    [shape=(N,)].
-    """
+    """Return how far rays [starts and unit directions: shape=(N, 3)] go until they meet a form [shape=(N,)]."""
     far, going = np.zeros(len(start)), np.arange(len(start))
     for _ in range(steps):
         gap = form(start[going] + far[going, None] * direction[going])

@@ -22,8 +22,7 @@ BITTEN = (0.8, 0.95)
 OO_ROUNDNESS = 0.8
 """How round the lips of oo are; those of w are a ring."""
 MOOD_SMILE, MOOD_FROWN, MOOD_TIGHT, RAISED_LIP = 0.065, 0.07, 0.025, 0.06
-"""How far a mood raises the corners, lowers them, lowers those of tight, stretched or raised lips, and raises the upper
-lip."""
+"""How far a mood raises the corners, lowers them, lowers those of serious lips, and raises the upper lip."""
 FULL_NARROWING, FULL_WIDENING = 0.16, 0.12
 """Changes of width at which lips are round, and spread, whatever the phones ask for."""
 

@@ -80,9 +80,7 @@ class Binding:
         return Binding(places, columns, jaw, bound, self.shares[of[rows][bound]], cheeks, nose)
 
     def move(self, pose: CharacterPose, contour: Real, columns: Binding) -> Real:
-        """Return the places in a pose [shape=(..., N, 3)], bound to columns of the lips' contour [shape=(..., COLUMNS,
-        3)].
-        """
+        """Return the places [shape=(..., N, 3)], bound to columns of the contour [shape=(..., COLUMNS, 3)]."""
         places = self._by_jaw(pose)
         places[..., self.bound, :] += self.shares @ (contour - columns._by_jaw(pose))
         spread, roundness, cheek, sneer = (

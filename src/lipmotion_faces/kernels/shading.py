@@ -33,15 +33,16 @@ def shade(
     light = np.empty(normals.shape, np.float32)
     for v in range(len(normals)):
         nx, ny, nz = normals[v]
-        ex, ey, ez = _towards(viewer, places[v])
+        ex, ey, ez = viewer[0] - places[v, 0], viewer[1] - places[v, 1], viewer[2] - places[v, 2]
+        far = np.sqrt(ex * ex + ey * ey + ez * ez)
+        ex, ey, ez = ex / far, ey / far, ez / far
         faces = nx * ex + ny * ey + nz * ez
         if faces < LEAST_FACING_COSINE:
             light[v] = 0.0
             continue
         grazing = min(max(1.0 - faces, 0.0), 1.0)
         grazing2 = grazing * grazing
-        open_sky, direct = reaches[v]
-        finish = finishes[kinds[v]]
+        (open_sky, direct), finish = reaches[v], finishes[kinds[v]]
         up = 0.5 + 0.5 * ny
         cr, cg, cb = colours[v]
         red = _bounced(open_sky, cr) * (up * lamps[4, 0] + (1.0 - up) * lamps[5, 0])
@@ -82,13 +83,6 @@ def shade(
         light[v, 1] = cg * green + shine_g
         light[v, 2] = cb * blue + shine_b
     return light
-
-
-@compiled
-def _towards(viewer: Real, place: Real) -> tuple[float, float, float]:
-    x, y, z = viewer[0] - place[0], viewer[1] - place[1], viewer[2] - place[2]
-    far = np.sqrt(x * x + y * y + z * z)
-    return x / far, y / far, z / far
 
 
 @compiled

@@ -25,8 +25,7 @@ SCALE = 1 / 65535
 WIDE_SAMPLES = 8
 """In triangles wider than this, in samples, the columns of a row are worked out before they are tried."""
 PLANES = 27
-"""Numbers of a triangle that are linear on the screen: three of each of light, highlights, depth, and place in the
-texture times depth."""
+"""Linear numbers of a triangle: three each of light, highlights, depth, and place in the texture times depth."""
 
 
 class TexturedTriangles(NamedTuple):

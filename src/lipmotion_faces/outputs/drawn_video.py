@@ -17,8 +17,9 @@ from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performanc
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
-from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawsPlanes, Face, Staging
+from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, Face, Staging
 from lipmotion_faces.film.filmed_video import RENDERING
+from lipmotion_faces.portrait import DrawnFace
 from lipmotion_faces.registry import stage_face
 
 OPAQUE_SUFFIX = ".mp4"
@@ -120,11 +121,8 @@ def write_drawn_face(  # noqa: PLR0913
     prosody : loudness and pitch in the time of the motion; None: those of the sound, which begins with the motion
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
-    staged, drawn = stage_face(face, staging, prosody or measure_prosody(sound)), None
-    if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
-        drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
-    if drawn is None:
-        drawn = staged.render(generation.motion, generation.units, fps=fps)
+    staged = stage_face(face, staging, prosody or measure_prosody(sound))
+    drawn = staged.render(generation.motion, generation.units, fps=fps)
     write_frames(path, with_reports(drawn, frame_count(generation, fps), RENDERING, monitor), fps, sound)
 
 
@@ -147,8 +145,6 @@ def write_frames(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float, so
 
 def load_drawing(face: Face) -> None:
     """Load what draws a face for videos (compiled kernels), so that drawing it begins sooner."""
-    if isinstance(face, DrawsPlanes) and numba_works():
+    if isinstance(face, DrawnFace) and numba_works():
         closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
-        smallest = stage_face(face, Staging(size=SMALLEST_PX))
-        if isinstance(smallest, DrawsPlanes) and (frames := smallest.render_planes(closed, Timeline(()))) is not None:
-            list(frames)
+        list(face.with_staging(Staging(size=SMALLEST_PX)).render(closed, Timeline(())))

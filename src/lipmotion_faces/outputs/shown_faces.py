@@ -21,28 +21,10 @@ from lipmotion.types.progress import with_reports
 from lipmotion.units.phones import OPTIONAL
 from lipmotion_faces.base import Face, Staging
 from lipmotion_faces.cut_out import CutOut, read_cut_out
-from lipmotion_faces.film.filmed_video import (
-    RENDERING,
-    Film,
-    check_film,
-    make_film,
-    person_shown,
-    refuse_film,
-    write_film,
-)
+from lipmotion_faces.film import filmed_video
 from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion_faces.mesh import MeshFace
-from lipmotion_faces.outputs.drawn_video import (
-    DRAWN_HZ,
-    OPAQUE_SUFFIX,
-    check_background,
-    check_drawable,
-    frame_count,
-    load_drawing,
-    sound_track,
-    write_drawn_face,
-    write_frames,
-)
+from lipmotion_faces.outputs import drawn_video
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.registry import FACES, is_drawings, make_face, stage_face
 
@@ -54,7 +36,7 @@ class _WithHead(ShownFace):
     """A face of which files for 3D programs show the 3D head."""
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
-        check_drawable(path, generation.motion)
+        drawn_video.check_drawable(path, generation.motion)
 
     def scene(
         self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
@@ -71,24 +53,24 @@ class ShownDrawing(_WithHead):
         self.face = face
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
-        refuse_film(settings.outputs)
+        filmed_video.refuse_film(settings.outputs)
         stage_face(self.face, settings.staging)
 
     def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
-        check_background(path, settings.staging)
+        drawn_video.check_background(path, settings.staging)
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
-        settings, played = performance.settings, performance.cached(sound_track)
+        settings, played = performance.settings, performance.cached(drawn_video.sound_track)
         others = {edit.channel for edit in performance.generation.curve_edits} - {*WEIGHTS, ""}
         if others and self.character is None:
             named = ", ".join(sorted(others))
             LOG.warning("%s: %s is of a rig that this face has not, and does not show; pin jawOpen", path, named)
         seen, prosody = performance.cached(_seen), performance.cached(_played_prosody)
         monitor, hertz = performance.monitor, _frame_rate(settings)
-        write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
+        drawn_video.write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
 
     def load(self) -> None:  # noqa: D102
-        load_drawing(self.face)
+        drawn_video.load_drawing(self.face)
 
 
 class ShownCharacter(ShownDrawing):
@@ -114,10 +96,10 @@ class ShownCutOut(_WithHead):
         self.face = face
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
-        refuse_film(settings.outputs)
+        filmed_video.refuse_film(settings.outputs)
 
     def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
-        check_background(path, settings.staging)
+        drawn_video.check_background(path, settings.staging)
         check_cue_options(_frame_rate(settings), None, self._optional)
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
@@ -129,11 +111,13 @@ class ShownCutOut(_WithHead):
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, generation, fps = performance.settings, performance.generation, _frame_rate(performance.settings)
         sheet = cues(generation, fps=fps, shapes=self._optional, delivery=settings.delivery)
-        count = frame_count(generation, fps)
+        count = drawn_video.frame_count(generation, fps)
         shown = list_frame_shapes(sheet)[:count]
         frames = self.face.frames([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
-        sound = performance.cached(sound_track)
-        write_frames(path, with_reports(frames, count, RENDERING, performance.monitor), fps, sound)
+        sound = performance.cached(drawn_video.sound_track)
+        drawn_video.write_frames(
+            path, with_reports(frames, count, filmed_video.RENDERING, performance.monitor), fps, sound
+        )
 
     @property
     def _optional(self) -> str:
@@ -149,7 +133,7 @@ class ShownPerson(_WithHead):
         self.face = face
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
-        check_film(settings.outputs, settings.recording)
+        filmed_video.check_film(settings.outputs, settings.recording)
         if settings.staging != Staging():
             raise InputError("size, colour of the background and what moves are of drawn faces; leave them out")
 
@@ -161,8 +145,8 @@ class ShownPerson(_WithHead):
             raise InputError(
                 "a filmed face has the mood of its footage; leave the mood out, or show a drawn face or a character"
             )
-        if path.suffix.lower() != OPAQUE_SUFFIX:
-            raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
+        if path.suffix.lower() != drawn_video.OPAQUE_SUFFIX:
+            raise ExportError(f"{path}: filmed faces are written as {drawn_video.OPAQUE_SUFFIX}; name the output so")
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
         """Log a warning where tags in the words ask for a mood; ``make_film`` names the channels that are needed."""
@@ -172,17 +156,17 @@ class ShownPerson(_WithHead):
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings = performance.settings
-        film, sound = self.film(performance), performance.cached(sound_track)
-        write_film(path, film, sound, mark=settings.outputs.mark, monitor=performance.monitor)
+        film, sound = self.film(performance), performance.cached(drawn_video.sound_track)
+        filmed_video.write_film(path, film, sound, mark=settings.outputs.mark, monitor=performance.monitor)
 
-    def film(self, performance: Performance) -> Film:
+    def film(self, performance: Performance) -> filmed_video.Film:
         """Return the video, which is made while it is read. Raises InputError: the motion lacks channels."""
         settings, seen = performance.settings, performance.cached(_seen)
-        return make_film(
+        return filmed_video.make_film(
             self.face,
             seen.motion,
             speech=settings.recording,
-            sound=performance.cached(sound_track),
+            sound=performance.cached(drawn_video.sound_track),
             model=performance.model,
             units=seen.units,
             fps=settings.outputs.fps,
@@ -190,13 +174,11 @@ class ShownPerson(_WithHead):
         )
 
     def other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: D102
-        return person_shown(model, self.face, speaker)
+        return filmed_video.person_shown(model, self.face, speaker)
 
 
 def shown_face(face: AnyFace | ShownFace) -> ShownFace:
-    """Return a face as outputs show it, of a name, a path or a value. Raises InputError: none. Raises ModelFormatError:
-    damaged.
-    """
+    """Return a face as outputs show it, of a name, a path or a value. Raises InputError, ModelFormatError: none."""
     if isinstance(face, ShownFace):
         return face
     if isinstance(face, DrivenCharacter):
@@ -233,8 +215,8 @@ def _seen(performance: Performance) -> Generation:
 
 def _played_prosody(performance: Performance) -> Prosody:
     """Return loudness and pitch of the sound track, in the time of the motion."""
-    return shift_prosody(measure_prosody(performance.cached(sound_track)), performance.settings.delivery)
+    return shift_prosody(measure_prosody(performance.cached(drawn_video.sound_track)), performance.settings.delivery)
 
 
 def _frame_rate(settings: OutputSettings) -> float:
-    return settings.outputs.fps or DRAWN_HZ
+    return settings.outputs.fps or drawn_video.DRAWN_HZ

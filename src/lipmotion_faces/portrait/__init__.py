@@ -2,27 +2,24 @@
 
 The stages of a frame: ``face_poses`` (motion, phones and voice → numbers) → ``geometry`` (numbers → outlines) →
 ``mouth_painting`` (outlines → pixels) → ``portrait_rasteriser`` (pixels → picture, moved by ``movement``). The still
-parts are painted once, by ``still_parts`` and ``eyes`` on a ``layer``. ``planar`` draws the same for the encoder of a
-video.
+parts are painted once, by ``parts`` on a ``layer``.
 A character is a ``design``: ``woman``, ``man``, ``cartoon``.
 """
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import TRANSPARENT, DrawnMotion, Face, Staging
-from lipmotion_faces.portrait.design import Design
 
 if TYPE_CHECKING:
-    from lipmotion_faces.portrait.portrait_rasteriser import FacePose
+    from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 
 __all__ = ["Cartoon", "DrawnFace", "Man", "Portrait", "Woman"]
 
@@ -31,19 +28,16 @@ OWN_SIZE = 640
 
 
 class DrawnFace(Face):
-    """A drawn character; ``design`` says which.
+    """A drawn character; ``character`` names its design in ``characters``.
 
     Motion needs ``opening``; ``width``, ``outer``, the chin ``y_152`` and the articulatory channels are used where they
     exist. ``width`` and ``outer`` are taken relative to the rest pose in silence, so they suit any speaker.
     """
 
+    character: ClassVar[str]
+
     def __init__(self, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
         self.staging, self.prosody = staging or Staging(), prosody
-
-    @property
-    @abstractmethod
-    def design(self) -> Design:
-        """The character."""
 
     def with_staging(self, staging: Staging, prosody: Prosody | None = None) -> DrawnFace:
         """Return the same character with other settings; ``prosody`` is of the speech that will be rendered."""
@@ -56,39 +50,23 @@ class DrawnFace(Face):
         from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 
         poses = face_poses(motion, units, fps, self.staging, self.prosody)
-        return DrawnMotion(poses, lambda: self._painter)
+        return DrawnMotion(poses, lambda: self._rasteriser.paint)
 
     @cached_property
-    def _painter(self) -> Callable[[FacePose], NDArray[np.uint8]]:
-        from lipmotion_faces.portrait.portrait_rasteriser import Rasteriser, make_painter
+    def _rasteriser(self) -> Rasteriser:
+        from lipmotion_faces.portrait import characters
+        from lipmotion_faces.portrait.portrait_rasteriser import Rasteriser
 
         chosen = self.staging
         background = None if chosen.background == TRANSPARENT else chosen.colour or chosen.background
-        return make_painter(Rasteriser(self.design, chosen.size or OWN_SIZE, background))
-
-    def render_planes(  # noqa: D102
-        self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
-    ) -> Iterator[NDArray[np.uint8]] | None:
-        from lipmotion_faces.portrait.planar import PlanarRasteriser
-        from lipmotion_faces.portrait.portrait_rasteriser import face_poses, make_painter
-
-        chosen = self.staging
-        if chosen.background == TRANSPARENT:
-            return None
-        poses = face_poses(motion, units, fps, chosen, self.prosody)
-        background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE
-        return iter(DrawnMotion(poses, lambda: make_painter(PlanarRasteriser(self.design, size, background))))
+        return Rasteriser(getattr(characters, self.character), chosen.size or OWN_SIZE, background)
 
 
 @final
 class Woman(DrawnFace):
     """A woman with long hair."""
 
-    @property
-    def design(self) -> Design:  # noqa: D102
-        from lipmotion_faces.portrait.characters import WOMAN
-
-        return WOMAN
+    character = "WOMAN"
 
 
 Portrait = Woman
@@ -99,19 +77,11 @@ Portrait = Woman
 class Man(DrawnFace):
     """A man with short hair."""
 
-    @property
-    def design(self) -> Design:  # noqa: D102
-        from lipmotion_faces.portrait.characters import MAN
-
-        return MAN
+    character = "MAN"
 
 
 @final
 class Cartoon(DrawnFace):
     """A flat cartoon with lines around its surfaces."""
 
-    @property
-    def design(self) -> Design:  # noqa: D102
-        from lipmotion_faces.portrait.characters import CARTOON
-
-        return CARTOON
+    character = "CARTOON"

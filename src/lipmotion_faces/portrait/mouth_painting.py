@@ -14,17 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.kernels.painting import paint_band
+from lipmotion_faces.portrait import geometry
 from lipmotion_faces.portrait.design import Colour, Design, Palette
-from lipmotion_faces.portrait.geometry import (
-    Heights,
-    LipOutlines,
-    MouthInterior,
-    MouthPose,
-    drawn_half_width,
-    far_open,
-    lip_outlines,
-    mouth_interior,
-)
 from lipmotion_faces.portrait.layer import Window
 
 Texture = NDArray[np.float64]
@@ -32,8 +23,7 @@ Texture = NDArray[np.float64]
 COLUMNS = 4
 """Places in each column of pixels at which heights are computed."""
 FOLD, FOLD_TOP = (0.19, 0.1), -0.235
-"""A fold between nose and mouth begins so far from the middle, and ends so far beside the corner; its upper end lies so
-far below the line of the lips."""
+"""Where a fold begins, from the middle, and ends, from the corner; and its top, from the line of the lips."""
 CORNER_REACH = 1.28
 """The shadows beside the corners are painted up to this multiple of the mouth's half width."""
 SPAN = 0.26
@@ -43,28 +33,29 @@ LOWER_TOOTH_GAPS = (0.0, 0.034, 0.068, 0.1, 0.13)
 
 
 class MouthPainter:
-    """Paints mouths of a character into the pixels of one window, with textures in its layers' colours, or its own."""
+    """Paints mouths of a character into the pixels of one window."""
 
-    def __init__(self, design: Design, window: Window, textures: MouthTextures | None = None) -> None:
-        self._lips, self._textures = design.lips, textures or mouth_textures(design)
+    def __init__(self, design: Design, window: Window) -> None:
+        self._lips, colours = design.lips, design.palette
+        self._textures = _flat_textures(colours) if design.flat else _shaded_textures(colours)
         self._x = window.columns(COLUMNS).reshape(-1, COLUMNS).T.astype(np.float64)
         self._scale, self._first_row = window.view.scale, window.y0 - window.view.origin[1]
 
-    def paint(self, layer: NDArray[np.float32], pose: MouthPose) -> None:
+    def paint(self, layer: NDArray[np.float32], pose: geometry.MouthPose) -> None:
         """Paint the mouth of a pose on the window's pixels [shape=(h, w, 4)], in place."""
-        art, half_width = self._textures, drawn_half_width(self._lips, pose)
+        art, half_width = self._textures, geometry.drawn_half_width(self._lips, pose)
         columns = np.flatnonzero(np.abs(self._x).max(axis=0) < half_width * CORNER_REACH)
         on = _Columns(layer, columns[0], columns[-1] + 1, self._scale, self._first_row)
         x = self._x[:, on.first : on.last]
         on_lips, across = _place(x, half_width), _place(x, SPAN)
-        shape = lip_outlines(self._lips, pose, x)
+        shape = geometry.lip_outlines(self._lips, pose, x)
         depth = 0.085 + 0.03 * pose.protrusion
         on.paint(shape.lower_outer, shape.lower_outer + depth, on_lips, art.under_lip)
         on.paint(shape.lower_outer, shape.lower_outer + 0.7 * depth, on_lips, art.under_lip, pose.tuck)
         self._paint_folds(on, shape, pose)
         corner = np.full_like(x, shape.corner_y)
         on.paint(corner - 0.06, corner + 0.06, _place(x, shape.half_width * CORNER_REACH), art.corners)
-        within = mouth_interior(self._lips, pose, x, shape) if pose.gap > 0 else None
+        within = geometry.mouth_interior(self._lips, pose, x, shape) if pose.gap > 0 else None
         if within is not None:
             bottom = shape.lower_inner
             on.paint(shape.upper_inner, bottom, on_lips, art.cavity)
@@ -81,7 +72,7 @@ class MouthPainter:
         if within is not None:
             self._paint_front(on, shape, within, pose, across)
 
-    def _paint_folds(self, on: _Columns, shape: LipOutlines, pose: MouthPose) -> None:
+    def _paint_folds(self, on: _Columns, shape: geometry.LipOutlines, pose: geometry.MouthPose) -> None:
         """Paint the folds between nose and corners that a raised upper lip draws."""
         if pose.upper_raise <= 0:
             return
@@ -94,7 +85,12 @@ class MouthPainter:
         wide.paint(middle - 0.03, middle + 0.03, share.mean(axis=0), self._textures.fold, pose.upper_raise)
 
     def _paint_front(
-        self, on: _Columns, shape: LipOutlines, within: MouthInterior, pose: MouthPose, across: Heights
+        self,
+        on: _Columns,
+        shape: geometry.LipOutlines,
+        within: geometry.MouthInterior,
+        pose: geometry.MouthPose,
+        across: geometry.Heights,
     ) -> None:
         """Paint the upper teeth, what of the tongue is in front of the lower lip, and the lines of a drawn mouth."""
         art = self._textures
@@ -107,7 +103,7 @@ class MouthPainter:
             front = np.maximum(front, tip)
         # teeth show less behind lips that hardly part, unless the sound asks for them; what is hardly seen of them is
         # covered by the lip, from above: they are never grey
-        shown = max(min(2.5 * pose.teeth, 1), far_open(pose), pose.tuck)
+        shown = max(min(2.5 * pose.teeth, 1), geometry.far_open(pose), pose.tuck)
         shown = float(shown * max(min(max((pose.gap - 0.015) / 0.04, 0), 1), pose.tuck, 2 * pose.teeth - 1))
         low = top + min(1.2 * shown, 1) * (within.teeth_upper - top)
         on.paint(top, low, across, art.upper_teeth, min(5 * shown, 1))
@@ -137,7 +133,14 @@ class _Columns(NamedTuple):
     scale: float
     first_row: float
 
-    def paint(self, top: Heights, bottom: Heights, across: Heights, texture: Texture, opacity: float = 1.0) -> None:
+    def paint(
+        self,
+        top: geometry.Heights,
+        bottom: geometry.Heights,
+        across: geometry.Heights,
+        texture: Texture,
+        opacity: float = 1.0,
+    ) -> None:
         if opacity <= 0:
             return
         if opacity < 1:
@@ -146,7 +149,7 @@ class _Columns(NamedTuple):
         paint_band(self.layer[:, self.first : self.last], *rows, across, texture)
 
 
-def _place(x: Heights, half_width: float) -> Heights:
+def _place(x: geometry.Heights, half_width: float) -> geometry.Heights:
     """Return the place of columns in a texture that spans a width, 0..1 [shape=(W,)]."""
     return np.clip(x.mean(axis=0) / (2 * half_width) + 0.5, 0, 1)
 
@@ -169,11 +172,6 @@ class MouthTextures:
     corners: Texture
     fold: Texture
     outline: Texture
-
-
-def mouth_textures(design: Design) -> MouthTextures:
-    """Return the textures of a character's mouth."""
-    return _flat_textures(design.palette) if design.flat else _shaded_textures(design.palette)
 
 
 def _flat_textures(colours: Palette) -> MouthTextures:

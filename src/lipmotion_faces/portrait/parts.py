@@ -40,9 +40,7 @@ GAZE_STEPS = 8
 
 
 class LidPose(NamedTuple):
-    """The lids and furrows in steps: shut up to ``LID_POSITIONS``, moods to ``MOOD_LIDS``; slant < 0: the outer half
-    falls.
-    """
+    """Lids and furrows in steps: ``LID_POSITIONS`` when shut, ``MOOD_LIDS`` in moods; slant < 0: outwards."""
 
     shut: int
     wide: int = 0
@@ -88,9 +86,7 @@ class EyePainter:
         self._cached = lru_cache(maxsize=128)(self._paint)
 
     def paint(self, shut: float, gaze_x: float, gaze_y: float, mood: UpperFace = CALM) -> Pixels:
-        """Return the eyes, premultiplied [shape=(h, w, 4)], not to be changed; gaze to the right and down, eye
-        distances.
-        """
+        """Return the eyes, premultiplied [shape=(h, w, 4)], not to be changed; gaze right and down, eye distances."""
         step = self._window.view.scale * GAZE_STEPS
         return self._cached(lid_pose(shut, mood), round(gaze_x * step), round(gaze_y * step))
 

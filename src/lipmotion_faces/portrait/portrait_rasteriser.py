@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,22 +14,12 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, Picture, Staging, stage_liveliness
 from lipmotion_faces.kernels.painting import stack, warp, warp_bytes
+from lipmotion_faces.portrait import geometry
 from lipmotion_faces.portrait.design import Colour, Design
-from lipmotion_faces.portrait.geometry import (
-    STEP,
-    BrowField,
-    BrowPose,
-    HeadField,
-    HeadPlacement,
-    MouthPose,
-    SkinField,
-    brow_pose,
-)
 from lipmotion_faces.portrait.layer import View, Window
 from lipmotion_faces.portrait.mouth_painting import MouthPainter
 from lipmotion_faces.portrait.parts import EyePainter, paint_still_layers
 
-CanvasT = TypeVar("CanvasT")
 Pixels = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Canvas = NDArray[np.uint16]
@@ -47,12 +36,12 @@ LARGEST_TURN = np.array([0.35, 0.35, 0.13])
 class FacePose(NamedTuple):
     """Everything that moves in a frame; lengths in eye distances, gaze to the right and down, lids closed 0..1."""
 
-    mouth: MouthPose
+    mouth: geometry.MouthPose
     lids: float = 0.0
     gaze_x: float = 0.0
     gaze_y: float = 0.0
     brows: float = 0.0
-    head: HeadPlacement = HeadPlacement()
+    head: geometry.HeadPlacement = geometry.HeadPlacement()
     mood: UpperFace = CALM
 
 
@@ -67,62 +56,59 @@ def face_poses(
     heads = np.stack([SWAY_X * yaw, -SWAY_Y * pitch, roll, YAW * yaw, -PITCH * pitch], axis=1)
     lids, rows = np.maximum(moved.lids, RESTING_LIDS), mouth.with_corners(moved.unit(12), moved.unit(15)).rows()
     return [
-        FacePose(MouthPose(*(row[name] for name in MouthPose._fields)), shut, x, -y, brows, HeadPlacement(*head), mood)
+        FacePose(
+            geometry.MouthPose(*(row[name] for name in geometry.MouthPose._fields)),
+            shut,
+            x,
+            -y,
+            brows,
+            geometry.HeadPlacement(*head),
+            mood,
+        )
         for row, shut, (x, y), brows, head, mood in zip(
             rows, lids.tolist(), gaze.tolist(), moved.brows.tolist(), heads.tolist(), moved.upper_face, strict=True
         )
     ]
 
 
-class Draws(Protocol[CanvasT]):
-    """What draws the pictures of poses, each thread on a canvas of its own."""
-
-    def canvas(self) -> CanvasT:
-        """Return what ``picture`` draws on."""
-
-    def picture(self, pose: FacePose, canvas: CanvasT) -> NDArray[np.uint8]:
-        """Return one frame."""
-
-
-def make_painter(drawing: Draws[CanvasT]) -> Callable[[FacePose], Picture]:
-    """Return what draws the picture of a pose, on a canvas of the thread that calls it."""
-    canvases = threading.local()
-
-    def paint(pose: FacePose) -> Picture:
-        if not hasattr(canvases, "own"):
-            canvases.own = drawing.canvas()
-        return drawing.picture(pose, canvases.own)
-
-    return paint
-
-
 class Rasteriser:
-    """Draws a character at one size; ``picture`` may be called by several threads, each with a canvas of its own."""
+    """Draws a character at one size; ``paint`` may be called by several threads, each of which has its own canvas."""
 
     def __init__(self, design: Design, size: int, background: Colour | str | None = SCENE) -> None:
-        view = View(size)
+        view, line_y = View(size), design.lips.line_y
         whole = view.window(-9, -9, 9, 9)
-        self._opaque = background is not None
-        self._jaw, self._mouth, self._eyes, self._brow, self._below_brows, self._head = moving_parts(view, design)
+        self._opaque, self._canvases = background is not None, threading.local()
+        self._jaw = view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95)
+        self._mouth = view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7)
+        self._eyes, self._brow = view.window(-0.66, -0.24, 0.66, 0.21), view.window(-0.8, -0.64, 0.8, -0.06)
+        # the part of the eyes' window that the brows' does not have
+        self._below_brows = Window(view, self._eyes.x0, self._brow.y1, self._eyes.x1, self._eyes.y1)
+        self._head = view.window(-1.3, -9, 1.3, 1.9)
         self._skin, self._below, self._shade, self._front, still = paint_still_layers(whole, design, background)
         self._eye_painter = EyePainter(design, self._eyes)
         self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint16)
         self._frame = self._still[..., : 3 if self._opaque else 4].astype(np.uint8)
         self._brows = lru_cache(maxsize=64)(self._paint_brows)
-        self._skin_field, self._brow_field = SkinField(self._jaw, design.lips), BrowField(self._brow)
-        self._head_field = HeadField(self._head)
+        self._skin_field, self._brow_field = geometry.SkinField(self._jaw, design.lips), geometry.BrowField(self._brow)
+        self._head_field = geometry.HeadField(self._head)
         self._mouth_painter = MouthPainter(design, self._mouth)
 
     def canvas(self) -> Canvas:
         """Return the picture of the resting face without eyes and mouth, to draw on [shape=(size, size, 4)]."""
         return self._still.copy()
 
+    def paint(self, pose: FacePose) -> Picture:
+        """Return one frame, drawn on the canvas of the thread that calls; shape as of ``picture``."""
+        if not hasattr(self._canvases, "own"):
+            self._canvases.own = self.canvas()
+        return self.picture(pose, self._canvases.own)
+
     def picture(self, pose: FacePose, canvas: Canvas) -> Bytes:
         """Return one frame [shape=(size, size, 3), or 4 channels where transparent]; the canvas is changed."""
         skin = self._move_skin(self._jaw, self._skin_field.shifts(pose.mouth, pose.mood))
         self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])
-        canvas[self._brow.area] = self._brows(brow_pose(pose.brows, pose.mood, self._brow.view.scale))
+        canvas[self._brow.area] = self._brows(geometry.brow_pose(pose.brows, pose.mood, self._brow.view.scale))
         canvas[self._below_brows.area] = self._still[self._below_brows.area]
         eyes = self._eye_painter.paint(pose.lids, pose.gaze_x, pose.gaze_y, pose.mood)
         mixed = eyes * np.array([1, 1, 1, 255], np.float32)
@@ -131,7 +117,7 @@ class Rasteriser:
         canvas[self._eyes.area] = mixed
         frame = self._frame.copy()
         area = self._head.area
-        warp_bytes(canvas[area], *self._head_field.shifts(pose.head), STEP, frame[area])
+        warp_bytes(canvas[area], *self._head_field.shifts(pose.head), geometry.STEP, frame[area])
         if not self._opaque:  # straight alpha, as files store it
             cover = frame[..., 3:].astype(np.uint16)
             edge = (cover[..., 0] > 0) & (cover[..., 0] < 255)
@@ -139,7 +125,7 @@ class Rasteriser:
             frame[edge, :3] = np.minimum(colours, 255)
         return frame
 
-    def _paint_brows(self, brows: BrowPose) -> Canvas:
+    def _paint_brows(self, brows: geometry.BrowPose) -> Canvas:
         picture = np.empty_like(self._still[self._brow.area])
         self._lay(self._move_skin(self._brow, self._brow_field.shifts(brows)), self._brow, picture)
         return picture
@@ -147,34 +133,9 @@ class Rasteriser:
     def _move_skin(self, window: Window, shifts: tuple[NDArray[np.float64], NDArray[np.float64]]) -> Pixels:
         source = self._skin[window.area]
         skin = np.empty_like(source)
-        warp(source, *shifts, STEP, skin)
+        warp(source, *shifts, geometry.STEP, skin)
         return skin
 
     def _lay(self, skin: Pixels, window: Window, target: Canvas) -> None:
         area = window.area
         stack(self._below[area], self._shade[area], skin, self._front[area], target)
-
-
-class MovingParts(NamedTuple):
-    """Windows of what moves; ``below_brows`` is the part of the eyes' window that the brows' does not have."""
-
-    jaw: Window
-    mouth: Window
-    eyes: Window
-    brow: Window
-    below_brows: Window
-    head: Window
-
-
-def moving_parts(view: View, design: Design) -> MovingParts:
-    """Return the windows of what moves in a view of a character."""
-    line_y = design.lips.line_y
-    eyes, brow = view.window(-0.66, -0.24, 0.66, 0.21), view.window(-0.8, -0.64, 0.8, -0.06)
-    return MovingParts(
-        jaw=view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95),
-        mouth=view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7),
-        eyes=eyes,
-        brow=brow,
-        below_brows=Window(view, eyes.x0, brow.y1, eyes.x1, eyes.y1),
-        head=view.window(-1.3, -9, 1.3, 1.9),
-    )

@@ -39,9 +39,7 @@ _POINTS = {"C": STEPS, "S": STEPS, "Q": STEPS, "T": STEPS, "A": 4 * STEPS}
 
 
 def flatten_path(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]]:
-    """Return a path's subpaths [shape=(N, 2)], and whether each is closed. Raises InputError: no path, or over ``most``
-    points.
-    """
+    """Return subpaths [shape=(N, 2)], and whether each is closed. Raises InputError: no path, over ``most`` points."""
     lines: list[tuple[Points, bool]] = []
     current: list[Points] = []
     at = start = control = np.zeros(2)

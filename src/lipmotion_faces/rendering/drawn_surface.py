@@ -46,22 +46,28 @@ class TexturedCanvas:
         moving : places of vertices; only the smallest box of pixels around them is drawn
         """
         picture = (self.empty if onto is None else onto).copy()
-        opacity = np.empty(picture.shape[:2], np.uint8)
-        points = self.camera.on_screen(places)
-        area = self.camera.box(points if moving is None else self.camera.on_screen(moving))
-        if area is not None:
-            draw_textured(points, light, shine, self.surface, area, self._background, self._tone, picture, opacity)
+        self._draw(places, light, shine, self._background, picture, moving)
         return picture
 
     def cut_out(self, places: Real, light: Colours, shine: Colours) -> Picture:
         """Return the surface without background: red, green, blue and straight alpha [shape=(H, W, 4)]."""
         picture = np.zeros((self.camera.height, self.camera.width, 3), np.uint8)
-        opacity = np.zeros(picture.shape[:2], np.uint8)
-        points = self.camera.on_screen(places)
-        area = self.camera.box(points)
+        return add_alpha(picture, self._draw(places, light, shine, self._black, picture), self._tone)
+
+    def _draw(
+        self,
+        places: Real,
+        light: Colours,
+        shine: Colours,
+        behind: Colours,
+        picture: Picture,
+        moving: Real | None = None,
+    ) -> Picture:
+        opacity, points = np.zeros(picture.shape[:2], np.uint8), self.camera.on_screen(places)
+        area = self.camera.box(points if moving is None else self.camera.on_screen(moving))
         if area is not None:
-            draw_textured(points, light, shine, self.surface, area, self._black, self._tone, picture, opacity)
-        return add_alpha(picture, opacity, self._tone)
+            draw_textured(points, light, shine, self.surface, area, behind, self._tone, picture, opacity)
+        return opacity
 
 
 Array = NDArray[np.float64]

@@ -27,18 +27,15 @@ are not found; 93 clips of GRID: at most 1 picture of 6,882 is below)."""
 LARGEST_SHARE = 1 / 3
 """Where more pictures repeat the one before, they are drawn and may stay as they are (toy faces: half of them)."""
 FROZEN_S = 0.2
-"""Pictures that repeat one another for so long are frozen; single ones are doubled, as where frame rates were changed.
-"""
+"""Pictures that repeat one another for so long are frozen; single ones are doubled, as by changed frame rates."""
 JUMP = 1.5
-"""The picture after frozen ones differs at least so much more than most do; after people who stand still it does not.
-"""
+"""The picture after frozen ones differs at least so much more than most; after people who stand still it does not."""
 MOST_COMPARED = 4000
 """Mouths of a person that each one is compared with, spread evenly."""
 LEAST_COMPARED = 500
 """With fewer mouths, no one can say what is unlike the others."""
 APART_S = 10.0
-"""A mouth is compared with those of other clips, and with those of its own that are so far away: smears last seconds.
-"""
+"""A mouth is compared with other clips, and with its own from so far away on: smears last seconds."""
 SIZE, FINE_PX, COARSE_PX = (24, 18), 1.0, 5.0
 """Size of a compared mouth, and the details in it: between these two standard deviations, px of the mouth region."""
 LEAST_CONTRAST = 20.0
@@ -119,7 +116,9 @@ def find_damaged(
         others = slice(None) if is_one else slice(number, number + 1)
         light, sharpness = (_median([look[part] for look in looks[others]], seen[others]) for part in (0, 1))
         lights, sharp = looks[number]
-        dark, blurred = lights < DARKNESS * light, _median_of_neighbours(sharp) < SHARPNESS * sharpness
+        padded = np.pad(sharp, BLUR_FRAMES // 2, "edge")
+        steady = np.median(np.lib.stride_tricks.sliding_window_view(padded, BLUR_FRAMES), axis=-1)
+        dark, blurred = lights < DARKNESS * light, steady < SHARPNESS * sharpness
         found = {"dark": dark, "blurred": blurred, "smeared": _find_smeared(values / usual)}
         result.append({kind: mask & which for kind, which in found.items()})
     return result
@@ -164,8 +163,3 @@ def _describe(mouths: Pictures) -> tuple[Floats, Floats, Floats]:
         sharpness.append(np.abs(cv2.Laplacian(grey, cv2.CV_32F)).mean() / max(float(grey.mean()), 1.0))
         details.append(detail / max(float(np.linalg.norm(detail)), LEAST_CONTRAST))
     return np.array(light), np.array(sharpness), np.array(details, np.float32)
-
-
-def _median_of_neighbours(values: Floats) -> Floats:
-    half = BLUR_FRAMES // 2
-    return np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, half, "edge"), BLUR_FRAMES), axis=-1)

@@ -9,18 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion_faces.tracking import trackers
 from lipmotion_faces.tracking.image_similarity import face_thumbnail, image_correlation, is_cut, scene_thumbnail
 from lipmotion_faces.tracking.packages import import_opencv
-from lipmotion_faces.tracking.trackers import (
-    EYE_CORNERS,
-    MEDIAPIPE,
-    TRACKED_POINTS,
-    BoxFinder,
-    FaceBox,
-    LandmarkTracker,
-    PointFinder,
-    make_tracker,
-)
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -69,7 +60,7 @@ class FaceWindow:
 class WindowedMesh:
     """Follows one face with the mesh of a tracker in a window that goes along with it."""
 
-    def __init__(self, box: FaceBox, tracker: LandmarkTracker) -> None:
+    def __init__(self, box: trackers.FaceBox, tracker: trackers.LandmarkTracker) -> None:
         self._window = FaceWindow.around(box.x, box.y, REACH * box.side)
         self._mesh = tracker.points()
 
@@ -110,7 +101,7 @@ THUMBNAIL_STEP, MOST_THUMBNAILS = 5, 20
 NEW_LOOK_CORRELATION, MOST_LOOKS = 0.95, 60
 """Later thumbnails are kept when they correlate less than this with all that are kept, and how many at most in all."""
 
-_EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
+_EYES = [trackers.TRACKED_POINTS.index(index) for index in trackers.EYE_CORNERS]
 
 
 class FaceFollower:
@@ -122,9 +113,9 @@ class FaceFollower:
     Raises InputError: no tracker of that name.
     """
 
-    def __init__(self, person: Sequence[Array] = (), tracker: str = MEDIAPIPE) -> None:
+    def __init__(self, person: Sequence[Array] = (), tracker: str = trackers.MEDIAPIPE) -> None:
         self._wanted = list(person)
-        self._tracker = make_tracker(tracker)
+        self._tracker = trackers.make_tracker(tracker)
         self._finder = self._tracker.boxes()
         self._scenes = [_Scene(self._wanted, self._finder, self._tracker)]
         self._picture: Array | None = None
@@ -211,7 +202,7 @@ class _Scene:
     is_lost        : whether the mesh, which follows one face, has changed to another one
     """
 
-    def __init__(self, known: Sequence[Array], finder: BoxFinder, tracker: LandmarkTracker) -> None:
+    def __init__(self, known: Sequence[Array], finder: trackers.BoxFinder, tracker: trackers.LandmarkTracker) -> None:
         self.thumbnails: list[Array] = []
         self.missing_frames = 0
         self.is_lost = False
@@ -222,7 +213,7 @@ class _Scene:
         self._last: Array | None = None
         self._frames = 0
         self._open = ExitStack()
-        self._mesh: PointFinder | WindowedMesh | None = None
+        self._mesh: trackers.PointFinder | WindowedMesh | None = None
         self._is_crowd = False
 
     def close(self) -> None:

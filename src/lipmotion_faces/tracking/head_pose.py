@@ -12,23 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT, WIDTH
+from lipmotion_faces.tracking import trackers
 from lipmotion_faces.tracking.packages import import_opencv
-from lipmotion_faces.tracking.trackers import (
-    EYE_CORNERS,
-    FOREHEAD,
-    FOREHEAD_SLOPE_DEG,
-    LIP_POINTS,
-    NASION,
-    RIGID_POINTS,
-    TRACKED_POINTS,
-)
 
 Array = NDArray[np.float64]
 
 ROUNDS = 3
 """Iterations of aligning to the mean face and averaging again. On GRID the second moves points by up to 4e-6 eye
 distances, the third by less than 1e-9."""
-_LIPS = [TRACKED_POINTS.index(index) for index in LIP_POINTS]
+_LIPS = [trackers.TRACKED_POINTS.index(index) for index in trackers.LIP_POINTS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +58,7 @@ def estimate_head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
     Source: Umeyama 1991 (one frame), Gower 1975 (the mean face).
     """
     column = {index: n for n, index in enumerate(layout)}
-    rigid = points[:, [column[index] for index in RIGID_POINTS]]
+    rigid = points[:, [column[index] for index in trackers.RIGID_POINTS]]
     face = rigid[0] - rigid[0].mean(axis=0)
     size = np.linalg.norm(face)
     for _ in range(ROUNDS):  # generalised Procrustes analysis
@@ -74,13 +66,13 @@ def estimate_head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
         face = (scale[:, None, None] * (rigid @ rotation.transpose(0, 2, 1)) + translation[:, None, :]).mean(axis=0)
         face *= size / np.linalg.norm(face)  # without this the mean shrinks from round to round
     rotation, scale, translation = fit_similarities(rigid, face)
-    eyes = [face[RIGID_POINTS.index(index)] for index in EYE_CORNERS]
-    up = face[RIGID_POINTS.index(FOREHEAD)] - face[RIGID_POINTS.index(NASION)]
+    eyes = [face[trackers.RIGID_POINTS.index(index)] for index in trackers.EYE_CORNERS]
+    up = face[trackers.RIGID_POINTS.index(trackers.FOREHEAD)] - face[trackers.RIGID_POINTS.index(trackers.NASION)]
     unit = float(np.linalg.norm(eyes[1] - eyes[0]))
     x, origin = (eyes[1] - eyes[0]) / unit, (eyes[0] + eyes[1]) / 2
     up = up - (up @ x) * x
     up /= np.linalg.norm(up)
-    slope = np.deg2rad(FOREHEAD_SLOPE_DEG)
+    slope = np.deg2rad(trackers.FOREHEAD_SLOPE_DEG)
     y = np.cos(slope) * up + np.sin(slope) * np.cross(x, up)
     axes = np.stack([x, y, np.cross(x, y)])
     return HeadPose(axes @ rotation, scale, (translation - origin) @ axes.T, unit)
@@ -158,7 +150,7 @@ def face_to_image(points: Array) -> Array:
     lips are on average, so a nod neither moves nor shortens the mouth.
     """
     upright = points * (1, -1, -1)
-    pose = estimate_head_pose(upright, TRACKED_POINTS)
+    pose = estimate_head_pose(upright, trackers.TRACKED_POINTS)
     maps = pose.plane_to_image(float(pose.to_head_coordinates(upright)[:, _LIPS, 2].mean()))
     maps[:, 1] *= -1  # y is down in the image,
     maps[:, :, 1] *= -1  # and in the region

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_faces.tracking.packages import import_face_detection, import_face_mesh, import_opencv, missing
+from lipmotion_faces.tracking.packages import import_opencv, import_solution, missing
 from lipmotion_faces.tracking.trackers import MEDIAPIPE, TRACKED_POINTS, FaceBox, LandmarkTracker
 
 GraphT = TypeVar("GraphT", bound="_Graph")
@@ -54,12 +54,10 @@ class _Graph:
 
 
 class FaceMesh(_Graph):
-    """Finds the faces in a clip's frames, up to ``most``, and follows them. Raises MissingDependencyError: no
-    MediaPipe.
-    """
+    """Finds up to ``most`` faces in frames, and follows them. Raises MissingDependencyError: no MediaPipe."""
 
     def __init__(self, most: int = 1) -> None:
-        module = import_face_mesh()
+        module = import_solution("face_mesh")
         super().__init__(lambda: module.FaceMesh(max_num_faces=most, refine_landmarks=True))
 
     def faces(self, image: Image) -> list[NDArray[np.float64]]:  # noqa: D102
@@ -76,7 +74,7 @@ class FaceFinder(_Graph):
 
     def __init__(self) -> None:
         settings = {"min_detection_confidence": LEAST_SCORE, "model_selection": FULL_RANGE_MODEL}
-        super().__init__(lambda: import_face_detection().FaceDetection(**settings))
+        super().__init__(lambda: import_solution("face_detection").FaceDetection(**settings))
 
     def boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
         """Return the faces in a picture, those with the highest score first, as ``BoxFinder.boxes``.

@@ -19,23 +19,14 @@ def import_opencv() -> Any:
     return cv2
 
 
-def import_face_mesh() -> Any:
-    """Return MediaPipe's module ``face_mesh``, with less logging. Raises MissingDependencyError: no import."""
-    return _import_solution("face_mesh")
-
-
-def import_face_detection() -> Any:
-    """Return MediaPipe's module ``face_detection``, with less logging. Raises MissingDependencyError: no import."""
-    return _import_solution("face_detection")
-
-
 def tracking_versions() -> str:
     """Return the version of OpenCV; MediaPipe is imported, too. Raises MissingDependencyError: one cannot be."""
-    import_face_mesh()
+    import_solution("face_mesh")
     return import_opencv().__version__
 
 
-def _import_solution(name: str) -> Any:
+def import_solution(name: str) -> Any:
+    """Return a module of MediaPipe's solutions, with less logging. Raises MissingDependencyError: no import."""
     os.environ.setdefault("GLOG_minloglevel", "2")
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     try:

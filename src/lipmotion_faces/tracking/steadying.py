@@ -26,8 +26,7 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 POSITION_S, SHAPE_S = 0.04, 0.32
-"""Standard deviations of the Gaussians in time that smooth the position of the mouth, and the turn and size of the
-face, which change more slowly, s."""
+"""Deviations of the Gaussians in time that smooth the place of the mouth, and turn and size of the face, s."""
 TRACKED_NOISE_PX, REGISTERED_NOISE_PX = 0.5, 0.2
 """Motion that smoothing takes away is given back where it is much larger than this, px of the face that looks straight
 ahead: the noise of tracked and of registered maps is smaller, and nods are larger."""

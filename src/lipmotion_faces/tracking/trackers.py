@@ -103,15 +103,11 @@ class LandmarkTracker(ABC):
 
     @abstractmethod
     def versions(self) -> dict[str, str]:
-        """Return the versions of packages that results depend on, with the tracker's. Raises MissingDependencyError:
-        one is missing.
-        """
+        """Return the versions of packages that results depend on. Raises MissingDependencyError: one is missing."""
 
     @abstractmethod
     def points(self, most: int = 1) -> PointFinder:
-        """Return what finds the points of at most so many faces in a clip. Raises MissingDependencyError: a package is
-        missing.
-        """
+        """Return what finds the points of so many faces in a clip. Raises MissingDependencyError: no package."""
 
     @abstractmethod
     def boxes(self) -> BoxFinder:

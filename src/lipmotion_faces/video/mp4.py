@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 from heapq import merge
@@ -85,8 +85,7 @@ def write_mp4(
 ) -> None:
     """Write a video with sound; frame n is shown at ``n / fps`` seconds, the sound starts at 0.
 
-    frames : RGB [shape=(H, W, 3)], or brightness and colours, YUV 4:2:0 of BT.601 [shape=(H · 3 / 2, W)], as
-             ``faces.base.DrawsPlanes`` gives them; even sizes, at least one; taken one at a time
+    frames : RGB [shape=(H, W, 3)], even sizes, at least one; taken one at a time
     fps    : 23.976, 29.97 and 59.94 stand for 24000/1001, 30000/1001 and 60000/1001
     tags   : metadata that players show, by names of ``TAGS``
     xmp    : metadata for programs, as an XMP packet (``synthetic_mark``)
@@ -95,23 +94,23 @@ def write_mp4(
     Raises ExportError: no frames, frames of odd or different sizes, no sound, fps not positive, an unknown tag, or the
     file cannot be written.
     """
+    rate = check_rate(path, fps, audio)
+    if unknown := set(tags or ()) - TAGS:
+        raise ExportError(f"{path}: unknown tags {', '.join(sorted(unknown))}; known: {', '.join(sorted(TAGS))}")
+    texts = {name: as_text(text) for name, text in (tags or {}).items()}
+    with atomic_file(path) as temporary:
+        _encode(temporary, path, check_frames(frames, path, (3,)), rate, audio, texts)
+        if xmp is not None:
+            append_xmp(temporary, xmp)
+
+
+def check_rate(path: Path, fps: float, audio: Audio) -> Fraction:
+    """Return the exact frame rate. Raises ExportError: not positive, or there is no sound."""
     if not 0 < fps < np.inf:
         raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
     if not len(audio.samples):
         raise ExportError(f"{path}: the sound has no samples")
-    if unknown := set(tags or ()) - TAGS:
-        raise ExportError(f"{path}: unknown tags {', '.join(sorted(unknown))}; known: {', '.join(sorted(TAGS))}")
-    texts = {name: as_text(text) for name, text in (tags or {}).items()}
-
-    def is_even(shape: tuple[int, ...]) -> bool:  # of RGB or YUV 4:2:0
-        height, width, *colours = shape
-        return not width % 2 and (not height % 2 if colours == [3] else not colours and not height % 3)
-
-    with atomic_file(path) as temporary:
-        checked = check_frames(frames, path, "RGB", is_even)
-        _encode(temporary, path, checked, frame_rate(fps), audio, texts)
-        if xmp is not None:
-            append_xmp(temporary, xmp)
+    return frame_rate(fps)
 
 
 def frame_rate(fps: float) -> Fraction:
@@ -122,15 +121,14 @@ def frame_rate(fps: float) -> Fraction:
     return Fraction(fps).limit_denominator(1001)
 
 
-def check_frames(
-    frames: Iterable[Frame], path: Path, kind: str, is_even: Callable[[tuple[int, ...]], bool]
-) -> Iterator[Frame]:
-    """Yield the frames. Raises ExportError: none, or one of another type or size than ``is_even`` asks."""
+def check_frames(frames: Iterable[Frame], path: Path, channels: tuple[int, ...] = (3, 4)) -> Iterator[Frame]:
+    """Yield the frames. Raises ExportError: none, or one of another type or size, or of odd sizes."""
     shape: tuple[int, ...] | None = None
     for n, frame in enumerate(frames):
         shape = shape or frame.shape
-        if frame.shape != shape or frame.dtype != np.uint8 or not is_even(shape):
-            required = f"required uint8 {kind} of even sizes, all alike"
+        is_even = len(shape) == 3 and shape[2] in channels and not (shape[0] % 2 or shape[1] % 2)
+        if frame.shape != shape or frame.dtype != np.uint8 or not is_even:
+            required = f"required uint8 {'RGB' if channels == (3,) else 'RGB or RGBA'} of even sizes, all alike"
             raise ExportError(f"{path}: frame {n} is {frame.dtype} {frame.shape}, {required}")
         yield frame
     if shape is None:
@@ -148,7 +146,7 @@ def _encode(
         container.metadata.update(tags)
         options = _ENCODER | {"x264-params": _ENCODER["x264-params"] + x264_instructions()}
         video = container.add_stream("libx264", rate=rate, options=options)
-        video.height, video.width = first.shape[:2] if first.ndim == 3 else (len(first) * 2 // 3, first.shape[1])
+        video.height, video.width = first.shape[:2]
         video.pix_fmt = "yuv420p"
         context = video.codec_context
         context.time_base = 1 / rate
@@ -157,12 +155,8 @@ def _encode(
         sound = container.add_stream("aac", rate=SOUND_HZ, layout="mono", bit_rate=128_000)
 
         def convert(frame: Frame) -> Any:
-            if frame.ndim == 3:
-                picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
-                return converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
-            picture = av.VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), format="yuv420p")
-            picture.colorspace, picture.color_range = _BT601, _LIMITED_RANGE
-            return picture
+            picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
+            return converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
 
         mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, sound_parts(audio))
 
@@ -240,12 +234,9 @@ def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: 
     """
     if path.suffix.lower() not in _CONTAINERS:
         raise ExportError(f"{path}: required one of: {' '.join(_CONTAINERS)}")
-    if not 0 < fps < np.inf:
-        raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
-    if not len(audio.samples):
-        raise ExportError(f"{path}: the sound has no samples")
+    rate = check_rate(path, fps, audio)
     with atomic_file(path) as temporary:
-        _encode_alpha(temporary, path, check_frames(frames, path, "RGB or RGBA", _is_even), frame_rate(fps), audio)
+        _encode_alpha(temporary, path, check_frames(frames, path), rate, audio)
 
 
 def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
@@ -256,13 +247,9 @@ def write_pictures(path: Path, frames: Iterable[Frame]) -> None:
     """
     from PIL import Image
 
-    for number, frame in enumerate(check_frames(frames, path, "RGB or RGBA", _is_even)):
+    for number, frame in enumerate(check_frames(frames, path)):
         with atomic_file(path.with_name(path.name % number)) as temporary:
             Image.fromarray(frame).save(temporary, compress_level=4)
-
-
-def _is_even(shape: tuple[int, ...]) -> bool:
-    return len(shape) == 3 and shape[2] in (3, 4) and not (shape[0] % 2 or shape[1] % 2)
 
 
 def _encode_alpha(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction, audio: Audio) -> None:

@@ -21,16 +21,7 @@ from lipmotion.stats.curves import varies
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Monitor, Utterance, silent_monitor
 from lipmotion.units import VISEMES, Lexicon
-from lipmotion_lab.evaluation.held_out import (
-    OPENING,
-    TEST_LIST,
-    WITH_TRANSCRIPT,
-    ComparedClip,
-    HeldOutRecordings,
-    generate_compared,
-    load_held_out,
-    make_speech,
-)
+from lipmotion_lab.evaluation import held_out
 
 BILABIAL = VISEMES["bi"]
 SILENCE_MARGIN_S = 0.3
@@ -53,7 +44,7 @@ class Compared(Protocol):
         """Names of the channels that are eigenlips."""
 
 
-def figures_of(clips: Sequence[ComparedClip], recordings: Compared, seed: int) -> dict[str, Any]:
+def figures_of(clips: Sequence[held_out.ComparedClip], recordings: Compared, seed: int) -> dict[str, Any]:
     """Return the figures of one condition, by name; figures that cannot be computed are NaN.
 
     Eigenlips have figures of their own, ``eigenlips``; without other channels, these are also the overall figures.
@@ -78,7 +69,7 @@ def figures_of(clips: Sequence[ComparedClip], recordings: Compared, seed: int) -
     is_eigenlips = np.array([name in eigenlips for name in compared])
     overall = ~is_eigenlips if not is_eigenlips.all() else is_eigenlips
     spread = np.where(overall, np.concatenate(original).std(axis=0), 0)
-    leading = compared.index(OPENING) if OPENING in compared else int(spread.argmax())
+    leading = compared.index(held_out.OPENING) if held_out.OPENING in compared else int(spread.argmax())
 
     def distance(columns: NDArray[np.bool_]) -> float:
         return curves.mean_distance([clip[:, columns] for clip in generated], [clip[:, columns] for clip in original])
@@ -100,11 +91,11 @@ def figures_of(clips: Sequence[ComparedClip], recordings: Compared, seed: int) -
         figures["eigenlips"] = means | {"amse": distance(is_eigenlips), "channels": eigenlips}
     if threshold is None:
         return figures
-    return figures | _opening_figures(clips, compared.index(OPENING), threshold, rate_hz, seed)
+    return figures | _opening_figures(clips, compared.index(held_out.OPENING), threshold, rate_hz, seed)
 
 
 def _opening_figures(
-    clips: Sequence[ComparedClip], column: int, threshold: float, rate_hz: float, seed: int
+    clips: Sequence[held_out.ComparedClip], column: int, threshold: float, rate_hz: float, seed: int
 ) -> dict[str, Any]:
     """Return the figures of the channel ``opening``: its interval, closures, and silence."""
     generated, original = [clip.generated[:, column] for clip in clips], [clip.original[:, column] for clip in clips]
@@ -126,7 +117,7 @@ def _opening_figures(
     }
 
 
-def _silence(clips: Sequence[ComparedClip], values: curves.Clips) -> dict[str, float]:
+def _silence(clips: Sequence[held_out.ComparedClip], values: curves.Clips) -> dict[str, float]:
     """Return mean and standard deviation of the opening in silence away from speech, and the number of its frames."""
     quiet = np.concatenate(
         [
@@ -147,7 +138,7 @@ def evaluate(
     model: Model,
     corpus: Corpus,
     *,
-    selection: Selection = TEST_LIST,
+    selection: Selection = held_out.TEST_LIST,
     lexicon: Lexicon | None = None,
     recogniser: str = "auto",
     seed: int = 0,
@@ -179,7 +170,7 @@ def evaluate(
     ['audio only', 'with transcript']
     """
     phones = cached_recogniser(model.phones, recogniser, model.adaptation)
-    recordings = load_held_out(
+    recordings = held_out.load_held_out(
         corpus,
         phones,
         selection=selection,
@@ -193,10 +184,10 @@ def evaluate(
     engine, conditions = model.engine, {}
     without = engine.without_closures()
     for name in recordings.conditions:
-        speech = make_speech(recordings, name, engine, model.learned)
-        row = figures_of(generate_compared(recordings, speech, engine, model.learned), recordings, seed)
+        speech = held_out.make_speech(recordings, name, engine, model.learned)
+        row = figures_of(held_out.generate_compared(recordings, speech, engine, model.learned), recordings, seed)
         if without != engine and recordings.closed_under is not None:
-            clips = generate_compared(recordings, speech, without, model.learned)
+            clips = held_out.generate_compared(recordings, speech, without, model.learned)
             row["unpinned"] = figures_of(clips, recordings, seed)
         conditions[name] = row
     figures = {
@@ -206,7 +197,7 @@ def evaluate(
         "still_channels": list(recordings.still),
         "conditions": conditions,
     }
-    if WITH_TRANSCRIPT not in recordings.conditions:
+    if held_out.WITH_TRANSCRIPT not in recordings.conditions:
         figures["without_words"] = sum(not (each.words or each.phones) for each in recordings.utterances)
     if _was_trained_on(model, recordings.utterances, corpus.path.name):
         figures["seen_in_training"] = True
@@ -290,9 +281,11 @@ def closing_score_statistic(generated: Clips, original: Clips, threshold: float)
     return ClipStatistic(sums, lambda total: float(100 * total[0] / total[1]) if total[1] else float("nan"))
 
 
-def opening_curves(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> tuple[list[Array], list[Array]]:
+def opening_curves(
+    recordings: held_out.HeldOutRecordings, made: Sequence[held_out.ComparedClip]
+) -> tuple[list[Array], list[Array]]:
     """Return the generated and the original opening of every clip [each shape=(T, 1)]."""
-    column = slice(recordings.channels.index(OPENING), recordings.channels.index(OPENING) + 1)
+    column = slice(recordings.channels.index(held_out.OPENING), recordings.channels.index(held_out.OPENING) + 1)
     return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
 
 

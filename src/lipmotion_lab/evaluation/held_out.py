@@ -1,4 +1,4 @@
-"""Held-out recordings, also in noise, and pairs of recorded and generated motion."""
+"""Held-out recordings, and pairs of recorded and generated motion."""
 
 from __future__ import annotations
 

@@ -19,14 +19,7 @@ from lipmotion.formats.web_page import GENERATOR
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import GEOMETRY
 from lipmotion.pipeline.training.labels import fingerprint_training
-from lipmotion.storage.files import (
-    TEMPORARY,
-    atomic_file,
-    atomic_folder,
-    lock_folder,
-    remove_unfinished,
-    unfinished_work,
-)
+from lipmotion.storage import files
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, sub_monitor
@@ -191,8 +184,8 @@ def experiment_report(
         raise CorpusError(f"{corpus.path}: {name} is {reason}")
     check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
     _check_folder(folder)
-    with lock_folder(folder):
-        remove_unfinished(folder)
+    with files.lock_folder(folder):
+        files.remove_unfinished(folder)
         config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
         of_input = fingerprint_training(
             corpus, corpus.names(), engine_named("trajectory"), config, lexicon, GEOMETRY, None
@@ -221,7 +214,7 @@ def _check_folder(folder: Path) -> None:
     try:
         if not folder.exists():
             return
-        inner = [path for path in folder.iterdir() if not path.name.startswith(TEMPORARY)]
+        inner = [path for path in folder.iterdir() if not path.name.startswith(files.TEMPORARY)]
         page = folder / PAGE
         if not inner or (page.is_file() and GENERATOR in page.read_text("utf-8", errors="replace")):
             return
@@ -279,7 +272,7 @@ class _Writer:
         text = report_html(f"Experiments on {corpus}", about, finished, left_open, failed, quick=self.quick)
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
-            with atomic_file(page) as unfinished:
+            with files.atomic_file(page) as unfinished:
                 unfinished.write_text(text, encoding="utf-8")
 
     def run(self, name: str, settings: ExperimentSettings) -> None:
@@ -295,7 +288,7 @@ class _Writer:
     def _run(self, name: str, settings: ExperimentSettings) -> None:
         part, target = PARTS[name], self.folder / name
         models = self.folder / "models" / self.key("models")[:KEY_DIGITS]  # of other recordings, other models
-        with unfinished_work(self.folder / f"{name}.json") as work:
+        with files.unfinished_work(self.folder / f"{name}.json") as work:
             stamp = Stamp()
             keeper = ClipKeeper(work / MOTION, self.key(name))
             running = replace(settings, monitor=sub_monitor(settings.monitor, 0, 0.95), receive=keeper)
@@ -304,7 +297,7 @@ class _Writer:
             section, motion = part.section(figures), keeper.content()
             made_with = stamp.content(self._command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
-            with atomic_folder(target) as made:
+            with files.atomic_folder(target) as made:
                 videos = []
                 if motion:
                     drawing = sub_monitor(settings.monitor, 0.95, 1)
@@ -318,7 +311,7 @@ class _Writer:
                 folder = made / "tables"
                 folder.mkdir()
                 for table in section.tables:
-                    with atomic_file(folder / f"{table.name}.csv") as unfinished:
+                    with files.atomic_file(folder / f"{table.name}.csv") as unfinished:
                         unfinished.write_text(table.as_csv(), encoding="utf-8", newline="")
                     _write_json(folder / f"{table.name}.json", table.as_content())
                 _write_json(made / MOTION, motion)
@@ -337,5 +330,5 @@ def describe_error(error: Exception) -> str:
 
 
 def _write_json(path: Path, content: Any) -> None:
-    with atomic_file(path) as unfinished:
+    with files.atomic_file(path) as unfinished:
         unfinished.write_text(as_json(content, indent=1) + "\n", encoding="utf-8")

@@ -10,6 +10,7 @@ from typing import Any
 
 from lipmotion.formats.web_page import Html, element, joined
 from lipmotion.measures.evaluation_table import figure_text
+from lipmotion.printable import printable
 from lipmotion.storage.text_table import as_field
 from lipmotion_lab.evaluation.evaluate import sign_of_difference, significance_mark
 
@@ -91,6 +92,20 @@ class Table:
         about = {"caption": self.caption, "reference": self.reference or None, "columns": columns}
         return about | {"rows": self.records()}
 
+    @property
+    def star(self) -> str:
+        """What the star beside a figure says."""
+        return f"*: the 95 % interval of the difference from {self.reference} leaves out 0. " if self.reference else ""
+
+    def as_lines(self) -> list[str]:
+        """Return the table as lines of text; intervals are in brackets."""
+        texts = [[self.head, *(column.title for column in self.columns)]]
+        for name, row in self.rows.items():
+            cells = (_cell(column, row) for column in self.columns)
+            texts.append([name, *(f"{figure} ({interval})" if interval else figure for figure, interval in cells)])
+        widths = [max(map(len, column)) for column in zip(*texts, strict=True)]
+        return ["  ".join(map(str.ljust, line, widths)).rstrip() for line in texts]
+
     def as_html(self, folder: str) -> Html:
         """Return the table on the page; where it is wider than the screen, it scrolls by itself."""
         heads = [
@@ -98,7 +113,7 @@ class Table:
             *(element("th", each.title, scope="col", class_="number" if each.form else None) for each in self.columns),
         ]
         lines = [
-            element("tr", element("th", name, scope="row"), *(_cell(column, row) for column in self.columns))
+            element("tr", element("th", name, scope="row"), *(_html_cell(column, row) for column in self.columns))
             for name, row in self.rows.items()
         ]
         table = element(
@@ -106,11 +121,10 @@ class Table:
         )
         # the star, the files, and what the columns are
         files = [element("a", kind.upper(), href=f"{folder}/tables/{self.name}.{kind}") for kind in ("csv", "json")]
-        star = f"*: the 95 % interval of the difference from {self.reference} leaves out 0. " if self.reference else ""
         notes = [joined(element("dt", each.title), element("dd", each.note)) for each in self.columns if each.note]
         about = element(
             "div",
-            element("p", star, "This table as ", files[0], " and ", files[1], "."),
+            element("p", self.star, "This table as ", files[0], " and ", files[1], "."),
             element("details", element("summary", "What the columns are"), element("dl", *notes)),
             class_="note",
         )
@@ -118,17 +132,22 @@ class Table:
         return joined(scrolls, about)
 
 
-def _cell(column: Column, row: Row) -> Html:
+def _cell(column: Column, row: Row) -> tuple[str, str]:
+    """Return a figure with its star, and its interval; empty: it has none."""
     value = row.get(column.key)
     if not column.form:
-        return element("td", "–" if value is None else str(value))
+        return "–" if value is None else str(value), ""
     mark = significance_mark(row.get(column.key + DIFFERENCE) or (None, None))
-    text: list[str] = [figure_text(value, column.form).strip() + mark]
     low, high = row.get(column.key + INTERVAL) or (None, None)
-    if low is not None and high is not None:
-        form = column.form.replace("+", "")
-        text += [" ", element("small", f"{low:{form}}–{high:{form}}")]
-    return element("td", *text, class_="number")
+    form = column.form.replace("+", "")
+    interval = "" if low is None or high is None else f"{low:{form}}–{high:{form}}"
+    return figure_text(value, column.form).strip() + mark, interval
+
+
+def _html_cell(column: Column, row: Row) -> Html:
+    figure, interval = _cell(column, row)
+    beside = (" ", element("small", interval)) if interval else ()
+    return element("td", figure, *beside, class_="number" if column.form else None)
 
 
 FEW_CLIPS = 10
@@ -160,6 +179,17 @@ class Section:
     def tables(self) -> list[Table]:
         """All tables."""
         return [self.table, *(table for _, table in self.more)]
+
+    def as_text(self) -> str:
+        """Return what a terminal shows: what was compared, the tables, what their columns are, and what was found."""
+        lines = [self.about]
+        for about, table in ((self.table.caption, self.table), *self.more):
+            lines += ["", about, *table.as_lines()]
+        notes = {f"{column.title}: {column.note}" for table in self.tables for column in table.columns if column.note}
+        lines += ["", *dict.fromkeys(table.star for table in self.tables if table.star), *sorted(notes)]
+        for title, sentences in self.words.items():
+            lines += ["", title, *sentences]
+        return "\n".join(printable(line).rstrip() for line in [*lines, "", self.verdict])
 
 
 def warn_of_few(clips: int) -> dict[str, list[str]]:

@@ -8,8 +8,8 @@ from typing import Any
 
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion_lab.evaluation.evaluate import sign_of_difference
-from lipmotion_lab.evaluation.held_out import AUDIO_ONLY
-from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET, what_held
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES
+from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET
 from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
 from lipmotion_lab.report.charts import Dot, draw_dots, draw_rising
 from lipmotion_lab.report.section import (
@@ -33,13 +33,14 @@ from lipmotion_lab.report.section import (
 )
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, TUNED
 
+TIMING = Column("timing_ms", "timing", "+.0f", "by how much closings are late, in ms")
 AS_PRINTED, SETS = next(iter(PINS)), "Unit sets, "
 HOFER_COLUMNS = (
     Column("paper", "paper: score", ".1f", "the paper's Table 1, in %: another speaker, corpus and threshold"),
     SCORE,
     PRECISION,
     RECALL,
-    Column("timing_ms", "timing", "+.0f", "by how much closings are late, in ms"),
+    TIMING,
     ACC,
     NRMSE,
     JERK,
@@ -59,17 +60,7 @@ def hofer_section(figures: Mapping[str, Any]) -> Section:
         if (block["states"], block["condition"], block["pins"]) == (most, AUDIO_ONLY, AS_PRINTED)
     )
     table, rows = _hofer_table(main), main["rows"]
-    pairs = [
-        PaperPair(
-            pair["better"],
-            pair["worse"],
-            difference(rows[pair["better"]]["score"], rows[pair["worse"]]["score"]),
-            pair["score_gain_95"],
-        )
-        for pair in main["paper_order"]
-    ]
-    here = {name: row["score"] for name, row in rows.items()}
-    order = PaperOrder("Score of closings", {name: PAPER_SCORES[name] for name in rows}, here, pairs, "+.1f")
+    order = _hofer_order(main)
     charts = [
         draw_dots(
             "Score of closings",
@@ -80,19 +71,38 @@ def hofer_section(figures: Mapping[str, Any]) -> Section:
             ],
         )
     ]
-    closed = figures["closed_under"]
     about = (
         f"Which set of units predicts closings of the mouth best: the system of the paper, trained on "
         f"{figures['trained_on']} recordings with each of {len(rows)} sets, compared on {figures['clips']} of "
-        f"{figures['split']}. The mouth is closed under {closed:.4f} eye distances; the recordings close it "
-        f"{next(iter(rows.values()))['closings']} times. Shown first: sound alone, {AS_PRINTED}, {most} states."
+        f"{figures['split']}.{_closings(figures, next(iter(rows.values())))} "
+        f"Shown first: sound alone, {AS_PRINTED}, {most} states."
     )
     words = warn_of_few(figures["clips"]) | {"The paper's order": order.sentences()}
     others = [(block, _hofer_table(block)) for block in blocks if block is not main]
-    more = [(f"{other.caption.removeprefix(SETS)}: {what_held(block)}.", other) for block, other in others]
+    more = [(f"{other.caption.removeprefix(SETS)}: {_hofer_order(block).verdict()}", other) for block, other in others]
     shown = [f"{units}, {most} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
     return Section(title, about, order.verdict(), words, charts, table, more, shown)
+
+
+def _hofer_order(block: Mapping[str, Any]) -> PaperOrder:
+    pairs = []
+    for pair in block["paper_order"]:
+        better, worse = pair["better"], pair["worse"]
+        gain = difference(block["rows"][better]["score"], block["rows"][worse]["score"])
+        pairs.append(PaperPair(better, worse, gain, pair["score_gain_95"]))
+    here = {name: row["score"] for name, row in block["rows"].items()}
+    return PaperOrder("Score of closings", {name: PAPER_SCORES[name] for name in here}, here, pairs, "+.1f")
+
+
+def _closings(figures: Mapping[str, Any], row: Row) -> str:
+    """Return a sentence on the closings of the recordings, of which there is a row; empty: no opening is compared."""
+    if figures["closed_under"] is None:
+        return ""
+    return (
+        f" The mouth is closed under {figures['closed_under']:.4f} eye distances; the recordings close it "
+        f"{row['closings']} times, and in {row['p_b_m']} p, b and m."
+    )
 
 
 def _hofer_table(block: Mapping[str, Any]) -> Table:
@@ -101,13 +111,18 @@ def _hofer_table(block: Mapping[str, Any]) -> Table:
     return Table(name, f"{SETS}{case}", HOFER_COLUMNS, block["rows"], REFERENCE_SET, "unit set")
 
 
+RATIOS = (VARIANCE, JERK)
 MINNIS_COLUMNS = (
     ACC,
     replace(RECALL, note="p, b and m in which the lips close, without pins, in %"),
     SCORE,
     ELSEWHERE,
     NRMSE,
-    VARIANCE,
+    *(
+        Column(f"{channel}_{each.key}", f"{each.title}, {channel}", ".2f", "by that of the recording")
+        for channel in DISTANCES
+        for each in RATIOS
+    ),
     Column("joins_per_clip", "joins", ".1f", "a recording"),
     Column("joins_hard", "hard", ".0f", "joins at which units abut, in %"),
     Column("joins_smooth", "smooth", ".0f", "joins no rougher than 95 % of the speaker's own motion, in %"),
@@ -125,6 +140,8 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
                 joins = row["joins"]
                 shares = {key: None if joins[key] is None else 100 * joins[key] for key in ("hard", "smooth")}
                 own = {"joins_per_clip": joins["per_clip"], **{f"joins_{key}": share for key, share in shares.items()}}
+                for channel, each in row["channels"].items():
+                    own |= {f"{channel}_{ratio.key}": each[ratio.key] for ratio in RATIOS}
                 with_joins[system] = {**row, **own}
             tables[split, condition] = Table(name.replace(" ", "-"), caption, MINNIS_COLUMNS, with_joins, PRINTED)
     split, last = list(figures["lists"].items())[-1]
@@ -154,6 +171,7 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
         f"The system of the paper as printed, each addition of this project alone, and other readings of the print: "
         f"units of {figures['utterances']} recordings ({figures['minutes']} minutes), compared on {last['clips']} "
         f"recordings of {split}, sound alone."
+        f"{' Quick: few epochs, only to see that it runs.' if figures['quick'] else ''}"
     )
     shown = [Dot(name, row["acc"], row["acc_95"]) for name, row in rows.items()]
     charts = [draw_dots("ACC of the opening", "ACC", shown)]
@@ -180,8 +198,11 @@ XIELIU_COLUMNS = (
     Column("paper_amse", "paper: AMSE", ".3f", "in the paper's units of eigenlips, which do not compare"),
     Column("amse", "AMSE", ".4f", "mean distance from the recording, smaller is better"),
     Column("opening_acc", "opening", ".3f", "correlation of the opening alone"),
+    NRMSE,
+    Column("rmse", "RMSE", ".4f", "of the opening"),
     SCORE,
     RECALL,
+    ELSEWHERE,
     VARIANCE,
     Column("lag_ms", "lag", "+.0f", "in ms"),
     Column("parameters", "numbers", ".0f", "what the chains have learned"),
@@ -192,17 +213,11 @@ MEASURES = (("acc", "ACC", "+.3f"), ("amse", "AMSE", "+.4f"))
 
 def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``xieliu2007`` say, of the largest number of recordings."""
-    size = figures["rows"][-1]
-    tables = {}
-    for condition, rows in size["conditions"].items():
-        full_rows = {}
-        for name, row in rows.items():  # with the paper's figures, the opening, the training
-            amse, acc = PAPER_FIGURES.get(name.removesuffix(TUNED), (None, None))
-            training = {key: size["training"][name][key] for key in ("parameters", "seconds")}
-            full_rows[name] = {**(row["opening"] or {}), **row, **training, "paper_amse": amse, "paper_acc": acc}
-        name, caption = f"xieliu2007-{condition}".replace(" ", "-"), f"Structures of chains, {condition}"
-        tables[condition] = Table(name, caption, XIELIU_COLUMNS, full_rows, REFERENCE_SYSTEM)
-    main = tables.pop(AUDIO_ONLY)
+    *smaller, size = figures["rows"]
+    cases = [(condition, rows, size) for condition, rows in size["conditions"].items()]
+    for each in smaller:
+        cases += [(f"{name}, {each['names']} recordings", rows, each) for name, rows in each["conditions"].items()]
+    (_, main), *more = ((caption, _systems_table(caption, *case)) for caption, *case in cases)
     words, verdict, by_amse = warn_of_few(figures["clips"]), "", []
     for ending, called in (("", "as printed"), (TUNED, "as tuned on val")):
         names = {name + ending for name in PAPER_FIGURES}
@@ -213,21 +228,48 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
             by_amse.append(f"Systems {called}: {by_error.verdict()}")
             verdict = verdict or by_acc.verdict()
     words["By AMSE"] = by_amse
+    if changed := [_chosen(name, row["options"]) for name, row in size["training"].items() if row["tried"]]:
+        words["Settings, the best on val"] = changed
+    if size["pairs"]:
+        rows = {f"{pair['better']} over {pair['worse']}": pair for pair in size["pairs"]}
+        columns = [Column(key, f"difference of {title}", form) for key, title, form in MEASURES]
+        more.append(("Pairs of the paper", Table("xieliu2007-pairs", "Pairs of the paper", columns, rows, head="pair")))
     channels = figures["channels"]
     about = (
         f"Which structure of chains predicts lips best: {len(main.rows)} systems trained on {size['used']} recordings, "
         f"compared on {figures['clips']} of {figures['split']}, by {len(channels)} channels "
         f"({', '.join(channels[:3])}{', …' if len(channels) > 3 else ''})."
+        f"{_closings(figures, next(iter(main.rows.values())))}"
     )
     if figures["tuning"]["tried"]:
         about += " Tuned systems have what the print leaves open as it was best on val; nothing was chosen on test."
     shown = [Dot(name, row["acc"], row["acc_95"], row["paper_acc"]) for name, row in main.rows.items()]
     charts = [draw_dots("ACC of every system", "ACC", shown)]
     title = "Xie & Liu 2007, Table 3: structures of chains"
-    more = [(table.caption, table) for table in tables.values()]
     return Section(
         title, about, verdict, words, charts, main, more, [name for name in PAPER_FIGURES if name in main.rows]
     )
+
+
+def _systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) -> Table:
+    """Return the table of all systems in one case, with the paper's figures, the opening and the training."""
+    full_rows = {}
+    for name, row in rows.items():
+        amse, acc = PAPER_FIGURES.get(name.removesuffix(TUNED), (None, None))
+        training = {key: size["training"][name][key] for key in ("parameters", "seconds")}
+        full_rows[name] = {**(row["opening"] or {}), **row, **training, "paper_amse": amse, "paper_acc": acc}
+    columns = [*XIELIU_COLUMNS]
+    if not any(row["opening"] for row in rows.values()):  # eigenlips alone, in grey levels
+        columns = [replace(column, form=".1f") if column.key == "amse" else column for column in columns]
+    elif any("eigenlips_acc" in row for row in rows.values()):
+        columns += [Column(f"eigenlips_{key}", f"{title}, eigenlips", ".3f") for key, title, _ in MEASURES]
+    name = f"xieliu2007-{case}".replace(", ", "-").replace(" ", "-")
+    return Table(name, f"Structures of chains, {case}", columns, full_rows, REFERENCE_SYSTEM)
+
+
+def _chosen(name: str, options: Mapping[str, Any]) -> str:
+    texts = [f"{key}={value}" for key, value in options.items() if key not in ("structure", "chains")]
+    return f"{name}: {', '.join(texts) or 'as printed'}."
 
 
 def _order_of_systems(
@@ -248,14 +290,25 @@ def _order_of_systems(
     return PaperOrder(title, paper, here, compared, form, is_error)
 
 
+ENGINES_COLUMNS = (
+    *(*OPENING, ELSEWHERE, JERK, Column("width_acc", "width", ".3f", "correlation of the width")),
+    *(
+        Column(f"unpinned_{each.key}", f"{each.title}, no pins", each.form, "lips not made to meet")
+        for each in (SCORE, PRECISION, RECALL, ELSEWHERE)
+    ),
+)
+
+
 def engines_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``engines`` say."""
     reference, tables = figures["reference"], {}
     for condition, found in figures["conditions"].items():
         rows = {
-            name: {**row, "acc_gain_95": row["acc_gain_95"].get(reference)} for name, row in found["systems"].items()
+            name: {**row, "acc_gain_95": row["acc_gain_95"].get(reference)}
+            | {f"unpinned_{key}": value for key, value in row["unpinned"].items()}
+            for name, row in found["systems"].items()
         }
-        name, columns = f"engines-{condition}".replace(" ", "-"), (*OPENING, ELSEWHERE, JERK)
+        name, columns = f"engines-{condition}".replace(" ", "-"), ENGINES_COLUMNS
         tables[condition] = Table(name, f"Engines, {condition}", columns, rows, reference)
     main = tables.pop(AUDIO_ONLY)
     signs = {name: sign_of_difference(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}
@@ -273,6 +326,7 @@ def engines_section(figures: Mapping[str, Any]) -> Section:
     about = (
         f"All engines with their defaults, trained on {minutes} minutes, on {figures['clips']} "
         f"recordings of {figures['split']}, with closed lips forced in p, b and m."
+        f"{_closings(figures, main.rows[best])}"
     )
     charts = [draw_dots("ACC of the opening", "ACC", [Dot(n, r["acc"], r["acc_95"]) for n, r in main.rows.items()])]
     more = [(table.caption, table) for table in tables.values()]
@@ -282,17 +336,19 @@ def engines_section(figures: Mapping[str, Any]) -> Section:
 def learning_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``learning_curve`` say."""
     sizes = {str(row["names"]): row for row in figures["rows"]}
-    trained = (
+    columns = (
         Column("used", "used", ".0f", "recordings that could be used"),
         Column("minutes", "minutes", ".1f", "of training"),
         Column("seconds", "seconds", ".0f", "that training took"),
+        *OPENING,
+        *(Column(f"acc_{name}", name, ".3f", f"correlation of the {name}") for name in DISTANCES[1:]),
     )
     conditions = list(figures["rows"][0]["conditions"])
     tables = {
         condition: Table(
             f"learning-curve-{condition}".replace(" ", "-"),
             f"Learning curve, {condition}",
-            (*trained, *OPENING),
+            columns,
             {size: {**row, **row["conditions"][condition]} for size, row in sizes.items()},
             head="recordings",
         )
@@ -320,7 +376,8 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
         for condition in conditions
     }
     about = (
-        f"The default engine trained on the first recordings of the training list alone, in a random order, "
+        f"The default engine trained on the first recordings of "
+        f"{'the list given' if figures['order'] == 'given' else 'the training list, in a random order,'} alone, "
         f"compared on {figures['clips']} of {figures['split']}."
     )
     verdict = f"ACC {low} with {first} recordings, {high} with {last}."
@@ -334,15 +391,13 @@ def folds_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``folds`` say."""
     rows = figures["conditions"]
     original = Column("original_per_minute", "recorded elsewhere", ".1f", "the same of the recordings")
-    table = Table(
-        "folds", f"Cross-validation, {figures['folds']} folds", (*OPENING, ELSEWHERE, original), rows, head="condition"
-    )
-    row = rows[AUDIO_ONLY]
+    columns, row = (*OPENING, TIMING, ELSEWHERE, original), rows[AUDIO_ONLY]
+    table = Table("folds", f"Cross-validation, {figures['folds']} folds", columns, rows, head="condition")
     acc, clips = figure_text(row["acc"], ".3f"), figures["clips"]
     verdict = f"ACC {acc} on {clips} recordings, each generated by a model of the others."
     about = (
         f"The training list in {figures['folds']} parts: each is generated by a model of the others, "
-        f"{min(figures['trained_on'])} to {max(figures['trained_on'])} recordings."
+        f"{min(figures['trained_on'])} to {max(figures['trained_on'])} recordings.{_closings(figures, row)}"
     )
     words = warn_of_few(figures["clips"]) | {
         "More closings than a test list has": [
@@ -350,4 +405,9 @@ def folds_section(figures: Mapping[str, Any]) -> Section:
             f"{row['closings']} closings {figure_text(row['score'], '.1f')} % are made in time."
         ]
     }
+    if speakers := sorted((acc, name) for name, acc in row.get("speakers", {}).items() if acc is not None):
+        mean, lowest, highest = sum(acc for acc, _ in speakers) / len(speakers), speakers[0], speakers[-1]
+        words["Speakers unknown to the model"] = [
+            "{} speakers: mean ACC {:.3f}, {:.3f} ({}) to {:.3f} ({}).".format(len(speakers), mean, *lowest, *highest)
+        ]
     return Section("Cross-validation", about, verdict, words, [], table)

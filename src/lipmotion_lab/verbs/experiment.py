@@ -59,17 +59,19 @@ def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = ""
 def run_experiment(
     options: argparse.Namespace,
     experiment: Callable[..., dict[str, Any]],
-    table: Callable[[dict[str, Any]], str],
+    name: str,
     *,
     has_parts: bool = True,
 ) -> None:
-    """Call ``experiment(corpus, work=…, settings=…)``, print its table, and give its figures with their stamp.
+    """Call ``experiment(corpus, work=…, settings=…)``, print what a report says of it, and give its figures.
 
+    name : of the part of a report
     ``work`` is a folder of finished parts, from which a second run goes on; None without an output, and not
     ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
     from lipmotion.storage.files import unfinished_work
+    from lipmotion_lab.report.report import PARTS
     from lipmotion_lab.runner import ExperimentSettings, Stamp, take_quick_part
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
@@ -82,7 +84,7 @@ def run_experiment(
             figures = experiment(corpus, work=work, settings=settings)
         return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
 
-    report_figures(options, compute, table)
+    report_figures(options, compute, lambda figures: PARTS[name].section(figures).as_text())
 
 
 def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -95,11 +97,11 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
 
 
 def run_hofer2008(options: argparse.Namespace) -> None:
-    """Call ``hofer2008`` and print its table."""
-    from lipmotion_lab.hofer2008 import FULL, QUICK, hofer2008, table
+    """Call ``hofer2008`` and print its section."""
+    from lipmotion_lab.hofer2008 import FULL, QUICK, hofer2008
 
     chosen = QUICK if options.quick else FULL
-    run_experiment(options, partial(hofer2008, options=chosen, split=list_or_all(options.split)), table)
+    run_experiment(options, partial(hofer2008, options=chosen, split=list_or_all(options.split)), "hofer2008")
 
 
 def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -114,15 +116,15 @@ def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentPar
 
 
 def run_learning_curve(options: argparse.Namespace) -> None:
-    """Call ``learning_curve`` and print its table."""
+    """Call ``learning_curve`` and print its section."""
     from lipmotion.corpora.source_recordings import read_names
-    from lipmotion_lab.learning_curve import learning_curve, table
+    from lipmotion_lab.learning_curve import learning_curve
 
     def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
         order = read_names(options.order) if options.order else None
         return learning_curve(corpus, order=order, sizes=options.sizes, split=list_or_all(options.split), **others)
 
-    run_experiment(options, experiment, table)
+    run_experiment(options, experiment, "learning-curve")
 
 
 def _add_folds(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -137,10 +139,10 @@ def _add_folds(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 
 def run_folds(options: argparse.Namespace) -> None:
-    """Call ``folds`` and print its table."""
-    from lipmotion_lab.folds import folds, table
+    """Call ``folds`` and print its section."""
+    from lipmotion_lab.folds import folds
 
-    run_experiment(options, partial(folds, count=options.folds, by_speaker=options.by_speaker), table)
+    run_experiment(options, partial(folds, count=options.folds, by_speaker=options.by_speaker), "folds")
 
 
 def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -164,10 +166,10 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def run_xieliu2007(options: argparse.Namespace) -> None:
-    """Call ``xieliu2007`` and print its table."""
+    """Call ``xieliu2007`` and print its section."""
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
-    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, table, xieliu2007
+    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
 
     if options.quick and options.order:
         raise InputError("--quick takes recordings of its own, and --order is a list of others; leave out one of them")
@@ -184,7 +186,7 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
         split, sizes, plots = list_or_all(options.split), options.sizes, options.plots
         return xieliu2007(corpus, compared, split=split, order=order, sizes=sizes, plots=plots, **others)
 
-    run_experiment(options, experiment, table)
+    run_experiment(options, experiment, "xieliu2007")
 
 
 def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -196,10 +198,10 @@ def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def run_minnis2000(options: argparse.Namespace) -> None:
-    """Call ``minnis2000`` and print its table."""
-    from lipmotion_lab.minnis2000 import minnis2000, table
+    """Call ``minnis2000`` and print its section."""
+    from lipmotion_lab.minnis2000 import minnis2000
 
-    run_experiment(options, partial(minnis2000, models=options.models, quick=options.quick), table)
+    run_experiment(options, partial(minnis2000, models=options.models, quick=options.quick), "minnis2000")
 
 
 def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -212,13 +214,13 @@ def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -
 
 
 def run_engines(options: argparse.Namespace) -> None:
-    """Call ``engines`` and print its table."""
-    from lipmotion_lab.engine_comparison import engines, table
+    """Call ``engines`` and print its section."""
+    from lipmotion_lab.engine_comparison import engines
 
     def experiment(corpus: Corpus, *, settings: ExperimentSettings, work: None) -> dict[str, Any]:  # noqa: ARG001
         return engines(corpus, split=list_or_all(options.split), models=options.models, settings=settings)
 
-    run_experiment(options, experiment, table, has_parts=False)
+    run_experiment(options, experiment, "engines", has_parts=False)
 
 
 def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -18,12 +18,10 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
-from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.printable import printable
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
 from lipmotion.storage.archive import Checkpoint
@@ -31,14 +29,8 @@ from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import Lexicon
-from lipmotion_lab.evaluation.evaluate import (
-    ClipStatistic,
-    correlation_statistic,
-    distance_statistic,
-    figures_of,
-    opening_curves,
-    significance_mark,
-)
+from lipmotion_lab import runner
+from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
@@ -48,18 +40,6 @@ from lipmotion_lab.evaluation.held_out import (
     load_held_out,
 )
 from lipmotion_lab.learning_curve import check_training_names, choose_sizes
-from lipmotion_lab.runner import (
-    DEFAULT_SETTINGS,
-    QUICK_CLIPS,
-    ExperimentSettings,
-    PartKey,
-    check_opening,
-    clips_from_arrays,
-    clips_to_arrays,
-    open_parts,
-    opening_row_with_rates,
-    shuffled,
-)
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
     ALL_PATHS,
@@ -104,7 +84,7 @@ DEFAULT_OPTIONS = ComparisonOptions()
 QUICK = ComparisonOptions(
     systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"],
     tuning=TuningOptions(
-        clips=QUICK_CLIPS["train"], judges=QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
+        clips=runner.QUICK_CLIPS["train"], judges=runner.QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
     ),
 )
 """A small comparison, for the recordings of ``runner.take_quick_part``; conversion by factorial chains is slow."""
@@ -120,7 +100,7 @@ def xieliu2007(  # noqa: PLR0913
     sizes: Sequence[int] | None = None,
     plots: Path | None = None,
     work: Path | None = None,
-    settings: ExperimentSettings = DEFAULT_SETTINGS,
+    settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
 
@@ -136,14 +116,14 @@ def xieliu2007(  # noqa: PLR0913
     names, seed = select_systems(options.systems), settings.seed
     check_visual(options.visual)
     tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
-    listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
+    listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), seed)
     chosen_on_val = tunes or any(COMPARED_SYSTEMS[name].splits for name in names)
     held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
     check_training_names(corpus, listed, (*held_out, *validation))
     steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
     if options.visual != EIGENLIPS:
-        check_opening(corpus, held_out)  # before the long work
+        runner.check_opening(corpus, held_out)  # before the long work
     if plots is not None:
         check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
@@ -187,7 +167,7 @@ class _TrainingSetup:
     held_out: Sequence[str]
     validation: Sequence[str]
     options: ComparisonOptions
-    settings: ExperimentSettings
+    settings: runner.ExperimentSettings
     work: Path | None
 
     def tune(self, systems: Sequence[str], listed: Sequence[str], monitor: Monitor) -> dict[str, list[Trial]]:
@@ -254,12 +234,12 @@ class _TrainingSetup:
     def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
         everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.tuning), *compared))
-        key = PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
-        return open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
+        key = runner.PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
+        return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
 
 def _size(
-    trained: _TrainedSystems, transcripts: bool, settings: ExperimentSettings, kept: Checkpoint
+    trained: _TrainedSystems, transcripts: bool, settings: runner.ExperimentSettings, kept: Checkpoint
 ) -> dict[str, Any]:
     """Return the figures of all systems trained on one number of utterances."""
     recordings, systems, seed = trained.recordings, trained.systems, settings.seed
@@ -294,9 +274,9 @@ def _generate(
         stage = f"{condition}-{name}"
         found = kept.load(stage)
         if found is None:
-            found = clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
+            found = runner.clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
             kept.save(stage, found)
-        made[name] = clips_from_arrays(found)
+        made[name] = runner.clips_from_arrays(found)
     return made
 
 
@@ -327,7 +307,7 @@ def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[Compared
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
     reference, rows = _statistics(recordings, made[REFERENCE_SYSTEM]), {}
     for system, clips in made.items():
-        figures = figures_of(clips, recordings, seed)
+        figures = evaluate.figures_of(clips, recordings, seed)
         row: dict[str, Any] = {}
         for name, statistic in _statistics(recordings, clips).items():
             row[name], row[f"{name}_95"] = statistic.value, statistic.interval(seed)
@@ -335,13 +315,13 @@ def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[Compared
         still = not varies(np.concatenate([clip.generated for clip in clips])).any()
         row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
         if OPENING in recordings.channels:
-            rmse = float(curves.rmse(*opening_curves(recordings, clips))[0])
-            row["opening"] = opening_row_with_rates(figures) | {"rmse": rmse}
+            rmse = float(curves.rmse(*evaluate.opening_curves(recordings, clips))[0])
+            row["opening"] = runner.opening_row_with_rates(figures) | {"rmse": rmse}
         rows[system] = row
     return rows
 
 
-def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, ClipStatistic]:
+def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, evaluate.ClipStatistic]:
     """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; and the ACC of the opening."""
     pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
     parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
@@ -350,99 +330,8 @@ def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> 
         if columns.any():
             generated = [clip.generated[:, columns] for clip in made]
             original = [clip.original[:, columns] for clip in made]
-            statistics[f"{part}amse"] = distance_statistic(generated, original)
-            statistics[f"{part}acc"] = correlation_statistic(generated, original)
+            statistics[f"{part}amse"] = evaluate.distance_statistic(generated, original)
+            statistics[f"{part}acc"] = evaluate.correlation_statistic(generated, original)
     if OPENING in recordings.channels:
-        statistics["opening_acc"] = correlation_statistic(*opening_curves(recordings, made))
+        statistics["opening_acc"] = evaluate.correlation_statistic(*evaluate.opening_curves(recordings, made))
     return statistics
-
-
-WIDTH = 34
-NAMED_CHANNELS = 8
-HEAD = (
-    f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
-    "nRMSE    RMSE    lag  score  p b m  false  variance   numbers  seconds"
-)
-
-LEGEND = (
-    "paper: its AMSE and ACC; nRMSE, RMSE, variance: of the opening, the last by that of the recordings; lag: ms",
-    "score, p b m: %; false: closings outside p b m, a minute of speech; seconds: of a processor, for training",
-)
-
-
-def table(figures: Mapping[str, Any]) -> str:
-    """Return the figures of ``xieliu2007`` as text."""
-    order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
-    amse_form = ".1f" if figures["visual"] == EIGENLIPS else ".4f"  # grey levels, or eye distances
-    closed = f"; closed under {figures['closed_under']:.4f}" if figures["closed_under"] is not None else ""
-    names = figures["channels"]
-    compared = ", ".join(names) if len(names) <= NAMED_CHANNELS else f"{len(names)} channels"
-    lines = [
-        f"the first N clips of {order[figures['order']]}; split {figures['split']}: {figures['clips']} clips",
-        f"AMSE, ACC of {compared}{closed}; numbers: what the chains have learned",
-    ]
-    for size in figures["rows"]:
-        for condition, rows in size["conditions"].items():
-            lines += ["", f"{condition}, {size['used']} of the first {size['names']} clips", HEAD]
-            lines += [_line(name, row, size["training"][name], amse_form) for name, row in rows.items()]
-            lines += _eigenlips(rows)
-        changed = []
-        for name, row in size["training"].items():
-            if row["tried"]:
-                options = {key: value for key, value in row["options"].items() if key not in ("structure", "chains")}
-                texts = (f"{key}={value}" if key == "start" else f"{key}={value:g}" for key, value in options.items())
-                changed.append(f"  {name:{WIDTH}}{', '.join(texts) or 'as printed'}")
-        lines += ["", "settings, the best on val", *changed] if changed else []
-        lines += _pair_lines(size["pairs"], amse_form)
-    lines += [
-        "",
-        f"* differs from {REFERENCE_SYSTEM}: the 95 % interval of the difference on the same clips leaves out 0",
-        *LEGEND,
-    ]
-    return "\n".join(map(printable, lines))
-
-
-def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any], amse_form: str) -> str:
-    printed = "{:.3f} {:.3f}".format(*PAPER_FIGURES[name]) if name in PAPER_FIGURES else ""
-    amse, acc = _with_interval(row, "amse", amse_form), _with_interval(row, "acc", ".3f")
-    lips = (row["opening"] or {}) | {"lag_ms": row["lag_ms"]}
-    columns = {"nrmse": "7.3f", "rmse": "8.4f", "lag_ms": "+7.0f", "score": "7.1f", "recall_p_b_m": "7.1f"}
-    columns |= {"false_per_minute": "7.1f", "global_variance": "10.2f"}
-    texts = "".join(figure_text(lips.get(key), form) for key, form in columns.items())
-    return (
-        f"  {name:{WIDTH}}{printed:>13}  {amse:25}  {acc:22}  {_with_interval(row, 'opening_acc', '.3f'):22}{texts}"
-        f"{figure_text(training['parameters'], '10.0f')}{training['seconds']:9.1f}"
-    )
-
-
-def _pair_lines(pairs: Sequence[Mapping[str, Any]], amse_form: str) -> list[str]:
-    if not pairs:
-        return []
-    lines = ["", f"  {'in the paper better than':{2 * WIDTH}}{'ACC (95 %)':27}AMSE (95 %)"]
-    for pair in pairs:
-        acc, amse = (
-            "{:+{f}}{} ({:+{f}} to {:+{f}})".format(
-                pair[key], significance_mark(pair[f"{key}_95"]), *pair[f"{key}_95"], f=form
-            )
-            for key, form in (("acc", ".3f"), ("amse", amse_form))
-        )
-        lines.append(f"  {pair['better']:{WIDTH}}{pair['worse']:{WIDTH}}{acc:27}{amse}")
-    return lines
-
-
-def _eigenlips(rows: Mapping[str, Any]) -> list[str]:
-    """Return the lines of AMSE and ACC of eigenlips; none where eigenlips are not compared beside geometry."""
-    if "eigenlips_acc" not in next(iter(rows.values())):
-        return []
-    lines = [f"  {'eigenlips':{WIDTH}}{'AMSE (95 %)':27}{'ACC (95 %)'}"]
-    for name, row in rows.items():
-        amse, acc = _with_interval(row, "eigenlips_amse", ".2f"), _with_interval(row, "eigenlips_acc", ".3f")
-        lines.append(f"  {name:{WIDTH}}{amse:27}{acc}")
-    return lines
-
-
-def _with_interval(row: Mapping[str, Any], name: str, form: str) -> str:
-    if name not in row:
-        return "–"
-    low, high = (format(end, form) for end in row[f"{name}_95"])
-    return f"{row[name]:{form}}{significance_mark(row[f'{name}_gain_95'])} ({low}–{high})"

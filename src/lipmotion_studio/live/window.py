@@ -85,7 +85,8 @@ def open_window(to: str, sound: LiveSound) -> Iterator[Consumer]:
     greeting = {"rate_hz": sound.rate_hz, "look_ahead_ms": sound.look_ahead_ms}
     greeting |= {"is_microphone": sound.is_microphone, "waits": opens}
     head: Future[bytes] = Future()
-    reply = partial(_reply, _read_files(), head)
+    page = dict(read_page(files("lipmotion_studio") / "page"))
+    reply = partial(_reply, page | {"": page[FIRST]}, head)
     server = Server(json.dumps(greeting), reply, joined.set, lambda said: ready.set() if said == READY else None)
     with open_server(to, PORT, server):
         Thread(target=_make_head, args=(head,), daemon=True).start()  # it takes seconds, in which the browser opens
@@ -106,11 +107,6 @@ def _make_head(head: Future[bytes]) -> None:
     except Exception as error:
         head.set_exception(error)  # the page is told
         raise
-
-
-def _read_files() -> dict[str, tuple[bytes, str]]:
-    page = dict(read_page(files("lipmotion_studio") / "page"))
-    return page | {"": page[FIRST], FIRST: page[FIRST]}
 
 
 async def _reply(

@@ -20,12 +20,12 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from lipmotion.errors import InputError
-from lipmotion.formats.web_page import colour_code
 from lipmotion.types.values import items, members, number, text, whole
 from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED, POSSIBLE, is_possible
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, list_questions, order_trials
 from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name
+from lipmotion_studio.web.files import read_page
 from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, foreign_refusal, json_reply, read_json
 
 
@@ -90,14 +90,8 @@ def check_sheet(study: Study, trials: list[StudyTrial], rater: int, content: Any
     return AnswerSheet(rater, sheet["trial"], values, seconds, sum(sheet["plays"]))
 
 
-PAGE = {
-    "": ("study.html", "text/html; charset=utf-8"),
-    "study.css": ("study.css", "text/css; charset=utf-8"),
-    "study.js": ("study.js", "text/javascript; charset=utf-8"),
-    "media.js": ("media.js", "text/javascript; charset=utf-8"),
-    "icon.svg": ("icon.svg", "image/svg+xml"),
-}
-"""Files of the page, which are in the package, by their addresses."""
+FIRST = "study.html"
+"""The page itself, whose address is empty."""
 ANSWER_HZ, ANSWER_BURST = 5.0, 60
 """Requests a second of one rater: nobody judges videos faster."""
 JOIN_HZ, JOIN_BURST = 5.0, 200
@@ -128,13 +122,10 @@ def study_application(
         return foreign_refusal(path, headers, is_own, names)
 
     replies = _Replies(study, store)
-    folder = files("lipmotion_studio.study") / "page"
-    page = {
-        name: (colour_code((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()
-    }
+    page = dict(read_page(files("lipmotion_studio.study") / "page"))
 
     async def packaged(request: Request) -> Response:
-        content, kind = page[request.url.path.removeprefix("/")]
+        content, kind = page[request.url.path.removeprefix("/") or FIRST]
         return Response(content, headers=FRESH | {"content-type": kind})
 
     async def video(request: Request) -> Response:
@@ -143,7 +134,7 @@ def study_application(
             raise HTTPException(404, "no such video")
         return FileResponse(path, media_type="video/mp4", headers=WELL_KEPT)
 
-    routes = [Route(f"/{name}", packaged) for name in page]
+    routes = [Route(f"/{name}".removesuffix(FIRST), packaged) for name in page]
     routes += [
         Route(f"/{VIDEOS}/{{name}}", video),
         Route("/api/study", replies.describe),

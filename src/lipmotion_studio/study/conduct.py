@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from contextlib import closing
 from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion_studio.study.answers import Answer, write_answers
-from lipmotion_studio.study.manifest import Study, check_videos, list_questions, order_trials, read_study
-from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name, rater_number
+from lipmotion_studio.study.manifest import check_videos, list_questions, order_trials, read_study
+from lipmotion_studio.study.store import StudyStore, rater_name, rater_number
 from lipmotion_studio.web.listening import HOST, check_installed, open_socket, serve
 
 PORT = 8000
@@ -43,10 +43,19 @@ def serve_study(
 
 
 def collect_answers(folder: Path) -> list[Answer]:
-    """Return the answers of a study by rater and trial. Raises InputError: no study, or nobody has answered."""
+    """Return the judgements of a study by rater and trial. Raises InputError: no study, or nobody has answered."""
     study = read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:
-        return list(list_answers(study, store.sheets()))
+        sheets = store.sheets()
+    orders = {number: order_trials(study, number) for number in sorted({sheet.rater for sheet in sheets})}
+    answers = []
+    for sheet in sheets:
+        trial = orders[sheet.rater][sheet.trial]
+        rater, sentence = rater_name(sheet.rater), study.shown(trial)[0].sentence
+        for (question, condition, other), value in zip(list_questions(study, trial), sheet.values, strict=True):
+            judged = (question, condition, other, value, sheet.seconds, sheet.plays, trial.practice, trial.expected)
+            answers.append(Answer(rater, study.kind, sheet.trial, sentence, *judged))
+    return answers
 
 
 def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
@@ -67,31 +76,7 @@ def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
 
 
 def forget_rater(folder: Path, name: str) -> int:
-    """Delete a rater and all answers, not of exported files; return how many. Raises InputError: no study, no such
-    rater.
-    """
+    """Delete a rater and all answers; return how many. Raises InputError: no study, no such rater."""
     read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:
         return store.forget(rater_number(name))
-
-
-def list_answers(study: Study, sheets: list[AnswerSheet]) -> Iterator[Answer]:
-    """Yield one row for each judgement."""
-    orders = {number: order_trials(study, number) for number in sorted({sheet.rater for sheet in sheets})}
-    for sheet in sheets:
-        trial = orders[sheet.rater][sheet.trial]
-        for (question, condition, other), value in zip(list_questions(study, trial), sheet.values, strict=True):
-            yield Answer(
-                rater_name(sheet.rater),
-                study.kind,
-                sheet.trial,
-                study.shown(trial)[0].sentence,
-                question,
-                condition,
-                other,
-                value,
-                sheet.seconds,
-                sheet.plays,
-                trial.practice,
-                trial.expected,
-            )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError
@@ -28,18 +28,8 @@ from lipmotion.types.progress import with_progress
 from lipmotion_faces.tracking.footage import read_video_frames
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_faces.video.synthetic_mark import LABEL, SOURCE_TYPE, mark_metadata
+from lipmotion_studio.study import manifest
 from lipmotion_studio.study.answers import ANCHOR, KINDS, MOS, PAIRED, RANKING, RECORDING
-from lipmotion_studio.study.manifest import (
-    VIDEOS,
-    Study,
-    StudyVideo,
-    anchor_trials,
-    attention_trials,
-    main_trials,
-    practice_trials,
-    shuffled,
-    write_manifest,
-)
 from lipmotion_studio.study.settings import CONSENT, INSTRUCTIONS, Region, StudySettings
 
 MODEL_SUFFIX, JOB_SUFFIX = ".lipmotion", ".toml"
@@ -174,9 +164,6 @@ def _animated(job: Job, made: dict[str, str]) -> Condition:
     return condition
 
 
-Pictures = NDArray[np.uint8]
-
-
 def encode_video(source: Path, target: Path, sound: Path, region: Region, late_ms: float = 0.0) -> float:
     """Write a video as raters see it (H.264, AAC), and return how long it lasts, in seconds.
 
@@ -196,20 +183,10 @@ def encode_video(source: Path, target: Path, sound: Path, region: Region, late_m
     is_marked = any(SOURCE_TYPE in text or text.startswith(LABEL) for text in texts)
     mark = mark_metadata() if is_marked else None
     marked: dict[str, Any] = {"tags": mark.tags, "xmp": mark.xmp} if mark else {}
-    counted = _Counted(region.cut(frame) for frame in frames)
-    write_mp4(target, counted, fps=rate_hz, audio=late, **marked)
-    return max(counted.count / rate_hz, played.duration_s)
-
-
-class _Counted:
-    def __init__(self, pictures: Iterable[Pictures]) -> None:
-        self._pictures = pictures
-        self.count = 0
-
-    def __iter__(self) -> Iterator[Pictures]:
-        for picture in self._pictures:
-            self.count += 1
-            yield picture
+    counter = itertools.count()
+    pictures = (region.cut(frame) for frame, _ in zip(frames, counter, strict=False))
+    write_mp4(target, pictures, fps=rate_hz, audio=late, **marked)
+    return max(next(counter) / rate_hz, played.duration_s)
 
 
 MAX_TEXT_BYTES = 1 << 16
@@ -223,7 +200,7 @@ def design_study(
     sentences: Sequence[Path],
     settings: StudySettings = DEFAULTS,
     monitor: Monitor = silent_monitor,
-) -> Study:
+) -> manifest.Study:
     """Make a study: render, encode and name its videos, plan its trials, and write its folder.
 
     output     : a folder that must not exist
@@ -244,7 +221,7 @@ def design_study(
     makers = {name: make_condition(source, spoken, drawn) for name, source in sources.items()}
     base = RECORDING if RECORDING in sources else next(iter(sources))
     names, seed = [sentence.name for sentence in spoken], settings.seed
-    late = shuffled(names, "anchor", seed)[: settings.anchors]  # the sentences that have an anchor
+    late = manifest.shuffled(names, "anchor", seed)[: settings.anchors]  # the sentences that have an anchor
     if kind == RANKING:  # every page has one, if any has
         late = names if settings.anchors else []
     texts = {"consent": CONSENT, "instructions": INSTRUCTIONS[kind]}
@@ -253,8 +230,8 @@ def design_study(
         if path:
             texts[name] = read_text_file(path, name, MAX_TEXT_BYTES).strip()
     with atomic_folder(output) as folder:
-        (folder / VIDEOS).mkdir()
-        videos: list[StudyVideo] = []
+        (folder / manifest.VIDEOS).mkdir()
+        videos: list[manifest.StudyVideo] = []
         wanted = [(sentence, name) for sentence in spoken for name in makers]
         for sentence, name in with_progress(wanted, "making videos", monitor):
             made = makers[name](sentence, folder / _UNFINISHED)
@@ -263,12 +240,12 @@ def design_study(
                 videos.append(_encode(made, sentence, ANCHOR, folder, settings))
             (folder / _UNFINISHED).unlink(missing_ok=True)
         numbers = {(video.sentence, video.condition): n for n, video in enumerate(videos)}
-        trials = main_trials(kind, list(sources), names, numbers)
+        trials = manifest.main_trials(kind, list(sources), names, numbers)
         with_anchor = [name for name in names if (name, ANCHOR) in numbers]
-        anchored = anchor_trials(base, with_anchor, numbers) if kind == PAIRED else []
-        checks = attention_trials(kind, trials, settings.checks, seed)
-        practice = practice_trials([*trials, *anchored], settings.practice, seed)
-        study = Study(
+        anchored = manifest.anchor_trials(base, with_anchor, numbers) if kind == PAIRED else []
+        checks = manifest.attention_trials(kind, trials, settings.checks, seed)
+        practice = manifest.practice_trials([*trials, *anchored], settings.practice, seed)
+        study = manifest.Study(
             kind=kind,
             title=settings.title,
             **texts,
@@ -283,19 +260,21 @@ def design_study(
             made_by={"lipmotion": installed_version()}
             | {name: str(value) for name, value in asdict(settings).items() if name not in texts},
         )
-        write_manifest(study, folder)
+        manifest.write_manifest(study, folder)
     return study
 
 
 _UNFINISHED = "made.mp4"
 
 
-def _encode(video: MadeVideo, sentence: StudySentence, name: str, folder: Path, settings: StudySettings) -> StudyVideo:
+def _encode(
+    video: MadeVideo, sentence: StudySentence, name: str, folder: Path, settings: StudySettings
+) -> manifest.StudyVideo:
     """Encode a video as it is shown, and name it by its content."""
     late_ms = settings.anchor_ms if name == ANCHOR else 0.0
-    file = folder / VIDEOS / "encoded.mp4"
+    file = folder / manifest.VIDEOS / "encoded.mp4"
     seconds = encode_video(video.file, file, sentence.recording, settings.shown_region, late_ms)
     digest = sha256_of(file)
     file.replace(file.with_name(f"{digest[:32]}.mp4"))
     made = video.made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})
-    return StudyVideo(f"{digest[:32]}.mp4", sentence.name, name, round(seconds, 3), digest, made)
+    return manifest.StudyVideo(f"{digest[:32]}.mp4", sentence.name, name, round(seconds, 3), digest, made)

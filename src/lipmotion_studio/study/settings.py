@@ -84,9 +84,7 @@ class Region:
 
     @classmethod
     def parsed(cls, text: str) -> Region:
-        """Return the region of ``LEFT,TOP,WIDTH,HEIGHT``, or the whole picture. Raises InputError: not four numbers
-        inside.
-        """
+        """Return the region of a text, or the whole picture. Raises InputError: not four numbers inside."""
         if not text:
             return cls()
         try:

@@ -120,9 +120,7 @@ class StudyStore:
         return 0 if last is None else int(last) + 1
 
     def record(self, sheet: AnswerSheet) -> Future[bool]:
-        """Store the answers to a trial, the first ones only; the result: whether they are there (not of a forgotten
-        rater).
-        """
+        """Store the first answers to a trial; the result: whether they are there (not of a forgotten rater)."""
         rows = [
             {"rater": sheet.rater, "trial": sheet.trial, "item": item, "value": value}
             | {"seconds": sheet.seconds, "plays": sheet.plays}

@@ -102,9 +102,7 @@ class PunctualConnection(H11Protocol):
             self.transport.abort()
 
     def _make_room(self) -> None:
-        """Close a connection, where there are too many: the one idle longest, of those without a request first; not new
-        ones.
-        """
+        """Where there are too many connections, close one: idle longest, without a request first, not a new one."""
         self.was_read = True
         everybody: set[Any] = {*self.connections}
         own = [each for each in everybody if each.client and self.client and each.client[0] == self.client[0]]

@@ -152,18 +152,18 @@ async def read_body(request: Request, largest: int, within_s: float) -> bytes:
 
 async def write_body(request: Request, file: IO[bytes], largest: int, within_s: float) -> None:
     """Write the body of a request into a file. Raises as ``read_body``."""
+
+    async def write() -> None:
+        size = 0
+        async for part in request.stream():
+            size += len(part)
+            if size > largest:
+                raise HTTPException(413, f"required at most {largest} bytes", {"connection": "close"})
+            file.write(part)
+
     try:
-        await asyncio.wait_for(_write(request, file, largest), within_s)
+        await asyncio.wait_for(write(), within_s)
     except (TimeoutError, asyncio.TimeoutError) as error:
         raise HTTPException(408, "the request came too slowly") from error
     except ClientDisconnect as error:
         raise HTTPException(400, "the request broke off") from error
-
-
-async def _write(request: Request, file: IO[bytes], largest: int) -> None:
-    size = 0
-    async for part in request.stream():
-        size += len(part)
-        if size > largest:
-            raise HTTPException(413, f"required at most {largest} bytes", {"connection": "close"})
-        file.write(part)

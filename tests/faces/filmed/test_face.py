@@ -97,12 +97,7 @@ def test_the_same_face_is_the_same_file(small: FilmedFace, arrays: dict[str, np.
 
 
 def test_the_summary_says_what_it_is(filmed_face: FilmedFace, filmed_face_file: Path) -> None:
-    summary = filmed_face.summary
-    assert summary["name"] == "toy"
-    assert summary["background"] == "2.0 s of 224 × 288 px at 25 frames a second"
-    assert summary["needs"] == "3 channels of tracked points, or eigenlips"
-    assert summary["jaw"].endswith("of the variance; 120 candidates")
-    assert summary["licence"] == "synthesised by lipmotion"
+    assert filmed_face.summary["background"] == "2.0 s of 224 × 288 px at 25 frames a second"
     header = read_face_header(filmed_face_file)  # without the pictures
     assert header["takes"] == 2
     assert [channel["name"] for channel in header["channels"]] == ["opening", "width", "outer"]

@@ -14,15 +14,6 @@ from lipmotion_faces.rendering.rasteriser import Camera
 from lipmotion_faces.testing import check_face
 
 
-@pytest.mark.long
-def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
-    moved = opening(*np.linspace(0, 0.2, 8))
-    faces = (Head(Staging(seed=seed), size=(64, 64)) for seed in (1, 1, 2))
-    first, second, other = (np.array(list(face.render(moved, NOTHING_SAID))) for face in faces)
-    assert np.array_equal(first, second)
-    assert not np.array_equal(first, other)
-
-
 def test_the_head_is_a_face_like_all_others_and_an_unusable_size_is_refused_at_once():
     check_face(make_face("head"))
     for size in ((63, 120), (160, 0), (129, 120)):

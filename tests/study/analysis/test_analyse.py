@@ -35,16 +35,11 @@ def test_figures_come_with_and_without_screening(tmp_path):
 def test_the_table_has_all_figures():
     figures = analyse_study(study(), baseline="ph-HMM")
     text = analysis_table(figures)
-    assert "left out: r3 (sides: 0 of 18 pairs answered alike in both orders)" in text
-    for words in ("11 of 12 raters kept", "mos, overall: 264 answers, 11 raters, 6 sentences", "% over ph-HMM"):
-        assert words in text
-    for words in ("recording - anchor", "anchor over"):
-        assert words not in text
+    assert "recording - anchor" not in text
     for part in figures["screened"]:
         for row in part["conditions"]:
             number = f"{row['share']:.1%}" if "share" in row else f"{row['mean']:.2f}"
             assert any(row["condition"] in line and number in line for line in text.splitlines())
-    assert "raters to tell a preference (6 sentences, power 80%): 55%:" in text
     assert "all raters" in text
     assert "all raters" not in analysis_table(analyse_study([each for each in study() if each.rater != "r3"]))
 
@@ -104,12 +99,3 @@ def test_degenerate_studies_have_figures_without_numbers_that_are_none(name):
     text = analysis_table(figures)
     assert not re.search(r"\b(nan|inf)\b", text)
     as_json(nan_as_null(figures))
-
-
-def test_degenerate_studies_say_what_their_intervals_are_over():
-    assert "intervals over sentences only" in analysis_table(analyse_study(DEGENERATE["one rater"]))
-    assert "intervals over raters only" in analysis_table(analyse_study(DEGENERATE["one sentence"]))
-    assert "raters, all agree only" in analysis_table(analyse_study(DEGENERATE["one always wins"]))
-    assert "half a win was given" in analysis_table(analyse_study(DEGENERATE["one always wins"]))
-    assert "no comparison links the groups a, b; c, d" in analysis_table(analyse_study(DEGENERATE["nothing links"]))
-    assert "all comparisons are with the anchor" in analysis_table(analyse_study(DEGENERATE["anchor alone"]))

@@ -140,9 +140,7 @@ def variance_of_mean(
 
 
 def _components(rest: Array, seen: NDArray[np.bool_]) -> Components:
-    """Return the variances of effects by three sums of squares, from rests [shape=(R, S)], 0 where there is no
-    judgement.
-    """
+    """Return the variances of effects by three sums of squares; rests are 0 where nothing was judged [shape=(R, S)]."""
     of_rater, of_sentence, cells = seen.sum(axis=1), seen.sum(axis=0), int(seen.sum())
     squares = float(np.square(rest).sum())
     within_raters = squares - float((rest.sum(axis=1) ** 2 / of_rater).sum())

@@ -11,16 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion_studio.study.analysis.crossed import (
-    CONFIDENCE,
-    NOTHING,
-    Array,
-    Components,
-    CrossedMean,
-    Interval,
-    crossed_mean,
-    holm,
-)
+from lipmotion_studio.study.analysis import crossed
 from lipmotion_studio.study.answers import FIRST, Answer
 
 MOST_STEPS = 20_000
@@ -40,17 +31,17 @@ class Strengths:
     is_shrunk : whether the likelihood has no maximum, so that half wins were added
     """
 
-    strengths: Array
+    strengths: crossed.Array
     order: float
-    covariance: Array
+    covariance: crossed.Array
     is_shrunk: bool
 
-    def probability(self) -> Array:
+    def probability(self) -> crossed.Array:
         """Return the probability that i, shown first, is preferred to j [shape=(C, C)]."""
         return _logistic(self.strengths[:, None] - self.strengths + self.order)
 
 
-def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
+def fit_strengths(first_wins: crossed.Array, second_wins: crossed.Array) -> Strengths:
     """Return the strengths of most likely preferences.
 
     first_wins, second_wins : how often i, shown first, was preferred to j, and j to it [shape=(C, C)]
@@ -83,11 +74,11 @@ def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
     contrasts = _contrasts(pairs, len(weights))
     contrasts[:, -1] *= has_order
     information = (contrasts * weights[tuple(pairs.T)][:, None]).T @ contrasts  # Fisher's, on strengths and order
-    covariance: Array = np.linalg.pinv(information, hermitian=True, rcond=1e-10).astype(float)
+    covariance: crossed.Array = np.linalg.pinv(information, hermitian=True, rcond=1e-10).astype(float)
     return Strengths(strengths, order, covariance, is_shrunk)
 
 
-def link_groups(comparisons: Array) -> list[list[int]]:
+def link_groups(comparisons: crossed.Array) -> list[list[int]]:
     """Return the groups of conditions that are linked by comparisons [shape=(C, C)]."""
     from scipy.sparse.csgraph import connected_components
 
@@ -95,7 +86,7 @@ def link_groups(comparisons: Array) -> list[list[int]]:
     return [np.flatnonzero(labels == label).tolist() for label in range(count)]
 
 
-def _has_maximum(first_wins: Array, second_wins: Array, has_order: bool) -> bool:
+def _has_maximum(first_wins: crossed.Array, second_wins: crossed.Array, has_order: bool) -> bool:
     """Return whether the likelihood has a maximum: no direction of strengths and order in which it never falls."""
     from scipy.optimize import linprog
 
@@ -107,7 +98,7 @@ def _has_maximum(first_wins: Array, second_wins: Array, has_order: bool) -> bool
     return bool(-found.fun < 1e-7)
 
 
-def _contrasts(pairs: NDArray[np.intp], count: int) -> Array:
+def _contrasts(pairs: NDArray[np.intp], count: int) -> crossed.Array:
     """Return what the log odds of comparisons are in strengths and order [shape=(N, C + 1)]; ``pairs``: (N, 2)."""
     contrasts = np.zeros((len(pairs), count + 1))
     rows = np.arange(len(pairs))
@@ -117,7 +108,7 @@ def _contrasts(pairs: NDArray[np.intp], count: int) -> Array:
     return contrasts
 
 
-def deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.bool_]) -> Array:
+def deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.bool_]) -> crossed.Array:
     """Return by how much each answer moves strengths and order, to first order [shape=(N, C + 1)].
 
     pairs : what was shown first and second [shape=(N, 2)];  is_first : whether the first was preferred [shape=(N,)]
@@ -128,12 +119,7 @@ def deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.b
     return (_contrasts(pairs, len(model.strengths)) * (is_first - expected)[:, None]) @ model.covariance
 
 
-def group_text(names: Sequence[str], groups: Sequence[Sequence[int]]) -> str:
-    """Return groups of conditions in words."""
-    return "; ".join(", ".join(names[place] for place in group) for group in groups)
-
-
-def _logistic(values: Array) -> Array:
+def _logistic(values: crossed.Array) -> crossed.Array:
     return 1 / (1 + np.exp(-values))
 
 
@@ -155,18 +141,18 @@ class PairTable:
     rater: Indices
     sentence: Indices
 
-    def cells(self, values: Array, chosen: NDArray[np.bool_]) -> Array:
+    def cells(self, values: crossed.Array, chosen: NDArray[np.bool_]) -> crossed.Array:
         """Return the mean of the chosen answers' values for each rater and sentence [shape=(R, S)]; NaN: no answer."""
         count = self._sums(np.ones(len(values)), chosen)
         return np.where(count > 0, self._sums(values, chosen) / np.maximum(count, 1), np.nan)
 
-    def influence(self, values: Array) -> Array:
+    def influence(self, values: crossed.Array) -> crossed.Array:
         """Return sums of all answers' values, times the number of cells, so that their mean is the sum of all."""
         count = self._sums(np.ones(len(values)), np.full(len(values), True))
         sums = self._sums(values, np.full(len(values), True))
         return np.where(count > 0, sums * int((count > 0).sum()), np.nan)
 
-    def _sums(self, values: Array, chosen: NDArray[np.bool_]) -> Array:
+    def _sums(self, values: crossed.Array, chosen: NDArray[np.bool_]) -> crossed.Array:
         sums = np.zeros((len(self.raters), len(self.sentences)))
         np.add.at(sums, (self.rater[chosen], self.sentence[chosen]), values[chosen])
         return sums
@@ -179,7 +165,7 @@ class PairTable:
         """Return which answers prefer a condition [shape=(N,)]."""
         return np.where(self.is_first, self.shown[:, 0], self.shown[:, 1]) == condition
 
-    def wins(self) -> tuple[Array, Array]:
+    def wins(self) -> tuple[crossed.Array, crossed.Array]:
         """Return how often i, shown first, was preferred to j, and j to it [each shape=(C, C)]."""
         first, second = (np.zeros((len(self.conditions),) * 2) for _ in range(2))
         np.add.at(first, tuple(self.shown[self.is_first].T), 1)
@@ -220,7 +206,7 @@ def paired_figures(table: PairTable) -> Figures:
         names: Figures = {"condition": table.conditions[i], "other": table.conditions[j]}
         counts = {"wins": wins, "answers": count, "p_binomial": binomial_p(wins, count)}
         rows.append(names | counts | share_figures(cells))
-    corrected = holm([row["p"] for row in rows])
+    corrected = crossed.holm([row["p"] for row in rows])
     scores = []
     for place, name in enumerate(table.conditions):  # how often each was preferred: Hofer 2008, Fig. 6
         chosen, preferred = (table.shown == place).any(axis=1), table.is_preferred(place)
@@ -236,31 +222,31 @@ def paired_figures(table: PairTable) -> Figures:
     }
 
 
-def share_figures(cells: Array) -> Figures:
+def share_figures(cells: crossed.Array) -> Figures:
     """Return a share, its interval over raters and sentences, and the test against one half.
 
     cells : share of each rater on each sentence; NaN: none [shape=(R, S)]
     The interval is symmetric in log odds. Where all answers agree, it is the exact one of so many independent answers
     as there are raters (Clopper & Pearson 1934), and so is the test.
     """
-    share = crossed_mean(cells, 1.0)
+    share = crossed.crossed_mean(cells, 1.0)
     raters = int(np.isfinite(cells).any(axis=1).sum())
     if share.mean in (0.0, 1.0):
         wins = int(share.mean) * raters
         interval, p, over = exact_interval(wins, raters), binomial_p(wins, raters), ALL_EQUAL
     else:
         interval, p = share.interval_within(0, 1), share.log_odds(0, 1).p_value
-        over = share.over if share.is_known else NOTHING
+        over = share.over if share.is_known else crossed.NOTHING
     return {"share": share.mean, "low": interval.low, "high": interval.high, "p": p, "over": over}
 
 
-def exact_interval(wins: int, count: int) -> Interval:
+def exact_interval(wins: int, count: int) -> crossed.Interval:
     """Return the exact interval of a probability, from independent answers. Source: Clopper & Pearson 1934."""
     from scipy.special import betaincinv
 
-    tail = (1 - CONFIDENCE) / 2
+    tail = (1 - crossed.CONFIDENCE) / 2
     low = float(betaincinv(wins, count - wins + 1, tail)) if wins else 0.0
-    return Interval(low, float(betaincinv(wins + 1, count - wins, 1 - tail)) if wins < count else 1.0)
+    return crossed.Interval(low, float(betaincinv(wins + 1, count - wins, 1 - tail)) if wins < count else 1.0)
 
 
 def binomial_p(wins: int, count: int) -> float:
@@ -297,14 +283,15 @@ def strength_figures(table: PairTable) -> Figures:
     first, second = table.wins()
     groups = link_groups(first + second)
     if len(groups) > 1:
-        return {"missing": f"no comparison links the groups {group_text(table.conditions, groups)}"}
+        texts = (", ".join(table.conditions[place] for place in group) for group in groups)
+        return {"missing": f"no comparison links the groups {'; '.join(texts)}"}
     model = fit_strengths(first, second)
     moved = deviations(model, table.shown, table.is_first)
     names = table.conditions
 
-    def row(value: float, change: Array) -> Figures:
-        error = crossed_mean(table.influence(change), 1.0)
-        interval = CrossedMean(value, error.error, error.degrees, error.over, None).interval
+    def row(value: float, change: crossed.Array) -> Figures:
+        error = crossed.crossed_mean(table.influence(change), 1.0)
+        interval = crossed.CrossedMean(value, error.error, error.degrees, error.over, None).interval
         low, high = (np.nan, np.nan) if model.is_shrunk else interval
         return {"strength": value, "low": low, "high": high}
 
@@ -322,17 +309,17 @@ def strength_figures(table: PairTable) -> Figures:
     }
 
 
-def share_components(table: PairTable) -> Components | None:
+def share_components(table: PairTable) -> crossed.Components | None:
     """Return the mean variances of effects on shares, by that of one answer; None: they cannot be told apart."""
     found = []
     for _, _, cells in _pair_cells(table):
-        share = crossed_mean(cells, 1.0)
+        share = crossed.crossed_mean(cells, 1.0)
         if share.components and share.error > 0:
             found.append(np.array(share.components) / (share.mean * (1 - share.mean)))
-    return Components(*np.mean(found, axis=0).tolist()) if found else None
+    return crossed.Components(*np.mean(found, axis=0).tolist()) if found else None
 
 
-def _pair_cells(table: PairTable) -> list[tuple[int, int, Array]]:
+def _pair_cells(table: PairTable) -> list[tuple[int, int, crossed.Array]]:
     """Return all pairs that were compared, and the share of the first for each rater and sentence."""
     found = []
     for i, j in combinations(range(len(table.conditions)), 2):
