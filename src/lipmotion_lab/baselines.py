@@ -14,7 +14,6 @@ from lipmotion.engines import Animator, Fit
 from lipmotion.errors import MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
-from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.stats.trees import ridge, zero_statistics
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -35,8 +34,6 @@ Recording = tuple[Float32Array, Array, NDArray[np.bool_]]
 """Features, reduced motion, and which frames are valid [shape=(T, 39), (T, Q), (T,)]."""
 COMPONENTS = 16
 """Dimensions that all point channels are reduced to, as in the engines."""
-SMOOTHING = 9
-"""Frames that the log energy is averaged over: 90 ms, a little more than two pictures of a video."""
 REACH = 15
 """Frames of acoustic context on both sides: ±150 ms."""
 RIDGE_FRAMES = 1e-3
@@ -124,16 +121,6 @@ class MeanPose(LinearBaseline):
 
     def regressors(self, features: Float32Array) -> Array:  # noqa: D102
         return np.ones((len(features), 1))
-
-
-@final
-class LoudnessRegression(LinearBaseline):
-    """Linear regression on the smoothed log energy."""
-
-    def regressors(self, features: Float32Array) -> Array:  # noqa: D102
-        padded = np.pad(features[:, LOG_ENERGY].astype(float), SMOOTHING // 2, "edge")
-        smooth = np.convolve(padded, np.full(SMOOTHING, 1 / SMOOTHING), "valid")
-        return np.stack([smooth, np.ones(len(smooth))], axis=1)
 
 
 @final

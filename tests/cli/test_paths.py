@@ -37,7 +37,6 @@ REFUSED = [
     ("the recording itself", "compare a.wav b.wav -o b.wav"),
     ("the corpus c", f"experiment hofer2008 {FIGURES} -o c/corpus.json"),
     ("the list itself", f"experiment learning-curve {FIGURES} --order t.txt -o t.txt"),
-    ("the folder of recordings r", f"experiment xieliu2007 {FIGURES} --talkers r -o r/a.wav"),
     ("the corpus c", f"experiment xieliu2007 {FIGURES} --plots c/pictures"),
     ("the folder of recordings itself", "corpus prepare r -o r"),
     ("the folder of recordings d.unfinished/r", "corpus prepare d.unfinished/r -o d.unfinished"),

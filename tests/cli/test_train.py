@@ -118,7 +118,7 @@ def test_other_voices_are_learned_from_but_those_for_judging(run, toy_model, toy
 
 @pytest.mark.long
 def test_the_paper_s_system_learns_eigenlips_unless_told_otherwise(run, toy_corpus, here):
-    for more, visual in (((), "eigenlips"), (("--visual", "geometry"), None)):
+    for more, visual in ((("--system", "ph-vi-CHMM"), "eigenlips"), (("--visual", "geometry"), None)):
         assert run("train", toy_corpus.path, "-o", "m.lipmotion", "--force", "--preset", "xieliu2007", *more).code == 0
         model = load_model(here / "m.lipmotion")
         assert (model.about.get("visual"), model.eigenlips is not None) == (visual, visual is not None)

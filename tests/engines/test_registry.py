@@ -10,8 +10,10 @@ def test_settings_and_presets_are_options() -> None:
         assert engine_from_settings(name) == engine_named(name, {})
     for system in SYSTEMS:
         assert engine_from_settings(preset=system) == engine_named("coupled", SYSTEMS[system])
+        assert engine_from_settings(preset=f"xieliu2007 {system}") == engine_from_settings(preset=system)
+        assert preset_visual(f"xieliu2007 {system}") == preset_visual(system) == "eigenlips"
     assert engine_from_settings(preset="xieliu2007") == engine_from_settings(preset="ph-vi-CHMM")
-    assert (preset_visual("xieliu2007"), preset_visual("ph-vi-CHMM"), preset_visual(None)) == ("eigenlips", None, None)
+    assert (preset_visual("xieliu2007"), preset_visual("hofer2008"), preset_visual(None)) == ("eigenlips", None, None)
 
 
 def test_the_systems_of_xie_and_liu_are_as_printed() -> None:
@@ -22,6 +24,9 @@ def test_the_systems_of_xie_and_liu_are_as_printed() -> None:
         assert not any((config.variance_scaling, config.closures, config.articulation, config.dynamic))
         assert config.chains.split()[-1] == ("viseme" if "-vi-" in system else "phone")
         assert config.asynchrony == (-1 if "FHMM" in system else 1)
+        if "FHMM" in system:  # every density integrates to 1, and nothing ties the chains together
+            assert (config.unseen_loss, config.start_asynchrony) == (0, 4)
+        assert not config.moves_together
         assert (config.audio_weight, config.visual_weight, config.mixtures, config.visual_mixtures) == (1, 1, 1, 1)
 
 
@@ -38,7 +43,7 @@ def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
 def test_arguments_that_are_not_allowed() -> None:
     for name, arguments, words in (
         ("joined", {}, "no engine 'joined'; there are: trajectory, coupled, joint"),
-        ("trajectory", {"preset": "ph-HMM"}, "of the engine 'coupled', not of 'trajectory'; leave --engine out"),
+        ("trajectory", {"preset": "ph-HMM"}, "of 'coupled', not of 'trajectory'; leave out one of them"),
         ("coupled", {"preset": "ph-hmm"}, "no preset 'ph-hmm'; there are: ph-HMM, ph-MSHMM"),
         ("coupled", {"units": "eVis"}, '--set chains="phone viseme"'),
         ("coupled", {"settings": ["state=3"]}, "no option 'state'; there are: structure, chains, states, "),

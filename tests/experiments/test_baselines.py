@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import CorpusError
-from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.testing.examples import CHANNELS
 from lipmotion.types import Example, silent_monitor
-from lipmotion_lab.baselines import REACH, ContextRidge, LoudnessRegression, MeanPose
+from lipmotion_lab.baselines import REACH, ContextRidge, MeanPose
 
-BASELINES: list[type] = [MeanPose, LoudnessRegression, ContextRidge]
+BASELINES: list[type] = [MeanPose, ContextRidge]
 
 
 def valid_motion(examples: list[Example]) -> np.ndarray:
@@ -64,14 +63,3 @@ def test_the_reach_of_the_acoustic_context(examples):
     column = np.eye(39)[3]
     assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH)) < 0.2
     assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH + 8)) > 1
-
-
-def test_loudness_is_smoothed(examples):
-    made = with_delayed_opening(examples, np.eye(39)[LOG_ENERGY], 0)
-    slow = []
-    for one in made:
-        opening = one.motion["opening"]
-        values = one.motion.values.copy()
-        values[:, one.motion.column("opening")] = [opening[max(t - 4, 0) : t + 5].mean() for t in range(len(opening))]
-        slow.append(replace(one, motion=replace(one.motion, values=values)))
-    assert error(LoudnessRegression(), slow) < 0.05 < error(LoudnessRegression(), made)

@@ -23,6 +23,7 @@ from lipmotion_lab.xie_liu2007.systems import (
     list_alternatives,
     list_changed_options,
     search_settings,
+    split_while_better,
     train_stages,
 )
 
@@ -92,6 +93,11 @@ def test_one_setting_after_another_from_the_best_so_far():
     assert best_trial([Trial({"a": 1}, 0.5, 0, 0), Trial({"a": 2}, 0.5, 0, 0)]).options == {"a": 1}
 
 
+def test_gaussians_are_split_while_that_is_better():
+    found = [(Trial({}, acc, 0.0, 0), None) for acc in (0.5, 0.6, 0.6, 0.9)]
+    assert [*split_while_better(found)] == found[:3]
+
+
 def test_what_is_tried_for_which_structure():
     names = {
         system: [
@@ -102,13 +108,15 @@ def test_what_is_tried_for_which_structure():
         for system, options in SYSTEMS.items()
     }
     assert names["ph-HMM"] == ["audio_weight", "mixtures", "states"]
-    assert names["ph-MSHMM"] == names["ph-vi-CHMM"] == ["audio_weight", "mixtures", "visual_mixtures", "states"]
+    multistream = ["audio_weight", "mixtures", "visual_mixtures"]
+    assert names["ph-MSHMM"] == [*multistream, "states"]
+    assert names["ph-vi-CHMM"] == [*multistream, "moves_together", "states"]
     assert names["ph-FHMM"] == ["audio_weight", "mixtures", "unseen_loss", "start_asynchrony", "states"]
 
 
 def test_options_are_told_where_they_are_not_those_printed():
     for system, options in SYSTEMS.items():
-        changed = list_changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 0.0}))
+        changed = list_changed_options(CoupledConfig(**options | {"audio_weight": 0.3, "unseen_loss": 3.0}))
         assert changed == {
-            "structure": options["structure"], "chains": options["chains"], "audio_weight": 0.3, "unseen_loss": 0.0,
+            "structure": options["structure"], "chains": options["chains"], "audio_weight": 0.3, "unseen_loss": 3.0,
         }, system  # fmt: skip

@@ -49,7 +49,8 @@ def engine_from_settings(
     """Return an engine whose configuration is parsed from texts, as on the command line.
 
     name     : of the engine; None: that of the preset, otherwise ``trajectory``
-    preset   : a named configuration: ``hofer2008``, ``xieliu2007``, ``minnis2000``, or a system as ``ph-vi-CHMM``
+    preset   : a named configuration: ``hofer2008``, ``xieliu2007``, ``minnis2000``, or a system as ``ph-vi-CHMM``;
+               several, with blanks between, if they agree on every option
     units    : the unit set, for engines with an option ``units``
     settings : ``NAME=VALUE`` for any options; these override preset and units
     Raises InputError: no such engine, preset, unit set or option, or a value that is not allowed.
@@ -73,7 +74,7 @@ def engine_from_settings(
 def preset_visual(preset: str | None) -> str | None:
     """Return the kind of motion that a preset is trained on where none is asked for; None: the default of ``train``."""
     kinds = [_class_of(engine).Config.preset_visual for engine in ENGINES.names]
-    return next((kind[preset] for kind in kinds if preset is not None and preset in kind), None)
+    return next((kind[each] for kind in kinds for each in (preset or "").split() if each in kind), None)
 
 
 def _class_of(name: str) -> type[Engine[Any]]:
@@ -92,11 +93,18 @@ def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
 
 
 def _preset(name: str | None, preset: str) -> tuple[str, dict[str, Any]]:
-    """Return the engine and the options of a preset. Raises InputError: no engine has it, or not ``name``."""
-    presets = {known: engine for engine in ENGINES.names for known in _class_of(engine).Config.presets}
-    if preset not in presets:
-        raise InputError(f"no preset {preset!r}; there are: {', '.join(presets)}")
-    engine = presets[preset]
-    if name not in (None, engine):
-        raise InputError(f"{preset} is a preset of the engine {engine!r}, not of {name!r}; leave --engine out")
-    return engine, dict(_class_of(engine).Config.presets[preset])
+    """Return the engine and the options of presets. Raises InputError: no engine has one, or two differ."""
+    engines = {known: engine for engine in ENGINES.names for known in _class_of(engine).Config.presets}
+    options: dict[str, Any] = {}
+    for each in preset.split() or [preset]:
+        if each not in engines:
+            raise InputError(f"no preset {each!r}; there are: {', '.join(engines)}")
+        name = name or engines[each]
+        if name != engines[each]:
+            raise InputError(f"{each} is a preset of {engines[each]!r}, not of {name!r}; leave out one of them")
+        more = _class_of(name).Config.presets[each]
+        for key, value in options.items():
+            if more.get(key, value) != value:
+                raise InputError(f"presets {preset}: {key} is {value!r} and {more[key]!r}; give one of them")
+        options |= more
+    return name or DEFAULT, options

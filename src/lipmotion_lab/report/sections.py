@@ -230,11 +230,11 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     cases = [(condition, rows, size) for condition, rows in size["conditions"].items()]
     for each in smaller:
         cases += [(f"{name}, {each['names']} recordings", rows, each) for name, rows in each["conditions"].items()]
-    cases += [(f"{each['kind']} noise, {each['snr_db']:g} dB", each["systems"], size) for each in figures["noise"]]
     (_, main), *more = ((caption, _systems_table(caption, *case)) for caption, *case in cases)
     words, verdict, by_amse = warn_of_few(figures["clips"]), "", []
     for ending, called in (("", "as printed"), (TUNED, "as tuned on val")):
-        pairs = [pair for pair in size["pairs"] if pair["better"].endswith(TUNED) == bool(ending)]
+        names = {name + ending for name in PAPER_FIGURES}
+        pairs = [pair for pair in size["pairs"] if {pair["better"], pair["worse"]} <= names]
         if pairs:
             by_acc, by_error = (_order_of_systems(main.rows, pairs, ending, *measure) for measure in MEASURES)
             words[f"Systems {called}, by ACC"] = [*([by_acc.verdict()] if verdict else []), *by_acc.sentences()]

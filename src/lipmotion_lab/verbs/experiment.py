@@ -164,16 +164,6 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
     parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
-    parser.add_argument("--noise", default="", metavar="KIND,KIND", help="compare also in noise: white, babble")
-    parser.add_argument(
-        "--snr",
-        type=numbers,
-        default=[20, 10, 5, 0],
-        metavar="DB,...",
-        help="signal-to-noise ratios (default: 20,10,5,0)",
-    )
-    talkers = "recordings of other people, for the babble"
-    add_input(parser, "--talkers", what="folder of recordings", metavar="FOLDER", help=talkers)
     add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
     add_experiment_arguments(parser, quick="the paper's systems, four of them also tuned; not with --order")
     parser.set_defaults(run=run_xieliu2007)
@@ -183,22 +173,18 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
     """Call ``xieliu2007`` and print its section."""
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
-    from lipmotion_lab.evaluation.held_out import NoiseConditions, read_talkers
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
 
     if options.quick and options.order:
         raise InputError("--quick takes recordings of its own, and --order is a list of others; leave out one of them")
 
     def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
-        kinds = tuple(kind for kind in options.noise.split(",") if kind)
-        talkers = tuple(read_talkers(options.talkers)) if options.talkers else ()
         usual = QUICK if options.quick else DEFAULT_OPTIONS
         compared = replace(
             usual,
             systems=options.systems or usual.systems,
             visual=options.visual,
             transcripts=options.transcripts,
-            noise=NoiseConditions(kinds, tuple(map(float, options.snr)), talkers),
         )
         order = read_names(options.order) if options.order else None
         split, sizes, plots = list_or_all(options.split), options.sizes, options.plots

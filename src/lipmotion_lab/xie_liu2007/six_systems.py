@@ -24,10 +24,10 @@ from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
-from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
-from lipmotion.types import Example, Monitor, sub_monitor, with_progress
+from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import Lexicon
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate
@@ -36,17 +36,17 @@ from lipmotion_lab.evaluation.held_out import (
     OPENING,
     ComparedClip,
     HeldOutRecordings,
-    NoiseConditions,
-    add_noise,
     generate_clips,
     load_held_out,
 )
 from lipmotion_lab.learning_curve import check_training_names, choose_sizes
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
+    ALL_PATHS,
     COMPARED_SYSTEMS,
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
+    SPLIT,
     TUNED,
     TUNING,
     TrainedSystem,
@@ -72,14 +72,12 @@ class ComparisonOptions:
     tuning      : how the settings of tuned systems are chosen, on the list ``val``
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
-    noise       : noise in which the systems trained on the largest size are compared as well
     """
 
     systems: Sequence[str] | None = None
     tuning: TuningOptions = TUNING
     visual: str = GEOMETRY
     transcripts: bool = False
-    noise: NoiseConditions | None = None
 
 
 DEFAULT_OPTIONS = ComparisonOptions()
@@ -119,7 +117,8 @@ def xieliu2007(  # noqa: PLR0913
     check_visual(options.visual)
     tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
     listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), seed)
-    held_out, validation = corpus.required(split), corpus.required("val") if tunes else ()
+    chosen_on_val = tunes or any(COMPARED_SYSTEMS[name].splits for name in names)
+    held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
     check_training_names(corpus, listed, (*held_out, *validation))
     steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
@@ -128,7 +127,7 @@ def xieliu2007(  # noqa: PLR0913
     if plots is not None:
         check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
-    shares = np.cumsum([0.3 * sum(steps), *steps, 0.1 * sum(steps)]) / (1.4 * sum(steps))
+    shares = np.cumsum([0.3 * sum(steps), *steps]) / (1.3 * sum(steps))
     trials = (
         setup.tune(tunes, listed, sub_monitor(settings.monitor, 0, float(shares[0]), "choosing: ")) if tunes else {}
     )
@@ -138,12 +137,6 @@ def xieliu2007(  # noqa: PLR0913
         trained = setup.train(names, listed[:count], trials, part)
         kept = setup.checkpoint(listed[:count], held_out)
         rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
-    noise, noise_rows = options.noise or NoiseConditions(), []
-    noises = [(kind, ratio_db) for kind in noise.kinds for ratio_db in noise.ratios_db]
-    for kind, ratio_db in with_progress(noises, "comparing in noise", sub_monitor(settings.monitor, 0.9, 1)):
-        noisy = add_noise(trained.recordings, kind, ratio_db, noise.talkers, seed)
-        systems = _system_rows(noisy, _generate(noisy, AUDIO_ONLY, trained.systems), seed)
-        noise_rows.append({"kind": kind, "snr_db": ratio_db, "systems": systems})
     recordings = trained.recordings
     if plots is not None:
         draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
@@ -156,7 +149,7 @@ def xieliu2007(  # noqa: PLR0913
         "validation": len(validation),
     }
     chosen |= {"tried": {name: [as_row(trial) for trial in tried] for name, tried in trials.items()}}
-    return nan_as_null(about | {"tuning": chosen, "rows": rows, "noise": noise_rows})
+    return nan_as_null(about | {"tuning": chosen, "rows": rows})
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +200,8 @@ class _TrainingSetup:
                 trained[name] = system_from_arrays(found)
                 continue
             known = with_inputs_of(name, examples, self.corpus)
-            trained[name] = train_system(name, known, recordings.get("val"), trials, trained, part)
+            validation, tuning = recordings.get("val"), self.options.tuning
+            trained[name] = train_system(name, known, validation, trials, trained, tuning, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 found = system_to_arrays(trained[name])
                 kept.save(f"system-{name}", found)
@@ -273,7 +267,7 @@ def _generate(
     recordings: HeldOutRecordings,
     condition: str,
     systems: Mapping[str, TrainedSystem],
-    kept: Checkpoint = NO_CHECKPOINT,
+    kept: Checkpoint,
 ) -> dict[str, list[ComparedClip]]:
     made = {}
     for name, system in systems.items():
@@ -292,10 +286,15 @@ def _paper_pairs(
     """Return how much better each system of the paper is than each that is worse in print, on the same clips."""
     by_acc = sorted(PAPER_FIGURES, key=lambda name: -PAPER_FIGURES[name][1])
     rows = []
-    for ending in ("", TUNED):
-        present = [name + ending for name in by_acc if name + ending in made]
-        statistics = {name: _statistics(recordings, made[name]) for name in present}
-        for better, worse in combinations(present, 2):
+    for ending in ("", SPLIT, TUNED):
+        compared = [name + ending for name in by_acc if name + ending in made]
+        pairs = [*combinations(compared, 2)]
+        if not ending:
+            pairs += [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
+            pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
+        pairs = [pair for pair in pairs if {*pair} <= made.keys()]
+        statistics = {name: _statistics(recordings, made[name]) for pair in pairs for name in pair}
+        for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
                 own, other = statistics[better][key], statistics[worse][key]

@@ -14,20 +14,21 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Animator, Engine, engine_named
 from lipmotion.engines.coupled.arrays import coupled_arrays
-from lipmotion.engines.coupled.chains.structures import FACTORIAL, HMM, SYSTEMS
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, SYSTEMS, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import growing_models
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
-from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, LoudnessRegression, MeanPose, import_torch
+from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose, import_torch
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
 
 Options = Mapping[str, Any]
-FREE = {"unseen_loss": 0.0, "start_asynchrony": 4}
-"""Factorial chains that nothing ties together: every density integrates to 1, and they may be apart from the start."""
+TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
+"""Factorial chains that are tied together: rare joint states lose 10 nats, and the chains begin a state apart."""
+TOGETHER = {"moves_together": True}
 CONVERSIONS: tuple[Options, ...] = ({"start": "viterbi", "steps": 3}, {"start": "soft", "steps": 1})
 """Conversions by EM that are tried: from the best path to where it converges, and one step from all paths."""
 
@@ -41,6 +42,7 @@ class TuningOptions:
     mixtures        : most Gaussians a state, of speech; 1, 2, 4, … are tried
     visual_mixtures : Gaussians a state of lips, then
     pair_mixtures   : most Gaussians of factorial chains, whose densities are those of pairs of states
+    split           : most Gaussians a state where their number alone is chosen, of both streams and of speech only
     states          : a unit
     """
 
@@ -50,6 +52,7 @@ class TuningOptions:
     mixtures: int = 8
     visual_mixtures: int = 2
     pair_mixtures: int = 1
+    split: int = 8
     states: tuple[int, ...] = (3,)
 
 
@@ -80,11 +83,13 @@ def list_alternatives(options: Options, tuning: TuningOptions) -> list[list[dict
     """Return the kinds of settings that are tried for a system, in order, each with its values."""
     factorial = options["structure"] == FACTORIAL
     most = tuning.pair_mixtures if factorial else tuning.mixtures
-    kinds = [[{"audio_weight": weight, "mixtures": most} for weight in tuning.weights]]
+    kinds: list[list[dict[str, Any]]] = [[{"audio_weight": weight, "mixtures": most} for weight in tuning.weights]]
     if options["structure"] != HMM and most > 1:
         kinds.append([{"visual_mixtures": tuning.visual_mixtures}])
     if factorial:
-        kinds.append([{"unseen_loss": 0.0}, FREE])
+        kinds.append([{"unseen_loss": UNSEEN_LOSS}, TIED])
+    if options["structure"] == COUPLED:
+        kinds.append([TOGETHER])
     return [*kinds, [{"states": states} for states in tuning.states]]
 
 
@@ -132,6 +137,16 @@ def judge_systems(
             yield trial, replace(system, engine=engine)
 
 
+def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
+    """Yield systems of 1, 2, 4, … Gaussians, up to the first that is no better than that before it."""
+    best = -np.inf
+    for trial, system in found:
+        yield trial, system
+        if trial.acc <= best:
+            return
+        best = trial.acc
+
+
 def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
     """Return the system of which something is highest, as the ACC of its trial; with all trials."""
     pairs = list(found)
@@ -165,9 +180,9 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
 """AMSE and ACC of the paper's Table 3: eigenlips of another speaker, so only their order compares."""
 BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
-TUNED = ", tuned"
+TUNED, SPLIT, ALL_PATHS = ", tuned", ", K on val", ", all paths"
+SOFT = {"start": "soft", "steps": 0}
 ABOUT = "about"
-MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
 
 
 @dataclass(frozen=True)
@@ -177,6 +192,7 @@ class ComparedSystem:
     make          : returns its engine; None: it is the coupled engine with ``options``
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
     tunes         : the system of the paper whose settings are chosen on validation recordings
+    splits        : only its number of Gaussians is, as in the paper (§7.1)
     when_named    : it is compared only if it is asked for
     """
 
@@ -184,6 +200,7 @@ class ComparedSystem:
     options: Mapping[str, Any] = field(default_factory=dict)
     same_model_as: str = ""
     tunes: str = ""
+    splits: bool = False
     when_named: bool = False
 
     @property
@@ -198,24 +215,25 @@ def _engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
 
 COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     **{name: ComparedSystem(options=SYSTEMS[name]) for name in PAPER_FIGURES},
+    **{name + SPLIT: ComparedSystem(options=SYSTEMS[name], splits=True) for name in PAPER_FIGURES},
     **{name + TUNED: ComparedSystem(options=SYSTEMS[name], tunes=name) for name in PAPER_FIGURES},
-    MATCHED: ComparedSystem(options=SYSTEMS["ph-MSHMM"], tunes="ph-MSHMM"),
-    "ph-vi-FHMM, free": ComparedSystem(options=SYSTEMS["ph-vi-FHMM"] | FREE),
-    "ph-vi-CHMM, soft start": ComparedSystem(options={"start": "soft"}, same_model_as=REFERENCE_SYSTEM),
+    **{f"{name}, tied": ComparedSystem(options=SYSTEMS[name] | TIED) for name in ("ph-FHMM", "ph-vi-FHMM")},
+    **{f"{name}, together": ComparedSystem(options=SYSTEMS[name] | TOGETHER) for name in ("ph-CHMM", "ph-vi-CHMM")},
+    **{name + ALL_PATHS: ComparedSystem(options=SOFT, same_model_as=name) for name in PAPER_FIGURES},
     BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
     "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
     "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
     "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
     BLSTM: ComparedSystem(BlstmBaseline, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),
-    "loudness": ComparedSystem(LoudnessRegression),
     "mean pose": ComparedSystem(MeanPose),
 }
 """The systems of the table, in its order.
 
-The paper's six are those of ``train --preset``; ``tuned``: with the settings that were best on validation recordings;
-``as large as``: with as many Gaussians as bring the number of parameters nearest to that of the tuned ph-vi-FHMM.
-``free``: factorial chains as ``tuning.FREE`` has them. ``best path``: means along the best path, no EM.
+The paper's six are those of ``train --preset``, of one Gaussian a state; ``K on val``: with the number of Gaussians
+that was best on validation recordings; ``tuned``: with all settings that were best there;
+``tied``, ``together``: chains as ``TIED`` and ``TOGETHER`` have them. ``all paths``: expected means given speech, no
+EM; ``best path``: means along the best path, no EM.
 ``own means``: no regression of the visual means on acoustic features.
 """
 
@@ -229,9 +247,8 @@ def select_systems(names: Sequence[str] | None) -> list[str]:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
     if BLSTM in names:
         import_torch()
-    needed = {REFERENCE_SYSTEM} | {COMPARED_SYSTEMS[name].tunes for name in names}
-    if MATCHED in names:
-        needed |= {"ph-vi-FHMM", "ph-vi-FHMM" + TUNED}
+    chosen = [COMPARED_SYSTEMS[name] for name in names]
+    needed = {REFERENCE_SYSTEM} | {name for system in chosen for name in (system.tunes, system.same_model_as)}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
 
 
@@ -264,6 +281,7 @@ def train_system(
     validation: HeldOutRecordings | None,
     trials: Mapping[str, Sequence[Trial]],
     trained: Mapping[str, TrainedSystem],
+    tuning: TuningOptions,
     monitor: Monitor,
 ) -> TrainedSystem:
     """Return one trained system.
@@ -278,19 +296,20 @@ def train_system(
     if system.make is not None:
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
+    if system.splits and validation is not None:
+        found: list[tuple[Trial, TrainedSystem]] = []
+        for more in [{"visual_mixtures": tuning.split}, {}][: 1 if system.options["structure"] == HMM else 2]:
+            grown = train_stages({**system.options, "mixtures": tuning.split, **more}, examples, monitor)
+            found += split_while_better(judge_systems(grown, validation))
+        return choose_by(lambda trial: trial.acc, found)
     if not system.tunes or validation is None:
         *_, last = train_stages(system.options, examples, monitor)
         return last
     options = best_trial(trials[system.tunes]).options
-    if name != MATCHED:
-        printed = trained[system.tunes]
-        same = CoupledConfig.parsed(options) == printed.engine.config
-        on_the_way = () if same else train_stages(options, examples, monitor)
-        return choose_by(lambda trial: trial.acc, judge_systems([printed, *on_the_way], validation))
-    wanted = trained["ph-vi-FHMM" + TUNED].model.chains.parameters
-    most = max(trial.options["mixtures"] for trial in trials[system.tunes])
-    larger = train_stages({**options, "mixtures": most, "visual_mixtures": most}, examples, monitor)
-    return choose_by(lambda trial: -abs(trial.parameters - wanted), judge_systems(larger, validation))
+    printed = trained[system.tunes]
+    same = CoupledConfig.parsed(options) == printed.engine.config
+    on_the_way = () if same else train_stages(options, examples, monitor)
+    return choose_by(lambda trial: trial.acc, judge_systems([printed, *on_the_way], validation))
 
 
 def system_to_arrays(system: TrainedSystem) -> dict[str, NDArray[Any]]:

@@ -7,7 +7,7 @@ import numpy as np
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import Grammar, initial_transitions, reachable
-from lipmotion.engines.coupled.chains.structures import COUPLED, HMM, Structure
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
 from lipmotion.units.unit_sets import CLOSED_UNIT
@@ -20,6 +20,11 @@ THREE = UnitSet(
 )
 TWO = UnitSet("two", {phone: CLOSED_UNIT if phone in SHUT else "open" for phone in PHONES})
 """On the second chain, round and open are one unit."""
+KINDS = [
+    (COUPLED, (THREE, TWO), 1), (COUPLED, (THREE, TWO), 0), (FACTORIAL, (THREE, TWO), 1),
+    (FACTORIAL, (THREE, TWO), None), (MULTISTREAM, (THREE,), 1), (HMM, (THREE,), 1),
+]  # fmt: skip
+"""Structures, the unit sets of their chains, and their limits of asynchrony."""
 
 
 def structure(kind=COUPLED, chains=(THREE, TWO), states=2, limit=1, cross_units=True) -> Structure:
@@ -66,7 +71,8 @@ def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0,
     return Chains(("speech", "seen"), transitions, tuple(groups))
 
 
-def observations(frames=4, sizes=(2, 1), seed=0, seen=True) -> AudioVisualObservations:
+def observations(frames=4, sizes=(2, 1), seed=0, seen: bool | float = True) -> AudioVisualObservations:
+    """Return speech, and what is seen in all frames (True), in none (False), or in every other (0.5)."""
     draw = np.random.default_rng([seed, 3])
     streams = tuple(draw.normal(0, 1, (frames, size)).astype(np.float32) for size in sizes)
-    return AudioVisualObservations(streams, (None, None if seen else np.zeros(frames, bool)))
+    return AudioVisualObservations(streams, (None, None if seen is True else np.arange(frames) % 2 < float(seen)))

@@ -38,10 +38,10 @@ def model_to_start_from(name: str, engine: Engine[Any]) -> Model | None:
 
 ENGINE = "trajectory (default), coupled (chains of states), joint (one model, five streams) or selection (recordings)"
 PRESET = (
-    "a system of a paper, which names its engine: hofer2008, minnis2000, xieliu2007, or one of the last one's six, "
-    "ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM, ph-vi-CHMM"
+    "a system of a paper, which names its engine: hofer2008, minnis2000, xieliu2007, or also, or instead, one of the "
+    "last one's six, ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM, ph-vi-CHMM"
 )
-VISUAL = "geometry (default), eigenlips (default of xieliu2007) or both"
+VISUAL = "geometry (default), eigenlips (default of xieliu2007 and its systems) or both"
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 OTHERS = "also train on transcribed recordings without motion (coupled)"
 
@@ -55,7 +55,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
     add_options(parser, Request, "lexicon")
     parser.add_argument("--engine", help=ENGINE)
-    parser.add_argument("--preset", "--system", metavar="NAME", help=PRESET)
+    parser.add_argument("--preset", "--system", action="append", metavar="NAME", help=PRESET)
     add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
     parser.add_argument("--visual", metavar="KIND", help=VISUAL)
@@ -79,9 +79,10 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.storage.locks import unfinished_work
     from lipmotion.units import Lexicon
 
+    preset = " ".join(options.preset) if options.preset else None
     with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        engine = engine_from_settings(options.engine, preset=options.preset, units=options.units, settings=options.set)
+        engine = engine_from_settings(options.engine, preset=preset, units=options.units, settings=options.set)
         voices = other_voices(
             synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
         )
@@ -91,7 +92,7 @@ def run(options: argparse.Namespace) -> None:
                 selection=Selection(list_or_all(options.split), tuple(options.speaker)),
                 engine=engine,
                 lexicon=lexicon,
-                visual=options.visual or preset_visual(options.preset) or GEOMETRY,
+                visual=options.visual or preset_visual(preset) or GEOMETRY,
                 voices=voices,
                 prior=model_to_start_from(options.start, engine),
                 run=Run(report.receive, work, worker_count(options)),

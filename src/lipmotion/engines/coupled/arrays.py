@@ -207,7 +207,10 @@ def _transitions(arrays: Arrays, structure: Structure) -> Transitions | Factoria
     product = reachable(structure, grammar)
     rows = tuple(check_arrays(own, ROWS, J=len(product.joint_states))["rows"] for own in of_chains)
     for number, row in enumerate(rows):
-        check_index(f"chain_{number}/rows", row, len(advance[number]))
+        blocks = 1 << number if structure.moves_together else 1
+        if len(advance[number]) % blocks:
+            raise ValueError(f"chain_{number}/advance of {len(advance[number])} rows, required a multiple of {blocks}")
+        check_index(f"chain_{number}/rows", row, len(advance[number]) // blocks)
     return Transitions(product, rows, advance)
 
 

@@ -49,6 +49,7 @@ class CoupledConfig(Configuration):
     cross_units : let chains leave a unit at different times
     start_asynchrony, unseen_loss : of factorial chains without a limit: how far apart the chains may be while the first
                  densities are learned, and the nats that rare joint states lose (``chains.structures.Structure``)
+    moves_together : coupled chains may move on in the same frame more often than by chance; the paper's may not
     mixtures, visual_mixtures : Gaussians per state, of the speech stream and of visual streams (powers of two); the
                  structure ``hmm`` uses the first for both
     speech_only_mixtures, speech_only_steps, speech_only_weight : of the second stage of training, on speech without
@@ -95,10 +96,11 @@ class CoupledConfig(Configuration):
     articulation: bool = True
     start_asynchrony: int = option(1, Rule(least=0), omit_default=True)
     unseen_loss: float = option(UNSEEN_LOSS, Rule(least=0), omit_default=True)
+    moves_together: bool = option(default=False, omit_default=True)
     modulation_filter: float = option(0.0, STRENGTH, omit_default=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
-    preset_visual: ClassVar[Mapping[str, str]] = {"xieliu2007": EIGENLIPS}
+    preset_visual: ClassVar[Mapping[str, str]] = dict.fromkeys(PRESETS, EIGENLIPS)
     aliases: ClassVar[Mapping[str, str]] = {
         "crosses": "cross_units",
         "more_mixtures": "speech_only_mixtures",
@@ -117,8 +119,8 @@ class CoupledConfig(Configuration):
     def structure_with(self, chains: tuple[UnitSet, ...]) -> Structure:
         """Return the structure of chains of these unit sets. Raises InputError: as ``Structure``."""
         limit = None if self.asynchrony < 0 else self.asynchrony
-        losses = self.start_asynchrony, self.unseen_loss
-        return Structure(self.structure, chains, self.states, limit, self.cross_units, *losses)
+        others = self.start_asynchrony, self.unseen_loss, self.moves_together
+        return Structure(self.structure, chains, self.states, limit, self.cross_units, *others)
 
     @property
     def dynamic(self) -> bool:

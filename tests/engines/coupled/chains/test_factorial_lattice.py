@@ -6,11 +6,13 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from engines.coupled.training.test_training import sentences
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, UNSEEN_LOSS
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert
 from lipmotion.engines.coupled.training.chain_training import (
+    LEAST_FRAMES,
     MixtureSchedule,
     growing_chains,
     with_joint_state_densities,
@@ -69,6 +71,21 @@ def test_conversion_is_the_same():
     for update in ("exact", "printed"):
         results = [convert(x, data, x.full_lattice, ConversionSettings("soft", update, 3)) for x in (listed, free)]
         np.testing.assert_allclose(results[0].streams[1], results[1].streams[1], rtol=1e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("loss", [0.0, UNSEEN_LOSS])
+def test_densities_integrate_to_1_without_a_loss(loss):
+    """As printed, those of every joint state; with the option, rare ones lose that share, and frequent ones nothing."""
+    of = replace(structure(FACTORIAL, (THREE, TWO), limit=None), unseen_loss=loss)
+    listed = chains(of, sizes=(1, 1))
+    visits = np.where(np.arange(len(listed.transitions.product.joint_states)) < 4, LEAST_FRAMES, LEAST_FRAMES - 1)
+    free = with_joint_state_densities(listed, listed.transitions, visits, of)
+    assert len(free.transitions.own_density_states) == 4
+    grid = np.linspace(-15, 15, 3001, dtype=np.float32)[:, None]
+    logs = free.emission_log_densities(AudioVisualObservations((grid, grid), (None, None)), free.full_lattice)
+    first, second = (np.exp(log.astype(float)).sum(axis=0) * 0.01 for log in logs.log_densities)
+    np.testing.assert_allclose(first[-4:] * second[-4:], 1, rtol=1e-3)
+    np.testing.assert_allclose(np.outer(first[:-4], second[:-4]), np.exp(-loss), rtol=1e-3)
 
 
 def test_counts_are_of_moving_on_and_staying():

@@ -1,16 +1,12 @@
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observations, structure
+from engines.coupled.tiny import KINDS, THREE, TWO, chains, observations, structure
 from lipmotion.engines.coupled.chains.product import Transitions
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.conversion.em_conversion import precision_statistics
 from oracles import coupled as oracle
 
-KINDS = [
-    (COUPLED, (THREE, TWO), 1), (COUPLED, (THREE, TWO), 0), (FACTORIAL, (THREE, TWO), 1),
-    (FACTORIAL, (THREE, TWO), None), (MULTISTREAM, (THREE,), 1), (HMM, (THREE,), 1),
-]  # fmt: skip
 every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 
 
@@ -19,7 +15,7 @@ def made(kind, sets, limit, **other):
 
 
 @every
-@pytest.mark.parametrize("seen", [True, False])
+@pytest.mark.parametrize("seen", [True, False, 0.5])
 def test_posteriors_are_those_of_all_paths(kind, sets, limit, seen):
     model, data = made(kind, sets, limit), observations(seen=seen)
     lattice = model.full_lattice

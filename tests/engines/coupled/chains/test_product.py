@@ -161,15 +161,6 @@ def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
         assert other <= value + 1e-6 * abs(value)
 
 
-def test_without_a_mask_it_is_the_closed_form():
-    transitions = chains(structure(HMM, (THREE,), limit=1)).transitions
-    counts = random_counts(transitions)
-    best = transitions.reestimated(counts)
-    left = np.bincount(transitions.product.arc_from, counts)
-    moved = np.bincount(transitions.product.arc_from, counts * transitions.product.moves[0])
-    np.testing.assert_allclose(best.advance[0][best.rows[0]], moved / left, atol=1e-6)
-
-
 def test_rows_without_data_stay():
     transitions = chains().transitions
     counts = random_counts(transitions)

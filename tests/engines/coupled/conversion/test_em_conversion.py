@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observations, structure
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
+from engines.coupled.tiny import KINDS, TWO, chains, observations, structure
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     PRINTED,
@@ -14,14 +13,12 @@ from lipmotion.engines.coupled.conversion.em_conversion import (
     without_visual_streams,
 )
 from lipmotion.engines.coupled.conversion.mean_regression import (
-    CONSTANT,
     OWN_RIDGE,
     SHARED_RIDGE,
     RegressionUtterance,
     VisualRegression,
     fit_regression_inputs,
     fit_visual_regression,
-    posterior_axes,
     regression_weights,
 )
 from lipmotion.engines.coupled.engine import CoupledEngine
@@ -31,13 +28,6 @@ from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
 from oracles import coupled as oracle
 
-KINDS = [
-    (COUPLED, (THREE, TWO), 1),
-    (FACTORIAL, (THREE, TWO), 1),
-    (FACTORIAL, (THREE, TWO), None),
-    (MULTISTREAM, (THREE,), 1),
-    (HMM, (THREE,), 1),
-]
 every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 
 
@@ -121,15 +111,6 @@ def test_the_printed_update_weighs_by_components_and_partners():
     np.testing.assert_allclose(printed, expected, rtol=1e-3, atol=1e-4)
 
 
-def test_with_one_component_and_one_partner_each_print_and_maximiser_agree():
-    model = chains(structure(MULTISTREAM, (THREE,)), components=(1, 1))
-    data = observations(6)
-    one, other = (
-        convert(model, data, model.full_lattice, ConversionSettings(SOFT, update, 5)) for update in (EXACT, PRINTED)
-    )
-    np.testing.assert_allclose(one.streams[1], other.streams[1], rtol=1e-4, atol=1e-5)
-
-
 def utterances(count=3, frames=60, states=4, seed=0) -> list[RegressionUtterance]:
     draw = np.random.default_rng(seed)
     result = []
@@ -182,19 +163,6 @@ def test_expected_means_and_precisions_are_sums_over_states():
     ]
     np.testing.assert_allclose(regression.means(inputs, posterior), expected, rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(regression.precisions(posterior), posterior @ (1 / regression.variances), rtol=1e-6)
-
-
-def test_regression_inputs_end_with_a_constant_and_have_few_axes():
-    data = utterances(states=4)
-    axes = posterior_axes(one.reduced_posteriors for one in data)
-    assert axes.shape == (4, 4)
-    np.testing.assert_allclose(axes.T @ axes, np.eye(4), atol=1e-5)
-    inputs = fit_regression_inputs(axes, data)
-    z = inputs(data[0].features, data[0].reduced_posteriors)
-    assert len(z) == 60
-    assert (z[:, -1] == CONSTANT).all()
-    rows = np.concatenate([inputs(one.features, one.reduced_posteriors @ axes.T)[:, :-1] for one in data])
-    assert np.abs(rows.mean(axis=0)).max() < 1e-3
 
 
 def test_every_viseme_has_a_regression_for_each_position_of_a_state():

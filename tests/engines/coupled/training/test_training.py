@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
+from lipmotion.engines import engine_from_settings
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, reestimated_group
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
+from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units, uniform_path
@@ -53,21 +55,6 @@ def test_the_likelihood_rises_at_every_step(kind, sets):
     for one, other in pairwise(steps):
         if one.mixtures == other.mixtures:
             assert other.log_likelihood >= one.log_likelihood - 1e-5
-
-
-def test_statistics_of_utterances_are_those_of_all_paths():
-    model = chains()
-    data = [observations(3, seed=1), observations(4, seed=2)]
-    result = e_step(model, [LatticeUtterance(one, model.full_lattice) for one in data], workers=2)
-    joints = [oracle.posteriors(model, one)[0] for one in data]
-    group, statistics = model.groups[0], result.emissions[0]
-    for density in range(group.mixtures.size[0]):
-        first = 0
-        for one, joint in zip(data, joints, strict=True):
-            posterior = joint[:, group.tie == density].sum(axis=1)
-            first = first + posterior @ one.streams[0]
-        np.testing.assert_allclose(statistics.products[0][:, density, :2].sum(axis=0), first, atol=1e-3)
-    assert result.frames == 7
 
 
 def test_densities_are_weighted_means_and_variances():
@@ -180,3 +167,23 @@ def test_every_stream_has_a_chain_and_a_weight_of_its_own():
     generated = CoupledEngine(config).generate(model, data[0].speech).motion
     for name in ("opening", "lips_r_01"):
         assert np.corrcoef(generated[name], data[0].motion[name])[0, 1] > 0.8
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.long] * ("FHMM" in name)) for name in SYSTEMS])
+def test_a_preset_is_the_system_of_the_paper(name):
+    """Table 2: 47 phones, or 13 visemes, of five states; 39 features of speech; eigenlips; streams of equal weight."""
+    data = [with_pictures(number) for number in range(2)]
+    lips = [replace(one, motion=one.motion.selected(["lips_r_01"])) for one in data]
+    chains = engine_from_settings(preset=f"xieliu2007 {name}").fit(lips, silent_monitor).model.chains
+    of, streams = chains.structure, [group.streams for group in chains.groups]
+    visual = {"HMM": [], "MSHMM": []}.get(name[3:], [13 if "-vi-" in name else 47])
+    assert [len(units) for units in of.units] == [47, *visual]
+    assert of.state_counts == tuple(5 * len(units) for units in of.units)
+    assert (chains.streams, streams) == (("speech", "eigenlips"), [(0, 1)] if name == "ph-HMM" else [(0,), (1,)])
+    sizes = [group.mixtures.size for group in chains.groups]
+    assert [size[1:] for size in sizes] == ([(1, 40)] if name == "ph-HMM" else [(1, 39), (1, 1)])
+    assert {weight for group in chains.groups for weight in group.weights} == {1.0}
+    assert isinstance(chains.transitions, FactorialTransitions) == ("FHMM" in name)  # no limit, no coupling
+    if "CHMM" in name:
+        assert np.abs(chains.transitions.product.lead).max() == 1
+        assert len(chains.transitions.advance[1]) != of.state_counts[1]  # depends on the states of both chains

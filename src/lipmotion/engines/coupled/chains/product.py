@@ -282,7 +282,8 @@ class Transitions:
     """The probability that each chain moves on, given the joint state of the frame before.
 
     rows    : for each chain, the row of its table that each joint state uses [each shape=(S,)]
-    advance : for each chain, the probability of moving on in each row of its table [each shape=(R_c,)]
+    advance : for each chain, the probability of moving on in each row of its table [each shape=(R_c,)]; where chains
+              move together, its table has such rows for every combination of the chains before it that move
 
     The weight of an arc is the product of its chains' probabilities of moving on or staying and of the probability of
     the units entered. Its probability is this weight, divided by the sum over the arcs from the same joint state that
@@ -310,7 +311,7 @@ class Transitions:
         """Log probability of every arc [shape=(E,)]."""
         weight = self.product.unit_probability.copy()
         for chain in range(len(self.rows)):
-            advance = self.advance[chain][self.rows[chain]][self.product.arc_from]
+            advance = self.advance[chain][self._arc_rows(chain)]
             weight *= np.where(self.product.moves[chain], advance, 1 - advance)
         total = np.bincount(self.product.arc_from, weight, len(self.product.joint_states))
         return np.log(weight / total[self.product.arc_from])
@@ -321,9 +322,12 @@ class Transitions:
         counts : the expected count of each arc [shape=(E,)]
         Every arc uses one entry of each chain's table. While the other chains' tables are fixed, the likelihood is
         highest where the expected use of each entry equals its count. Iterative scaling does this chain after chain and
-        never lowers the likelihood. Without a mask one sweep is the usual closed form.
+        never lowers the likelihood. Without a mask one sweep is the usual closed form, and so it is where chains move
+        together (the row before counts as one more frame, so that chains that begin in step may fall out of step).
         Source: Darroch & Ratcliff 1972; the M-step of Xie & Liu 2007, Eq. A.16, is exact only without the mask.
         """
+        if self.product.structure.moves_together:
+            return replace(self, advance=tuple(self._counted(chain, counts) for chain in range(len(self.rows))))
         left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joint_states)).astype(float)[
             self.product.arc_from
         ]
@@ -342,21 +346,40 @@ class Transitions:
         """
         rows, advance = [], []
         for chain, own in enumerate(self.rows):
-            key, count = own.copy(), len(self.advance[chain])
+            blocks = self.advance[chain].reshape(self._blocks(chain), -1)
+            key, count = own.copy(), blocks.shape[1]
             rare = frames < LEAST_FRAMES
             parts: Sequence[Index] = [self.product.chain_states[chain], *(self.product.lead - self.product.lead[chain])]
             _, number = np.unique(np.stack(parts), axis=1, return_inverse=True)
             key[rare] = count + np.asarray(number, np.intp).reshape(-1)[rare]
             distinct, first, row = np.unique(key, return_index=True, return_inverse=True)
             rows.append(row.astype(np.intp))
-            advance.append(self.advance[chain][own[first[: len(distinct)]]])
+            advance.append(blocks[:, own[first[: len(distinct)]]].ravel())
         return replace(self, rows=tuple(rows), advance=tuple(advance))
+
+    def _blocks(self, chain: int) -> int:
+        """Return how many combinations of moves of the chains before it a chain's table has rows for."""
+        return 1 << chain if self.product.structure.moves_together else 1
+
+    def _arc_rows(self, chain: int) -> Index:
+        """Return the row of a chain's table that each arc uses [shape=(E,)]."""
+        blocks, rows = self._blocks(chain), self.rows[chain][self.product.arc_from]
+        if blocks == 1:
+            return rows
+        return rows + len(self.advance[chain]) // blocks * ((1 << np.arange(chain)) @ self.product.moves[:chain])
+
+    def _counted(self, chain: int, counts: Array) -> Array:
+        """Return the shares of moving on in a chain's table, from counts of arcs [shape=(E,)]."""
+        rows, old = self._arc_rows(chain), self.advance[chain]
+        moved = np.bincount(rows, counts * self.product.moves[chain], len(old))
+        share = (moved + old) / (np.bincount(rows, counts, len(old)) + 1)
+        return np.clip(share, LEAST_ADVANCE, 1 - LEAST_ADVANCE)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
         """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs
         [shape=(E,)].
         """
-        row, moves = self.rows[chain][self.product.arc_from], self.product.moves[chain]
+        row, moves = self._arc_rows(chain), self.product.moves[chain]
         size = len(self.advance[chain])
         entries = []
         for moved, present in ((True, self.advance[chain]), (False, 1 - self.advance[chain])):
@@ -379,4 +402,10 @@ def initial_transitions(product: Product) -> Transitions:
     own = np.arange(len(product.joint_states))
     rows = [own if coupled else states for states in product.chain_states]
     counts = [len(own) if coupled else count for count in product.structure.state_counts]
-    return Transitions(product, tuple(rows), tuple(np.full(count, INITIAL_ADVANCE) for count in counts))
+    advance = [np.full(count, INITIAL_ADVANCE) for count in counts]
+    if product.structure.moves_together:
+        for chain, count in enumerate(counts[1:], start=1):
+            share = np.full((1 << chain, count), INITIAL_ADVANCE)
+            share[0], share[-1] = INITIAL_ADVANCE / 4, 1 - INITIAL_ADVANCE
+            advance[chain] = share.ravel()
+    return Transitions(product, tuple(rows), tuple(advance))

@@ -29,17 +29,19 @@ AS_PRINTED: dict[str, Any] = {
 the best path, and nothing done to them afterwards (§4.1, §7.1). Ours, as the print gives no number: one Gaussian a
 state, five steps of EM ("a very few").
 """
+FREE: dict[str, Any] = {"asynchrony": -1, "unseen_loss": 0.0, "start_asynchrony": 4}
+"""Factorial chains that nothing ties together: every density integrates to 1, and they may be apart from the start."""
 SYSTEMS: dict[str, dict[str, Any]] = {
     "ph-HMM": AS_PRINTED | {"structure": HMM, "chains": "phone"},
     "ph-MSHMM": AS_PRINTED | {"structure": MULTISTREAM, "chains": "phone"},
-    "ph-FHMM": AS_PRINTED | {"structure": FACTORIAL, "chains": "phone phone", "asynchrony": -1},
-    "ph-vi-FHMM": AS_PRINTED | {"structure": FACTORIAL, "chains": "phone viseme", "asynchrony": -1},
+    "ph-FHMM": AS_PRINTED | FREE | {"structure": FACTORIAL, "chains": "phone phone"},
+    "ph-vi-FHMM": AS_PRINTED | FREE | {"structure": FACTORIAL, "chains": "phone viseme"},
     "ph-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone phone"},
     "ph-vi-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone viseme"},
 }
 """Options of the coupled engine for each system. Source: Xie & Liu 2007, Table 2."""
-PRESETS: dict[str, dict[str, Any]] = SYSTEMS | {"xieliu2007": SYSTEMS["ph-vi-CHMM"]}
-"""The systems by name, and the one that the paper proposes (docs/papers/xieliu2007.md)."""
+PRESETS: dict[str, dict[str, Any]] = SYSTEMS | {"xieliu2007": AS_PRINTED}
+"""The systems by name, and what they share: alone it is the one that the paper proposes, ph-vi-CHMM."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,9 @@ class Structure:
     start_limit : without a limit, the one that holds while the first densities are learned (Viterbi training)
     unseen_loss : without a limit, what the log density of a joint state without a density of its own loses, nats; 0:
                   all densities integrate to 1, and nothing but the shared densities holds the chains together
+    moves_together : of coupled chains: whether the chance that a chain moves on depends also on which chains before it
+                  move in the same frame. In Eq. 2 it depends on the joint state before alone, so that chains in step
+                  must fall out of step, for a frame at least, nearly wherever one moves
     Source: Xie & Liu 2007, Fig. 3 and Eqs. 17–19.
     Raises InputError: an unknown kind, or a number of chains or limit that does not fit it.
     """
@@ -68,12 +73,15 @@ class Structure:
     cross_units: bool = True
     start_limit: int = 1
     unseen_loss: float = UNSEEN_LOSS
+    moves_together: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in STRUCTURES:
             raise InputError(f"structure is {self.kind!r}, required one of: {', '.join(STRUCTURES)}")
         if (self.kind in (HMM, MULTISTREAM)) != (len(self.chains) == 1):
             raise InputError(f"structure {self.kind} with {len(self.chains)} chains; hmm and multistream have one")
+        if self.moves_together and self.kind != COUPLED:
+            raise InputError(f"moves_together with the structure {self.kind}; required {COUPLED}")
         if self.limit is not None and not 0 <= self.limit < self.states:
             raise InputError(
                 f"asynchrony is {self.limit} states, required 0 to {self.states - 1} (fewer than a unit has), or -1"
