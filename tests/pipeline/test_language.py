@@ -11,10 +11,11 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis import language
 from lipmotion.pipeline.analysis.language import detect_english, resolve_language, warn_of_another_language
 from lipmotion.pipeline.analysis.read_request import read_request
+from lipmotion.pipeline.generation import MAPPED_CONFIDENCE
 from lipmotion.pipeline.request import as_request
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.espeak import MAPPED_CONFIDENCE, LanguageLexicon
+from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
 from lipmotion.units import Lexicon
 

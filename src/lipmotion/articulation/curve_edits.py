@@ -15,7 +15,8 @@ from lipmotion.articulation.phone_targets import SAID, with_gestures
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
-from lipmotion.types import WEIGHT, CurveEdit, DrawnCurve, Gain, Generation, Hold, Motion, Pin, Timeline, Unit, frame_of
+from lipmotion.motion.generation import bend_through_pins, find_pinned_frame
+from lipmotion.types import WEIGHT, CurveEdit, DrawnCurve, Gain, Generation, Hold, Motion, Pin, Timeline, Unit
 from lipmotion.types.edits import Locked
 
 Curve = NDArray[np.float64]
@@ -92,29 +93,6 @@ def check_drawn(edit: DrawnCurve, *, is_weight: bool) -> None:
     if is_weight and not 0 <= min(edit.values) <= max(edit.values) <= 1:
         drawn = f"{min(edit.values):g} and {max(edit.values):g}"
         raise InputError(f"{edit.channel} is drawn between {drawn}, required 0 to 1")
-
-
-def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], reach: int) -> None:
-    """Bend curves [shape=(T, P)] through pins (frame, column, value), within ``reach`` frames; all hold exactly."""
-    for frame, column, value in pins:
-        if abs(lacking := value - values[frame, column]) > 1e-9:
-            first, stop = max(frame - reach, 0), min(frame + reach + 1, len(values))
-            distance = np.abs(np.arange(first, stop) - frame) / (reach + 1)
-            values[first:stop, column] += lacking * (1 + np.cos(np.pi * distance)) / 2
-    for frame, column, value in pins:
-        values[frame, column] = value
-
-
-def find_pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
-    """Return the frame of a pin in motion. Raises InputError: a time outside of it, or a value that is not possible."""
-    if not np.isfinite(pin.value) or (is_weight and not 0 <= pin.value <= 1):
-        required = "0 to 1" if is_weight else "a finite number"
-        raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required {required}")
-    frame = frame_of(pin.time_s, len(motion.values), motion.rate_hz)
-    if frame is None:
-        last_s = (len(motion.values) - 1) / motion.rate_hz
-        raise InputError(f"pin at {pin.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
-    return frame
 
 
 def apply_gain(generation: Generation, gain: Gain) -> Generation:

@@ -11,25 +11,21 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.curve_edits import bend_through_pins, find_pinned_frame
 from lipmotion.articulation.lip_points import make_symmetrical
 from lipmotion.articulation.rest import rest_in_pauses
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
-from lipmotion.motion.generation import BLOCK_FRAMES, DOUBLE_FRAMES
+from lipmotion.motion.generation import BLOCK_FRAMES, DOUBLE_FRAMES, bend_through_pins, find_pinned_frame
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, measure_restfulness, weigh_visemes
 from lipmotion.pipeline.analysis.language import weigh_words
 from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
-from lipmotion.pipeline.analysis.transcribe import is_other_language
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
-from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB, joined_units, placed_units
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
-from lipmotion.speech.voices.espeak import MAPPED_CONFIDENCE
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChannelValue,
@@ -59,6 +55,10 @@ TRANSCRIPT = "the words that are spoken (--transcript)"
 OWN_MODEL = "recordings of this person (lipmotion adapt for the sound alone, lipmotion train with video)"
 WHOLE_TRANSCRIPT = "a transcript of all that is said, and of nothing else"
 LESS_NOISE = "a recording with less noise"
+MAPPED_CONFIDENCE = 0.8
+"""Most confidence in words of another language: their phones are the nearest ones of English, on which models are
+trained. 0.80 of the phones of espeak-ng's sentences in nine languages are phones of English as well
+(docs/results/languages.md)."""
 RAMP_FRAMES = 12
 """Frames beside a passage in which the mouth comes from rest, or goes there; within it, where another one is near."""
 NOWHERE_S = 1e6
@@ -235,7 +235,7 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     recognition, speech, fit = analysis.recognition, analysis.speech, analysis.fit
     similarity = recognition.similarity if recognition is not None else None
     needs = (  # the most helpful first: before all else the words, where they are not sure
-        (WHOLE_TRANSCRIPT, fit is not None and fit.share < LEAST_FITTING_SHARE),
+        (WHOLE_TRANSCRIPT, fit is not None and fit.is_partial),
         (TRANSCRIPT, recognition is not None and weigh_words(recognition) < SURE_CONFIDENCE),
         (LESS_NOISE, analysis.range_db < NOISY_DB),
         (OWN_MODEL, recognition is not None and (similarity is None or similarity < FULL_WEIGHT_SCORE)),
@@ -253,6 +253,8 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
     if words == "transcript" and request.language != ENGLISH:
         known = MAPPED_CONFIDENCE
     elif words == "transcript":
+        from lipmotion.pipeline.analysis.transcribe import is_other_language
+
         lexicon, labels = read_lexicon(request), [span.label for span in group_words(speech.units) if span.label]
         known = sum(map(lexicon.known, labels)) / len(labels) if is_other_language(labels, lexicon) else 1.0
     if known < 1:

@@ -13,18 +13,8 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from threading import RLock
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from lipmotion.articulation.curve_edits import (
-    MotionStretch,
-    apply_curve_edits,
-    apply_gain,
-    apply_stretch,
-    cut_locked_stretch,
-    hold_mouth,
-    mark_edited,
-)
-from lipmotion.articulation.phone_targets import GESTURES, SAID, with_gestures
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.kernels.compiler import numba_works, one_thread
 from lipmotion.motion.speaker_maps import SpeakerMap
@@ -77,6 +67,9 @@ from lipmotion.types import (
 )
 from lipmotion.types.edits import Locked
 from lipmotion.units import Pronunciation, group_words, split_words
+
+if TYPE_CHECKING:
+    from lipmotion.articulation.curve_edits import MotionStretch
 
 ResultT = TypeVar("ResultT")
 
@@ -310,9 +303,13 @@ class Session:
         self._edited_units(steps)  # refuses phones that change what is locked
         generation = self._with_curves(tuple(step for step in steps if not isinstance(step, LockStep | UnlockStep)))
         locks = find_locks(steps)
-        if locks:  # what phones beside a lock ask must not reach into it
-            said = with_gestures(generation.motion, generation.units, SAID)
-            generation = generation.with_motion(said)
+        if not locks:
+            return generation
+        from lipmotion.articulation.curve_edits import apply_stretch
+        from lipmotion.articulation.phone_targets import SAID, with_gestures
+
+        said = with_gestures(generation.motion, generation.units, SAID)
+        generation = generation.with_motion(said)  # what phones beside a lock ask must not reach into it
         for place, lock in locks.items():
             for later in steps[place + 1 :]:
                 if isinstance(later, CurveStep) and lock.holds(later.edit):
@@ -327,6 +324,8 @@ class Session:
 
     def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
         """Return what a lock keeps: the motion after the edits before it, with the channels of these names."""
+        from lipmotion.articulation.curve_edits import cut_locked_stretch
+        from lipmotion.articulation.phone_targets import with_gestures
 
         def cut() -> MotionStretch:
             generation = self._after(before)
@@ -342,6 +341,11 @@ class Session:
         """Return the motion after some edits without locks: the engine's, then gains and what bends single curves."""
         edits = [step.edit for step in steps if isinstance(step, CurveStep)]
         phone_steps = tuple(step for step in steps if isinstance(step, PhoneStep | WordStep))
+        if not edits:
+            return self._with_pins(phone_steps, ())
+        from lipmotion.articulation.curve_edits import apply_curve_edits, apply_gain, hold_mouth, mark_edited
+        from lipmotion.articulation.phone_targets import GESTURES, with_gestures
+        from lipmotion.pipeline.outputs.curve_sets import check_edit
 
         def is_modelled(channel: str) -> bool:
             if channel in MODELLED:
@@ -362,11 +366,8 @@ class Session:
         if gestures := [edit.channel for edit in curves if edit.channel in GESTURES]:
             generation = generation.with_motion(with_gestures(generation.motion, generation.units, gestures))
         motion = mark_edited(apply_curve_edits(generation.motion, generation.units, curves), [*modelled, *curves])
-        if edits:
-            from lipmotion.pipeline.outputs.curve_sets import check_edit  # it loads characters
-
-            for edit in edits:
-                check_edit(edit, motion, self._curves)
+        for edit in edits:
+            check_edit(edit, motion, self._curves)
         others = tuple(e for e in edits if isinstance(e, Hold) or (e in curves and e.channel not in motion.names))
         return replace(generation.with_motion(motion), curve_edits=others)
 

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, TrajectoryConfig, fit_trajectory
+from lipmotion.engines.trajectory.config import TrajectoryConfig
+from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, fit_trajectory
 from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, label_full_context
 from lipmotion.stats.trees import Question, Tree, fit_regression_node, fit_tree_regressions, ridge, zero_statistics

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
+from lipmotion.engines.trajectory.config import TrajectoryConfig
 from lipmotion.engines.trajectory.model import Experts, TrajectoryModel, model_arrays, model_from_arrays
-from lipmotion.engines.trajectory.trajectory_training import TrajectoryConfig, fit_trajectory
 from lipmotion.motion.frame_labels import label_full_context, with_unit_names
 from lipmotion.motion.general_motion import hear_articulators
 from lipmotion.motion.predictors import count_conditions
@@ -52,6 +52,8 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Fit[TrajectoryModel]:
+        from lipmotion.engines.trajectory.trajectory_training import fit_trajectory  # who animates does not train
+
         model = fit_trajectory(examples, self.config, monitor, checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
         uses_prior = model.network is not None and model.network.uses_prior

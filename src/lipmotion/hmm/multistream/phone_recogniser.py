@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.densities import SPEECH, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
 from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
 from lipmotion.storage.archive import Checkpoint
@@ -74,13 +73,16 @@ def fit_phone_recogniser(
         return None
     arrays = checkpoint.load(_CHECKPOINT)
     if arrays is None:
-        hmm = train_joint(
-            [_training_utterance(example, x) for example, x in zip(examples, values, strict=True)],
-            Inventory(PHONES.units, PHONES.silence, CONFIG.states),
-            PHONES.classes(),
-            CONFIG,
-            monitor,
-        )
+        from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
+
+        utterances = []
+        for example, x in zip(examples, values, strict=True):
+            speech = example.speech
+            observed = stream_observations(np.asarray(speech.features.values), speech.log_f0, x, example.valid)
+            units, bounds = units_to_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
+            utterances.append(TrainingUtterance(observed, units, bounds))
+        inventory = Inventory(PHONES.units, PHONES.silence, CONFIG.states)
+        hmm = train_joint(utterances, inventory, PHONES.classes(), CONFIG, monitor)
         arrays = joint_to_arrays(hmm, np.float32)
         checkpoint.save(_CHECKPOINT, arrays)
     hmm = joint_from_arrays(arrays, CONFIG)
@@ -110,13 +112,6 @@ def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
 
 def _observations(speech: Speech) -> StreamObservations:
     return stream_observations(np.asarray(speech.features.values), speech.log_f0)
-
-
-def _training_utterance(example: Example, values: NDArray[np.float64]) -> TrainingUtterance:
-    speech = example.speech
-    observations = stream_observations(np.asarray(speech.features.values), speech.log_f0, values, example.valid)
-    units, bounds = units_to_frames(speech.units, observations.frames, PHONES.silence[0], PHONES.unit_of)
-    return TrainingUtterance(observations, units, bounds)
 
 
 def _similarity_score(hmm: JointHmm, observations: StreamObservations) -> float:

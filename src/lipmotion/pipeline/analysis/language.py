@@ -23,7 +23,6 @@ from lipmotion.speech.recognition.network.posteriors import (
 )
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, cached_recogniser
-from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
@@ -59,6 +58,8 @@ def resolve_language(request: Request) -> Request:
     language = request.language if request.language != AUTO else _detect_language(request, transcript)
     if language in (ENGLISH, AUTO):
         return replace(request, language=language)
+    from lipmotion.speech.voices.espeak import LanguageLexicon
+
     lexicon = LanguageLexicon(read_lexicon(request).user, language)
     if transcript is not None and request.units is None:
         transcript = transcript.with_words(

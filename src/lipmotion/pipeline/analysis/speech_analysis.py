@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -18,13 +18,6 @@ from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.analysis.language import warn_of_another_language
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request
-from lipmotion.pipeline.analysis.transcribe import (
-    compute_phone_posteriors,
-    format_places,
-    transcribe,
-    warn_of_guesses,
-    warn_of_label_misfit,
-)
 from lipmotion.pipeline.model import Model, with_prior
 from lipmotion.pipeline.request import DETECTED, Request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
@@ -32,7 +25,6 @@ from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.features.speaker_similarity import voice_knowledge
 from lipmotion.speech.features.voice_events import silence_phones, voice_events
-from lipmotion.speech.recognition.agreement import TranscriptFit, label_fit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.beam_search import english_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
@@ -50,7 +42,6 @@ from lipmotion.speech.recognition.recogniser import (
     cached_recogniser,
     network_of,
 )
-from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
@@ -78,6 +69,9 @@ from lipmotion.types.languages import ENGLISH
 from lipmotion.units import SILENCE, UNKNOWN_PHONES, check_phones, check_text, close_gaps, is_silent
 from lipmotion.units.mood_tags import parse_tagged_text
 from lipmotion.units.text_normalisation import require_tokens
+
+if TYPE_CHECKING:
+    from lipmotion.speech.recognition.agreement import TranscriptFit
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
@@ -160,6 +154,8 @@ def analyse_speech(
     if analysis.is_without_speech and not analysis.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     elif tones:
+        from lipmotion.pipeline.analysis.transcribe import format_places
+
         LOG.warning("a steady tone covers what is said at %s: the mouth rests there", format_places(tones))
     if recognition is not None and request.language == ENGLISH:
         warn_of_another_language(recognition)
@@ -219,6 +215,8 @@ def align_between(
     pauses : whether silence before and after the words stays; else the first and the last phone take its time
     Raises AlignmentError: the words do not fit in there.
     """
+    from lipmotion.pipeline.analysis.transcribe import warn_of_guesses
+
     first, stop = (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s))
     lexicon, words = read_lexicon(request), require_tokens(text)
     warn_of_guesses(words, lexicon)
@@ -286,6 +284,8 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
     if words is None and request.recogniser in INSTALLED_RECOGNISERS:
         words = recognise_words(audio, request.recogniser)
     if words is not None:
+        from lipmotion.pipeline.analysis.transcribe import transcribe
+
         lexicon = read_lexicon(request)
         aligned, fit = transcribe(phones, audio, audio.mfcc(), words, lexicon, lambda: recognised().units)
         if aligned is not None:
@@ -434,6 +434,10 @@ def _follow_units(
     Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
     else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
     """
+    from lipmotion.pipeline.analysis.transcribe import compute_phone_posteriors, format_places, warn_of_label_misfit
+    from lipmotion.speech.recognition.agreement import label_fit
+    from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
+
     given = cast("Timeline[Unit]", request.units)  # of ``read_request``
     _check_units(given, audio.duration_s)
     spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import EDITED, GAP, gap_to_opening, read_edited, read_gap
-from lipmotion.articulation.curve_edits import apply_curve_edits, check_drawn, edited_share, find_pinned_frame
+from lipmotion.articulation.curve_edits import apply_curve_edits, check_drawn, edited_share
 from lipmotion.articulation.expression import is_mood, read_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
@@ -30,6 +30,7 @@ from lipmotion.meshes.fitting.shape_weights import (
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, read_rig_table
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, arkit_name
+from lipmotion.motion.generation import find_pinned_frame
 from lipmotion.pipeline.analysis.speech_analysis import LATE_S
 from lipmotion.types import (
     WEIGHT,

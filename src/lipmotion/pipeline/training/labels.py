@@ -24,7 +24,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.printable import printable
-from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE, transcript_fit
+from lipmotion.speech.recognition.agreement import transcript_fit
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.sources import sha256_of
@@ -51,13 +51,13 @@ def warn_of_doubtful_transcripts(
         for utterance, units in labelled:
             if utterance.phones is None and utterance.words:
                 fit, count = transcript_fit(utterance.audio, units), count + 1
-                if realigned is not None and (fit.is_doubtful or fit.share < LEAST_FITTING_SHARE):
+                if realigned is not None and fit.is_partial:
                     with suppress(AlignmentError):
                         other = transcript_fit(utterance.audio, realigned(utterance))
                         fit = max(fit, other, key=lambda each: (not each.is_doubtful, each.share))
                 if fit.is_doubtful:
                     wrong.append(utterance.name)
-                elif fit.share < LEAST_FITTING_SHARE:
+                elif fit.is_partial:
                     short.append(utterance.name)
     except MissingDependencyError:
         return

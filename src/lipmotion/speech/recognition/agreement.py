@@ -81,6 +81,11 @@ class TranscriptFit:
         doubted_s = self.missing_s + sum(end_s - start_s for start_s, end_s in (*self.idle, *self.wrong))
         return 1.0 - min(doubted_s / max(self.speech_s, 1e-9), 1.0)
 
+    @property
+    def is_partial(self) -> bool:
+        """Whether the transcript fits so little of the speech that this is worth a remark."""
+        return self.share < LEAST_FITTING_SHARE
+
     def of_frames(self, count: int) -> NDArray[np.float64]:
         """Return in which frames the transcript fits: 1; 0 where it does not [shape=(count,)]."""
         fits = np.full(count, 0.0 if self.is_doubtful else 1.0)

@@ -214,12 +214,6 @@ def _answer(printed: str) -> Any:
 ESPEAK_NG = Synthesiser("espeak-ng", PACKAGE, _voices, _synthesise, ESPEAK_PHONES, _others, EXTRA)
 
 
-MAPPED_CONFIDENCE = 0.8
-"""Most confidence in words of another language: their phones are the nearest ones of English, on which models are
-trained. 0.80 of the phones of espeak-ng's sentences in nine languages are phones of English as well
-(docs/results/languages.md)."""
-
-
 @dataclass(frozen=True)
 class LanguageLexicon(Lexicon):
     """Pronunciations of the words of a language that is not English: the user's, then those of espeak-ng.
