@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.engines.trajectory.model import TrajectoryConfig
+from lipmotion.engines.trajectory.config import TrajectoryConfig
 from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, fit_trajectory
 from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, label_full_context

@@ -1,4 +1,4 @@
-"""The options of the trajectory engine, and its training: decision trees, emission densities, variance scaling."""
+"""The training of the trajectory engine: decision trees, emission densities, variance scaling."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.trajectory.config import TrajectoryConfig
 from lipmotion.engines.trajectory.model import (
     NETWORK_SHARE,
     AcousticRegression,
     Emission,
     Experts,
-    TrajectoryConfig,
     TrajectoryModel,
     add_acoustic_regression,
 )
@@ -25,7 +25,12 @@ from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, label_full_context
 from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import Predictor, PredictorTraining, choose_predictor, split_folds
+from lipmotion.motion.predictors import (
+    Predictor,
+    PredictorTraining,
+    choose_predictor,
+    split_folds,
+)
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
