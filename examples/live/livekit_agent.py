@@ -15,8 +15,8 @@ from livekit import rtc
 from livekit.agents import Agent, AgentSession, JobContext, WorkerOptions, cli
 from livekit.agents.voice.avatar import AudioSegmentEnd, AvatarRunner, QueueAudioOutput
 
+from lipmotion.live.livekit import LipSync
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion_agents.livekit import LipSyncOutput
 from lipmotion_agents.livekit_video import AvatarVideo
 
 SPEECH = Path(__file__).parent.parent / "welcome.flac"
@@ -35,7 +35,7 @@ async def talk(ctx: JobContext):
     """Greet in a room; motion goes to all in it."""
     session = AgentSession()
     await session.start(Agent(instructions="Greet."), room=ctx.room)
-    session.output.audio = LipSyncOutput(session.output.audio, room=ctx.room)
+    session.output.audio = LipSync(session.output.audio, room=ctx.room)
     await session.say("Welcome.", audio=recording())
 
 
@@ -66,7 +66,7 @@ async def talk_offline():
     session, sink = AgentSession(), QueueAudioOutput(sample_rate=16_000)
     playing = asyncio.create_task(play())
     await session.start(Agent(instructions="Greet."))
-    session.output.audio = LipSyncOutput(sink, on_frames=show)
+    session.output.audio = LipSync(sink, on_frames=show)
     await session.say("Welcome.", audio=recording())
     playing.cancel()
     await session.aclose()

@@ -1,7 +1,7 @@
 """A Pipecat bot whose face moves. It runs as it is, offline: python examples/live/pipecat_agent.py
 
 ``Recording`` stands where your text-to-speech service stands, and ``Console`` where your transport does: replace both,
-and put what answers (speech-to-text, a language model) before them. ``LipSyncProcessor()`` stays as it is.
+and put what answers (speech-to-text, a language model) before them. ``LipSync()`` stays as it is.
 """
 
 import asyncio
@@ -15,8 +15,8 @@ from pipecat.transports.base_output import BaseOutputTransport
 from pipecat.transports.base_transport import TransportParams
 from pipecat.workers.runner import WorkerRunner
 
+from lipmotion.live.pipecat import LipSync
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion_agents.pipecat import LipSyncProcessor
 
 SPEECH = Path(__file__).parent.parent / "welcome.flac"
 
@@ -60,7 +60,7 @@ class Console(BaseOutputTransport):
 async def main():
     """Say a sentence."""
     console = Console(TransportParams(audio_out_enabled=True, audio_out_sample_rate=16_000))
-    worker = PipelineWorker(Pipeline([Recording(), LipSyncProcessor(), console]))
+    worker = PipelineWorker(Pipeline([Recording(), LipSync(), console]))
     await worker.queue_frames([TTSSpeakFrame("Welcome."), EndFrame()])
     runner = WorkerRunner()
     await runner.add_workers(worker)

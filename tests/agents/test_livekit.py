@@ -1,4 +1,4 @@
-"""``LipSyncOutput`` around the audio output of LiveKit agents: sound is unchanged, motion is sent in time with it."""
+"""``LipSync`` around the audio output of LiveKit agents: sound is unchanged, motion is sent in time with it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from livekit.agents.voice.io import AudioOutput, AudioOutputCapabilities, TimedS
 from agents import CLOSED_S, MAMA_S, Client, make_vowel, read_speech, run
 from lipmotion import LiveFrame
 from lipmotion.errors import InputError
-from lipmotion_agents.livekit import LipSyncOutput
+from lipmotion.live.livekit import LipSync
 
 
 def frames_of(sound: np.ndarray, sizes: list[int], rate_hz: int = 16_000) -> list[rtc.AudioFrame]:
@@ -117,7 +117,7 @@ def bytes_of(frames: list[rtc.AudioFrame]) -> bytes:
 def test_sound_is_unchanged_and_motion_is_in_time(rate_hz: int, channels: int, sizes: list[int]) -> None:
     async def work() -> None:
         viewer, sink = Viewer(), Loudspeaker()
-        lips = LipSyncOutput(sink, on_frames=viewer.take)
+        lips = LipSync(sink, on_frames=viewer.take)
         speech = read_speech(rate_hz, channels)
         spoken = frames_of(speech[: 2 * rate_hz + 77], sizes, rate_hz), frames_of(speech[:rate_hz], sizes, rate_hz)
         for utterance in spoken:
@@ -150,7 +150,7 @@ def test_motion_goes_to_the_room() -> None:
             assert topic == "lipmotion"
             packets.append(json.loads(payload))
 
-        lips = LipSyncOutput(
+        lips = LipSync(
             Loudspeaker(), room=SimpleNamespace(local_participant=SimpleNamespace(publish_data=publish_data))
         )  # type: ignore[arg-type]
         for frame in frames_of(read_speech()[:16_000], [3_200]):
@@ -164,7 +164,7 @@ def test_motion_goes_to_the_room() -> None:
 
     run(work())
     with pytest.raises(InputError, match="where should motion go"):
-        LipSyncOutput(Loudspeaker())
+        LipSync(Loudspeaker())
 
 
 def test_words_that_come_with_their_times_are_said() -> None:
@@ -172,7 +172,7 @@ def test_words_that_come_with_their_times_are_said() -> None:
         words = [TimedString("mama ", start_time=MAMA_S[0]), TimedString("oh", start_time=MAMA_S[1], end_time=1.4)]
         for given in ([], words):
             viewer = Viewer()
-            lips = LipSyncOutput(Loudspeaker(), on_frames=viewer.take)
+            lips = LipSync(Loudspeaker(), on_frames=viewer.take)
             frames = frames_of(make_vowel(1.6), [4_000])
             frames[0].userdata[USERDATA_TIMED_TRANSCRIPT] = given
             for frame in frames:
@@ -190,7 +190,7 @@ def test_an_output_that_does_not_tell_when_it_is_heard_is_named(caplog: pytest.L
     async def work() -> None:
         sink = Loudspeaker()
         sink.on_playback_started = lambda **_: None  # type: ignore[method-assign]
-        lips = LipSyncOutput(sink, on_frames=lambda *_: None)
+        lips = LipSync(sink, on_frames=lambda *_: None)
         for frame in frames_of(read_speech()[:16_000], [1_600]):
             await lips.capture_frame(frame)
         lips.flush()
@@ -203,7 +203,7 @@ def test_an_output_that_does_not_tell_when_it_is_heard_is_named(caplog: pytest.L
 def test_a_pause_rests_and_goes_on() -> None:
     async def work() -> None:
         viewer, sink = Viewer(), Loudspeaker()
-        lips = LipSyncOutput(sink, on_frames=viewer.take)
+        lips = LipSync(sink, on_frames=viewer.take)
         for frame in frames_of(read_speech()[:48_000], [1_600]):
             await lips.capture_frame(frame)
         lips.flush()
@@ -226,7 +226,7 @@ def test_a_pause_rests_and_goes_on() -> None:
 def test_random_pieces_and_interruptions(seed: int) -> None:
     async def work() -> None:
         rng, speech, viewer, sink = np.random.default_rng(seed), read_speech(), Viewer(), Loudspeaker()
-        lips = LipSyncOutput(sink, on_frames=viewer.take)
+        lips = LipSync(sink, on_frames=viewer.take)
         clock = asyncio.get_running_loop()
         for _ in range(10):
             start = int(rng.integers(len(speech) - 8_000))
@@ -266,7 +266,7 @@ def test_a_session_speaks_with_it_and_is_interrupted() -> None:
         viewer, sink = Viewer(), Loudspeaker()
         session: AgentSession[None] = AgentSession()
         await session.start(Agent(instructions="Speak."))
-        session.output.audio = LipSyncOutput(sink, on_frames=viewer.take)
+        session.output.audio = LipSync(sink, on_frames=viewer.take)
 
         async def speech() -> AsyncIterator[rtc.AudioFrame]:
             for frame in frames_of(read_speech()[:48_000], [3_200]):

@@ -1,4 +1,4 @@
-"""``LipSyncProcessor`` in Pipecat pipelines: sound is unchanged, motion comes before it, interruptions rest."""
+"""``LipSync`` in Pipecat pipelines: sound is unchanged, motion comes before it, interruptions rest."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from pipecat.transports.base_transport import TransportParams
 
 from agents import CLOSED_S, MAMA_S, Client, make_vowel, read_speech, run
 from lipmotion import LiveFrame
-from lipmotion_agents.pipecat import LipSyncProcessor
+from lipmotion.live.pipecat import LipSync
 
 
 def cut(sound: np.ndarray, sizes: list[int], rate_hz: int, context: str) -> list[Frame]:
@@ -102,7 +102,7 @@ def test_sound_is_unchanged_and_its_motion_comes_before_it(rate_hz: int, channel
         sent = cut(speech[: 2 * rate_hz + 77], sizes, rate_hz, "first")
         sent.insert(3, TextFrame("hello"))
         sent += cut(speech[rate_hz : 2 * rate_hz], sizes, rate_hz, "second")
-        down, _ = await run_test(LipSyncProcessor(), frames_to_send=sent)
+        down, _ = await run_test(LipSync(), frames_to_send=sent)
         passed = [frame for frame in down if not isinstance(frame, OutputTransportMessageFrame)]
         assert [id(frame) for frame in passed] == [id(frame) for frame in sent]
         check_conversation(list(down))
@@ -124,7 +124,7 @@ def test_words_that_come_with_their_times_are_said() -> None:
             words.append(TTSTextFrame(text, "word", context_id="a"))
             words[-1].pts = round(1e6 + start_s * 1e9)
         for given in ([], words):
-            down, _ = await run_test(LipSyncProcessor(), frames_to_send=[*given, *sent])
+            down, _ = await run_test(LipSync(), frames_to_send=[*given, *sent])
             motion = motion_of([frame for frame in down if isinstance(frame, OutputTransportMessageFrame)])
             closed = {round(frame["time_s"], 2): frame["weights"].get("viseme_PP", 0) > 0.8 for frame in motion}
             assert [closed[time_s] for time_s in CLOSED_S] == [bool(given)] * 2
@@ -140,7 +140,7 @@ def test_a_callback_takes_frames_instead_of_the_client() -> None:
             taken.extend((frame, now and not number) for number, frame in enumerate(frames))
 
         sent = cut(read_speech()[:16_000], [4_000], 16_000, "a")
-        down, _ = await run_test(LipSyncProcessor(on_frames=take), frames_to_send=sent)
+        down, _ = await run_test(LipSync(on_frames=take), frames_to_send=sent)
         assert list(down) == sent
         assert [frame.number for frame, _ in taken] == list(range(55))  # 100 ms of rest follow
         assert [number for number, (_, now) in enumerate(taken) if now] == [0]
@@ -162,7 +162,7 @@ def test_sound_waits_no_longer_than_the_look_ahead_where_a_service_stops_without
         def take(frames: list[LiveFrame], now: bool) -> None:  # noqa: ARG001
             taken.extend(frames)
 
-        down, _ = await run_test(LipSyncProcessor(on_frames=take), frames_to_send=service())  # type: ignore[arg-type]
+        down, _ = await run_test(LipSync(on_frames=take), frames_to_send=service())  # type: ignore[arg-type]
         assert list(down[:-1]) == sent
 
     run(work())
@@ -171,7 +171,7 @@ def test_sound_waits_no_longer_than_the_look_ahead_where_a_service_stops_without
 @pytest.mark.parametrize("seed", range(10))
 def test_random_pieces_and_interruptions(seed: int) -> None:
     async def work() -> None:
-        rng, speech, lips = np.random.default_rng(seed), read_speech(), LipSyncProcessor()
+        rng, speech, lips = np.random.default_rng(seed), read_speech(), LipSync()
         sent: list[Frame] = []
         for number in range(10):
             start = int(rng.integers(len(speech) - 8_000))
@@ -224,7 +224,7 @@ def test_a_transport_sends_motion_before_its_sound_and_drops_it_when_interrupted
             yield SleepFrame(sleep=1.0)
             yield from sent
 
-        await run_test(Pipeline([LipSyncProcessor(), transport]), frames_to_send=conversation())  # type: ignore[arg-type]
+        await run_test(Pipeline([LipSync(), transport]), frames_to_send=conversation())  # type: ignore[arg-type]
         client, heard_s, rested = Client(), 0.0, False
         for number, frame in enumerate(transport.sent):
             if not isinstance(frame, OutputTransportMessageFrame):
