@@ -47,7 +47,7 @@ _ACC, _COUNTS = "table1/acc", "table1/gaussians"
 
 
 @dataclass(frozen=True)
-class Table1Options:
+class PhoneticTableOptions:
     """What is trained.
 
     states   : numbers of states a unit
@@ -61,7 +61,7 @@ class Table1Options:
     channels: str = ""
 
 
-FULL, QUICK = Table1Options(), Table1Options(states=(5,), mixtures=(1, 2), motion_mixtures=(1, 2))
+FULL, QUICK = PhoneticTableOptions(), PhoneticTableOptions(states=(5,), mixtures=(1, 2), motion_mixtures=(1, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class _System:
 @one_thread()
 def hofer2008(
     corpus: Corpus,
-    options: Table1Options = FULL,
+    options: PhoneticTableOptions = FULL,
     *,
     split: str | None = "test",
     work: Path | None = None,
@@ -165,7 +165,7 @@ def _engine(**options: Any) -> JointEngine:
 
 def _train_system(
     engine: JointEngine,
-    options: Table1Options,
+    options: PhoneticTableOptions,
     examples: Sequence[Example],
     choosing: HeldOutRecordings,
     checkpoint: Checkpoint,

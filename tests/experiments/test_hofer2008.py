@@ -13,13 +13,13 @@ from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import hofer2008 as table1
-from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options, hofer2008
+from lipmotion_lab.hofer2008 import PAPER_SCORES, PhoneticTableOptions, hofer2008
 from lipmotion_lab.report.sections import hofer_section
 from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
-TWO = Table1Options(states=(3,), mixtures=(1, 2), motion_mixtures=(1, 2), channels="opening width outer")
+TWO = PhoneticTableOptions(states=(3,), mixtures=(1, 2), motion_mixtures=(1, 2), channels="opening width outer")
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.units import Lexicon
 from lipmotion_lab import hofer2008 as table1
-from lipmotion_lab.hofer2008 import PAPER_SCORES, Table1Options
+from lipmotion_lab.hofer2008 import PAPER_SCORES, PhoneticTableOptions
 from lipmotion_lab.report import report
 from lipmotion_lab.report.report import PAGE, PARTS, PartRun, ReportPart, WrittenReport, experiment_report
 from lipmotion_lab.runner import ExperimentSettings
@@ -186,7 +186,7 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Wri
     bare = copied(toy_corpus, folder, lambda each: replace(each, track=replace(each.track, crops=None)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in SETS})
-        patch.setattr(table1, "QUICK", Table1Options(states=(3,), mixtures=(1,)))
+        patch.setattr(table1, "QUICK", PhoneticTableOptions(states=(3,), mixtures=(1,)))
         return experiment_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SMALL)
 
 
