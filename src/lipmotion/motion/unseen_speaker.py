@@ -44,8 +44,7 @@ CONSONANT_CLOSING = 0.25
 """Consonants are less open than the table says, by so many standard deviations of the speaker: a fifth to a third of
 the phones that it was measured on are wrong, so that it has vowels too closed and consonants too open."""
 BREATH_S = 0.6
-"""So long before the first phone the mouth of such a voice is as open as in speech: people part their lips and breathe
-in."""
+"""So long before the first phone such a mouth is as open as in speech: people part their lips and breathe in."""
 SURE_PHONES = 5000
 """Models of so many phones in training, some twelve minutes, know their own speaker; those of 50 sentences take his
 voice for 0.85 of a known one (docs/results/jerk.md), no more than the large model some strangers of the same studio."""

@@ -1,5 +1,4 @@
-"""Files for 3D programs: a character with its animation, as ``.glb``, ``.usda`` or ``.fbx``; the first two name the
-sound."""
+"""Files for 3D programs: a character with its animation, as ``.glb``, ``.usda`` or ``.fbx``."""
 
 from __future__ import annotations
 

@@ -25,12 +25,7 @@ from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, label_full_context
 from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import (
-    Predictor,
-    PredictorTraining,
-    choose_predictor,
-    split_folds,
-)
+from lipmotion.motion.predictors import Predictor, PredictorTraining, choose_predictor, split_folds
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
@@ -88,7 +83,9 @@ CLIPS_PER_BLOCK = 64
 """Examples of a block; the frames of a block are sorted by the node whose regression they belong to."""
 
 
-def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], options: TrajectoryConfig) -> Emission:
+def fit_acoustic_regression(
+    emission: Emission, clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout
+) -> Emission:
     """Return the densities with means that are regressed on acoustic features, and variances around these means.
 
     Every node of the trees with enough frames has a linear regression on the features around the frame, shrunk towards
@@ -102,12 +99,12 @@ def fit_acoustic_regression(emission: Emission, clips: Sequence[TrainingClip], o
     owners = [*nodes, None]
     components, outputs = context.basis.shape[1], emission.means[0].size
     statistics = {node: zero_statistics(components, outputs) for node in dict.fromkeys(owners) if node is not None}
-    for node, z, error in _frames(emission, clips, options, context, owners):
+    for node, z, error in _frames(emission, clips, layout, context, owners):
         statistics[node].add(z, error)
     coefficients, index = _coefficients(emission, statistics, options)
     rows = np.array([-1 if node is None else index[node] for node in owners], np.int32)
     regression = AcousticRegression(context, coefficients, rows)
-    return replace(emission, regression=regression, variances=_variances(emission, regression, clips, options))
+    return replace(emission, regression=regression, variances=_variances(emission, regression, clips, options, layout))
 
 
 _Node = tuple[str, int]
@@ -117,7 +114,7 @@ _Node = tuple[str, int]
 def _frames(
     emission: Emission,
     clips: Sequence[TrainingClip],
-    options: TrajectoryConfig,
+    layout: StateLayout,
     context: AcousticContext,
     owners: Sequence[_Node | None],
 ) -> Iterator[tuple[_Node, NDArray[np.float32], NDArray[np.float32]]]:
@@ -126,7 +123,7 @@ def _frames(
     nodes, of_row = list(numbers), np.array([numbers[node] for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
         block = clips[start : start + CLIPS_PER_BLOCK]
-        rows = np.concatenate([density_rows(emission, clip.training_states, options.training_layout) for clip in block])
+        rows = np.concatenate([density_rows(emission, clip.training_states, layout) for clip in block])
         z = np.concatenate([context(clip.features, clip.frames) for clip in block])
         error = np.concatenate([clip.rows for clip in block]) - emission.means[rows]
         order = np.argsort(of_row[rows], kind="stable")
@@ -155,12 +152,16 @@ def _coefficients(
 
 
 def _variances(
-    emission: Emission, regression: AcousticRegression, clips: Sequence[TrainingClip], options: TrajectoryConfig
+    emission: Emission,
+    regression: AcousticRegression,
+    clips: Sequence[TrainingClip],
+    options: TrajectoryConfig,
+    layout: StateLayout,
 ) -> NDArray[np.float32]:
     """Return the variances around the regressed means, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for clip in clips:
-        rows = density_rows(emission, clip.training_states, options.training_layout)
+        rows = density_rows(emission, clip.training_states, layout)
         means = emission.means[rows].astype(float)
         add_acoustic_regression(means, regression, rows, regression.context(clip.features, clip.frames))
         np.add.at(squares, rows, np.square(clip.rows - means))
@@ -199,10 +200,10 @@ def fit_trajectory(
             f"motion was seen in {len(covered)} of {layout.speech} states of a phone; learn from more speech"
         )
     monitor(Progress(_STAGE, 1, 3, 0.1))
-    emission = _fit_emission(clips, options)
+    emission = _fit_emission(clips, options, layout)
     if options.acoustic_regression:
         monitor(Progress(_STAGE, 2, 3, 0.3))
-        emission = fit_acoustic_regression(emission, clips, options)
+        emission = fit_acoustic_regression(emission, clips, options, layout)
     prior = fit_articulation_prior(space, values, examples) if options.articulation else None
     network: Predictor | None = None
     share = NETWORK_SHARE
@@ -213,7 +214,7 @@ def fit_trajectory(
             PredictorTraining(examples, values, direct, options.epochs, of_predictor, checkpoint)
         )
         if held_out is not None:
-            share = _share_of_predictor(held_out, clips, options, direct)
+            share = _share_of_predictor(held_out, clips, options, layout, direct)
     recorded, generated = _recorded_and_generated(emission, network, prior, share, clips, layout)
     factors = fit_scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
     scaled = ((original, factors * made) for original, made in zip(recorded, generated, strict=True))
@@ -229,7 +230,11 @@ _STAGE = "trees"
 
 
 def _share_of_predictor(
-    predictions: Sequence[Array], clips: Sequence[TrainingClip], options: TrajectoryConfig, direct: int
+    predictions: Sequence[Array],
+    clips: Sequence[TrainingClip],
+    options: TrajectoryConfig,
+    layout: StateLayout,
+    direct: int,
 ) -> float:
     """Return the weight of a predictor beside the states, by cross-validation: 0 to 1.
 
@@ -240,12 +245,13 @@ def _share_of_predictor(
         return 1.0
     products = squares = 0.0
     for inside, outside in split_folds(len(clips)):
-        emission = _fit_emission([clips[number] for number in inside], options)
+        learned = [clips[number] for number in inside]
+        emission = _fit_emission(learned, options, layout)
         if options.acoustic_regression:
-            emission = fit_acoustic_regression(emission, [clips[number] for number in inside], options)
+            emission = fit_acoustic_regression(emission, learned, options, layout)
         for number in outside:
             clip = clips[number]
-            rows = density_rows(emission, clip.states, options.training_layout)
+            rows = density_rows(emission, clip.states, layout)
             states = solve_mlpg(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
             recorded, predicted = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
             spread = np.maximum(recorded.std(axis=0), 1e-6)
@@ -284,40 +290,35 @@ def training_clip(example: Example, values: Array, layout: StateLayout) -> Train
     return TrainingClip(example.speech, states, frames, dynamics)
 
 
-def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig) -> Emission:
+def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout) -> Emission:
     """Return the Gaussians of all leaves; each mean and variance is shrunk towards that of its parent node."""
-    rest = options.training_layout.rest
     moving = np.concatenate(
-        [clip.rows[[state != rest for state in clip.training_states]] for clip in clips], dtype=np.float64
+        [clip.rows[[state != layout.rest for state in clip.training_states]] for clip in clips], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
     scale = np.sqrt(np.maximum(overall, least))
-    grouped = _context_moments(clips, options.training_layout, centre, scale)
-    forest = {name: _grow_tree(contexts, 2 * overall.size, options) for name, contexts in grouped.items()}
+    grouped = _context_moments(clips, layout, centre, scale)
+    forest = {name: _grow_tree(contexts, 2 * overall.size, options, layout) for name, contexts in grouped.items()}
     leaves = [
         gaussian
         for name, tree in forest.items()
         for gaussian in _leaf_gaussians(tree, grouped[name], overall.size, options)
     ]
     means, variances = (np.array(rows).reshape(-1, *overall.shape) for rows in zip(*leaves, strict=True))
-    rest_mean, rest_variance = _rest_gaussian(clips, options, centre, overall)
+    rest_mean, rest_variance = _rest_gaussian(clips, options, layout, centre, overall)
     means = np.concatenate([means * scale + centre, rest_mean[None]])
     variances = np.concatenate([variances * scale * scale, rest_variance[None]])
     return Emission(forest, means.astype(np.float32), np.maximum(variances, least).astype(np.float32), None)
 
 
-def _grow_tree(contexts: _Contexts, parameters: int, options: TrajectoryConfig) -> Tree:
+def _grow_tree(contexts: _Contexts, parameters: int, options: TrajectoryConfig, layout: StateLayout) -> Tree:
     """Return the decision tree of one state; a single leaf where no training frame is in this state."""
-    empty = {options.training_layout.rest.context: np.zeros(1 + parameters)}
+    empty = {layout.rest.context: np.zeros(1 + parameters)}
     return grow_tree(
         list(contexts or empty),
         np.array(list((contexts or empty).values())),
-        [
-            Question(place, *unit_class)
-            for place in range(3)
-            for unit_class in options.training_layout.units.classes().items()
-        ],
+        [Question(place, *unit_class) for place in range(3) for unit_class in layout.units.classes().items()],
         gaussian_log_likelihood,
         parameters=parameters,
         factor=options.tree_factor,
@@ -367,14 +368,14 @@ def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: Traject
 
 
 def _rest_gaussian(
-    clips: Sequence[TrainingClip], options: TrajectoryConfig, fallback: Array, overall: Array
+    clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout, fallback: Array, overall: Array
 ) -> tuple[Array, Array]:
     """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech."""
     poses = [
         clip.rows[number, 0]
         for clip in clips
         for number, state in enumerate(clip.training_states)
-        if state == options.training_layout.rest
+        if state == layout.rest
     ]
     if not poses:
         return fallback, overall

@@ -69,7 +69,7 @@ def voice_knowledge(hmm: UnitHmm, audio: AnalysedAudio) -> float:
     dissimilar, and vectors of short recordings are unlike. In noise less likeness is needed.
     """
     by_score = float(np.interp(speaker_similarity(hmm, audio).score, (STRANGER_SCORE, OWN_SCORE), (0, 1)))
-    if hmm.speaker is None:
+    if hmm.speaker is None or by_score >= 1:
         return by_score
     stretch = _longest_passage(audio)
     vector, own = stretch.cached("speaker vector", lambda: speaker_vector(stretch)), hmm.speaker.astype(float)
