@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
@@ -57,15 +57,15 @@ class Footage:
         return len(self.pictures_s)
 
 
-def track_footage(path: Path, span: VideoSpan = WHOLE, *, person: Sequence[Array] = (), crops: bool = False) -> Footage:
+def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -> Footage:
     """Return a tracked video, and where the face is in every frame of it.
 
-    path, span, person : as of ``track.track``
-    crops              : whether mouth pictures are wanted, for which the video is decoded once more
+    path, span : as of ``track.track``
+    crops      : whether mouth pictures are wanted, for which the video is decoded once more
     Raises InputError and MissingDependencyError: as ``track.track``; InputError also if the pictures of the
     video have several sizes.
     """
-    frames = track_frames(path, span, person)
+    frames = track_frames(path, span)
     if len(frames.sizes) > 1:
         several = " and ".join(f"{width} × {height}" for height, width in sorted(frames.sizes)[:3])
         raise InputError(f"{path}: pictures of {several} pixels in one video; export the video in one size")
