@@ -37,8 +37,7 @@ def test_smeared_blurred_and_dark_mouths_are_found_and_a_rare_one_is_not():
     clips[8][50:] //= 4
     damage = find_damaged([partial(np.copy, clip) for clip in clips], [np.ones(FRAMES, bool)] * 13, [RATE_HZ] * 13)
     found = {
-        number: {kind: find_runs(mask).tolist() for kind, mask in each.items() if mask.any()}
-        for number, each in enumerate(damage)
+        n: {k: find_runs(mask).tolist() for k, mask in each.items() if mask.any()} for n, each in enumerate(damage)
     }
     assert {number: set(kinds) for number, kinds in found.items() if kinds} == {
         3: {"smeared"},

@@ -65,7 +65,7 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -
     Raises InputError and MissingDependencyError: as ``track.track``; InputError also if the pictures of the
     video have several sizes.
     """
-    frames = track_frames(path, span)
+    frames = track_frames(path, span, ())
     if len(frames.sizes) > 1:
         several = " and ".join(f"{width} × {height}" for height, width in sorted(frames.sizes)[:3])
         raise InputError(f"{path}: pictures of {several} pixels in one video; export the video in one size")
