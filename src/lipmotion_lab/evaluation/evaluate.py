@@ -149,8 +149,8 @@ def evaluate(
     selection  : the utterances to compare; by default those of the list ``test``
     recogniser : ``own``, ``general`` or ``auto``, as in ``Request``
 
-    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; in addition
-    or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures
+    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; of an
+    engine with the option ``channels`` those alone; in addition or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures
     that cannot be computed are None. A model of several people generates the motion of each utterance's speaker; of
     speakers whom it does not know, named under ``strangers``, that of the mean person. ``without_words`` is the number
     of utterances without words or labelled phones, if there is one; ``seen_in_training`` is there, and True, if the
@@ -170,10 +170,12 @@ def evaluate(
     ['audio only', 'with transcript']
     """
     phones = cached_recogniser(model.phones, recogniser, model.adaptation)
+    modelled = getattr(model.engine.config, "channels", "").split()  # some alone: what else moves is not compared
     recordings = held_out.load_held_out(
         corpus,
         phones,
         selection=selection,
+        channels=modelled or None,
         lexicon=lexicon,
         monitor=monitor,
         visual=model.visual,

@@ -43,6 +43,7 @@ from lipmotion_lab.learning_curve import check_training_names, choose_sizes
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
     ALL_PATHS,
+    BLSTM,
     COMPARED_SYSTEMS,
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
@@ -53,6 +54,7 @@ from lipmotion_lab.xie_liu2007.systems import (
     Trial,
     TuningOptions,
     as_row,
+    best_trial,
     list_changed_options,
     select_systems,
     system_from_arrays,
@@ -110,7 +112,7 @@ def xieliu2007(  # noqa: PLR0913
     Gaussians, and whether they are better than those printed, with systems of the size itself.
     Raises InputError: no such system, or sizes that the list does not have.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
-    Raises MissingDependencyError: a system or the pictures need a package that is not installed.
+    Raises MissingDependencyError: the pictures need a package that is not installed.
     Raises ExportError: the pictures cannot be written.
     """
     names, seed = select_systems(options.systems), settings.seed
@@ -252,6 +254,8 @@ def _size(
     for name, system in systems.items():
         row: dict[str, Any] = {"seconds": system.seconds, "parameters": None, "options": None}
         row["tried"] = [*map(as_row, system.tried)]
+        if name == BLSTM and system.tried:
+            row |= {key: getattr(best_trial(system.tried), key) for key in ("parameters", "options")}
         if isinstance(system.model, CoupledModel):
             row |= {"parameters": system.model.chains.parameters, "options": list_changed_options(system.engine.config)}
         training[name] = row

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.engines import Animator, Engine, engine_named
+from lipmotion.engines import Animator, engine_named
 from lipmotion.engines.coupled.arrays import coupled_arrays
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, SYSTEMS, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
@@ -21,9 +21,16 @@ from lipmotion.engines.coupled.training.coupled_training import growing_models
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
-from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose, import_torch
+from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
-from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
+from lipmotion_lab.evaluation.held_out import (
+    AUDIO_ONLY,
+    ComparedClip,
+    HeldOutRecordings,
+    generate_clips,
+    generate_compared,
+    make_speech,
+)
 
 Options = Mapping[str, Any]
 TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
@@ -31,6 +38,13 @@ TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
 TOGETHER = {"moves_together": True}
 CONVERSIONS: tuple[Options, ...] = ({"start": "viterbi", "steps": 3}, {"start": "soft", "steps": 1})
 """Conversions by EM that are tried: from the best path to where it converges, and one step from all paths."""
+
+NETWORK_SETTINGS: tuple[Sequence[Options], ...] = (
+    [{"rate": rate} for rate in (4e-3, 2e-3, 8e-3)],
+    [{"cells": 192}],
+    [{"steps": 100.0}],
+)
+"""Settings of the BLSTM that are tried, one kind after another."""
 
 
 @dataclass(frozen=True)
@@ -130,11 +144,30 @@ def judge_systems(
         for conversion in conversions:
             engine = CoupledEngine(replace(system.engine.config, **conversion))
             made = generate_clips(validation, AUDIO_ONLY, engine, system.model)
-            generated, original = [clip.generated for clip in made], [clip.original for clip in made]
-            acc = correlation_statistic(generated, original).value
-            amse = distance_statistic(generated, original).value
-            trial = Trial(engine.config.as_mapping(), acc, amse, system.model.chains.parameters)
+            trial = Trial(engine.config.as_mapping(), *measure_clips(made), system.model.chains.parameters)
             yield trial, replace(system, engine=engine)
+
+
+def measure_clips(made: Sequence[ComparedClip]) -> tuple[float, float]:
+    """Return ACC and AMSE of what a system makes of recordings."""
+    both = [clip.generated for clip in made], [clip.original for clip in made]
+    return correlation_statistic(*both).value, distance_statistic(*both).value
+
+
+def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, monitor: Monitor) -> TrainedSystem:
+    """Return the BLSTM whose learning rate, then cells, then steps are the best on validation recordings."""
+    speech, found = make_speech(validation, AUDIO_ONLY, BlstmBaseline(), None), list[tuple[Trial, TrainedSystem]]()
+
+    def attempt(options: Options) -> list[Trial]:
+        start_s, engine = process_time(), BlstmBaseline(**options)
+        model = engine.fit(examples, monitor).model
+        size = sum(array.size for array in model.learned.network.parameters)
+        trial = Trial(options, *measure_clips(generate_compared(validation, speech, engine, model)), size)
+        found.append((trial, TrainedSystem(engine, model, process_time() - start_s)))
+        return [trial]
+
+    search_settings({}, NETWORK_SETTINGS, attempt)
+    return choose_by(lambda trial: trial.acc, found)
 
 
 def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
@@ -155,8 +188,10 @@ def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, Trained
 
 
 def as_row(trial: Trial) -> dict[str, Any]:
-    """Return a trial as figures; its options are those that ``list_changed_options`` returns."""
-    return asdict(trial) | {"options": list_changed_options(CoupledConfig.parsed(trial.options))}
+    """Return a trial as figures; the options of chains are those that ``list_changed_options`` returns."""
+    options = trial.options
+    chains = "structure" in options
+    return asdict(trial) | {"options": list_changed_options(CoupledConfig.parsed(options)) if chains else options}
 
 
 def list_changed_options(config: CoupledConfig) -> dict[str, Any]:
@@ -192,7 +227,7 @@ class ComparedSystem:
     make          : returns its engine; None: it is the coupled engine with ``options``
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
     tunes         : the system of the paper whose settings are chosen on validation recordings
-    splits        : only its number of Gaussians is, as in the paper (§7.1)
+    splits        : only its number of Gaussians is, as in the paper (§7.1); of the BLSTM, ``NETWORK_SETTINGS``
     when_named    : it is compared only if it is asked for
     """
 
@@ -224,7 +259,7 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
     "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
     "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
-    BLSTM: ComparedSystem(BlstmBaseline, when_named=True),
+    BLSTM: ComparedSystem(BlstmBaseline, splits=True, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),
     "mean pose": ComparedSystem(MeanPose),
 }
@@ -239,14 +274,12 @@ EM; ``best path``: means along the best path, no EM.
 
 
 def select_systems(names: Sequence[str] | None) -> list[str]:
-    """Return the systems to compare, in order. Raises InputError: no such system. Raises MissingDependencyError."""
+    """Return the systems to compare, in order. Raises InputError: no such system."""
     if names is None:
         return [name for name, system in COMPARED_SYSTEMS.items() if not system.when_named]
     unknown = [name for name in names if name not in COMPARED_SYSTEMS]
     if unknown:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
-    if BLSTM in names:
-        import_torch()
     chosen = [COMPARED_SYSTEMS[name] for name in names]
     needed = {REFERENCE_SYSTEM} | {name for system in chosen for name in (system.tunes, system.same_model_as)}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
@@ -268,11 +301,10 @@ def tune_options(
 def with_inputs_of(name: str, examples: Sequence[Example], corpus: Corpus) -> Sequence[Example]:
     """Return examples with what a system takes from their sound, as ``lipmotion train`` gives it to an engine."""
     make = COMPARED_SYSTEMS[name].make
-    engine = make() if make is not None else None
-    if not isinstance(engine, Engine):
+    if make is None:
         return examples
     sound = {example.name: corpus.utterance(example.name).audio for example in examples}
-    return with_sound_inputs(engine, examples, sound, silent_monitor, map)
+    return with_sound_inputs(make(), examples, sound, silent_monitor, map)
 
 
 def train_system(
@@ -293,6 +325,8 @@ def train_system(
     if system.same_model_as:
         twin = trained[system.same_model_as]
         return replace(twin, engine=CoupledEngine(replace(twin.engine.config, **system.options)))
+    if system.make is BlstmBaseline and validation is not None:
+        return tune_network(examples, validation, monitor)
     if system.make is not None:
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
