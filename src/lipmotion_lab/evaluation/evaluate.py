@@ -150,11 +150,12 @@ def evaluate(
     recogniser : ``own``, ``general`` or ``auto``, as in ``Request``
 
     Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; of an
-    engine with the option ``channels`` those alone; in addition or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures
-    that cannot be computed are None. A model of several people generates the motion of each utterance's speaker; of
-    speakers whom it does not know, named under ``strangers``, that of the mean person. ``without_words`` is the number
-    of utterances without words or labelled phones, if there is one; ``seen_in_training`` is there, and True, if the
-    model's header says that it was trained on some of the utterances.
+    engine with the option ``channels`` those alone; in addition or instead, the eigenlips of the model.
+    Figures of closures and of silence need the channel ``opening``. Figures that cannot be computed are None. A model
+    of several people generates the motion of each utterance's speaker; of speakers whom it does not know, named under
+    ``strangers``, that of the mean person. ``without_words`` is the number of utterances without words or labelled
+    phones, if there is one; ``seen_in_training`` is there, and True, if the model's header says that it was trained on
+    some of the utterances.
     If the engine makes the lips meet in p, b and m, ``unpinned`` holds the figures of its motion without that.
     The reference for speech and for p, b and m are the labelled phones, or the forced alignment, or the recognised
     phones of utterances without transcript. The threshold of a closed mouth is computed from the corpus's training

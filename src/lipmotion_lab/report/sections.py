@@ -31,7 +31,7 @@ from lipmotion_lab.report.section import (
     difference,
     warn_of_few,
 )
-from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, TUNED
+from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
 
 TIMING = Column("timing_ms", "timing", "+.0f", "by how much closings are late, in ms")
 AS_PRINTED, SETS = next(iter(PINS)), "Unit sets, "
@@ -232,7 +232,7 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
         cases += [(f"{name}, {each['names']} recordings", rows, each) for name, rows in each["conditions"].items()]
     (_, main), *more = ((caption, _systems_table(caption, *case)) for caption, *case in cases)
     words, verdict, by_amse = warn_of_few(figures["clips"]), "", []
-    for ending, called in (("", "as printed"), (TUNED, "as tuned on val")):
+    for ending, called in (("", "as printed"), (SPLIT, "with Gaussians chosen on val")):
         names = {name + ending for name in PAPER_FIGURES}
         pairs = [pair for pair in size["pairs"] if {pair["better"], pair["worse"]} <= names]
         if pairs:
@@ -254,8 +254,8 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
         f"({', '.join(channels[:3])}{', …' if len(channels) > 3 else ''})."
         f"{_closings(figures, next(iter(main.rows.values())))}"
     )
-    if figures["tuning"]["tried"]:
-        about += " Tuned systems have what the print leaves open as it was best on val; nothing was chosen on test."
+    if changed:
+        about += " K on val: with the number of Gaussians that was best there; nothing was chosen on test."
     shown = [Dot(name, row["acc"], row["acc_95"], row["paper_acc"]) for name, row in main.rows.items()]
     charts = [draw_dots("ACC of every system", "ACC", shown)]
     title = "Xie & Liu 2007, Table 3: structures of chains"
@@ -268,7 +268,7 @@ def _systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) 
     """Return the table of all systems in one case, with the paper's figures, the opening and the training."""
     full_rows = {}
     for name, row in rows.items():
-        amse, acc = PAPER_FIGURES.get(name.removesuffix(TUNED), (None, None))
+        amse, acc = PAPER_FIGURES.get(name.removesuffix(SPLIT), (None, None))
         training = {key: size["training"][name][key] for key in ("parameters", "seconds")}
         full_rows[name] = {**(row["opening"] or {}), **row, **training, "paper_amse": amse, "paper_acc": acc}
     columns = [*XIELIU_COLUMNS]

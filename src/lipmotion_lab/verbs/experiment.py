@@ -174,7 +174,7 @@ def run_folds(options: argparse.Namespace) -> None:
 def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = actions.add_parser(
         "xieliu2007",
-        help="which structure of chains predicts lips best, as printed and tuned (Xie & Liu 2007, Table 3)",
+        help="which structure of chains predicts lips best, as printed and chosen on val (Xie & Liu 2007, Table 3)",
     )
     parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
     order = "names of recordings, one per line (default: train, shuffled)"
@@ -187,7 +187,9 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
     add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
-    add_experiment_arguments(parser, quick="the paper's systems, four of them also tuned; not with --order")
+    add_experiment_arguments(
+        parser, quick="the paper's systems, four also with Gaussians chosen on val; not with --order"
+    )
     add_blocks(parser)
     parser.set_defaults(run=run_xieliu2007)
 
