@@ -93,19 +93,16 @@ class Baseline(Animator[FrameRegressionModel]):
         """Return the reduced motion of speech [shape=(T, Q)]."""
 
 
-class LinearBaseline(Baseline):
-    """Ridge regression of motion on the ``regressors`` of each frame."""
+class ContextRidge(Baseline):
+    """Ridge regression on the features of all frames within a reach, and a constant."""
 
-    strength: ClassVar[float] = 0.0
-
-    @abstractmethod
-    def regressors(self, features: Float32Array) -> Array:
-        """Return the regressors of each frame [shape=(T, F)]."""
+    reach: ClassVar[int] = REACH
+    strength: ClassVar[float] = RIDGE_FRAMES
 
     def fit_map(self, recordings: Sequence[Recording], monitor: Monitor) -> Array:  # noqa: D102, ARG002 - takes seconds
         statistics, frames = None, 0
         for speech, targets, mask in recordings:
-            rows = self.regressors(np.asarray(speech.features.values))[mask]
+            rows = self.regressors(speech)[mask]
             statistics = statistics or zero_statistics(rows.shape[1], targets.shape[1])
             statistics.add(rows, targets[mask])
             frames += len(rows)
@@ -114,27 +111,22 @@ class LinearBaseline(Baseline):
         return ridge(statistics, np.zeros_like(statistics.targets), self.strength * frames)
 
     def predict(self, learned: Array, speech: Speech) -> Array:  # noqa: D102
-        return self.regressors(np.asarray(speech.features.values)) @ learned
+        return self.regressors(speech) @ learned
 
-
-@final
-class MeanPose(LinearBaseline):
-    """The mean of all training frames, for every frame."""
-
-    def regressors(self, features: Float32Array) -> Array:  # noqa: D102
-        return np.ones((len(features), 1))
-
-
-@final
-class ContextRidge(LinearBaseline):
-    """Ridge regression on the features of all frames within ±150 ms."""
-
-    strength = RIDGE_FRAMES
-
-    def regressors(self, features: Float32Array) -> Array:  # noqa: D102
-        frames = np.clip(np.arange(len(features))[:, None] + np.arange(-REACH, REACH + 1), 0, len(features) - 1)
-        rows = features[frames].reshape(len(features), -1)
+    def regressors(self, speech: Speech) -> Array:
+        """Return the regressors of each frame [shape=(T, F)]."""
+        features = np.asarray(speech.features.values)
+        offsets = np.arange(-self.reach, self.reach + 1)
+        frames = np.clip(np.arange(len(features))[:, None] + offsets, 0, len(features) - 1)
+        rows = features[frames].reshape(len(features), len(offsets) * features.shape[1])
         return np.concatenate([rows, np.ones((len(rows), 1), rows.dtype)], axis=1).astype(float)
+
+
+@final
+class MeanPose(ContextRidge):
+    """The mean of all training frames, for every frame: the constant alone."""
+
+    reach, strength = -1, 0.0
 
 
 LAYERS, BATCH_SIZE, DROPOUT = 2, 8, 0.4
