@@ -24,13 +24,7 @@ from lipmotion.measures.curves import pooled_correlation
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import (
-    ClipStatistic,
-    closing_score_statistic,
-    correlation_statistic,
-    distance_statistic,
-    figures_of,
-)
+from lipmotion_lab.evaluation.evaluate import clip_statistics, figures_of
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings, choose_channels
 
 FOLDS = 5
@@ -215,16 +209,7 @@ def _block_rows(
     compared: _GeneratedFold, systems: Mapping[str, Sequence[ComparedClip]], references: Sequence[str], seed: int
 ) -> dict[str, Any]:
     """Return the figures of systems on the same clips, each with its intervals, and those of gains over references."""
-    statistics: dict[str, dict[str, ClipStatistic]] = {}
-    for system, clips in systems.items():
-        both = [clip.generated for clip in clips], [clip.original for clip in clips]
-        found = {"acc": correlation_statistic(*both), "amse": distance_statistic(*both)}
-        if compared.closed_under is not None:
-            column = compared.channels.index(OPENING)
-            opening = tuple([curves[:, column : column + 1] for curves in each] for each in both)
-            found["opening_acc"] = correlation_statistic(*opening)
-            found["score"] = closing_score_statistic(*opening, compared.closed_under)
-        statistics[system] = found
+    statistics = {system: clip_statistics(compared, clips) for system, clips in systems.items()}
     rows = {}
     for system, clips in systems.items():
         row: dict[str, Any] = {}

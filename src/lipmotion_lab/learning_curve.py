@@ -19,7 +19,7 @@ from lipmotion.motion.space import resample_track
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Speech, Timeline, sub_monitor
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, generate_clips, load_held_out
 from lipmotion_lab.xie_liu2007.systems import BLSTM, as_row, best_trial, tune_network, with_inputs_of
 
@@ -139,12 +139,8 @@ def _compare_network(
     free = result.model.engine.without_closures()
     ours = generate_clips(recordings, AUDIO_ONLY, free, result.model.learned)
     channels: dict[str, Any] = {}
-    for column, channel in enumerate(recordings.channels):
-        part = slice(column, column + 1)
-        own, other = (
-            correlation_statistic([clip.generated[:, part] for clip in made], [clip.original[:, part] for clip in made])
-            for made in (ours, clips)
-        )
+    for channel in recordings.channels:
+        own, other = (correlation_statistic(*opening_curves(recordings, made, channel)) for made in (ours, clips))
         channels[channel] = {"ours": own.value, "acc": other.value, "acc_95": other.interval(settings.seed)}
         channels[channel]["gain_95"] = own.gain(other, settings.seed)
     best = best_trial(system.tried).options

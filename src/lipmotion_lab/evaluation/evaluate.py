@@ -285,11 +285,30 @@ def closing_score_statistic(generated: Clips, original: Clips, threshold: float)
 
 
 def opening_curves(
-    recordings: held_out.HeldOutRecordings, made: Sequence[held_out.ComparedClip]
+    recordings: Compared, made: Sequence[held_out.ComparedClip], channel: str = held_out.OPENING
 ) -> tuple[list[Array], list[Array]]:
-    """Return the generated and the original opening of every clip [each shape=(T, 1)]."""
-    column = slice(recordings.channels.index(held_out.OPENING), recordings.channels.index(held_out.OPENING) + 1)
+    """Return the generated and the original opening, or another channel, of every clip [each shape=(T, 1)]."""
+    column = slice(recordings.channels.index(channel), recordings.channels.index(channel) + 1)
     return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
+
+
+def clip_statistics(recordings: Compared, made: Sequence[held_out.ComparedClip]) -> dict[str, ClipStatistic]:
+    """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; ACC and score of the opening."""
+    pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
+    parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
+    statistics = {}
+    for part, columns in parts.items():
+        if columns.any():
+            both = [clip.generated[:, columns] for clip in made], [clip.original[:, columns] for clip in made]
+            statistics[f"{part}amse"], statistics[f"{part}acc"] = (
+                distance_statistic(*both),
+                correlation_statistic(*both),
+            )
+    if recordings.closed_under is not None:
+        opening = opening_curves(recordings, made)
+        statistics["opening_acc"] = correlation_statistic(*opening)
+        statistics["score"] = closing_score_statistic(*opening, recordings.closed_under)
+    return statistics
 
 
 def sign_of_difference(interval: Sequence[float | None]) -> int:

@@ -255,7 +255,7 @@ def _paper_pairs(
             pairs += [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
             pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
         pairs = [pair for pair in pairs if {*pair} <= made.keys()]
-        statistics = {name: _statistics(recordings, made[name]) for pair in pairs for name in pair}
+        statistics = {name: evaluate.clip_statistics(recordings, made[name]) for pair in pairs for name in pair}
         for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
@@ -267,11 +267,11 @@ def _paper_pairs(
 
 def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
-    reference, rows = _statistics(recordings, made[REFERENCE_SYSTEM]), {}
+    reference, rows = evaluate.clip_statistics(recordings, made[REFERENCE_SYSTEM]), {}
     for system, clips in made.items():
         figures = evaluate.figures_of(clips, recordings, seed)
         row: dict[str, Any] = {}
-        for name, statistic in _statistics(recordings, clips).items():
+        for name, statistic in evaluate.clip_statistics(recordings, clips).items():
             row[name], row[f"{name}_95"] = statistic.value, statistic.interval(seed)
             row[f"{name}_gain_95"] = statistic.gain(reference[name], seed)
         still = not varies(np.concatenate([clip.generated for clip in clips])).any()
@@ -281,19 +281,3 @@ def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[Compared
             row["opening"] = runner.opening_row_with_rates(figures) | {"rmse": rmse}
         rows[system] = row
     return rows
-
-
-def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, evaluate.ClipStatistic]:
-    """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; and the ACC of the opening."""
-    pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
-    parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
-    statistics = {}
-    for part, columns in parts.items():
-        if columns.any():
-            generated = [clip.generated[:, columns] for clip in made]
-            original = [clip.original[:, columns] for clip in made]
-            statistics[f"{part}amse"] = evaluate.distance_statistic(generated, original)
-            statistics[f"{part}acc"] = evaluate.correlation_statistic(generated, original)
-    if OPENING in recordings.channels:
-        statistics["opening_acc"] = evaluate.correlation_statistic(*evaluate.opening_curves(recordings, made))
-    return statistics
