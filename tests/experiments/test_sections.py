@@ -32,10 +32,6 @@ CHAINS = [f"Structures of chains, {CONDITIONS[0]}"]
 TABLES: dict[str, tuple[str, str, Callable[..., list[tuple[str, str]]]]] = {
     "engines.test": ("engines", "engines-test", lambda title, name: [(f"Engines, {title}", name)]),
     "folds.folds": ("folds", "folds", lambda name: [("Cross-validation, 5 folds", name)]),
-    "learning-curve.earlier": (
-        *("learning-curve", "learning-curve"),
-        lambda number: [(f"Learning curve, {title}", str(SIZES[int(number)])) for title in CONDITIONS],
-    ),
     "hofer2008.all": ("hofer2008", "hofer2008", lambda name: [("Unit sets, 5 states, audio only, as printed", name)]),
     "xieliu2007.all": ("xieliu2007", "xieliu2007", lambda *names: [*product(CHAINS, filter(None, names))]),
     "xieliu2007.eigenlips": (
