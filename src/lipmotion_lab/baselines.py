@@ -155,7 +155,7 @@ class Hearing:
     def time_steps(self, speech: Speech) -> Float32Array:
         """Return what the network hears in every time step of 40 ms [shape=(ceil(T / 4), I)]."""
         parts = [stack_spectrum(np.asarray(speech.features.values))]
-        if self.basis is not None and speech.posteriors is not None:
+        if self.mean is not None and self.basis is not None and speech.posteriors is not None:
             rows = (limit_logarithms(speech.posteriors) - self.mean) @ self.basis
             at = np.minimum(ROWS * np.arange(len(parts[0]))[:, None] + np.arange(ROWS), len(rows) - 1)
             parts.append(rows[at].reshape(len(at), -1))
