@@ -59,7 +59,7 @@ def _fold_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> _GeneratedFold:
         if name:
             parts[int(number)][name] = array
     clips = dict(zip(conditions, map(runner.clips_from_arrays, parts), strict=True))
-    return _GeneratedFold(clips, *about, tuple(channels))
+    return _GeneratedFold(clips, *about, channels=tuple(channels))
 
 
 @one_thread()

@@ -111,7 +111,8 @@ def measure_clips(made: Sequence[ComparedClip]) -> tuple[float, float]:
 
 def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, monitor: Monitor) -> TrainedSystem:
     """Return the BLSTM whose learning rate, then cells, then steps are the best on validation recordings."""
-    speech, found = make_speech(validation, AUDIO_ONLY, BlstmBaseline(), None), list[tuple[Trial, TrainedSystem]]()
+    hearing: Animator[Any] = BlstmBaseline()
+    speech, found = make_speech(validation, AUDIO_ONLY, hearing, None), list[tuple[Trial, TrainedSystem]]()
 
     def attempt(options: Options) -> list[Trial]:
         start_s, engine = process_time(), BlstmBaseline(**options)
