@@ -52,14 +52,14 @@ class _GeneratedFold:
 
 
 def _fold_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> _GeneratedFold:
-    conditions, *about, channels = json.loads(str(arrays[_ABOUT]))
+    conditions, speakers, used, closed_under, channels = json.loads(str(arrays[_ABOUT]))
     parts: list[dict[str, NDArray[Any]]] = [{} for _ in conditions]
     for key, array in arrays.items():
         number, _, name = key.partition("/")
         if name:
             parts[int(number)][name] = array
     clips = dict(zip(conditions, map(runner.clips_from_arrays, parts), strict=True))
-    return _GeneratedFold(clips, *about, channels=tuple(channels))
+    return _GeneratedFold(clips, speakers, used, closed_under, tuple(channels))
 
 
 @one_thread()
