@@ -123,8 +123,8 @@ class PosteriorNetwork(Predictor):
                 "examples without posteriors, which the predictor posteriors needs; train with the recogniser auto"
             )
         centre, scale = measure_poses(training)
-        rows = [_limit(each) for each in posteriors]
-        mean, basis = _fit_components(rows)
+        rows = [limit_logarithms(each) for each in posteriors]
+        mean, basis = fit_components(rows)
         heard = all(example.condition_spectra for example in examples)
         spectra = [example.condition_spectra[0].values if heard else None for example in examples]
         inputs = [_stack_inputs((row - mean) @ basis, x) for row, x in zip(rows, spectra, strict=True)]
@@ -175,7 +175,7 @@ class PosteriorNetwork(Predictor):
 
     def _components(self, posteriors: TokenPosteriors) -> NDArray[np.floating]:
         """Return the principal components of the logarithms of posteriors [shape=(N, 120)]."""
-        return (_limit(posteriors) - self.mean) @ self.basis
+        return (limit_logarithms(posteriors) - self.mean) @ self.basis
 
     def _check(self, posteriors: TokenPosteriors | None) -> TokenPosteriors:
         """Return the posteriors; raise InputError where there are none, or those of another phone recogniser."""
@@ -269,7 +269,7 @@ def _run(network: SequenceNetwork, shifted: Sequence[NDArray[np.float32]], frame
     return mean
 
 
-def _fit_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def fit_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the mean of posteriors [shape=(K,)] and a basis, scaled as inputs of the network [shape=(K, 120)]."""
     everything = np.concatenate(rows).astype(float)
     mean = everything.mean(axis=0)
@@ -280,7 +280,7 @@ def _fit_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.flo
     return mean.astype(np.float32), basis.astype(np.float32)
 
 
-def _limit(posteriors: TokenPosteriors) -> NDArray[np.float32]:
+def limit_logarithms(posteriors: TokenPosteriors) -> NDArray[np.float32]:
     """Return the logarithms of posteriors within the limit [shape=(N, K)]."""
     limited: NDArray[np.float32] = np.maximum(posteriors.values, MIN_LOG_POSTERIOR).astype(np.float32)
     return limited
