@@ -6,20 +6,25 @@ Here every worker has a pipe of its own, and the end of a pipe is detected.
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
+import platform
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from itertools import chain, islice
 from multiprocessing import connection as pipes
 from multiprocessing.process import BaseProcess
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
-from lipmotion.errors import CorpusError, InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.errors import CorpusError, InputError, MissingDependencyError
+from lipmotion.extensions import install_command, installed_version
+from lipmotion.kernels.compiler import blas_kernels, one_thread
 from lipmotion.types import ParallelMap
 
 ItemT = TypeVar("ItemT")
@@ -243,3 +248,124 @@ def _begin_below() -> None:
         os._exit(1)
 
     threading.Thread(target=end_with_parent, daemon=True).start()
+
+
+@contextmanager
+def training_pool(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
+    """Give the map that distributes a training, whose results are in the order of the items.
+
+    workers    : number of processes on this machine, or the address of a Dask scheduler
+    utterances : how many the training has: few are not worth a further process
+    Raises as ``cluster_pool``. The map raises CorpusError: a process died; Dask lets others finish its work, thrice.
+    """
+    if isinstance(workers, int):
+        with worker_pool(min(process_count(workers), utterances // UTTERANCES_PER_WORKER)) as team:
+            yield team.ordered_map
+        return
+    with cluster_pool(workers, ordered=True) as pool:
+
+        def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+            try:
+                yield from pool(partial(_work_alone, function), items)
+            except WorkerDied as error:
+                raise CorpusError(DIED) from error
+
+        yield each
+
+
+def _work_alone(function: Callable[[ItemT], ResultT], item: ItemT) -> ResultT:
+    with one_thread():
+        return function(item)
+
+
+LOG = logging.getLogger("lipmotion")
+UTTERANCES_PER_WORKER = 32
+"""Smallest number of utterances for which a further process is started."""
+CONNECT_S = 20
+ITEMS_AHEAD = 4
+"""Items a worker that are sent ahead: with ``Parallel``'s own bundles of short items none waits, and memory is flat."""
+
+
+class WorkerDied(Exception):  # noqa: N818 # an event that the batch survives
+    """A worker process ended while it had work."""
+
+
+class Pool(Protocol):
+    """Applies a function to items in other processes; yields results as they are ready.
+
+    Raises WorkerDied: a worker ended; which items are done is not known.
+    """
+
+    def __call__(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        """Yield the result of every item, in any order."""
+
+
+@contextmanager
+def cluster_pool(address: str, out: Path | None = None, *, ordered: bool = False) -> Iterator[Pool]:
+    """Give the workers of a Dask cluster as a pool.
+
+    address : of its scheduler, as ``tcp://HOST:8786``
+    out     : the folder of the outputs, which every worker must see under the same path; None: there is none
+    ordered : as of ``joblib_pool``; then a warning says where the last bits of results may differ
+    Raises MissingDependencyError: the package distributed is not installed.
+    Raises InputError: no cluster answers, it has no workers, or they lack lipmotion, its version or the folder.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"a cluster needs the package distributed: {install_command('cluster')}, here and on all workers"
+        ) from error
+    with ExitStack() as stack:
+        try:
+            client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
+        except (OSError, TimeoutError, ValueError) as error:
+            raise InputError(f"{address}: no Dask scheduler answers ({error}); start one: dask scheduler") from error
+        try:
+            answers = client.run(describe_worker, str(out), on_error="return")
+        except Exception as error:  # what the scheduler could not send
+            raise InputError(f"{address}: the workers cannot be asked ({error})") from error
+        if not answers:
+            raise InputError(f"{address}: the cluster has no workers; start some: dask worker {address} --nthreads 1")
+        for worker, answer in answers.items():
+            if isinstance(answer, BaseException):
+                raise InputError(
+                    f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
+                ) from answer
+            version, sees_folder, processor = answer
+            if version != installed_version():
+                raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
+            if ordered and processor != describe_worker("")[2]:
+                LOG.warning("%s: has another processor (%s): the last bits of the model may differ", worker, processor)
+            if out is not None and not sees_folder:
+                raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
+        yield joblib_pool({"backend": "dask", "client": client, "pure": False}, ordered=ordered)
+
+
+def describe_worker(out: str) -> tuple[str, bool, str]:
+    """Return a worker's version of lipmotion, whether it sees a folder, and what kind of processor it has."""
+    return installed_version(), os.path.isdir(out), f"{platform.machine()} {blas_kernels()}"  # noqa: PTH112
+
+
+def joblib_pool(chosen: dict[str, Any], *, ordered: bool = False) -> Pool:
+    """Return a pool of joblib; ``ordered``: its results come in the order of the items."""
+    from joblib import Parallel, delayed, parallel_config
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        with parallel_config(**chosen):
+            results = Parallel(
+                return_as="generator" if ordered else "generator_unordered", pre_dispatch=f"{ITEMS_AHEAD}*n_jobs"
+            )(delayed(function)(item) for item in items)
+            try:
+                yield from results
+            except BrokenProcessPool as error:
+                raise WorkerDied(str(error)) from error
+            except Exception as error:
+                if type(error).__name__ == "KilledWorker":
+                    raise WorkerDied(str(error)) from error
+                raise
+            finally:
+                results.close()
+
+    return each

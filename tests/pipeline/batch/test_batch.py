@@ -23,7 +23,7 @@ from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finish_line
-from lipmotion.pipeline.batch.run import WorkerDied
+from lipmotion.pipeline.workers import WorkerDied
 from lipmotion.types import Item
 from lipmotion_faces.outputs.shown_faces import shown_face
 

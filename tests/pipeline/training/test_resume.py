@@ -12,10 +12,10 @@ from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
+from lipmotion.pipeline import workers
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import labels as fingerprints
-from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
@@ -143,7 +143,7 @@ def test_a_damaged_checkpoint_is_not_used(corpus, whole, work, tmp_path):
 @pytest.mark.long
 def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monkeypatch):
     """Neither this process's own nor those that the processes it starts would use."""
-    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
+    monkeypatch.setattr(workers, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     with threadpool_limits(1, user_api="blas"):
         assert content(train(corpus, recogniser=CONFIG, run=Run(workers=2))[0], tmp_path) == whole
@@ -152,7 +152,7 @@ def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monk
 
 @pytest.mark.long
 def test_stopped_in_two_processes(corpus, whole, work, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
+    monkeypatch.setattr(workers, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
     before = set(multiprocessing.active_children())
     with pytest.raises(Stopped):

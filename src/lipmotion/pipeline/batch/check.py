@@ -16,9 +16,10 @@ from lipmotion.pipeline.analysis.language import detect_english
 from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
-from lipmotion.pipeline.batch.run import WorkerDied, local_pool
+from lipmotion.pipeline.batch.run import local_pool
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.workers import WorkerDied
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
 from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
