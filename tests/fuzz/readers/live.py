@@ -16,7 +16,7 @@ import numpy as np
 from websockets.sync.client import connect
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import good_model, require, short_speech
+from fuzz.readers.plausible import require, short_speech
 from lipmotion import Stream
 from lipmotion.errors import InputError
 from lipmotion.live.face import LiveFrame
@@ -58,9 +58,9 @@ def read(folder: Path, good: Good) -> None:
     if path.suffix == ".http":
         _send(content)
     elif path.name == "replies.json":
-        asyncio.run(_converse(_parsed(content), good))
+        asyncio.run(_converse(_parsed(content)))
     else:
-        stream = copy.deepcopy(_stream(good))
+        stream = copy.deepcopy(_stream())
         frames = []
         if path.suffix == ".json":
             (stream.add_words if path.stem == "words" else stream.add_phones)(_parsed(content))
@@ -92,8 +92,8 @@ def _is_finite(frame: LiveFrame) -> bool:
 
 
 @cache
-def _stream(good: Good) -> Stream:
-    return Stream(look_ahead_ms=80, model=good_model(good))
+def _stream() -> Stream:
+    return Stream(look_ahead_ms=80)
 
 
 @cache
@@ -142,11 +142,11 @@ class _Studio:
         return json.dumps(reply).replace('"ID"', json.dumps(question["requestID"]))
 
 
-async def _converse(replies: Any, good: Good) -> None:
+async def _converse(replies: Any) -> None:
     with tempfile.TemporaryDirectory() as folder, ExitStack() as patches:
         studio, connection = VTubeStudio("ws://nowhere", Path(folder) / "token"), _Studio(replies)
         patches.enter_context(mock.patch("websockets.asyncio.client.connect", return_value=connection))
         patches.enter_context(mock.patch("lipmotion_studio.live.vtube.AGAIN_S", 0.0))
-        studio(copy.deepcopy(_stream(good)).push(np.zeros(8000, np.float32))[-1])
+        studio(copy.deepcopy(_stream()).push(np.zeros(8000, np.float32))[-1])
         with suppress(asyncio.CancelledError, TimeoutError):
             await asyncio.wait_for(studio.work(), 0.05)
