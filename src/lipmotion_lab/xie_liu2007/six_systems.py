@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -19,8 +19,8 @@ from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
-from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
-from lipmotion.pipeline.workers import worker_pool
+from lipmotion.pipeline.training.train import phones_and_examples
+from lipmotion.pipeline.workers import training_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
 from lipmotion.storage.archive import Checkpoint
@@ -177,10 +177,10 @@ class _TrainingSetup:
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
         eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
-        with worker_pool(min(self.settings.workers, len(utterances) // UTTERANCES_PER_WORKER)) as team:
-            phones, examples, _ = phones_and_examples(
-                utterances, config, lexicon, sub_monitor(monitor, 0, 0.7), self.checkpoint(names), team.ordered_map
-            )
+        with training_pool(self.settings.workers, len(utterances)) as each:
+            checkpoint = replace(self.checkpoint(names), parallel_map=each)
+            learning = sub_monitor(monitor, 0, 0.7)
+            phones, examples, _ = phones_and_examples(utterances, config, lexicon, learning, checkpoint)
         read = partial(load_held_out, self.corpus, cached_recogniser(phones), lexicon=lexicon)
         read = partial(read, visual=visual, eigenlips=eigenlips)
         parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
