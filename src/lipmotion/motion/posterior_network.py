@@ -102,6 +102,7 @@ class PosteriorNetwork(Predictor):
     source: str
     recurrent: RecurrentNetwork | None = None
     name: ClassVar[str] = "posteriors"
+    needs: ClassVar[str] = "posteriors"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS | RECURRENT.specs
 
     @classmethod
@@ -111,17 +112,12 @@ class PosteriorNetwork(Predictor):
 
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
-        """Return the network of ``train``. Raises CorpusError."""
-        return PredictorFit(cls.train(training))
-
-    @classmethod
-    def train(cls, training: PredictorTraining) -> PosteriorNetwork:
         """Return a network that is trained on examples as recorded; without spectra where one of them has none.
 
         Raises CorpusError: an example without posteriors.
         """
         examples = training.examples
-        posteriors = _list_posteriors(examples)
+        posteriors = list_posteriors(examples)
         if posteriors is None:
             raise CorpusError(
                 "examples without posteriors, which the predictor posteriors needs; train with the recogniser auto"
@@ -144,11 +140,7 @@ class PosteriorNetwork(Predictor):
             for shifted, values in zip(inputs, training.values, strict=True)
         )
         variances = measure_error_variances(training, predicted, scale)
-        return cls(network, mean, basis, centre, scale, variances, posteriors[0].source, recurrent)
-
-    def can_predict(self, speech: Speech) -> bool:
-        """Return whether speech has posteriors."""
-        return speech.posteriors is not None
+        return PredictorFit(cls(network, mean, basis, centre, scale, variances, posteriors[0].source, recurrent))
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
         """Return motion in the motion space [shape=(T, Q)], and no distortion: 0 [shape=(T,)].
@@ -227,12 +219,7 @@ class PosteriorNetwork(Predictor):
         )
 
 
-def have_posteriors(examples: Sequence[Example]) -> bool:
-    """Return whether a posterior network can be trained on examples: whether all of them have posteriors."""
-    return _list_posteriors(examples) is not None
-
-
-def _list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None:
+def list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None:
     """Return the posteriors of examples; None where one of them has none."""
     known = [example.speech.posteriors for example in examples if example.speech.posteriors is not None]
     return known if known and len(known) == len(examples) else None
