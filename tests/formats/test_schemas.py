@@ -19,8 +19,8 @@ from study.small_study import small_study
 
 SCHEMAS = json.loads(resources.files("lipmotion.formats").joinpath("schemas.json").read_text("utf-8"))["$defs"]
 TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None)}
-UNDERSTOOD = {"type", "properties", "required", "additionalProperties", "items", "minItems", "maxItems", "const", "enum",
-              "pattern", "minimum", "maximum", "exclusiveMinimum", "$ref", "description"}  # fmt: skip
+UNDERSTOOD = {*"$ref const enum type properties required additionalProperties items minItems maxItems pattern".split()}
+UNDERSTOOD |= {*"minimum maximum exclusiveMinimum description".split()}
 
 
 def is_of(value: Any, kind: str) -> bool:
