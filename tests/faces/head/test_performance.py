@@ -91,7 +91,6 @@ def test_a_loud_high_voice_raises_the_brows():
 
 
 STAGE_SIZE = (360, 300)
-UNIT = STAGE_SIZE[1] / 0.8
 REST_WIDTH = 0.57
 
 
