@@ -173,11 +173,12 @@ def report_html(
     left_open: Mapping[str, str],
     failed: Mapping[str, str],
     *,
-    quick: bool,
+    subtitle: str = "How the systems of three papers, and those of this project, do on a corpus.",
+    how_to_read: str = HOW_TO_READ,
+    quick: bool = False,
 ) -> str:
     """Return the page of a report; ``left_open`` and ``failed``: reasons by experiment."""
     style = resources.files(__package__).joinpath("report.css").read_text("utf-8")
-    subtitle = "How the systems of three papers, and those of this project, do on a corpus."
     header = element("header", element("h1", title), element("p", subtitle, class_="quiet"))
     entries = [
         element("li", element("strong", element("a", each.section.title, href=f"#{each.name}")), each.section.verdict)
@@ -187,7 +188,7 @@ def report_html(
         entries += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
     warning = [element("p", QUICK_WARNING, class_="warning")] if quick else []
     overview = element("ul", *entries, class_="overview")
-    main = element("main", *warning, overview, element("p", HOW_TO_READ, class_="quiet"), *map(_section, finished))
+    main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_section, finished))
     footer = element("footer", element("h2", "The corpus and the run"), _listed(about))
     return whole_page(title, style, header, main, footer, script=SCRIPT)
 
@@ -229,7 +230,7 @@ def _section(part: FinishedPart) -> Html:
         *more,
         *_clip(part),
         *(
-            [element("h3", "Pictures like the paper's"), element("div", *pictures, class_="pictures")]
+            [element("h3", "Pictures"), element("div", *pictures, class_="pictures")]
             if pictures
             else []
         ),
