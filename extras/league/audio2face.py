@@ -1,9 +1,8 @@
 """Audio2Face-3D (NVIDIA's ``network.onnx`` of the regression kind): the first components of the face's skin.
 
-Settings: ``folder``, that of the network. Each picture hears 8,320 samples at 16 kHz about it, times 1.3, without emotion.
+Settings: ``folder``, that of the network. A picture hears 8,320 samples at 16 kHz about it, times 1.3; no emotion.
 """
 
-import os
 import wave
 from pathlib import Path
 
@@ -21,7 +20,7 @@ def begin(settings):
     if not path.is_file():
         raise FileNotFoundError(path)
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = int(os.environ.get("OMP_NUM_THREADS", 1))
+    options.intra_op_num_threads = 1
     network = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
     def answer(recording):

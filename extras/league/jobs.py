@@ -1,4 +1,4 @@
-"""What the adapters in Python share: a job in, weights out. They import nothing of lipmotion, for it has its own environment."""
+"""What the adapters in Python share: a job in, weights out. It needs nothing but Python, for rivals have their own."""
 
 import json
 import sys

@@ -1,7 +1,7 @@
 """OpenFaceFX (PyPI ``openfacefx``): curves of loudness, or of phones that it is told.
 
-Settings for sound: ``gate``, ``window``. Settings for phones: ``stream`` (its ``StreamingGenerator`` with so many seconds of
-look-ahead; 0: ``build_viseme_curves``), ``smooth``, ``intensity``.
+Settings for sound: ``gate``, ``window``. For phones: ``smooth``, ``intensity``, ``stream`` (look-ahead in seconds of its
+``StreamingGenerator``; 0: ``build_viseme_curves``).
 """
 
 from jobs import ABSENT, run

@@ -1,4 +1,4 @@
-"""lipmotion: ``animate``, or a ``Stream``, of a model. Settings: ``model`` (none: the one that ships), ``ahead_ms``, ``told``."""
+"""lipmotion: ``animate``, or a ``Stream`` (``ahead_ms``), of a ``model`` (none: the shipped one); ``told``: of phones."""
 
 from pathlib import Path
 

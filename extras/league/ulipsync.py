@@ -1,4 +1,4 @@
-"""uLipSync's port to Python (PyPI ``pylipsync``): five vowels and silence. Settings: ``method``, ``silence``, ``window_ms``."""
+"""uLipSync in Python (PyPI ``pylipsync``): vowels and silence. Settings: ``method``, ``silence``, ``window_ms``."""
 
 import wave
 
@@ -10,9 +10,7 @@ def begin(settings):
     import numpy as np
     from pylipsync import CompareMethod, PhonemeAnalyzer
 
-    analyser = PhonemeAnalyzer(
-        compare_method=CompareMethod[settings["method"]], silence_threshold=settings["silence"]
-    )
+    analyser = PhonemeAnalyzer(compare_method=CompareMethod[settings["method"]], silence_threshold=settings["silence"])
 
     def answer(recording):
         with wave.open(recording["sound"]) as sound:

@@ -44,6 +44,7 @@ from lipmotion.types import (
     sub_monitor,
     with_progress,
 )
+from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import Lexicon, is_silent
 from lipmotion_faces import stage_face
 from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic
@@ -76,7 +77,7 @@ class RivalError(InputError):
 class Rival:
     """A row of the table of adapters.
 
-    run      : command; a part in braces is the variable of the environment that names a program, ``{NAME:default}``
+    run      : program and file of the adapter; ``{NAME:default}`` is the program in a variable of the environment
     settings : values that are tried, all with all, by name; the choice among them is made where nothing is reported
     given    : what it hears: ``sound``, or also ``phones``
     """
@@ -90,16 +91,12 @@ class Rival:
     settings: Mapping[str, Sequence[Any]] | None = None
 
     def command(self, folder: Path) -> list[str]:
-        """Return the command, whose files are in a folder. Raises MissingDependencyError: a variable is not set."""
-        words = []
-        for word in self.run:
-            if word.startswith("{"):
-                variable, _, default = word.strip("{}").partition(":")
-                word = os.environ.get(variable, sys.executable if default == "python" else default)
-                if not word:
-                    raise MissingDependencyError(f"{variable} is not set; {self.needs}")
-            words.append(str(folder / word) if (folder / word).is_file() else word)
-        return words
+        """Return the command, whose files are in a folder."""
+        program, *files = self.run
+        if program.startswith("{"):
+            variable, _, default = program.strip("{}").partition(":")
+            program = os.environ.get(variable) or (sys.executable if default == "python" else default)
+        return [program, *(str(folder / file) for file in files)]
 
     def list_settings(self) -> list[dict[str, Any]]:
         """Return all settings that are tried. Raises MissingDependencyError: a variable in them is not set."""
@@ -248,7 +245,7 @@ def _run(rival: Rival, command: Sequence[str], folder: Path, limit_s: float) -> 
     """Run an adapter; what it prints goes to a file. Raises as ``ask``."""
     with (folder / "log.txt").open("wb") as log:  # not a pipe, which a program of the rival's could hold open
         try:
-            code = subprocess.run(command, stdout=log, stderr=log, timeout=limit_s, check=False).returncode  # noqa: S603
+            code = subprocess.run(command, stdout=log, stderr=log, timeout=limit_s, check=False).returncode
         except (FileNotFoundError, PermissionError) as error:
             raise MissingDependencyError(f"{command[0]} cannot be run; {rival.needs}") from error
         except subprocess.TimeoutExpired as error:
@@ -270,7 +267,9 @@ def read_answer(rival: Rival, recording: Recording, content: Any) -> Answer:
         weights = np.stack([np.array(content["weights"][name], float) for name in names], axis=1)
         seconds = float(content.get("seconds", np.nan))
     except (TypeError, KeyError, ValueError, AttributeError) as error:
-        raise RivalError(f"{about}: not an answer ({type(error).__name__}: {error}); required times, weights") from error
+        raise RivalError(
+            f"{about}: not an answer ({type(error).__name__}: {error}); required times, weights"
+        ) from error
     if len(time_s) != len(weights) or len(time_s) < 2:
         raise RivalError(f"{about}: {len(time_s)} times and {len(weights)} values, required as many, two or more")
     if not (np.isfinite(time_s).all() and np.isfinite(weights).all()):
@@ -310,12 +309,6 @@ def prepare_weights(answer: Answer, smoothing_s: float) -> Array:
     return np.concatenate([weights, np.ones((len(weights), 1))], axis=1)
 
 
-def rows_at(rows: Array, time_s: Array) -> Array:
-    """Return rows of the grid at some times."""
-    grid_s = np.arange(len(rows)) / GRID_HZ
-    return np.stack([np.interp(time_s, grid_s, column) for column in rows.T], axis=1)
-
-
 def fit_map(rows: Array, original: Array) -> Array:
     """Return the coefficients by ridge regression, which move as widely as the speakers do [shape=(W + 1, 2)]."""
     square = rows.T @ rows
@@ -331,9 +324,9 @@ def fit_map(rows: Array, original: Array) -> Array:
 def at_best_sync(recording: Recording, motion: Array, lag_s: float, limit_s: float) -> Array:
     """Return motion [shape=(T, 2)] in the frames of a recording, moved by up to ``limit_s`` to fit its opening best."""
     shifts = np.arange(-limit_s, limit_s + 1e-9, SYNC_STEP_S) if limit_s else np.zeros(1)
-    moved = [rows_at(motion[:, :1], recording.time_s + lag_s + shift) for shift in shifts]
+    moved = [interpolate_rows(motion[:, :1], GRID_HZ, recording.time_s + lag_s + shift) for shift in shifts]
     scores = [curves.correlation(each, recording.original[:, :1])[0] for each in moved]
-    return rows_at(motion, recording.time_s + lag_s + shifts[int(np.argmax(scores))])
+    return interpolate_rows(motion, GRID_HZ, recording.time_s + lag_s + shifts[int(np.argmax(scores))])
 
 
 def choose(
@@ -343,7 +336,7 @@ def choose(
 
     tried : answers to all recordings, by settings. Answers that have opening and width are taken as they are
     """
-    chosen, best = [recordings[n] for n in numbers], None
+    chosen, best = [recordings[n] for n in numbers], (Choice(0, 0.0, 0.0, np.zeros((1, 2))), list[Array]())
     original = np.concatenate([each.original for each in chosen])
     own = set(CHANNELS) <= set(tried[0][0].names)
     for setting, answers in enumerate(tried):
@@ -355,16 +348,17 @@ def choose(
                     for column, name in enumerate(CHANNELS):
                         coefficients[answers[0].names.index(name), column] = 1
                 else:
-                    placed = [rows_at(r, each.time_s + lag_s) for r, each in zip(rows, chosen, strict=True)]
+                    placed = [
+                        interpolate_rows(r, GRID_HZ, each.time_s + lag_s) for r, each in zip(rows, chosen, strict=True)
+                    ]
                     coefficients = fit_map(np.concatenate(placed), original)
                 made = [
                     at_best_sync(each, r @ coefficients, lag_s, limit_s) for r, each in zip(rows, chosen, strict=True)
                 ]
                 opened = [each.original[:, :1] for each in chosen]
                 score = float(curves.per_clip_correlation([each[:, :1] for each in made], opened)[0])
-                if best is None or score > best[0].score + 1e-4:
+                if score > best[0].score + 1e-4:
                     best = Choice(setting, lag_s, smoothing_s, coefficients, score=score), made
-    assert best is not None
     choice, made = best
     level = float(np.percentile(np.concatenate([each[:, 0] for each in made]), 95))
     counts = {
@@ -471,7 +465,13 @@ class Standing:
 
 
 def play(
-    rival: Rival, recordings: Sequence[Recording], reported: int, adapters: Path, work: Path, sync_s: float, limit_s: float
+    rival: Rival,
+    recordings: Sequence[Recording],
+    reported: int,
+    adapters: Path,
+    work: Path,
+    sync_s: float,
+    limit_s: float,
 ) -> Standing:
     """Return what a rival does on the first ``reported`` recordings. Raises as ``ask``."""
     settings = rival.list_settings()
@@ -496,7 +496,7 @@ def play(
 
 @dataclass(frozen=True, eq=False)
 class League:
-    """The standings, best first; why rivals are absent, or failed, by title; the recordings, and what is said of them."""
+    """The standings, best first; why rivals are absent, or failed, by title; the recordings, and texts on them."""
 
     standings: Sequence[Standing]
     absent: Mapping[str, str]
@@ -511,7 +511,7 @@ class League:
         return others[0] if others else None
 
 
-def league(
+def league(  # noqa: PLR0913
     corpus: Corpus,
     adapters: Path,
     work: Path,
@@ -571,7 +571,7 @@ COLUMNS = (
 HOW_TO_READ = (
     "Weights of a rival become opening and width by a linear map that moves as widely as the speakers do. The map, its "
     "lag, its smoothing, when lips count as closed, and the rival's settings are those with which it did best on "
-    "recordings that are not reported here. Systems that answer in opening and width are taken as they are. Small: 95 % "
+    "recordings that are not reported here. What answers in opening and width is taken as it is. Small: 95 % "
     "bootstrap intervals over recordings."
 )
 PART, INSTANTS, SHOWN_S = "league", 6, 6.0

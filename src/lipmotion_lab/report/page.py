@@ -166,7 +166,7 @@ class FinishedPart:
     section: Section
 
 
-def report_html(
+def report_html(  # noqa: PLR0913
     title: str,
     about: Mapping[str, str],
     finished: Sequence[FinishedPart],
@@ -229,11 +229,7 @@ def _section(part: FinishedPart) -> Html:
         section.table.as_html(part.name),
         *more,
         *_clip(part),
-        *(
-            [element("h3", "Pictures"), element("div", *pictures, class_="pictures")]
-            if pictures
-            else []
-        ),
+        *([element("h3", "Pictures"), element("div", *pictures, class_="pictures")] if pictures else []),
         element(
             "details",
             element("summary", "How this was made"),
