@@ -1,6 +1,6 @@
 """OpenFaceFX (PyPI ``openfacefx``): curves of loudness, or of phones that it is told.
 
-Settings for sound: ``gate``, ``window``. For phones: ``smooth``, ``intensity``, ``stream`` (look-ahead in seconds of its
+Settings for sound: ``gate``, ``window``. For phones: ``smooth``, ``intensity``, ``stream`` (look-ahead of its
 ``StreamingGenerator``; 0: ``build_viseme_curves``).
 """
 

@@ -1,4 +1,4 @@
-"""lipmotion: ``animate``, or a ``Stream`` (``ahead_ms``), of a ``model`` (none: the shipped one); ``told``: of phones."""
+"""lipmotion: ``animate``, or a ``Stream`` (``ahead_ms``), of a ``model`` (or the shipped one); ``told``: of phones."""
 
 from pathlib import Path
 

@@ -170,7 +170,10 @@ def load_recordings(corpus: Corpus, names: Sequence[str], work: Path, monitor: M
                 f"{corpus.path}: {utterance.name} has {what}, required the lips of a filmed face; prepare videos, or "
                 "leave the recording out"
             )
-        sound, timed = (work / "sound" / f"{utterance.name}.{kind}" for kind in ("wav", "json"))
+        content = np.asarray(utterance.audio.samples).tobytes() + repr((utterance.words, utterance.phones)).encode()
+        sound, timed = (
+            work / "sound" / f"{utterance.name}-{zlib.crc32(content):08x}.{kind}" for kind in ("wav", "json")
+        )
         if not sound.exists():
             samples = resample_poly(np.asarray(utterance.audio.samples, float), SOUND_HZ, utterance.audio.rate_hz)
             powers = np.square(samples[: len(samples) // LOUD_WINDOW * LOUD_WINDOW]).reshape(-1, LOUD_WINDOW)
@@ -209,7 +212,7 @@ def ask(
     key = hashlib.sha256(b"".join([*scripts, json.dumps(settings, sort_keys=True).encode()])).hexdigest()[:8]
     folder = work / "answers" / f"{rival.name}-{key}"
     make_folder(folder)
-    files = [folder / f"{each.name}-{zlib.crc32(each.sound.read_bytes()):08x}.json" for each in recordings]
+    files = [folder / f"{each.sound.stem}.json" for each in recordings]
     missing = [(each, file) for each, file in zip(recordings, files, strict=True) if not file.exists()]
     if missing:
         rows = [{"name": each.name, "sound": str(each.sound), "duration_s": each.duration_s} for each, _ in missing]
@@ -232,7 +235,10 @@ def ask(
         _read_answers(rival, each, from_json(file.read_bytes()), len(settings))
         for each, file in zip(recordings, files, strict=True)
     ]
-    return [list(answers) for answers in zip(*by_recording, strict=True)]
+    tried = [list(answers) for answers in zip(*by_recording, strict=True)]
+    if any(answer.names != answers[0].names for answers in tried for answer in answers):
+        raise RivalError(f"{rival.title}: recordings have weights of different names, required the same in all")
+    return tried
 
 
 def _read_answers(rival: Rival, recording: Recording, content: Any, count: int) -> list[Answer]:
@@ -263,7 +269,7 @@ def read_answer(rival: Rival, recording: Recording, content: Any) -> Answer:
     """Return an answer, checked. Raises RivalError."""
     about = f"{rival.title}, {recording.name}"
     try:
-        time_s, names = np.array(content["times"], float), tuple(content["weights"])
+        time_s, names = np.array(content["times"], float), tuple(sorted(content["weights"]))
         weights = np.stack([np.array(content["weights"][name], float) for name in names], axis=1)
         seconds = float(content.get("seconds", np.nan))
     except (TypeError, KeyError, ValueError, AttributeError) as error:

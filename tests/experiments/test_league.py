@@ -37,6 +37,7 @@ for row in job["recordings"]:
         if does == "early": times = [t / 9 for t in times]
         if does == "backwards": times = times[::-1]
         if does == "short": weights["minus width"].pop()
+        if does == "renames": weights = {row["name"]: weights["minus width"]}
         if does == "noise": weights = {"noise": [(n * 7919) % 13 for n in range(len(times))]}
         if does == "told": assert row["phones"]
         answers[row["name"]].append({"times": times, "weights": weights, "seconds": 0.5})
@@ -97,14 +98,14 @@ def test_answers_are_kept_and_what_one_rival_lacks_stops_no_other(adapters, toy_
     unset = {"settings": {"model": ["$NOT_SET/a.model"]}}
     rows = {"good": does("follows"), "absent": does("absent"), "gone": does("follows") | gone, "unset": unset}
     rows |= {"crash": does("crash"), "nan": does("nan"), "early": does("early"), "backwards": does("backwards")}
-    rows |= {"short": does("short"), "forgets": does("forgets")}
+    rows |= {name: does(name) for name in ("short", "forgets", "renames")}
     found = hold(adapters, toy_corpus, rows)
     assert [each.rival.name for each in found.standings] == ["good"]
     assert set(found.absent) == {"ABSENT", "GONE", "UNSET"}
     assert "put it on the PATH" in found.absent["GONE"]
     assert "no such voice" in found.failed["CRASH"]
     for name, words in (("NAN", "not readable"), ("EARLY", "times from"), ("BACKWARDS", "times from"),
-                        ("SHORT", "weights"), ("FORGETS", "no list of 1")):  # fmt: skip
+                        ("SHORT", "weights"), ("FORGETS", "no list of 1"), ("RENAMES", "different names")):  # fmt: skip
         assert words in found.failed[name] or "no readable" in found.failed[name]
     (adapters / "calls.txt").unlink()
     again = hold(adapters, toy_corpus, {"good": does("follows")})
