@@ -26,6 +26,7 @@ from lipmotion.errors import CorpusError, InputError, MissingDependencyError, sh
 from lipmotion.formats.sound import write_sound
 from lipmotion.measures import curves
 from lipmotion.measures.closures import REACH, closed_threshold, find_closings, match_closings
+from lipmotion.motion.rest import is_away_from_speech
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recogniser import cached_recogniser
@@ -58,7 +59,7 @@ SOUND_HZ, GRID_HZ = 48_000, 100.0
 """Rate of the sound that rivals hear, and that at which their weights are compared."""
 LOUD, LOUD_SHARE, LOUD_WINDOW = 0.1, 95, SOUND_HZ // 50
 """Rivals have thresholds: the root mean square of the loudest twentieth of each recording is brought to this."""
-LAGS_S, SMOOTHINGS_S = np.arange(-0.08, 0.21, 0.04), (0.0, 0.03, 0.06)
+LAGS_S, SMOOTHINGS_S = np.arange(-0.08, 0.33, 0.04), (0.0, 0.03, 0.06, 0.1)
 SHUT_SHARES = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
 """What is tried of every rival: lags, smoothing (σ), and the share of its 95th percentile under which it is shut."""
 SYNC_STEP_S, RIDGE = 0.01, 1e-3
@@ -180,13 +181,13 @@ def load_recordings(corpus: Corpus, names: Sequence[str], work: Path, monitor: M
             loudest = np.sqrt(np.percentile(powers.mean(axis=1), LOUD_SHARE))
             write_sound(sound, Audio((samples * LOUD / max(loudest, 1e-9)).astype(np.float32), SOUND_HZ))
         if not timed.exists():
-            spans = label_phones(utterance, phones, Lexicon())
-            rows = [(s.start_s, s.end_s, "" if is_silent(s.label.phone) else s.label.phone) for s in spans]
+            units = label_phones(utterance, phones, Lexicon())
+            rows = [(s.start_s, s.end_s, "" if is_silent(s.label.phone) else s.label.phone) for s in units]
             _write_json(timed, rows)
         time_s = motion.time_s[seen]
         original = np.stack([motion[name][seen] for name in CHANNELS], axis=1).astype(float)
-        spans = [(start, end, phone) for start, end, phone in from_json(timed.read_bytes())]
-        recordings.append(Recording(utterance, sound, time_s, original, spans))
+        spoken = [(start, end, phone) for start, end, phone in from_json(timed.read_bytes())]
+        recordings.append(Recording(utterance, sound, time_s, original, spoken))
     return recordings
 
 
@@ -387,9 +388,7 @@ def closing_counts(recording: Recording, made: Array, shut: float) -> tuple[Arra
     frame_s = float(np.median(np.diff(recording.time_s)))
 
     def inside(frames: NDArray[np.intp], spans: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
-        at_s = recording.time_s[frames][:, None]
-        starts, ends = np.array(spans).reshape(-1, 2).T
-        return ((at_s >= starts - margin_s) & (at_s <= ends + margin_s)).any(axis=1)
+        return ~is_away_from_speech(recording.time_s[frames], spans, margin_s)
 
     lips, other = recording.spoken(lips=True), recording.spoken(lips=False)
     wanted = original[inside(original, lips, frame_s)]
@@ -428,10 +427,8 @@ def measure(
     for recording, motion, shut in zip(recordings, made, shuts, strict=True):
         both = curves.correlation(motion, recording.original)
         everything, lips = closing_counts(recording, motion, shut)
-        starts, ends = np.array([s[:2] for s in recording.phones if s[2]]).reshape(-1, 2).T
-        at_s = recording.time_s[:, None]
-        speech = ((at_s >= starts) & (at_s <= ends)).any(axis=1)
-        speech = speech if speech.any() else np.ones(len(speech), bool)
+        speech = ~is_away_from_speech(recording.time_s, [s[:2] for s in recording.phones if s[2]], 0.0)
+        speech |= ~speech.any()  # nothing is spoken: all of it
         pair = (motion[:, 0], recording.original[:, 0])
         sums["acc"].append(np.array([both[0], 1]))
         sums["width"].append(np.array([both[1], 1]))
@@ -486,7 +483,8 @@ def play(
     shuts, seconds, chosen = dict[int, float](), dict[int, float](), []
     for numbers, held in split_choices(reported, len(recordings) - reported):
         choice = choose(tried, recordings, numbers, sync_s)
-        about = {"settings": settings[choice.setting], "lag_ms": round(1000 * choice.lag_s)}
+        shown = {k: Path(v).name if isinstance(v, str) else v for k, v in settings[choice.setting].items()}
+        about = {"settings": shown, "lag_ms": round(1000 * choice.lag_s)}
         chosen.append(about | {"smoothing_ms": round(1000 * choice.smoothing_s), "acc_there": round(choice.score, 3)})
         for n in held:
             answer = tried[choice.setting][n]
@@ -614,7 +612,11 @@ def describe_league(found: League) -> Section:
 def write_league(found: League, folder: Path) -> dict[str, Any]:
     """Write the page of a league, with its pictures and all figures, to a folder; return the figures."""
     section, motion, part = describe_league(found), _shown(found), folder / PART
-    figures = {"about": found.about, "best_rival": section.table.reference or None, "rivals": section.table.rows}
+    figures: dict[str, Any] = {
+        "about": found.about,
+        "best_rival": section.table.reference or None,
+        "rivals": section.table.rows,
+    }
     figures |= {"chosen": {each.rival.title: each.chosen for each in found.standings}}
     each_acc = {
         each.rival.title: {r.name: s[0] for r, s in zip(found.recordings, each.figures["acc"].sums, strict=True)}
@@ -652,7 +654,11 @@ def _shown(found: League) -> dict[str, Any]:
     seen = (recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S)
     spoken = [s for s in recording.phones if s[2] and s[1] > begin_s and s[0] < begin_s + SHOWN_S]
     systems = {each.rival.title: each.made[number][seen] for each in found.standings}
-    content = {"name": recording.name, "words": list(recording.utterance.words or ()), "channels": list(CHANNELS)}
+    content: dict[str, Any] = {
+        "name": recording.name,
+        "words": list(recording.utterance.words or ()),
+        "channels": list(CHANNELS),
+    }
     content |= {"spoken": spoken, "time_s": recording.time_s[seen], RECORDED: recording.original[seen]}
     return content | {"systems": systems}
 

@@ -263,17 +263,17 @@ def _clip(part: FinishedPart) -> list[Html]:
         )
         for video in part.record["videos"]
     ]
-    together = element("button", "Play all together", type="button", class_="together", hidden=True)
+    together = [element("button", "Play all together", type="button", class_="together", hidden=True)] if videos else []
     said = f", “{words}”" if words else ""
     return [
         element("h3", "One recording, seen and heard"),
         element(
             "p",
-            f"{name}{said}: of the compared recordings the one with most p, b and m, whatever the systems make of it. "
-            "Sound alone was given.",
+            f"{name}{said}: of the compared recordings the one with most p, b and m, whatever the systems make of it."
+            f"{' Sound alone was given.' if videos else ''}",
             class_="quiet",
         ),
-        element("div", together, element("div", *videos, class_="videos"), class_="clip"),
+        element("div", *together, element("div", *videos, class_="videos"), class_="clip"),
         element("h3", "Its opening of the mouth"),
         element("p", "Dashed: recorded, in eye distances; line: generated; shaded: p, b and m.", class_="quiet"),
         element("div", *draw_curves(part.motion, part.section.shown), class_="grid"),
