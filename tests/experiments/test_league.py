@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -149,10 +148,34 @@ def test_closings_of_the_lips(toy_corpus, tmp_path):
     assert closing_counts(recording, still, shut)[0][0] == 0  # a mouth that never opens closes nowhere
 
 
+ONNX = """
+import numpy as np
+class SessionOptions: pass
+class InferenceSession:
+    def __init__(self, path, options, providers): assert path.endswith("network.onnx")
+    def run(self, outputs, given):
+        sound, emotion = given["input"], given["emotion"]
+        assert sound.shape[1:] == (1, 8320) and emotion.shape == (len(sound), 1, 26) and sound.dtype == np.float32
+        loudness = np.square(sound[:, :, 4000:4320]).mean(axis=2, keepdims=True)
+        return [loudness * np.arange(301)]
+"""
+
+
+def test_audio2face_is_asked_as_its_network_wants(toy_corpus, tmp_path, monkeypatch):
+    (tmp_path / "onnxruntime.py").write_text(ONNX)  # a stand-in: the network is not to be had here
+    (tmp_path / "network.onnx").touch()
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]))
+    monkeypatch.setenv("LIPMOTION_AUDIO2FACE", str(tmp_path))
+    found = league(toy_corpus, ADAPTERS, tmp_path / "work", only=["audio2face"])
+    assert (found.failed, found.absent) == ({}, {})
+    (tmp_path / "network.onnx").unlink()
+    absent = league(toy_corpus, ADAPTERS, tmp_path / "other", only=["audio2face"]).absent
+    assert "network.onnx" in absent["Audio2Face-3D"]
+
+
 INSTALLED = {
     "rhubarb": lambda: shutil.which(os.environ.get("LIPMOTION_RHUBARB", "rhubarb")),
     "lipmotion": lambda: sys.executable,
-    "audio2face": lambda: os.environ.get("LIPMOTION_AUDIO2FACE") and find_spec("onnxruntime"),
     **dict.fromkeys(("wlipsync", "headaudio", "wawa"), lambda: os.environ.get("LIPMOTION_NODE_MODULES")),
     **dict.fromkeys(("openfacefx", "openfacefx-phones"), lambda: os.environ.get("LIPMOTION_PYTHON_OPENFACEFX")),
     "pylipsync": lambda: os.environ.get("LIPMOTION_PYTHON_PYLIPSYNC"),
