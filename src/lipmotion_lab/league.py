@@ -372,7 +372,7 @@ def choose(
         share: np.sum([closing_counts(each, m, share * level)[0] for each, m in zip(chosen, made, strict=True)], axis=0)
         for share in SHUT_SHARES
     }
-    return replace(choice, shut=level * max(counts, key=lambda share: float(_f1(counts[share]))))
+    return replace(choice, shut=level * max(counts, key=lambda share: np.nan_to_num(_f1(counts[share]))))
 
 
 def closing_counts(recording: Recording, made: Array, shut: float) -> tuple[Array, Array]:
@@ -419,12 +419,10 @@ def onset_errors(recording: Recording, made: Array, shut: float) -> Array:
     return 1000 * np.array([errors + ONSET_REACH_S * (len(original) - len(pairs)), len(original) / 1000])
 
 
-def measure(
-    recordings: Sequence[Recording], made: Sequence[Array], shuts: Sequence[float], seconds: Sequence[float]
-) -> dict[str, ClipStatistic]:
-    """Return the figures of one rival by name, each a sum over recordings."""
+def measure(recordings: Sequence[Recording], made: Sequence[tuple[Array, float, float]]) -> dict[str, ClipStatistic]:
+    """Return the figures of one rival by name, each a sum over recordings; made: motion, threshold, seconds."""
     sums: dict[str, list[Array]] = {name: [] for name in ("acc", "width", "f1", "lips", "strength", "jerk", "onset")}
-    for recording, motion, shut in zip(recordings, made, shuts, strict=True):
+    for recording, (motion, shut, _) in zip(recordings, made, strict=True):
         both = curves.correlation(motion, recording.original)
         everything, lips = closing_counts(recording, motion, shut)
         speech = ~is_away_from_speech(recording.time_s, [s[:2] for s in recording.phones if s[2]], 0.0)
@@ -437,7 +435,7 @@ def measure(
         sums["strength"].append(np.array([np.percentile(each[speech], 98) for each in pair]))
         sums["jerk"].append(np.array([np.abs(np.diff(each, 3)).sum() for each in pair]))
         sums["onset"].append(onset_errors(recording, motion, shut))
-    sums["seconds"] = [np.array([s, r.duration_s]) for s, r in zip(seconds, recordings, strict=True)]
+    sums["seconds"] = [np.array([s, r.duration_s]) for (_, _, s), r in zip(made, recordings, strict=True)]
     return {name: ClipStatistic(rows, _f1 if name in ("f1", "lips") else _ratio) for name, rows in sums.items()}
 
 
@@ -479,8 +477,7 @@ def play(
     """Return what a rival does on the first ``reported`` recordings. Raises as ``ask``."""
     settings = rival.list_settings()
     tried = ask(rival, recordings, adapters, work, limit_s)
-    made: dict[int, Array] = {}
-    shuts, seconds, chosen = dict[int, float](), dict[int, float](), []
+    done, chosen = dict[int, tuple[Array, float, float]](), []
     for numbers, held in split_choices(reported, len(recordings) - reported):
         choice = choose(tried, recordings, numbers, sync_s)
         shown = {k: Path(v).name if isinstance(v, str) else v for k, v in settings[choice.setting].items()}
@@ -489,13 +486,9 @@ def play(
         for n in held:
             answer = tried[choice.setting][n]
             motion = prepare_weights(answer, choice.smoothing_s) @ choice.coefficients
-            made[n] = at_best_sync(recordings[n], motion, choice.lag_s, sync_s)
-            shuts[n], seconds[n] = choice.shut, answer.seconds
-    order = range(reported)
-    figures = measure(
-        recordings[:reported], [made[n] for n in order], [shuts[n] for n in order], [seconds[n] for n in order]
-    )
-    return Standing(rival, [made[n] for n in order], figures, chosen)
+            done[n] = at_best_sync(recordings[n], motion, choice.lag_s, sync_s), choice.shut, answer.seconds
+    made = [done[n] for n in range(reported)]
+    return Standing(rival, [motion for motion, *_ in made], measure(recordings[:reported], made), chosen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -546,6 +539,9 @@ def league(  # noqa: PLR0913
         names = names or other.names("val") or other.names()
         recordings += load_recordings(other, names, work / "choosing", loading)
     next(split_choices(len(reported), len(names)))
+    stems = [each.sound.stem for each in recordings]
+    if both := sorted({*stems[: len(reported)]} & {*stems[len(reported) :]}):
+        raise InputError(f"{both[0]} is to choose on and is reported, required others; give another corpus to --choose")
     standings, absent, failed = [], {}, {}
     for rival in with_progress(rivals, "rivals", sub_monitor(monitor, 0.3, 1)):
         try:

@@ -127,6 +127,8 @@ def test_what_cannot_be_compared(adapters, toy_corpus, tmp_path):
         read_rivals(tmp_path)
     with pytest.raises(InputError, match="no rival 'other'"):
         hold(adapters, toy_corpus, {"good": does("follows")}, only=["other"])
+    with pytest.raises(InputError, match="to choose on and is reported"):
+        hold(adapters, toy_corpus, {"good": does("follows")}, choosing=toy_corpus)
     single = toy_corpus.part(toy_corpus.names("train")[:1])
     with pytest.raises(InputError, match="two or more"):
         hold(adapters, single, {"good": does("follows")})
