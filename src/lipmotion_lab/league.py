@@ -57,7 +57,7 @@ CHANNELS = ("opening", "width")
 TABLE = "rivals.json"
 SOUND_HZ, GRID_HZ = 48_000, 100.0
 """Rate of the sound that rivals hear, and that at which their weights are compared."""
-LOUD, LOUD_SHARE, LOUD_WINDOW = 0.1, 95, SOUND_HZ // 50
+LEVEL, LEVEL_SHARE, LEVEL_WINDOW = 0.1, 95, SOUND_HZ // 50
 """Rivals have thresholds: the root mean square of the loudest twentieth of each recording is brought to this."""
 LAGS_S, SMOOTHINGS_S = np.arange(-0.08, 0.33, 0.04), (0.0, 0.03, 0.06, 0.1)
 SHUT_SHARES = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
@@ -177,9 +177,9 @@ def load_recordings(corpus: Corpus, names: Sequence[str], work: Path, monitor: M
         )
         if not sound.exists():
             samples = resample_poly(np.asarray(utterance.audio.samples, float), SOUND_HZ, utterance.audio.rate_hz)
-            powers = np.square(samples[: len(samples) // LOUD_WINDOW * LOUD_WINDOW]).reshape(-1, LOUD_WINDOW)
-            loudest = np.sqrt(np.percentile(powers.mean(axis=1), LOUD_SHARE))
-            write_sound(sound, Audio((samples * LOUD / max(loudest, 1e-9)).astype(np.float32), SOUND_HZ))
+            powers = np.square(samples[: len(samples) // LEVEL_WINDOW * LEVEL_WINDOW]).reshape(-1, LEVEL_WINDOW)
+            loudest = np.sqrt(np.percentile(powers.mean(axis=1), LEVEL_SHARE))
+            write_sound(sound, Audio((samples * LEVEL / max(loudest, 1e-9)).astype(np.float32), SOUND_HZ))
         if not timed.exists():
             units = label_phones(utterance, phones, Lexicon())
             rows = [(s.start_s, s.end_s, "" if is_silent(s.label.phone) else s.label.phone) for s in units]
@@ -192,7 +192,7 @@ def load_recordings(corpus: Corpus, names: Sequence[str], work: Path, monitor: M
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class RivalAnswer:
     """What a rival made of a recording: its weights [shape=(T, W)], 100 rows a second; processor seconds, or NaN."""
 
     names: tuple[str, ...]
@@ -202,7 +202,7 @@ class Answer:
 
 def ask(
     rival: Rival, recordings: Sequence[Recording], adapters: Path, work: Path, limit_s: float
-) -> list[list[Answer]]:
+) -> list[list[RivalAnswer]]:
     """Return the answers of a rival by settings and recording; kept in ``work``, a file for each recording.
 
     limit_s : seconds after which the job is ended
@@ -242,7 +242,7 @@ def ask(
     return tried
 
 
-def _read_answers(rival: Rival, recording: Recording, content: Any, count: int) -> list[Answer]:
+def _read_answers(rival: Rival, recording: Recording, content: Any, count: int) -> list[RivalAnswer]:
     if not isinstance(content, list) or len(content) != count:
         raise RivalError(f"{rival.title}, {recording.name}: no list of {count} answers, one for each settings")
     return [read_answer(rival, recording, each) for each in content]
@@ -266,7 +266,7 @@ def _run(rival: Rival, command: Sequence[str], folder: Path, limit_s: float) -> 
         raise RivalError(f"{rival.title}: exit code {code} ({shorten(lines[-1])}); see {folder / 'log.txt'}")
 
 
-def read_answer(rival: Rival, recording: Recording, content: Any) -> Answer:
+def read_answer(rival: Rival, recording: Recording, content: Any) -> RivalAnswer:
     """Return an answer, checked. Raises RivalError."""
     about = f"{rival.title}, {recording.name}"
     try:
@@ -287,7 +287,7 @@ def read_answer(rival: Rival, recording: Recording, content: Any) -> Answer:
             f"{about}: times from {time_s[0]:.2f} to {last_s:.2f} s, required rising from about 0 to {needed_s:.2f} s"
         )
     at_s = np.arange(int(needed_s * GRID_HZ) + 1) / GRID_HZ
-    return Answer(names, np.stack([np.interp(at_s, time_s, column) for column in weights.T], axis=1), seconds)
+    return RivalAnswer(names, np.stack([np.interp(at_s, time_s, column) for column in weights.T], axis=1), seconds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,7 +306,7 @@ class Choice:
     score: float = -2.0
 
 
-def prepare_weights(answer: Answer, smoothing_s: float) -> Array:
+def prepare_weights(answer: RivalAnswer, smoothing_s: float) -> Array:
     """Return the smoothed weights of an answer, with a constant."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -337,7 +337,7 @@ def at_best_sync(recording: Recording, motion: Array, lag_s: float, limit_s: flo
 
 
 def choose(
-    tried: Sequence[Sequence[Answer]], recordings: Sequence[Recording], numbers: Sequence[int], limit_s: float
+    tried: Sequence[Sequence[RivalAnswer]], recordings: Sequence[Recording], numbers: Sequence[int], limit_s: float
 ) -> Choice:
     """Return the choice with the highest mean correlation of opening on recordings of some numbers.
 
