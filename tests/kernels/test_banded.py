@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import banded
+from kernels.conftest import load_numba
 from lipmotion.kernels.banded import normal_equations, pin, solve, solve_mlpg
 from oracles import trajectories
 
@@ -98,14 +98,13 @@ def forms(monkeypatch, compute) -> list:
     """Return the results of NumPy and of the compiled form."""
     results = []
     for compiled in (False, True):
-        monkeypatch.setattr(banded, "pays", lambda _, compiled=compiled: compiled)
+        load_numba(monkeypatch, compiled)
         results.append(compute())
     return results
 
 
 @pytest.mark.parametrize(("frames", "channels"), [(1, 1), (2, 7), (3, 2), (5, 1), (60, 33)])
 def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
-    pytest.importorskip("numba")
     mean, precision = statistics(frames, frames, channels)
     plain, fast = forms(monkeypatch, lambda: solve_mlpg(mean, precision))
     assert np.array_equal(plain, fast)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from children import environment, run_child
+from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
 from lipmotion.kernels import compiler
 from lipmotion.kernels.banded import solve_mlpg
@@ -25,8 +26,7 @@ TESTS = Path(__file__).parents[1]
 @pytest.fixture
 def unused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process in which numba can be imported but was not."""
-    monkeypatch.setattr(compiler, "numba_works", lambda: True)
-    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    load_numba(monkeypatch, False)
 
 
 @pytest.mark.usefixtures("unused")
@@ -152,11 +152,19 @@ def _sum(a: float, b: float) -> float:
     return a + b
 
 
+def keep_in(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return a kernel whose machine code is kept in a folder."""
+    numba = pytest.importorskip("numba")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+    numba.config.reload_config()
+    kernel = cast("Any", compiled(_sum))
+    kernel.prepare()
+    return kernel
+
+
 @pytest.mark.long
 def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    numba = pytest.importorskip("numba")
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    assert compiled(_sum)(1.0, 2.0) == 3.0
+    assert keep_in(tmp_path, monkeypatch)(1.0, 2.0) == 3.0
     files = sorted(path for path in tmp_path.rglob("*") if path.is_file())
     assert {path.suffix for path in files} == {".nbi", ".nbc"}
     for suffix in (".nbi", ".nbc"):
@@ -171,12 +179,9 @@ def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.Mo
 
 @pytest.mark.long
 def test_a_cache_that_takes_nothing_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    numba = pytest.importorskip("numba")
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    kernel = compiled(_sum)
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", full)
+    kernel = keep_in(tmp_path, monkeypatch)
+    for folder in tmp_path.iterdir():  # it has become a file
+        folder.rmdir()
+        folder.touch()
     assert kernel(1.0, 2.0) == 3.0
+    assert kernel.kernel.stats.cache_misses

@@ -12,7 +12,6 @@ import pytest
 
 from kernels.networks import arrays_of
 from lipmotion.kernels import forward_backward
-from lipmotion.kernels import paths as kernel_paths
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
 from lipmotion.kernels.network import ForwardBackwardNetwork
@@ -270,14 +269,6 @@ ONCE_WRONG = {
     "factorial, single": [(30, 135), (100, 61), (300, 119), (1e3, 18)],
 }
 """Spreads and numbers of cases in which probabilities counted that compiled forms once set to 0, or raised."""
-
-
-@pytest.fixture(params=["numpy", "compiled"])
-def form(request, monkeypatch) -> None:
-    """What has two forms is tested in both."""
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-    monkeypatch.setattr(kernel_paths, "pays", lambda _: request.param == "compiled")
 
 
 def wrong_cases(name: str) -> list[tuple[float, int]]:

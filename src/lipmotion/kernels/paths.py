@@ -62,6 +62,7 @@ def best_path(
     network: NetworkArrays,
     beam: float | None = None,
     windows: Windows | None = None,
+    block_frames: int | None = None,
 ) -> tuple[Index, float]:
     """Return the most probable path and its log probability (-inf: no path).
 
@@ -72,13 +73,14 @@ def best_path(
     beam         : states with a score lower than the best of the frame by more than this are dropped: that is faster,
                    but may miss the best path, or every path; None: exact
     windows      : the frames that each state may have; None: any
+    block_frames : frames whose scores are in memory at a time, B; None: as many as are fastest
     Returns the states of the path [shape=(T,)], and its score. Scores are relative to the best of their frame and in
     single precision: no path is lost, but one may be preferred to another that is better by less than their rounding.
-    Cost: O(T·E) time, O((T / B + B)·(S + G)) memory, with B frames in a block; with windows E and S are of the states
+    Cost: O(T·E) time, O((T / B + B)·(S + G)) memory; with windows E and S are of the states
     and arcs that have windows in one block, so both are linear in the duration where windows are short.
     """
     least = np.float32(-np.inf if beam is None else -beam)
-    length = WINDOW_BLOCK if windows else max(BLOCK, BLOCK_SCORES // len(network.emission))
+    length = block_frames or (WINDOW_BLOCK if windows else max(BLOCK, BLOCK_SCORES // len(network.emission)))
     starts = range(0, max(count - 1, 1), length)
     blocks = [_Block(network, windows, start, min(start + length + 1, count)) for start in starts]
     path = np.full(count, -1, np.intp)
