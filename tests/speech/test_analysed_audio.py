@@ -1,50 +1,21 @@
 import tracemalloc
-from collections import Counter
-from collections.abc import Callable, Sequence
-from typing import Any
-from zlib import crc32
 
 import numpy as np
 import pytest
 
-from lipmotion import Model, animate, load_model
 from lipmotion.errors import InputError
-from lipmotion.speech.features import analysed_audio as module
-from lipmotion.speech.features import mfcc as front_end
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc, spectrum
-from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS
-from lipmotion.speech.recognition.agreement import agreement_score
+from lipmotion.speech.features.speaker_similarity import WARPS
 from lipmotion.speech.recognition.general import general_features
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.voice_activity import find_passages
 from lipmotion.types import Audio
-from lipmotion.units import Lexicon
 from testing.toy import ToySentence, toy_sentences
 
 
 @pytest.fixture(scope="module")
 def sentence() -> ToySentence:
     return toy_sentences(3)[0]
-
-
-@pytest.fixture
-def computed(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, bytes, int]]:
-    """Counts what the front end computes: by filter bank or energy, and samples."""
-    counts: Counter[tuple[str, bytes, int]] = Counter()
-
-    def counting(kind: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        def counted(samples: np.ndarray, banks: Sequence[np.ndarray] = (np.zeros(0),)) -> Any:
-            counts.update((kind, bank.tobytes(), crc32(samples.tobytes())) for bank in banks)
-            return function(samples, banks) if kind == "filters" else function(samples)
-
-        return counted
-
-    monkeypatch.setattr(front_end, "log_mels", counting("filters", front_end.log_mels))
-    counted_energy = counting("energy", front_end.log_energy)
-    for owner in (front_end, module):
-        monkeypatch.setattr(owner, "log_energy", counted_energy)
-    return counts
 
 
 def of_samples(*parts: np.ndarray) -> AnalysedAudio:
@@ -171,6 +142,9 @@ def test_a_passage_is_not_divided_further_and_what_keeps_its_features_stays_itse
     assert passage.audio.is_passage
     assert passage.audio.frames == len(passage.audio.mfcc().values)
     assert analysed(audio) is audio
+    assert all(once is again for once, again in zip(kinds(passage.audio), kinds(passage.audio), strict=True))
+    features = mfcc(sentence.audio)
+    assert analysed(sentence.audio, features).mfcc() is features
     assert audio.samples is sentence.audio.samples
     assert audio.duration_s == sentence.audio.duration_s
     with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
@@ -183,41 +157,6 @@ def test_a_stretch_has_the_features_of_the_whole(sentence: ToySentence) -> None:
     assert len(stretch.samples) == 16_000
     for whole, part in zip(kinds(audio), kinds(stretch), strict=True):
         assert np.array_equal(part, whole[60:161])
-
-
-def test_features_that_are_known_are_not_computed(sentence: ToySentence, computed: Counter[Any]) -> None:
-    features = mfcc(sentence.audio)
-    computed.clear()
-    assert analysed(sentence.audio, features).mfcc() is features
-    assert not computed
-
-
-def long_audio() -> Audio:
-    sentences = toy_sentences(12)
-    samples = np.concatenate([sentence.audio.samples for sentence in sentences])
-    assert len(samples) / 160 > JUDGED_FRAMES
-    return Audio(samples, 16_000)
-
-
-@pytest.mark.parametrize("kind", ["fast", "general", pytest.param("auto", marks=pytest.mark.long)])
-@pytest.mark.parametrize("is_long", [False, pytest.param(True, marks=pytest.mark.long)])
-def test_each_kind_is_computed_once_for_all_that_is_done_with_a_recording(
-    sentence: ToySentence, kind: str, is_long: bool, computed: Counter[Any]
-) -> None:
-    audio: AnalysedAudio = analysed(long_audio() if is_long else sentence.audio)
-    recogniser = Recogniser(load_model().phones, kind)
-    recognised = recogniser.recognise(audio, audio.mfcc())
-    recogniser.align_phones(audio, audio.mfcc(), recognised)
-    aligned = recogniser.align(audio, audio.mfcc(), sentence.words, Lexicon())
-    agreement_score(audio, aligned)
-    assert set(computed.values()) == {1}
-    if not is_long:  # features at no warp and general ones, and at the other warps; of the longest passage alone
-        assert sum(what == "filters" for what, *_ in computed) == (2 if kind == "general" else 6)
-
-
-def test_animate_computes_each_kind_once(toy_model: Model, sentence: ToySentence, computed: Counter[Any]) -> None:
-    animate(sentence.audio, model=toy_model, transcript=" ".join(sentence.words))
-    assert set(computed.values()) == {1}
 
 
 def test_features_of_silence_take_no_more_memory_than_they_are() -> None:

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from lipmotion.errors import InputError
 from lipmotion.hmm.align import PlacedWord, SpokenWord
 from lipmotion.kernels.paths import Windows
-from lipmotion.speech.recognition import anchors as module
 from lipmotion.speech.recognition.anchors import (
     FREE_FRAMES,
     LINE_TOLERANCE_S,
@@ -232,8 +231,7 @@ def test_lines_after_the_end_are_left_out(caplog):
         fitted(transcript(line("a", 20.0, 22.0)), loud, 10.0)
 
 
-def test_widening_ends(monkeypatch):
-    monkeypatch.setattr(module, "MOST_WIDENINGS", 3)
+def test_widening_ends():
     found = anchors_of(transcript(line(" ".join("a" * 50), 1.0, 1.1)))
     windows, tolerance_s = feasible_windows(found, found.tolerance_s, np.full(50, 90, np.intp), 3, 3000)
     assert np.all(np.isinf(tolerance_s))

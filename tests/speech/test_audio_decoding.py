@@ -2,7 +2,6 @@ import os
 import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
@@ -13,7 +12,6 @@ from PIL import Image
 from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import _TrackDecoder, read_audio
-from lipmotion.storage.media import open_media
 from speech.opened import opened_in
 from speech.sounds import babble, late_by, write_constant_flac, write_sound, write_stamped, write_wave
 
@@ -189,14 +187,6 @@ def referring(content: bytes, name: bytes) -> bytes:
         size = int.from_bytes(content[place : place + 4]) + len(entry) - old
         grown[place : place + 4] = size.to_bytes(4)
     return bytes(grown)
-
-
-def test_addresses_are_not_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: dict[str, Any] = {}
-    monkeypatch.setattr(av, "open", lambda name, **options: asked.update(options, name=name))
-    open_media(tmp_path / "a.wav")
-    assert asked["name"] == f"file:{tmp_path / 'a.wav'}"
-    assert asked["options"]["protocol_whitelist"] == "file"
 
 
 def test_a_hole_keeps_what_follows_in_time(tmp_path: Path, original: Samples, caplog: pytest.LogCaptureFixture) -> None:

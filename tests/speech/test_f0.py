@@ -3,7 +3,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
-from lipmotion.speech.features import f0 as module
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import candidates, correlations, lags, log_f0, prosody_of
 from lipmotion.types import Audio
@@ -81,8 +80,9 @@ def test_a_known_frequency_is_found() -> None:
 
 
 def test_glides_have_no_jumps_and_frame_n_is_centred_at_n_times_10_ms() -> None:
+    """The first is longer than a block."""
     for vowel, noise_db, (first_hz, last_hz) in (("a", -3, (65, 390)), ("i", -10, (390, 65)), ("u", -40, (120, 240))):
-        hertz = first_hz * (last_hz / first_hz) ** np.linspace(0, 1, 3 * RATE_HZ)
+        hertz = first_hz * (last_hz / first_hz) ** np.linspace(0, 1, (12 if noise_db == -3 else 3) * RATE_HZ)
         ratio = found(voice(hertz, vowel, noise_db))[2:-2] / at_frames(hertz)[2:-2]
         assert np.abs(np.log(ratio)).max() < 0.1
         assert np.abs(np.log(ratio)).mean() < 0.01
@@ -136,17 +136,6 @@ def test_loudness_and_an_offset_change_nothing() -> None:
         assert found((gain * samples).astype(np.float32)) == pytest.approx(whole, rel=1e-3, nan_ok=True)
     samples = voice(steady(130))
     assert found(samples + np.float32(0.5)) == pytest.approx(found(samples), rel=2e-3, nan_ok=True)
-
-
-def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
-    hertz = 120 + 40 * np.sin(np.arange(RATE_HZ) / 4000)
-    samples = voice(hertz)
-    samples[8_000:12_000] = noise(4000) / 10
-    whole = found(samples)
-    assert 0 < np.isnan(whole).sum() < len(whole)
-    for block in (1, 7, 64):
-        monkeypatch.setattr(module, "BLOCK", block)
-        assert found(samples) == pytest.approx(whole, rel=1e-4, nan_ok=True)
 
 
 def test_very_short_recordings_work() -> None:

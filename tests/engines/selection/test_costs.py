@@ -16,7 +16,6 @@ from lipmotion.engines.selection.costs import (
     SelectionConfig,
     Target,
 )
-from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import phone_windows
 from lipmotion.types import Span, Timeline, Unit
@@ -144,23 +143,6 @@ def test_velocities_that_differ_cost_where_units_are_joined() -> None:
     costs = costs_of(replace(units, motion=drawn), join=0.1, velocity=0.05)
     wanted = 0.1 * 0.05**2 / 4  # at the end the motion stands still: the velocity is half of it
     assert costs.join_costs(target_of(costs, "aa iy"), 1, array(1), array(2)) == pytest.approx(wanted)
-
-
-def test_the_default_costs_prefer_the_right_word_stress_and_duration() -> None:
-    def chosen(units: RecordedUnits, text: str, *stress: int) -> int:
-        """Return the recording of the vowel, which is the second phone."""
-        costs = costs_of(units, SelectionConfig())
-        found = select(costs, target_of(costs, text, stress or None)).units[1]
-        return int(units.windows.recording[found])
-
-    assert [chosen(inventory("b iy s", "b iy | s"), text) for text in ("b iy s", "b iy | s")] == [0, 1]
-    stressed = with_stress(inventory("b iy s", "b iy s"), -1, 0, -1, -1, 1, -1)
-    assert [chosen(stressed, "b iy s", -1, stress, -1) for stress in (0, 1)] == [0, 1]
-    for factor in (0.5, 1.5):
-        units = inventory("b iy s", "b iy s")
-        times_s = units.windows.times_s.copy()
-        times_s[:3] *= factor
-        assert chosen(replace(units, windows=replace(units.windows, times_s=times_s)), "b iy s") == 1
 
 
 def test_by_default_a_cut_in_a_cluster_and_a_merge_in_another_stress_cost_more() -> None:

@@ -62,14 +62,18 @@ class OwnPhoneRecogniser:
 
 
 def fit_phone_recogniser(
-    examples: Sequence[Example], values: Sequence[NDArray[np.float64]], monitor: Monitor, checkpoint: Checkpoint
+    examples: Sequence[Example],
+    values: Sequence[NDArray[np.float64]],
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+    min_minutes: float = LEAST_MINUTES,
 ) -> OwnPhoneRecogniser | None:
     """Return a recogniser of phones that is trained on sound and motion, or None if there is too little speech.
 
     Source: Hofer 2008, §4 to §6: all streams are trained together; those of speech and F0 are used in recognition.
     """
     spoken_s = sum(s.duration_s for e in examples for s in e.speech.units if not is_silent(s.label.phone))
-    if spoken_s < 60 * LEAST_MINUTES:
+    if spoken_s < 60 * min_minutes:
         return None
     arrays = checkpoint.load(_CHECKPOINT)
     if arrays is None:
