@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
-from lipmotion_faces import Staging, stage_face
-from lipmotion_faces.head import Head
+from lipmotion_faces import Staging, head, stage_face
 
 pytestmark = pytest.mark.video
 mediapipe = pytest.importorskip("mediapipe")
@@ -39,7 +38,7 @@ def tracked(frames: list[np.ndarray]) -> np.ndarray:
 
 FACES = {
     "woman": (stage_face("woman", Staging(size=480)), (0.95, 0.85, 0.9), 1.25),
-    "head": (Head(size=(720, 720)), (0.97, 0.9, 0.95), 1.35),
+    "head": (head.Head(size=(720, 720)), (0.97, 0.9, 0.95), 1.35),
 }
 """Faces, how closely what is measured follows opening, width and outer, and the largest ratio of the openings."""
 

@@ -7,12 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmm.synthetic import known_hmm, random_hmm, recordings, speaker
+from lipmotion.hmm import align, model, network, unit_training
 from lipmotion.hmm import baum_welch as module
-from lipmotion.hmm.align import align_states, expand_states
 from lipmotion.hmm.baum_welch import accumulate_statistics, adapt_contexts, baum_welch
-from lipmotion.hmm.model import HmmConfig
-from lipmotion.hmm.network import compute_log_likelihoods
-from lipmotion.hmm.unit_training import add_contexts
 from oracles import paths
 
 
@@ -60,7 +57,7 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths():
     occupied, stays, total = np.zeros(len(hmm.table.names)), np.zeros(len(hmm.log_stay)), 0.0
     visits = stays.copy()
     for x, units in zip(data, said, strict=True):
-        chain = expand_states(hmm, units)
+        chain = align.expand_states(hmm, units)
         stay = hmm.log_stay[chain.plain].astype(float)
         emission = hmm.mixtures.log_likelihood(x)[:, chain.densities].astype(float)
         posterior, stay, log_likelihood = paths.chain_posteriors(emission, stay, np.log(-np.expm1(stay)))
@@ -126,8 +123,8 @@ def coarticulated(count: int):
     who = speaker(1)
     hmm, (transcribed, said, _) = known_hmm(who), recordings(1, count, who)
     for utterance, units in zip(transcribed, said, strict=True):
-        path = expand_states(hmm, units)
-        nearest = align_states(hmm, compute_log_likelihoods(hmm, utterance.features), units)[1]
+        path = align.expand_states(hmm, units)
+        nearest = align.align_states(hmm, network.compute_log_likelihoods(hmm, utterance.features), units)[1]
         for position, (before, unit) in enumerate(pairwise(units), start=1):
             if (before, unit) == ("d", "a"):
                 utterance.features[(path.positions[nearest] == position) & (nearest % 3 == 0)] += [0, 0, 1.5, 0]
@@ -136,11 +133,13 @@ def coarticulated(count: int):
 
 def test_contexts_get_densities_where_there_are_frames_enough():
     hmm, data, said = coarticulated(30)
-    hmm = replace(hmm, config=HmmConfig(mixtures=1, context_frames=40, relevance=5.0))
+    hmm = replace(hmm, config=model.HmmConfig(mixtures=1, context_frames=40, relevance=5.0))
 
     def in_context(context_frames):
         given = replace(hmm, config=replace(hmm.config, context_frames=context_frames))
-        result = baum_welch(add_contexts(given, data, said), data, said, hmm.config.iterations, adapt_contexts)
+        result = baum_welch(
+            unit_training.add_contexts(given, data, said), data, said, hmm.config.iterations, adapt_contexts
+        )
         return result.model, result.log_likelihoods
 
     better, log = in_context(40)

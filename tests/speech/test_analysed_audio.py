@@ -3,13 +3,11 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from lipmotion.errors import InputError
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion import errors, types
+from lipmotion.speech.features import analysed_audio, speaker_similarity
 from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc, spectrum
-from lipmotion.speech.features.speaker_similarity import WARPS
 from lipmotion.speech.recognition.general import general_features
 from lipmotion.speech.sound.voice_activity import find_passages
-from lipmotion.types import Audio
 from testing.toy import ToySentence, toy_sentences
 
 
@@ -18,8 +16,8 @@ def sentence() -> ToySentence:
     return toy_sentences(3)[0]
 
 
-def of_samples(*parts: np.ndarray) -> AnalysedAudio:
-    return analysed(Audio(np.concatenate(parts).astype(np.float32), 16_000))
+def of_samples(*parts: np.ndarray) -> analysed_audio.AnalysedAudio:
+    return analysed_audio.analysed(types.Audio(np.concatenate(parts).astype(np.float32), 16_000))
 
 
 def whole_frames(number: int) -> np.ndarray:
@@ -31,19 +29,19 @@ def silence(seconds: float, units: float = 0.0) -> np.ndarray:
     return np.random.default_rng(0).uniform(-units, units, round(16_000 * seconds)) / 32768
 
 
-def kinds(audio: AnalysedAudio) -> list[np.ndarray]:
+def kinds(audio: analysed_audio.AnalysedAudio) -> list[np.ndarray]:
     return [audio.mfcc().values, audio.mfcc(0.88).values, audio.spectrum, audio.general_features, audio.log_energy]
 
 
 def test_every_kind_is_that_of_the_passage_at_its_level(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
+    audio = analysed_audio.analysed(sentence.audio)
     (passage,) = audio.passages
     first, end = find_passages(log_energy(sentence.audio.samples))[0]
     lead, recorded = first - passage.first, sentence.audio.samples[first * HOP : end * HOP]
-    sound = Audio(passage.audio.samples[lead * HOP :][: len(recorded)], 16_000)
+    sound = types.Audio(passage.audio.samples[lead * HOP :][: len(recorded)], 16_000)
     rows = slice(lead, lead + len(recorded) // HOP + 1)
     assert np.corrcoef(sound.samples, recorded)[0, 1] == pytest.approx(1)
-    for warp, features in zip(WARPS, audio.mfcc_of_warps(WARPS), strict=True):
+    for warp, features in zip(speaker_similarity.WARPS, audio.mfcc_of_warps(speaker_similarity.WARPS), strict=True):
         assert passage.audio.mfcc(warp).values[rows] == pytest.approx(mfcc(sound, warp).values, abs=1e-5)
         assert features is audio.mfcc(warp)
         assert features.duration_s == sentence.audio.duration_s
@@ -136,23 +134,23 @@ def test_where_nothing_is_said_all_features_are_0() -> None:
 
 
 def test_a_passage_is_not_divided_further_and_what_keeps_its_features_stays_itself(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
+    audio = analysed_audio.analysed(sentence.audio)
     (passage,) = audio.passages
     assert not audio.is_passage
     assert passage.audio.is_passage
     assert passage.audio.frames == len(passage.audio.mfcc().values)
-    assert analysed(audio) is audio
+    assert analysed_audio.analysed(audio) is audio
     assert all(once is again for once, again in zip(kinds(passage.audio), kinds(passage.audio), strict=True))
     features = mfcc(sentence.audio)
-    assert analysed(sentence.audio, features).mfcc() is features
+    assert analysed_audio.analysed(sentence.audio, features).mfcc() is features
     assert audio.samples is sentence.audio.samples
     assert audio.duration_s == sentence.audio.duration_s
-    with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
-        analysed(Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
+    with pytest.raises(errors.InputError, match="need 16000 Hz, found 44100 Hz"):
+        analysed_audio.analysed(types.Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
 
 
 def test_a_stretch_has_the_features_of_the_whole(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
+    audio = analysed_audio.analysed(sentence.audio)
     stretch = audio.stretch(60, 160)
     assert len(stretch.samples) == 16_000
     for whole, part in zip(kinds(audio), kinds(stretch), strict=True):
@@ -160,7 +158,7 @@ def test_a_stretch_has_the_features_of_the_whole(sentence: ToySentence) -> None:
 
 
 def test_features_of_silence_take_no_more_memory_than_they_are() -> None:
-    audio = AnalysedAudio(np.zeros(120 * 16_000, np.float32), 16_000)
+    audio = analysed_audio.AnalysedAudio(np.zeros(120 * 16_000, np.float32), 16_000)
     assert not audio.passages
     tracemalloc.start()
     bands = audio.spectrum

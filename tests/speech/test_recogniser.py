@@ -6,15 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Model, load_model
-from lipmotion.errors import AlignmentError, CorpusError, InputError
+from lipmotion import Model, errors, load_model
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.pipeline.training.train import train_phone_models
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.recognition import recogniser, word_search
 from lipmotion.speech.recognition import recogniser as module
-from lipmotion.speech.recognition import word_search
 from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Timeline, Unit, silent_monitor
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
@@ -41,12 +39,12 @@ def hmm(toy_model: Model) -> UnitHmm:
 
 def align(hmm: UnitHmm, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: str = "own") -> Timeline[Unit]:
     heard = analysed(audio)
-    return Recogniser(hmm, kind).align(heard, heard.mfcc(), words, lexicon)
+    return recogniser.Recogniser(hmm, kind).align(heard, heard.mfcc(), words, lexicon)
 
 
 def recognise(hmm: UnitHmm, audio: Audio, kind: str = "own") -> Timeline[Unit]:
     heard = analysed(audio)
-    return Recogniser(hmm, kind).recognise(heard, heard.mfcc())
+    return recogniser.Recogniser(hmm, kind).recognise(heard, heard.mfcc())
 
 
 def phones(units: Timeline[Unit]) -> list[str]:
@@ -144,10 +142,10 @@ def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: UnitHmm, se
 def test_too_many_words_for_the_sound_and_an_unknown_kind_are_refused(
     hmm: UnitHmm, sentences: list[ToySentence]
 ) -> None:
-    with pytest.raises(AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+"):
+    with pytest.raises(errors.AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+"):
         align(hmm, sentences[0].audio, ["baby"] * 50, Lexicon())
-    with pytest.raises(InputError, match="'best'; required one of: auto, words, fast, own, general"):
-        Recogniser(hmm, "best")
+    with pytest.raises(errors.InputError, match="'best'; required one of: auto, words, fast, own, general"):
+        recogniser.Recogniser(hmm, "best")
 
 
 @pytest.mark.recordings
@@ -185,7 +183,7 @@ def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: li
     assert aligned == align(hmm, said.audio, said.words, lexicon, "general")
     assert aligned != align(hmm, said.audio, said.words, lexicon, "own")
     found = recognise(hmm, said.audio, "auto")
-    again = Recogniser(hmm, "general").align_phones(said.audio, analysed(said.audio).mfcc(), found)
+    again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, analysed(said.audio).mfcc(), found)
     assert phones(found) == phones(again)
     assert [span.start_s for span in found] == pytest.approx([span.start_s for span in again], abs=0.011)
 
@@ -267,5 +265,5 @@ def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) 
     bad = (good[0][0], ("five",) * 100)
     hmm = train_phone_models([*good, bad], Lexicon(), SMALL, silent_monitor)
     assert np.array_equal(hmm.mixtures.means, train_phone_models(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
-    with pytest.raises(CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
+    with pytest.raises(errors.CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
         train_phone_models([bad], Lexicon(), SMALL, silent_monitor)

@@ -12,11 +12,10 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion import Model, save_model
+from lipmotion import Model, save_model, units
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.units import Lexicon
 from lipmotion_faces.characters.gltf_weights import read_gltf_motion
 from lipmotion_faces.video.mp4 import write_mp4
 
@@ -238,7 +237,7 @@ def test_pronunciations_are_offered_and_kept(studio):
     part = {"start_s": 0.0, "end_s": state["words"][0]["end_s"], "revision": state["revision"]}
     said = studio.ask("/api/lines/1/transcript", {"text": "zenodo mamaqu", **part}).content
     assert [step.partition(" with ")[2] for step in said["steps"]] == ["zenodo z eh n ow"]
-    assert said["guessed"] == [{"word": "mamaqu", "phones": list(Lexicon().pronunciations("mamaqu")[0])}]
+    assert said["guessed"] == [{"word": "mamaqu", "phones": list(units.Lexicon().pronunciations("mamaqu")[0])}]
     at_work = [phone["label"] for phone in said["phones"] if phone["word"] == "zenodo"]
     assert at_work == ["z", "eh", "n", "ow"]
     for wrong in ({"word": "a b", "phones": ["b"]}, {"word": "a", "phones": ["B!"]}, {"word": "a", "phones": []}):

@@ -1,7 +1,6 @@
 import pytest
 
-from lipmotion.units.language_detection import detect_language, is_english
-from lipmotion.units.text_normalisation import split_written_words
+from lipmotion.units import language_detection, text_normalisation
 
 TEXTS = {
     "en": "bin blue at f two now",
@@ -22,17 +21,17 @@ SPANISH = ["l eh s ao f", "k ow s t ow", "k ax s ih t iy", "p er ao t ax", "ih s
 
 def test_of_a_text() -> None:
     for language, text in TEXTS.items():
-        assert detect_language(split_written_words(text)) == language
-    assert detect_language(("mandrusa", "kolpeti", "vastrini")) == ""
+        assert language_detection.detect_language(text_normalisation.split_written_words(text)) == language
+    assert language_detection.detect_language(("mandrusa", "kolpeti", "vastrini")) == ""
 
 
 @pytest.mark.long
 def test_of_speech() -> None:
     english, spanish = ([tuple(word.split()) for word in words] for words in (ENGLISH, SPANISH))
-    assert is_english(2 * english) is True
-    assert is_english(2 * spanish) is False
-    assert is_english(2 * english + 3 * spanish) is None
-    assert is_english(english) is None  # too few
+    assert language_detection.is_english(2 * english) is True
+    assert language_detection.is_english(2 * spanish) is False
+    assert language_detection.is_english(2 * english + 3 * spanish) is None
+    assert language_detection.is_english(english) is None  # too few
 
 
 def test_words_are_as_they_are_written_in_every_script() -> None:
@@ -43,4 +42,4 @@ def test_words_are_as_they_are_written_in_every_script() -> None:
         ("こんにちは、ラーメン", "こんにちは ラーメン"),
         ("हिन्दी 'ok'", "हिन्दी ok"),
     ):
-        assert " ".join(split_written_words(text)) == words
+        assert " ".join(text_normalisation.split_written_words(text)) == words

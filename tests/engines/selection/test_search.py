@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engines.selection.conftest import SETTINGS
+from lipmotion import errors, types
 from lipmotion.engines.selection.concatenation import TimeMap, concatenated, pieces_of, shown_units
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, Costs, Target
 from lipmotion.engines.selection.engine import SelectionEngine
@@ -14,10 +15,8 @@ from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
-from lipmotion.errors import InputError
 from lipmotion.testing.examples import OPENINGS, example, speech, timeline
 from lipmotion.testing.examples import PHONES as SPOKEN
-from lipmotion.types import Timeline, silent_monitor
 
 SENTENCES = st.lists(st.sampled_from(SPOKEN), min_size=1, max_size=6)
 
@@ -65,7 +64,7 @@ def test_pruning_does_not_change_the_cost(model: SelectionModel, engine, phones:
 LONGER = st.lists(st.sampled_from(tuple(OPENINGS)), min_size=2, max_size=8)
 
 
-def laid_out(model: SelectionModel, engine: SelectionEngine, units: Timeline):
+def laid_out(model: SelectionModel, engine: SelectionEngine, units: types.Timeline):
     costs = model.costs(engine.config)
     target = target_of(model, costs, speech(units))
     pieces = pieces_of(costs, target, select(costs, target).units)
@@ -114,7 +113,7 @@ def test_classes_of_lip_reading_and_their_overlaps() -> None:
     classes = [lip_reading_class(phone, parsed_invisible("t d g k")) for phone in ("b", "t", "l", "aa")]
     assert classes == ["protected", "invisible", "normal", "normal"]
     for text in ("t xx", "sil", "p"):
-        with pytest.raises(InputError, match="cannot be invisible"):
+        with pytest.raises(errors.InputError, match="cannot be invisible"):
             parsed_invisible(text)
 
 
@@ -134,7 +133,7 @@ def test_every_unit_is_shown(model: SelectionModel, engine: SelectionEngine, pho
 def test_a_recorded_sentence_comes_back_as_it_was_recorded() -> None:
     engine = SelectionEngine(replace(SETTINGS, guide=0.0))
     recorded = [example(phones, seed) for seed, phones in enumerate((("b", "aa", "t", "iy"), ("m", "uw", "s", "p")))]
-    model = engine.fit(recorded, silent_monitor).model
+    model = engine.fit(recorded, types.silent_monitor).model
     for one in recorded:
         again = engine.generate(model, one.speech)
         assert len({source.split(" ")[0] for source in again.trace.states}) == 1

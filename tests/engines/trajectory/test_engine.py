@@ -3,12 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.engines import engine_named
-from lipmotion.errors import InputError
+from lipmotion import engines, errors
 from lipmotion.testing.examples import CHANNELS, OPENINGS, examples, speech, timeline
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin, silent_monitor
 
-ENGINE = engine_named("trajectory", {"silent_states": 7, "articulation": False})  # at rest from 0.24 s on
+ENGINE = engines.engine_named("trajectory", {"silent_states": 7, "articulation": False})  # at rest from 0.24 s on
 MODEL = ENGINE.fit(examples(), silent_monitor).model
 
 
@@ -22,13 +21,13 @@ def test_a_configuration_that_makes_no_sense_is_an_input_error():
         {"ridge_frames": float("nan")},
         {"modulation_filter": -0.5},
     ):
-        with pytest.raises(InputError):
-            engine_named("trajectory", options)
+        with pytest.raises(errors.InputError):
+            engines.engine_named("trajectory", options)
 
 
 def test_any_odd_number_of_states_works():
     for states in (1, 7):
-        engine = engine_named("trajectory", {"states": states, "components": 2})
+        engine = engines.engine_named("trajectory", {"states": states, "components": 2})
         model = engine.fit(examples(4), silent_monitor).model
         values = engine.generate(model, speech(timeline(("p", "aa", "m")))).motion.values
         assert np.isfinite(values).all()
@@ -60,7 +59,7 @@ def test_variance_is_smaller_near_a_pin_and_what_is_far_stays():
 
 def test_points_cannot_be_pinned_and_a_mouth_not_further_than_shut():
     for pin, message in ((Pin(0.5, "x_17", 0.0), r"opening, width$"), (Pin(0.5, "opening", -0.1), "at least 0")):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             ENGINE.generate(MODEL, speech(timeline(("aa",))), Constraints((pin,)))
 
 
@@ -99,13 +98,13 @@ def test_blendshapes_without_an_opening():
     np.testing.assert_allclose(result.motion["still"], 0.3, atol=1e-3)
     pressed = ENGINE.generate(kept, spoken, Constraints((Pin(0.9, "jaw", 0.25),)))
     assert pressed.motion["jaw"][90] == 0.25
-    with pytest.raises(InputError, match=r"sets jaw to -0\.1, required at least 0"):
+    with pytest.raises(errors.InputError, match=r"sets jaw to -0\.1, required at least 0"):
         ENGINE.generate(kept, spoken, Constraints((Pin(0.9, "jaw", -0.1),)))
 
 
 def test_models_from_before_the_modulation_filter_have_none():
     former = {name: value for name, value in ENGINE.config.as_mapping().items() if name != "modulation_filter"}
-    engine = engine_named("trajectory", former, stored=True)
+    engine = engines.engine_named("trajectory", former, stored=True)
     assert engine.config.modulation_filter == 0
     assert engine.config.as_mapping() == former  # so that earlier versions can read it
     arrays = ENGINE.to_arrays(MODEL)
