@@ -33,17 +33,12 @@ def test_outlines_never_cross_and_the_gap_is_exact(name, drawn):
     shape = lip_outlines(design.lips, drawn, X)
     within = mouth_interior(design.lips, drawn, X, shape)
     for upper, lower in [
-        (shape.upper_outer, shape.upper_inner),
-        (shape.upper_inner, shape.lower_inner),
-        (shape.lower_inner, shape.lower_outer),
-        (shape.upper_inner, within.teeth_upper),
-        (within.teeth_upper, shape.lower_inner),
-        (shape.upper_inner, within.teeth_lower),
-        (within.teeth_lower, shape.lower_inner),
-        (shape.upper_inner, within.tongue_top),
-        (within.tongue_top, within.tongue_bottom),
-        (within.tongue_bottom, shape.lower_inner + 0.03),
-    ]:
+        (shape.upper_outer, shape.upper_inner), (shape.upper_inner, shape.lower_inner),
+        (shape.lower_inner, shape.lower_outer), (shape.upper_inner, within.teeth_upper),
+        (within.teeth_upper, shape.lower_inner), (shape.upper_inner, within.teeth_lower),
+        (within.teeth_lower, shape.lower_inner), (shape.upper_inner, within.tongue_top),
+        (within.tongue_top, within.tongue_bottom), (within.tongue_bottom, shape.lower_inner + 0.03),
+    ]:  # fmt: skip
         assert (upper <= lower + 1e-9).all()
     gap = shape.lower_inner - shape.upper_inner
     assert gap[MIDDLE] == pytest.approx(drawn.gap, abs=1e-6)

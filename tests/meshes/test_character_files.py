@@ -80,16 +80,12 @@ def test_other_files_and_folders_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("v 0 0 0\n", "no polygons"),
-        ("v 0 0\nf 1 1 1\n", "no vertex of 3 numbers"),
-        ("v 0 0 nan\nf 1 1 1\n", "not finite"),
-        ("v 0 0 zero\nf 1 1 1\n", "zero"),
-        (QUAD + "f 1 2 9\n", "names vertex 9 of 4 in line 12"),
-        (QUAD + "f 0 1 2\n", "names vertex 0"),
-        (QUAD + "f 1 2\n", "2 corners"),
-        (QUAD + "f one two three\n", "line 12"),
+        ("v 0 0 0\n", "no polygons"), ("v 0 0\nf 1 1 1\n", "no vertex of 3 numbers"),
+        ("v 0 0 nan\nf 1 1 1\n", "not finite"), ("v 0 0 zero\nf 1 1 1\n", "zero"),
+        (QUAD + "f 1 2 9\n", "names vertex 9 of 4 in line 12"), (QUAD + "f 0 1 2\n", "names vertex 0"),
+        (QUAD + "f 1 2\n", "2 corners"), (QUAD + "f one two three\n", "line 12"),
     ],
-)
+)  # fmt: skip
 def test_damaged_files_are_refused(tmp_path, text, message):
     with pytest.raises(errors.InputError, match=message):
         character_files.read_obj(_obj(tmp_path, text))

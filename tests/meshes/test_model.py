@@ -28,19 +28,15 @@ def test_displacements_of_some_vertices_and_of_what_moves_alone():
 
 
 WRONG = [
-    ({"vertices": CORNERS[:, :2]}, "shape"),
-    ({"vertices": np.full((4, 3), np.nan)}, "finite"),
-    ({"triangles": SQUARE + 1}, "1 to 4, required 0 to 3"),
-    ({"triangles": SQUARE[:, :2]}, "required"),
-    ({"triangles": SQUARE - 1}, "-1 to 2"),
-    ({"triangles": SQUARE.astype(float)}, "whole numbers"),
-    ({"uv": np.zeros((2, 2))}, "uv"),
-    ({"parts": (MeshPart("a", 0, 1),)}, "parts"),
+    ({"vertices": CORNERS[:, :2]}, "shape"), ({"vertices": np.full((4, 3), np.nan)}, "finite"),
+    ({"triangles": SQUARE + 1}, "1 to 4, required 0 to 3"), ({"triangles": SQUARE[:, :2]}, "required"),
+    ({"triangles": SQUARE - 1}, "-1 to 2"), ({"triangles": SQUARE.astype(float)}, "whole numbers"),
+    ({"uv": np.zeros((2, 2))}, "uv"), ({"parts": (MeshPart("a", 0, 1),)}, "parts"),
     ({"parts": (MeshPart("a", 0, 1), MeshPart("b", 0, 2))}, "parts"),
     ({"shapes": (Blendshape("a", np.array([9]), np.zeros((1, 3))),)}, "'a'"),
     ({"shapes": (Blendshape("a", np.array([1, 2]), np.zeros((1, 3))),)}, "as many"),
     ({"shapes": (Blendshape("a", np.array([1]), np.zeros((1, 3))),) * 2}, "one name"),
-]
+]  # fmt: skip
 
 
 def test_what_does_not_fit_is_refused():

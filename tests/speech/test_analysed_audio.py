@@ -63,16 +63,10 @@ def test_features_are_normalised_over_the_passage_alone() -> None:
 @pytest.mark.parametrize(
     ("before_s", "after_s", "units", "decibels"),
     [
-        (0.5, 0.5, 0, 0),
-        (0, 5, 0, 0),
-        (5, 0, 0, 0),
-        pytest.param(60, 0, 0, 0, marks=pytest.mark.long),
-        (5, 0.5, 1, 0),
-        (5, 0.5, 25, 0),
-        (0, 0, 0, -40),
-        (2, 2, 5, -6),
+        (0.5, 0.5, 0, 0), (0, 5, 0, 0), (5, 0, 0, 0), pytest.param(60, 0, 0, 0, marks=pytest.mark.long), (5, 0.5, 1, 0),
+        (5, 0.5, 25, 0), (0, 0, 0, -40), (2, 2, 5, -6),
     ],
-)
+)  # fmt: skip
 def test_silence_and_gain_change_no_features(before_s: float, after_s: float, units: float, decibels: float) -> None:
     """But that two frames at either end are left out, whose windows reach into it, and those of a noise as loud."""
     line = whole_frames(0)

@@ -266,13 +266,8 @@ def test_only_the_page_itself_with_the_token_gets_an_answer(studio):
     assert studio.ask(keyed, **{TOKEN_HEADER: ""}).status == 200
     assert studio.ask(keyed.replace("sound.wav", "doubts"), **{TOKEN_HEADER: ""}).status == 401
     for path in (
-        "/api/lines/2",
-        "/api/lines/0",
-        "/api/lines/1e3",
-        f"/api/lines/{'9' * 5000}",
-        "/project.json",
-        "/../x",
-    ):
+        "/api/lines/2", "/api/lines/0", "/api/lines/1e3", f"/api/lines/{'9' * 5000}", "/project.json", "/../x",
+    ):  # fmt: skip
         assert studio.ask(path).status == 404
     assert studio.ask("/api/faces/portrait.glb").status == 404
 

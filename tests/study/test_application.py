@@ -141,12 +141,8 @@ def test_videos_are_served_whole_and_in_parts_and_nothing_else_is(place):
     part = ask(place.application, f"/videos/{video.file}", headers={"range": "bytes=2-5"})
     assert (part.status, part.body) == (206, data[2:6])
     for path in (
-        "/videos/study.json",
-        "/videos/../study.json",
-        "/study.json",
-        "/answers.sqlite",
-        "/videos/" + "0" * 32,
-    ):
+        "/videos/study.json", "/videos/../study.json", "/study.json", "/answers.sqlite", "/videos/" + "0" * 32,
+    ):  # fmt: skip
         assert ask(place.application, path).status == 404
 
 

@@ -3,18 +3,14 @@ import pytest
 from lipmotion.units import language_detection, text_normalisation
 
 TEXTS = {
-    "en": "bin blue at f two now",
-    "es": "La sorpresa y el disgusto que produjo en los dos una noticia.",
+    "en": "bin blue at f two now", "es": "La sorpresa y el disgusto que produjo en los dos una noticia.",
     "fr": "Il est dans le jardin et la maison n'est pas à vous.",
-    "de": "Die Katze ist nicht in der Küche, und das ist gut.",
-    "it": "Il cane di Anna non è con gli altri.",
+    "de": "Die Katze ist nicht in der Küche, und das ist gut.", "it": "Il cane di Anna non è con gli altri.",
     "pt": "O menino não foi com os amigos para a praia, e é uma pena.",
     "nl": "De hond en het kind zijn niet in de tuin van oma.",
-    "ja": "東京は 寒い。",
-    "ko": "밥을 먹고",
-    "zh": "今天天气很好",
+    "ja": "東京は 寒い。", "ko": "밥을 먹고", "zh": "今天天气很好",
     "": "привет мир 12",
-}
+}  # fmt: skip
 ENGLISH = ["b l uw m", "k ax n f y uw z d", "w ih z axr d", "b ih hh ay n d", "k er t ax n", "l eh f t"]
 SPANISH = ["l eh s ao f", "k ow s t ow", "k ax s ih t iy", "p er ao t ax", "ih s ax l m", "m ae n iy f"]
 

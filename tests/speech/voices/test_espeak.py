@@ -161,14 +161,10 @@ def test_the_last_lasts_to_the_end() -> None:
 
 
 WORDS = {
-    "es": {"lobo": "l ow v ow", "cigüeña": "th iy g uw eh n aa"},
-    "fr": {"rue": "hh uw", "l'œuf": "l ao f"},
-    "de": {"schöne": "sh ow n ax", "12": "t s v ao l f"},
-    "ja": {"ふゆ": "f uh y uh"},
-    "ko": {"밥을": "p aa p ix l"},
-    "zh": {"吗": "m aa", "个": "k ax"},
-    "ru": {"мир": "m iy r"},
-}
+    "es": {"lobo": "l ow v ow", "cigüeña": "th iy g uw eh n aa"}, "fr": {"rue": "hh uw", "l'œuf": "l ao f"},
+    "de": {"schöne": "sh ow n ax", "12": "t s v ao l f"}, "ja": {"ふゆ": "f uh y uh"}, "ko": {"밥을": "p aa p ix l"},
+    "zh": {"吗": "m aa", "个": "k ax"}, "ru": {"мир": "m iy r"},
+}  # fmt: skip
 
 
 @pytest.mark.usefixtures("bare")
