@@ -1,3 +1,5 @@
+import sys
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -7,6 +9,7 @@ import pytest
 from lipmotion import errors, load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition import recognised_speech, recogniser, word_search
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples
 from lipmotion.types import Audio
@@ -17,9 +20,12 @@ SAID = "please speak and my lips will move five big blue boats float by".split()
 
 
 @pytest.fixture(autouse=True)
-def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Words are searched by pocketsphinx where no phone recogniser is installed."""
-    monkeypatch.setattr(recogniser, "installed_phone_recogniser", lambda: None)
+    monkeypatch.setitem(sys.modules, "hama", None)
+    installed_phone_recogniser.cache_clear()
+    yield
+    installed_phone_recogniser.cache_clear()
 
 
 @pytest.fixture(scope="module")
@@ -178,8 +184,8 @@ def test_one_recording_does_not_change_the_next() -> None:
     assert word_search.words_in(samples) == first
 
 
-def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(word_search, "find_english_data", lambda: tmp_path)
+def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     word_search._decoder.cache_clear()
     try:
         with pytest.raises(errors.MissingDependencyError, match="pip install pocketsphinx"):

@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import pytest
@@ -133,11 +134,10 @@ def test_a_file_that_is_none(tmp_path: Path, lexicon_file: Path) -> None:
 
 
 def test_without_a_dictionary_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lexicon, "find_spec", lambda _: None)
-    monkeypatch.setattr(lexicon, "_dictionary", lexicon._dictionary.__wrapped__)
-    monkeypatch.setattr(lexicon, "_dictionary_entries", lexicon._dictionary_entries.__wrapped__)
+    monkeypatch.setitem(sys.modules, "pocketsphinx", None)
+    lexicon._dictionary.cache_clear()
     with pytest.raises(MissingDependencyError, match="pip install pocketsphinx"):
-        Lexicon().known("bin")
+        Lexicon().known("binocularly")
 
 
 @pytest.mark.long
@@ -169,7 +169,7 @@ def test_a_made_up_word_is_read_as_people_read_it() -> None:
 
 
 def test_without_the_network_rules_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lexicon, "find_spec", lambda _: None)
+    monkeypatch.setitem(sys.modules, "hama", None)
     lexicon._network.cache_clear()
     pronounce_by_network.cache_clear()
     try:

@@ -2,7 +2,6 @@ import json
 import re
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,9 +28,9 @@ def wheel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A Python package with a library and data, which is not loaded."""
     folder = tmp_path / "espeakng_loader"
     fakes.install_data(folder / "espeak-ng-data")
-    (folder / "libespeak-ng.so").touch()
-    spec = SimpleNamespace(submodule_search_locations=[str(folder)])
-    monkeypatch.setattr(espeak, "find_spec", lambda _: spec)
+    for name in ("libespeak-ng.so", "__init__.py"):
+        (folder / name).touch()
+    monkeypatch.syspath_prepend(tmp_path)
     return folder
 
 
