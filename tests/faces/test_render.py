@@ -107,12 +107,6 @@ def test_each_part_moves_where_it_is_on_and_nothing_where_all_is_still():
         assert any(np.any(frame != drawn[0]) for frame in drawn[2::2])
 
 
-def test_the_same_seed_moves_alike_and_another_one_otherwise():
-    first, again, other = (frames(opening(*np.zeros(25)), size=64, seed=seed) for seed in (0, 0, 1))
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-
-
 @pytest.mark.parametrize("face", DRAWN)
 def test_a_transparent_background_shows_through_around_the_figure_only(face):
     (frame,) = frames(opening(0), face=face, size=128, background="transparent")

@@ -292,14 +292,6 @@ def test_minutes_of_digital_silence_are_no_crime_but_each_rate_is_checked(tmp_pa
         read_audio(path)
 
 
-def test_a_sound_without_video(tmp_path: Path) -> None:
-    from lipmotion_faces.tracking.frames import open_video
-
-    sound = write_sound(tmp_path / "blind.mp3", babble(44_100), 44_100, "libmp3lame", cover=True)
-    with pytest.raises(InputError, match="has no video stream"), open_video(sound):
-        pass
-
-
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
 def test_memory_is_that_of_the_result(tmp_path: Path) -> None:

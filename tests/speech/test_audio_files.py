@@ -15,18 +15,6 @@ def onset_s(audio: types.Audio) -> float:
     return float(np.flatnonzero(np.abs(audio.samples) > LEVEL / 3)[0]) / audio.rate_hz
 
 
-def level(audio: types.Audio, at_s: float) -> float:
-    """Return the amplitude of the tone in 0.2 s."""
-    part = audio.samples[round(at_s * audio.rate_hz) :][: audio.rate_hz // 5]
-    return float(np.sqrt(2 * np.square(part).mean()))
-
-
-def test_channels_are_averaged(tmp_path: Path) -> None:
-    stereo = tone(44_100, channels=2) * np.array([[1.0], [0.5]], np.float32)
-    audio = read_audio(write_sound(tmp_path / "a.mp4", stereo, 44_100, "aac"))
-    assert level(audio, 0.6) == pytest.approx(0.75 * LEVEL, rel=0.05)
-
-
 def test_another_rate_can_be_asked_for(tmp_path: Path) -> None:
     audio = read_audio(write_sound(tmp_path / "a.wav", tone(16_000), 16_000, "pcm_s16le"), 48_000)
     assert (audio.rate_hz, len(audio.samples)) == (48_000, pytest.approx(48_000, abs=100))

@@ -77,13 +77,6 @@ def test_nothing_that_raters_get_names_a_condition(place):
         assert not [name for name in ("visemes", "phones", "recording by", "anchor") if name.encode() in text]
 
 
-def test_the_first_answer_stands_however_often_it_is_sent(place):
-    now = place.join()
-    for value in ("first", "second", "first"):
-        assert place.send(now["token"], scripted_answer(place.study, now, value)).content["trial"] == 1
-    assert [sheet.values for sheet in place.store.sheets()] == [("first",)]
-
-
 def test_no_trial_is_skipped(place):
     now = place.join()
     reply = place.send(now["token"], scripted_answer(place.study, now) | {"trial": 1})

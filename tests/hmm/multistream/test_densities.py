@@ -140,10 +140,6 @@ def test_what_does_not_fit_is_refused():
             StreamWeights(f0_slope=weight)
 
 
-def test_a_weight_of_nothing_switches_off():
-    assert list(StreamWeights(motion=0, f0=0).active) == ["speech", "f0_slope", "f0_curvature"]
-
-
 HMM = random_joint(1, ("a", "b", "c"))
 
 

@@ -85,17 +85,6 @@ def test_a_stream_without_weight_is_as_good_as_absent():
     assert "motion" not in alone.models
 
 
-def test_a_step_improves_on_what_was_found():
-    hmm = random_joint(2, units=("a", "b", "c", "d"), components=1)
-    data = [(noise(np.random.default_rng(i), 40), ("sil", "a", "c", "sil")) for i in range(4)]
-    prepared, figures = multistream_training.prepare_utterances(hmm, data), []
-    for _ in range(4):
-        expected = multistream_training.accumulate_statistics(hmm, prepared)
-        figures.append(expected.mean_log_likelihood)
-        hmm = multistream_training.reestimate_hmm(hmm, expected)
-    assert (np.diff(figures) > 0).all()
-
-
 def test_what_was_learned_is_recognised(usual):
     recogniser = recognise.JointRecogniser(usual[0])
     right = [tuple(s.unit for s in recogniser.recognise(u.observed)) == u.units for u in HELD_OUT]
@@ -124,13 +113,6 @@ def test_a_flat_start_finds_the_units():
     for utterance in HELD_OUT:
         found = recognise.align(hmm, utterance.observed, utterance.units).bounds(len(utterance.units))
         assert np.abs(found - utterance.bounds).max() <= 4
-
-
-def test_gaussians_without_enough_data_are_not_split():
-    few, events = trained(mixtures=64)
-    assert few.models["speech"].tied.mixtures.size[1] < 64
-    assert any("Gaussians for speech" in stage for stage in stages(events))
-    assert len(stages(events)) < 5 + np.log2(64)
 
 
 def test_streams_and_units_that_are_missing_here_and_there():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lipmotion_studio.study.analysis.crossed import BOTH, NOTHING, RATERS, SENTENCES, crossed_mean, holm
+from lipmotion_studio.study.analysis.crossed import BOTH, RATERS, SENTENCES, crossed_mean, holm
 
 TABLE = np.random.default_rng(4).normal(3, 1, (7, 5)) + np.random.default_rng(5).normal(size=(7, 1))
 
@@ -101,14 +101,6 @@ def test_equal_judgements_have_no_interval(level):
     assert found.error == 0
     assert np.isnan(found.interval).all()
     assert np.isnan(found.p_value)
-
-
-def test_one_judgement_and_none_have_no_interval():
-    for table in (np.array([[3.0]]), np.full((2, 2), np.nan)):
-        found = crossed_mean(table, 4.0)
-        assert found.over == NOTHING
-        assert np.isnan(found.interval).all()
-        assert np.isnan(found.p_value)
 
 
 def test_intervals_within_a_scale_stay_there():

@@ -99,14 +99,6 @@ def test_raters_who_prefer_one_side_have_a_share_of_one_half_and_no_interval():
     assert np.isnan(figures["bradley_terry"]["order"]["low"])
 
 
-@pytest.mark.parametrize("size", [(1, 6), (8, 1), (1, 1)])
-def test_one_rater_or_one_sentence(size):
-    table = comparisons(np.random.default_rng(6), np.array([0, 0.2, 0.4]), size, USUAL)
-    for row in paired.paired_figures(table)["pairs"]:
-        assert row["over"] != "raters and sentences"
-        assert 0 <= row["share"] <= 1
-
-
 @pytest.mark.long
 def test_intervals_cover_known_preferences():
     draw, strengths = np.random.default_rng(8), np.array([-0.4, 0.0, 0.6])
