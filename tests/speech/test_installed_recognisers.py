@@ -110,13 +110,13 @@ def test_whisper(whisper: type[WhisperModel], tmp_path: Path) -> None:
 
 
 def test_whisper_without_times_of_words_and_in_another_language(
-    whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    whisper: type[WhisperModel], caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(whisper, "segments", [SimpleNamespace(start=0.5, end=2.0, text=" [Music] Hi!", words=None)])
+    whisper.segments = [SimpleNamespace(start=0.5, end=2.0, text=" [Music] Hi!", words=None)]
     found = installed_recognisers.recognise_words(AUDIO, "whisper")
     assert found.words == ("hi",)
     assert (found.lines[0].words[0].start_s, found.lines[0].end_s) == (None, 2.0)
-    monkeypatch.setattr(whisper, "language", "fr")
+    whisper.language = "fr"
     assert installed_recognisers.recognise_words(AUDIO, "whisper") is None
     assert "recognises the language 'fr', not English; its words are not used" in caplog.text
 

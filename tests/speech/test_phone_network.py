@@ -123,11 +123,10 @@ class Loud(posteriors.PhoneRecogniser):
     name: ClassVar[str] = "loud"
     tokens = TOKENS
     source = "loud 1 0"
-    installed: ClassVar[bool] = True
 
     @classmethod
     def is_installed(cls) -> bool:
-        return cls.installed
+        return cls.name == "loud"
 
     def log_posteriors(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
         rows = np.full((len(samples) // 320, len(TOKENS)), -9, np.float32)
@@ -136,10 +135,16 @@ class Loud(posteriors.PhoneRecogniser):
         return rows
 
 
+class Absent(Loud):
+    name: ClassVar[str] = "absent"
+
+
 @pytest.fixture
 def loud(monkeypatch: pytest.MonkeyPatch) -> str:
     registry = posteriors.PHONE_RECOGNISERS
-    monkeypatch.setattr(type(registry), "load", lambda _, name: Loud if name == "loud" else posteriors.Hama)
+    monkeypatch.setattr(
+        type(registry), "load", lambda _, name: {"loud": Loud, "absent": Absent, "odd": dict}.get(name, posteriors.Hama)
+    )
     monkeypatch.setattr(posteriors, "installed_phone_recogniser", lambda: "loud")
     posteriors.phone_recogniser.cache_clear()
     return "loud"
@@ -173,11 +178,10 @@ def test_a_long_recording_is_cut(loud: str) -> None:
     assert max(each.stretch.end - each.stretch.first for each in found) <= 2000
 
 
-def test_a_recogniser_that_is_not_installed_or_is_none_is_refused(loud: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Loud, "installed", False)
-    with pytest.raises(errors.MissingDependencyError, match="pip install loud"):
-        posteriors.phone_recogniser(loud)
-    monkeypatch.setattr(type(posteriors.PHONE_RECOGNISERS), "load", lambda *_: dict)
+@pytest.mark.usefixtures("loud")
+def test_a_recogniser_that_is_not_installed_or_is_none_is_refused() -> None:
+    with pytest.raises(errors.MissingDependencyError, match="pip install absent"):
+        posteriors.phone_recogniser("absent")
     with pytest.raises(errors.InputError, match="required a PhoneRecogniser"):
         posteriors.phone_recogniser("odd")
 

@@ -9,8 +9,8 @@ import pytest
 from lipmotion import Model, errors, load_model
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.pipeline.training.train import train_phone_models
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition import recogniser, word_search
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.recognition import recogniser
 from lipmotion.speech.recognition import recogniser as module
 from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
 from lipmotion.speech.sound.audio_files import read_audio
@@ -24,12 +24,6 @@ from testing.toy import WORDS, ToySentence, toy_sentences
 @pytest.fixture(scope="module")
 def sentences() -> list[ToySentence]:
     return toy_sentences(12)
-
-
-@pytest.fixture(scope="module")
-def passage(sentences: list[ToySentence]) -> AnalysedAudio:
-    """The sound of a passage, whose frames are those in which it is recognised."""
-    return analysed(sentences[0].audio).passages[0].audio
 
 
 @pytest.fixture(scope="module")
@@ -75,14 +69,11 @@ def test_the_words_are_found_where_they_are(hmm: UnitHmm, sentences: list[ToySen
     assert np.percentile(np.abs(errors_s), 90) < 0.05
 
 
-def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after(
-    hmm: UnitHmm, passage: AnalysedAudio, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bounds = np.array([0, 10, 12, 40, 60, passage.frames])
-    monkeypatch.setattr(word_search, "decode_path", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
-    found = recognise(hmm, passage)
+def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after_and_silences_are_one() -> None:
+    bounds = np.array([0, 10, 12, 40, 60, 80, 100])
+    found = module._timeline([(phone, "") for phone in ("sil", "p", "sil", "aa", "sil", "sil")], bounds, 1.0)
     assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
-    assert covers(found, passage.duration_s)
+    assert covers(found, 1.0)
     assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
 
 
@@ -186,17 +177,6 @@ def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: li
     again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, analysed(said.audio).mfcc(), found)
     assert phones(found) == phones(again)
     assert [span.start_s for span in found] == pytest.approx([span.start_s for span in again], abs=0.011)
-
-
-def test_noises_are_silence_and_silences_are_one(
-    hmm: UnitHmm, passage: AnalysedAudio, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bounds = np.array([0, 10, 30, 40, 60, 80, passage.frames])
-    labels = ("+spn+", "sil", "aa", "+nsn+", "sil", "+spn+")
-    monkeypatch.setattr(word_search, "decode_path", lambda *_: (labels, bounds))
-    found = recognise(hmm, passage, "general")
-    assert phones(found) == ["sil", "aa", "sil"]
-    assert [span.start_s for span in found] == pytest.approx([0, 0.295, 0.395])
 
 
 @pytest.mark.recordings

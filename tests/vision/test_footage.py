@@ -161,7 +161,7 @@ class Follower(Opened):
 def followed(monkeypatch):
     pytest.importorskip("cv2")
     monkeypatch.setattr(video_scan, "FaceFollower", Follower)
-    monkeypatch.setattr(Follower, "share", 1.0)
+    Follower.share = 1.0
 
 
 def scenes(path: Path, cuts: list[int], count: int = 120) -> Path:
@@ -193,10 +193,10 @@ def test_faces_are_looked_for_every_two_seconds(tmp_path):
 
 
 @pytest.mark.usefixtures("followed")
-def test_the_person_matters_only_where_there_are_others(tmp_path, monkeypatch):
+def test_the_person_matters_only_where_there_are_others(tmp_path):
     path = scenes(tmp_path / "a.mp4", [])
     assert video_scan.scan_video(path).person == ()
-    monkeypatch.setattr(Follower, "share", 0.6)
+    Follower.share = 0.6
     assert len(video_scan.scan_video(path).person) == 1
 
 
