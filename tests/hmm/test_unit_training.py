@@ -16,7 +16,7 @@ from hmm.synthetic import (
     within_silence,
 )
 from lipmotion.errors import CorpusError
-from lipmotion.hmm import baum_welch, model, unit_training
+from lipmotion.hmm import model, unit_training
 from lipmotion.hmm.network import build_unit_loop, compute_log_likelihoods, decode_units
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.types import silent_monitor
@@ -106,16 +106,6 @@ def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
     hmm = unit_training.train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
     for utterance, units, where in zip(transcribed, said, edges, strict=True):
         assert np.abs(align(hmm, utterance.features, units) - where).max() <= 3
-
-
-def test_no_state_lasts_longer_than_it_may(trained):
-    hmm, *_ = trained
-    lasting = {name: 1 / -np.expm1(float(stay)) for name, stay in zip(hmm.table.names, hmm.log_stay, strict=False)}
-    for name, frames in lasting.items():
-        free = name.split(".")[0] in (SILENCE, PAUSE)
-        assert frames <= (baum_welch.LONGEST_SILENCE_FRAMES if free else baum_welch.LONGEST_STATE_FRAMES) * 1.001
-    units = [sum(lasting[f"{unit}.{state}"] for state in range(3)) for unit in UNITS]
-    assert np.mean(units) == pytest.approx(9, abs=0.6)  # each state lasts 2, 3 or 4 frames
 
 
 def test_the_bigram_is_that_of_what_was_said_pauses_being_silence(trained):

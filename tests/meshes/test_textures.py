@@ -7,11 +7,9 @@ from PIL import Image
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart, Texture
 from lipmotion_faces.characters import character_files, gltf_scene, textures
-from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion_faces.rendering.rasteriser import Camera, flat
 from meshes.gltf import UV, document, glb, textured_document, with_colours
-from meshes.heads import write_glb
 
 QUARTERS = np.array([[[255, 0, 0, 255], [0, 255, 0, 255]], [[0, 0, 255, 255], [255, 255, 255, 0]]], np.uint8)
 """Red, green; blue, clear white."""
@@ -214,18 +212,6 @@ def test_colours_that_do_not_fit_are_refused(tmp_path, change, message):
     change(content["accessors"][-1])
     with pytest.raises(InputError, match=message):
         _read(tmp_path, content, binary)
-
-
-@pytest.mark.long
-def test_colours_of_the_head_come_back_from_its_own_file(tmp_path):
-    head = head_mesh(figure())
-    write_glb(tmp_path / "head.glb", head)
-    back = gltf_scene.read_gltf(tmp_path / "head.glb")
-    assert len(back.triangles) == len(head.triangles)
-    for part in head.parts:
-        same = next(each for each in back.parts if each.material.name == part.name)
-        before = head.colours[head.triangles[part.first : part.stop]]
-        np.testing.assert_allclose(back.colours[back.triangles[same.first : same.stop]], before, atol=1e-5)
 
 
 def test_colours_of_obj_vertices(tmp_path):
