@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import zlib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -310,6 +310,11 @@ class Corpus:
             if name not in self._index:
                 raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)}")
         return Corpus(self.path, {name: self._index[name] for name in names}, self._fetch)
+
+    def divided(self, lists: Mapping[str, Collection[str]]) -> Corpus:
+        """Return the utterances of other lists ``train``, ``val`` and ``test`` alone; as of ``part``."""
+        entries = {name: {**self._index[name], "split": split} for split, names in lists.items() for name in names}
+        return Corpus(self.path, entries, self._fetch)
 
     def required(self, split: str | None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
         """Return the same names as ``names``, at least one.

@@ -31,6 +31,10 @@ ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 
 
+class WorkerDiedError(CorpusError):
+    """A worker process ended while it had work."""
+
+
 def process_count(count: int | None) -> int:
     """Return how many processes share the work; None: one a core. Raises InputError: fewer than one."""
     if count is not None and count < 1:
@@ -51,7 +55,7 @@ class Workers:
     def ordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         """Yield the results in the order of the items. The first items are sent at once.
 
-        Raises CorpusError: a process died.
+        Raises WorkerDiedError: a process died.
         """
         numbered = self._numbered(function, items)
 
@@ -67,7 +71,7 @@ class Workers:
         return in_order()
 
     def unordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[ResultT]:
-        """Yield the results in the order in which they are ready. Raises CorpusError: a process died."""
+        """Yield the results in the order in which they are ready. Raises WorkerDiedError: a process died."""
         return (result for _, result in self._numbered(function, items))
 
     def _numbered(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[tuple[int, ResultT]]:
@@ -80,7 +84,7 @@ class Workers:
                 try:
                     end.send((function, item))
                 except OSError as error:
-                    raise CorpusError(DIED) from error
+                    raise WorkerDiedError(DIED) from error
                 busy[end] = number
 
         def results() -> Iterator[tuple[int, ResultT]]:
@@ -91,7 +95,7 @@ class Workers:
                     try:
                         succeeded, result = end.recv()
                     except (EOFError, OSError) as error:
-                        raise CorpusError(DIED) from error
+                        raise WorkerDiedError(DIED) from error
                     send_next(end)
                     if not succeeded:
                         raise result
@@ -262,20 +266,22 @@ def training_pool(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
         with worker_pool(min(process_count(workers), utterances // UTTERANCES_PER_WORKER)) as team:
             yield team.ordered_map
         return
-    with cluster_pool(workers, ordered=True) as pool:
+    with cluster_pool(workers) as pool:
 
         def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-            try:
-                yield from pool(partial(_work_alone, function), items)
-            except WorkerDied as error:
-                raise CorpusError(DIED) from error
+            waiting, following = dict[int, ResultT](), 0
+            for number, result in pool(partial(_work_alone, function), enumerate(items)):
+                waiting[number] = result
+                while following in waiting:
+                    yield waiting.pop(following)
+                    following += 1
 
         yield each
 
 
-def _work_alone(function: Callable[[ItemT], ResultT], item: ItemT) -> ResultT:
+def _work_alone(function: Callable[[ItemT], ResultT], numbered: tuple[int, ItemT]) -> tuple[int, ResultT]:
     with one_thread():
-        return function(item)
+        return numbered[0], function(numbered[1])
 
 
 LOG = logging.getLogger("lipmotion")
@@ -283,17 +289,13 @@ UTTERANCES_PER_WORKER = 32
 """Smallest number of utterances for which a further process is started."""
 CONNECT_S = 20
 ITEMS_AHEAD = 4
-"""Items a worker that are sent ahead: with ``Parallel``'s own bundles of short items none waits, and memory is flat."""
-
-
-class WorkerDied(Exception):  # noqa: N818 # an event that the batch survives
-    """A worker process ended while it had work."""
+"""Items a worker of a cluster that are sent ahead, so that none waits, and memory is flat."""
 
 
 class Pool(Protocol):
     """Applies a function to items in other processes; yields results as they are ready.
 
-    Raises WorkerDied: a worker ended; which items are done is not known.
+    Raises WorkerDiedError: a worker ended; which items are done is not known.
     """
 
     def __call__(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
@@ -301,17 +303,17 @@ class Pool(Protocol):
 
 
 @contextmanager
-def cluster_pool(address: str, out: Path | None = None, *, ordered: bool = False) -> Iterator[Pool]:
+def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
     """Give the workers of a Dask cluster as a pool.
 
     address : of its scheduler, as ``tcp://HOST:8786``
-    out     : the folder of the outputs, which every worker must see under the same path; None: there is none
-    ordered : as of ``joblib_pool``; then a warning says where the last bits of results may differ
+    out     : the folder of the outputs, which every worker must see under the same path
+    A warning says where the last bits of results may differ.
     Raises MissingDependencyError: the package distributed is not installed.
     Raises InputError: no cluster answers, it has no workers, or they lack lipmotion, its version or the folder.
     """
     try:
-        from distributed import Client
+        from distributed import Client, KilledWorker, as_completed
     except ImportError as error:
         raise MissingDependencyError(
             f"a cluster needs the package distributed: {install_command('cluster')}, here and on all workers"
@@ -335,37 +337,27 @@ def cluster_pool(address: str, out: Path | None = None, *, ordered: bool = False
             version, sees_folder, processor = answer
             if version != installed_version():
                 raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
-            if ordered and processor != describe_worker("")[2]:
-                LOG.warning("%s: has another processor (%s): the last bits of the model may differ", worker, processor)
-            if out is not None and not sees_folder:
+            if processor != describe_worker("")[2]:
+                LOG.warning("%s: has another processor (%s): the last bits of results may differ", worker, processor)
+            if not sees_folder:
                 raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
-        yield joblib_pool({"backend": "dask", "client": client, "pure": False}, ordered=ordered)
+
+        def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+            remaining = iter(items)
+            first = list(islice(remaining, ITEMS_AHEAD * sum(client.ncores().values())))
+            running = as_completed(client.map(function, first, pure=False), loop=client.loop)
+            try:
+                for future in running:
+                    yield future.result()
+                    running.update(client.submit(function, item, pure=False) for item in islice(remaining, 1))
+            except KilledWorker as error:
+                raise WorkerDiedError(str(error)) from error
+            finally:
+                client.cancel(list(running.futures))
+
+        yield each
 
 
 def describe_worker(out: str) -> tuple[str, bool, str]:
     """Return a worker's version of lipmotion, whether it sees a folder, and what kind of processor it has."""
     return installed_version(), os.path.isdir(out), f"{platform.machine()} {blas_kernels()}"  # noqa: PTH112
-
-
-def joblib_pool(chosen: dict[str, Any], *, ordered: bool = False) -> Pool:
-    """Return a pool of joblib; ``ordered``: its results come in the order of the items."""
-    from joblib import Parallel, delayed, parallel_config
-    from joblib.externals.loky.process_executor import BrokenProcessPool
-
-    def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-        with parallel_config(**chosen):
-            results = Parallel(
-                return_as="generator" if ordered else "generator_unordered", pre_dispatch=f"{ITEMS_AHEAD}*n_jobs"
-            )(delayed(function)(item) for item in items)
-            try:
-                yield from results
-            except BrokenProcessPool as error:
-                raise WorkerDied(str(error)) from error
-            except Exception as error:
-                if type(error).__name__ == "KilledWorker":
-                    raise WorkerDied(str(error)) from error
-                raise
-            finally:
-                results.close()
-
-    return each

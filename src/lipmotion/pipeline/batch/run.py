@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
-import sys
-import threading
-import time
 import uuid
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from lipmotion.errors import CorpusError, ExportError, shorten
-from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     FAILED,
@@ -44,59 +39,23 @@ from lipmotion.pipeline.batch.report import (
     write_reports,
 )
 from lipmotion.pipeline.job import Job
-from lipmotion.pipeline.workers import Pool, WorkerDied, cluster_pool, joblib_pool, process_count
+from lipmotion.pipeline.workers import Pool, WorkerDiedError, cluster_pool, process_count, worker_pool
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 
-PARENT_CHECK_S = 0.2
-GRACE_S = 5.0
+ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
 
 
 @contextmanager
 def local_pool(jobs: int) -> Iterator[Pool]:
     """Give a pool of processes on this machine; with one job, this process itself."""
-    from joblib.externals.loky import get_reusable_executor
-    from joblib.externals.loky.backend.resource_tracker import ensure_running
 
-    if jobs == 1:
-        with one_thread():
-            yield joblib_pool({"backend": "sequential"})
-        return
-    before = os.environ.get("PYTHONWARNINGS")
-    os.environ["PYTHONWARNINGS"] = "ignore"
-    try:
-        ensure_running()  # loky's process, which deletes what killed processes leave, without a word
-    finally:
-        del os.environ["PYTHONWARNINGS"]
-        if before is not None:
-            os.environ["PYTHONWARNINGS"] = before
-    report, ended = threading.excepthook, threading.Event()
+    def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        with worker_pool(jobs) as workers:
+            yield from workers.unordered_map(function, items)
 
-    def report_late(error: Any) -> None:
-        """Report an error of a thread unless the pool ends soon: a signal withdraws work that loky's threads meet."""
-        if not ended.wait(GRACE_S):
-            report(error)
-
-    threading.excepthook = lambda error: threading.Thread(target=report_late, args=(error,), daemon=True).start()
-    try:
-        yield joblib_pool({"backend": "loky", "n_jobs": jobs, "initializer": begin_worker, "initargs": (os.getpid(),)})
-    finally:
-        get_reusable_executor(max_workers=jobs).shutdown(wait=True, kill_workers=True)
-        ended.set()
-        threading.excepthook = report
-
-
-def begin_worker(parent: int) -> None:
-    """Prepare a worker process: Ctrl-C is for the first process, and no worker outlives it."""
-
-    def end_with_parent() -> None:
-        while os.getppid() == parent:
-            time.sleep(PARENT_CHECK_S)
-        os._exit(1)
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform != "win32":
-        threading.Thread(target=end_with_parent, daemon=True).start()
+    yield each
 
 
 LOG = logging.getLogger("lipmotion")
@@ -257,7 +216,7 @@ def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, 
                 del left[record["name"]]
                 deaths = 0
                 yield record
-        except WorkerDied as error:
+        except WorkerDiedError as error:
             deaths += 1
             suspects = [work for work in left.values() if work.place.work(work.line.name).is_dir()]
             if not suspects and deaths >= MAX_DEATHS:
@@ -269,7 +228,7 @@ def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, 
                 del left[work.line.name]
                 try:
                     yield next(iter(each(finish_line, [work])))  # while nothing else is done
-                except WorkerDied:
+                except WorkerDiedError:
                     yield {
                         "name": work.line.name,
                         "recording": work.line.recording,
