@@ -330,17 +330,7 @@ def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
         if not answers:
             raise InputError(f"{address}: the cluster has no workers; start some: dask worker {address} --nthreads 1")
         for worker, answer in answers.items():
-            if isinstance(answer, BaseException):
-                raise InputError(
-                    f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
-                ) from answer
-            version, sees_folder, processor = answer
-            if version != installed_version():
-                raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
-            if processor != describe_worker("")[2]:
-                LOG.warning("%s: has another processor (%s): the last bits of results may differ", worker, processor)
-            if not sees_folder:
-                raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
+            _check_worker(worker, answer, out)
 
         def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
             remaining = iter(items)
@@ -356,6 +346,21 @@ def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
                 client.cancel(list(running.futures))
 
         yield each
+
+
+def _check_worker(worker: str, answer: Any, out: str | Path) -> None:
+    """Raise InputError where a worker cannot do the work; warn where its processor is another kind."""
+    if isinstance(answer, BaseException):
+        raise InputError(
+            f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
+        ) from answer
+    version, sees_folder, processor = answer
+    if version != installed_version():
+        raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
+    if processor != describe_worker("")[2]:
+        LOG.warning("%s: has another processor (%s): the last bits of results may differ", worker, processor)
+    if not sees_folder:
+        raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
 
 
 def describe_worker(out: str) -> tuple[str, bool, str]:
