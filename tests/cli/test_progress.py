@@ -17,7 +17,7 @@ from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
 from lipmotion.cli.terminal.progress import report_progress
 from lipmotion.errors import CorpusError
 from lipmotion.types import Item, Progress
-from lipmotion_lab.verbs import evaluate
+from lipmotion_lab.verbs import measure
 
 EVENTS = (
     Progress("first", 0, 2, 0.0), Item("a", "prepared"), Progress("first", 1, 2, 0.25, -61.5),
@@ -100,7 +100,7 @@ def test_why_it_failed(capsys, monkeypatch):
         (ZeroDivisionError("what"), 1, "ZeroDivisionError: what"),
     ]
     for error, code, reason in errors:
-        monkeypatch.setattr(evaluate, "run", partial(fail, error))
+        monkeypatch.setattr(measure, "run_evaluate", partial(fail, error))
         with suppress(ZeroDivisionError):  # a bug is not hidden
             assert main(["evaluate", "m", "c", "--machine-readable"]) == code
         said = capsys.readouterr()
@@ -173,5 +173,5 @@ def test_what_is_swallowed_stops_at_the_next_event(monkeypatch, run):
             report.receive(EVENTS[0])
             raise AssertionError
 
-    monkeypatch.setattr(evaluate, "run", swallows)
+    monkeypatch.setattr(measure, "run_evaluate", swallows)
     assert run("evaluate", "m", "c") == (143, [], ["lipmotion: stopped; run the same command again to go on"])
