@@ -5,7 +5,7 @@ from functools import partial
 import pytest
 
 from lipmotion.measures.curves import bootstrap_interval
-from lipmotion.testing.examples import examples as sentences
+from lipmotion.testing import examples as sentences
 from lipmotion.types import Example
 from lipmotion_lab.evaluation import evaluate as evaluation_figures
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import CorpusError
-from lipmotion.testing.examples import CHANNELS
+from lipmotion.testing import CHANNELS
 from lipmotion.types import Example, silent_monitor
 from lipmotion_lab.baselines import REACH, ContextRidge, MeanPose
 

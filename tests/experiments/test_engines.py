@@ -13,7 +13,7 @@ from experiments.copies import copied
 from lipmotion import Corpus, Selection, evaluate, load_model
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.testing.examples import speech, timeline
+from lipmotion.testing import speech, timeline
 from lipmotion.types import Progress
 from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines
 from lipmotion_lab.runner import ExperimentSettings

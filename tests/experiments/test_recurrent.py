@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.testing.examples import CHANNELS
-from lipmotion.testing.examples import examples as sentences
+from lipmotion.testing import CHANNELS
+from lipmotion.testing import examples as sentences
 from lipmotion.types import Example, Progress
 from lipmotion_lab import baselines as network
 from lipmotion_lab.baselines import BlstmBaseline, FrameRegressionModel

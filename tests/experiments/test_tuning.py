@@ -10,7 +10,7 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.measures import curves
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.testing.examples import examples
+from lipmotion.testing import examples
 from lipmotion.types import silent_monitor
 from lipmotion_lab.evaluation.held_out import HeldOutRecordings, generate_clips, load_held_out
 from lipmotion_lab.xie_liu2007.systems import (

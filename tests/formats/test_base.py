@@ -9,8 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats import base, motion_suffix, motion_suffixes, read_motion, readable_suffixes, write_motion
-from lipmotion.formats.base import MOTION_FORMATS, MotionFormat, format_rows, read_members
+from lipmotion.formats import (
+    MotionFormat,
+    base,
+    motion_suffix,
+    motion_suffixes,
+    read_motion,
+    readable_suffixes,
+    write_motion,
+)
+from lipmotion.formats.base import MOTION_FORMATS, format_rows, read_members
 from lipmotion.types import Channel, Generation, Motion, Timeline
 
 EXACT = (".json", ".csv", ".npz", ".c3d")

@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import load_model
+from lipmotion import Request, load_model
 from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis, analyse_speech
 from lipmotion.pipeline.generation import predict_outlook
-from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.speech.sound.audio_files import read_audio

@@ -10,7 +10,7 @@ from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.network_steps import STEP, interpolate_steps
 from lipmotion.motion.predictors import PredictorTraining
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.testing.examples import example
+from lipmotion.testing import example
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example
 
 

@@ -29,7 +29,7 @@ from lipmotion.motion.predictors import (
     predictor_from_arrays,
 )
 from lipmotion.motion.prior_regression import PriorRegression
-from lipmotion.testing.examples import example, examples, speech, timeline
+from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.types import ConditionSpectrum, PriorOutput, TokenPosteriors, silent_monitor
 
 PAGE = Path(__file__).parents[2] / "docs" / "extend" / "predictor.md"

@@ -3,10 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Model, adapt, animate, load_model, save_model
+from lipmotion import Model, Request, adapt, animate, load_model, save_model
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import read_header
-from lipmotion.pipeline.request import Request
 from lipmotion.types import Audio
 from testing.toy import toy_sentences
 

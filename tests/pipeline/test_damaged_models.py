@@ -6,12 +6,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from lipmotion import Model
+from lipmotion import Model, Request
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_to_arrays
 from lipmotion.motion.eigenlips import eigenlips_to_arrays
 from lipmotion.pipeline.analysis.speech_analysis import analyse
-from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
 from pipeline.damage import DAMAGES, LARGEST_DIFFERENCE, QUICK, UNREADABLE, animated, damaged, distance, refused
 from testing.toy import ToySentence

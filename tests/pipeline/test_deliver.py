@@ -5,14 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Delivery, animate, read_motion, write
+from lipmotion import Delivery, Outputs, Request, animate, read_motion, write
 from lipmotion.articulation.contact import find_closures
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import InputError
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, shift_prosody
-from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.types import Prosody
 from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodKey

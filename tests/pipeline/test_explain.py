@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import Model, state_runs
+from lipmotion import Model, Request, state_runs
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate.explain import StateRun, explanation_document, explanation_text, run_lines, runs_of
-from lipmotion.pipeline.request import Request
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 WORDS = "See Bob, papa & mama!"

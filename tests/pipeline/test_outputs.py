@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from lipmotion import cues, write, write_cues
+from lipmotion import Outputs, cues, write, write_cues
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.pipeline.outputs import output
@@ -18,7 +18,6 @@ from lipmotion.pipeline.outputs.output import (
     create_outputs,
     plan,
 )
-from lipmotion.pipeline.request import Outputs
 from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
 from lipmotion_faces.outputs.scenes import SceneOutput
 from lipmotion_faces.outputs.shown_faces import shown_face

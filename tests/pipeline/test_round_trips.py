@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import animate, cues, read_motion, speak, write
+from lipmotion import Request, animate, cues, read_motion, speak, write
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.outputs.cues import cue_text
 from lipmotion.pipeline.outputs.motion_files import read_generation
-from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.types import Generation, Span, Timeline, Unit
 from speech import stand_in_voice

@@ -4,16 +4,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion import Corpus, Model, Selection, animate, evaluate, explain, load_model, save_model, train
+from lipmotion import (
+    Corpus,
+    Edits,
+    Model,
+    Request,
+    Selection,
+    Session,
+    animate,
+    evaluate,
+    explain,
+    load_model,
+    save_model,
+    train,
+)
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.speaker_maps import speakers_to_arrays
-from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.explain import chain_posteriors
-from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.session import Session
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
 from pipeline import made
 from pipeline.made import GAIN, OFFSET, corpus_of

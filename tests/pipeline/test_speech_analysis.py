@@ -5,13 +5,13 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from lipmotion import Model
+from lipmotion import Model, Request
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis import speech_analysis as pipeline_analysis
 from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech, build_speech, recognise_speech
 from lipmotion.pipeline.generation import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, predict_outlook
-from lipmotion.pipeline.request import Request, as_request
+from lipmotion.pipeline.request import as_request
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.agreement import TranscriptFit

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import lipmotion
-from lipmotion import Corpus, Model, animate, explain, load_model, map_onto, save_model, train, with_person
+from lipmotion import Corpus, Model, Request, animate, explain, load_model, map_onto, save_model, train, with_person
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import find_closable_ranges
-from lipmotion.pipeline.request import Onto, Request
+from lipmotion.pipeline.request import Onto
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Constraints, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan

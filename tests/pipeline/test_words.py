@@ -3,11 +3,10 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion import animate, load_model
+from lipmotion import Request, animate, load_model
 from lipmotion.errors import ExportError
 from lipmotion.pipeline.analysis.language import format_words, recognise_words, write_words
 from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech
-from lipmotion.pipeline.request import Request
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.types import Span, Timeline, Unit
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.formats.base import MOTION_FORMATS, MotionFormat
+from lipmotion.formats import MotionFormat
+from lipmotion.formats.base import MOTION_FORMATS
 from lipmotion.testing import ContractError, check_exporter
 from lipmotion_faces import Face, make_face
 from lipmotion_faces.testing import check_face

@@ -8,6 +8,7 @@ import pytest
 
 from lipmotion import Job, Outputs, Request
 from lipmotion.errors import ExportError
+from lipmotion.pipeline.batch import BatchLine
 from lipmotion.pipeline.batch import ledger as settings
 from lipmotion.pipeline.batch.ledger import (
     DONE,
@@ -25,7 +26,7 @@ from lipmotion.pipeline.batch.ledger import (
     read_receipt,
     write_receipt,
 )
-from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
+from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.storage.locks import LOCK
 

@@ -7,10 +7,9 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion import animate, write
+from lipmotion import Outputs, Request, animate, write
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.pipeline.outputs.output import OutputSettings
-from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
 from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.film import filmed_video as module

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import here, run
-from lipmotion import animate
-from lipmotion.pipeline.request import Request
+from lipmotion import Request, animate
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
 from lipmotion_faces.film.filmed_video import make_film, write_film

@@ -3,13 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion import Edits, Model, Session
+from lipmotion import Edits, Model, Request, Session
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
 from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, find_excerpt
 from lipmotion.pipeline.generation import generate_motion
-from lipmotion.pipeline.request import Request
 from lipmotion.types import Audio, Generation, Pin, Span, Timeline, Unit
 from testing.toy import ToySentence
 

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion import Edits, Model, Session, cues
+from lipmotion import Edits, Model, Request, Session, cues
 from lipmotion.articulation.contact import opening_to_gap
 from lipmotion.articulation.mouth import LIP_SPEED
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
-from lipmotion.pipeline.request import Request
 from lipmotion.types import Delivery, Generation
 from lipmotion_faces.base import Staging
 from lipmotion_faces.characters.character_files import load_character

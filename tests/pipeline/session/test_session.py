@@ -5,7 +5,7 @@ from threading import Barrier
 import numpy as np
 import pytest
 
-from lipmotion import Delivery, Edits, Model, Session, animate, write
+from lipmotion import Delivery, Edits, Model, Request, Session, animate, write
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
@@ -14,7 +14,6 @@ from lipmotion.pipeline.generation import generate_motion
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, measure_prosody
-from lipmotion.pipeline.request import Request
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion_faces.outputs.drawn_video import sound_track
 from lipmotion_faces.outputs.session_pictures import SessionPictures
