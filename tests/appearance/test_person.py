@@ -4,6 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lipmotion import FilmedFace
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import Motion
@@ -11,7 +12,6 @@ from lipmotion_faces.appearance import person
 from lipmotion_faces.appearance.candidates import CANDIDATES
 from lipmotion_faces.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relight, replaced_part
 from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
-from lipmotion_faces.filmed.face import FilmedFace
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
 

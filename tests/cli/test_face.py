@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from cli.conftest import check_refused
+from lipmotion import load_face, save_face
 from lipmotion_faces.film import build
-from lipmotion_faces.filmed.face import load_face, save_face
 from pipeline.film.toy_footage import ToyVideo, install, write_videos
 from speech import stand_in_voice
 

@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import FilmedFace, build_face, load_face, save_face
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
 from lipmotion_faces.film import build
-from lipmotion_faces.film.build import Take, build_face
-from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
+from lipmotion_faces.film.build import Take
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video, write_videos
