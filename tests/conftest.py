@@ -21,10 +21,9 @@ from numpy.typing import NDArray
 
 from lipmotion import Corpus, FilmedFace, Model, save_face, save_model, train
 from lipmotion.engines import engine_named
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
 from lipmotion.speech.recognition.network.posteriors import Hama
-from testing.toy import ToySentence, toy_sentences, toy_utterances
+from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
 
 SENTENCES = 12
@@ -156,10 +155,9 @@ def toy_sentence() -> ToySentence:
 
 def quickly(corpus: Corpus, engine: str = "trajectory", visual: str = "geometry", **options: Any) -> Model:
     """Return a model, trained in a second; its mouth does not move as English ones do."""
-    small = HmmConfig(mixtures=1, iterations=2)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(posterior_network, "STEPS", ENOUGH_STEPS)  # tests that ask for it first may be hasty
-        return train(corpus, recogniser=small, engine=engine_named(engine, options), visual=visual)[0]
+        return train(corpus, recogniser=SMALL, engine=engine_named(engine, options), visual=visual)[0]
 
 
 @pytest.fixture(scope="session")

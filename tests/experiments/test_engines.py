@@ -12,14 +12,14 @@ import pytest
 from experiments.copies import copied
 from lipmotion import Corpus, Selection, evaluate, load_model
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.testing import speech, timeline
 from lipmotion.types import Progress
 from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines
 from lipmotion_lab.runner import ExperimentSettings
+from testing import toy
 
 LONG = pytest.mark.long
-SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))
+SMALL = ExperimentSettings(recogniser=toy.SMALL)
 CONDITIONS = ["audio only", "with transcript"]
 SPOKEN = speech(timeline(("b", "aa", "t", "iy", "m", "uw", "s", "aa")))
 

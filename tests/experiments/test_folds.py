@@ -11,7 +11,6 @@ import pytest
 from experiments.copies import copied, renamed
 from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
 from lipmotion_lab import runner
@@ -19,9 +18,9 @@ from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load
 from lipmotion_lab.folds import folds
 from lipmotion_lab.report.sections import folds_section
 from lipmotion_lab.runner import ExperimentSettings
+from testing.toy import SMALL
 
-PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
-SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
+SMALL = ExperimentSettings(recogniser=SMALL)
 CONDITIONS = ["audio only", "with transcript"]
 RATE_HZ = 25
 OPENING_ROW = (
@@ -42,9 +41,7 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
     mixed = [names[i] for i in np.random.default_rng(0).permutation(len(names))]
     made = []
     for held_out in (mixed[0::3], mixed[1::3], mixed[2::3]):
-        model = train(
-            toy_corpus, selection=Selection(names=sorted(set(names) - set(held_out))), recogniser=PHONE_MODELS
-        )[0]
+        model = train(toy_corpus, selection=Selection(names=sorted(set(names) - set(held_out))), recogniser=SMALL)[0]
         found = load_held_out(toy_corpus, cached_recogniser(model.phones), selection=Selection(names=sorted(held_out)))
         made += generate_clips(found, "with transcript", model.engine, model.learned)
     return made

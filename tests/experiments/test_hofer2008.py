@@ -11,14 +11,13 @@ from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.errors import CorpusError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PhoneticTableOptions, hofer2008
 from lipmotion_lab.report.sections import hofer_section
 from lipmotion_lab.runner import ExperimentSettings
+from testing.toy import SMALL
 
-PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
-SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
+SMALL = ExperimentSettings(recogniser=SMALL)
 TWO = PhoneticTableOptions(states=(3,), mixtures=(1, 2), motion_mixtures=(1, 2), channels="opening width outer")
 
 
@@ -45,7 +44,7 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(figures, toy_corpus):
         settings = ["states=3", *numbers, f"closures={pins}", "channels=opening width outer"]
         if (pins, settings[1]) not in evaluated:
             engine = engine_from_settings(preset="hofer2008", settings=settings)
-            model = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine)[0]
+            model = train(toy_corpus, recogniser=SMALL, engine=engine)[0]
             evaluated[pins, settings[1]] = evaluate(model, toy_corpus)
         of_condition = evaluated[pins, settings[1]]["conditions"][block["condition"]]
         opening = of_condition["channels"]["opening"]

@@ -9,14 +9,13 @@ import pytest
 from experiments.copies import renamed
 from lipmotion import Corpus, Selection, evaluate, train
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import learning_curve as module
 from lipmotion_lab.learning_curve import learning_curve
 from lipmotion_lab.report.sections import learning_section
 from lipmotion_lab.runner import ExperimentSettings
+from testing.toy import SMALL
 
-PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
-SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
+SMALL = ExperimentSettings(recogniser=SMALL)
 CONDITIONS = ["audio only", "with transcript"]
 
 
@@ -41,7 +40,7 @@ def test_each_size_once_the_smallest_first(figures):
 @pytest.mark.long
 def test_a_row_is_what_train_and_evaluate_say(figures, toy_corpus, order):
     names = sorted(order[: figures["rows"][0]["names"]])
-    wanted = evaluate(train(toy_corpus, selection=Selection(names=names), recogniser=PHONE_MODELS)[0], toy_corpus)
+    wanted = evaluate(train(toy_corpus, selection=Selection(names=names), recogniser=SMALL)[0], toy_corpus)
     assert figures["closed_under"] == wanted["closed_under"]
     for condition in CONDITIONS:
         made, said = figures["rows"][0]["conditions"][condition], wanted["conditions"][condition]

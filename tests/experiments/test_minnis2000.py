@@ -11,7 +11,6 @@ from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.concatenation import pieces_of
 from lipmotion.engines.selection.costs import SelectionConfig
-from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
 from lipmotion_lab.minnis2000 import (
     ADDITIONS,
@@ -24,9 +23,9 @@ from lipmotion_lab.minnis2000 import (
     velocity_change,
 )
 from lipmotion_lab.runner import ExperimentSettings
+from testing.toy import SMALL
 
 LONG = pytest.mark.long
-PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 
 
 def test_all_additions_together_are_the_default():
@@ -68,12 +67,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
-    return minnis2000(toy_corpus, models=folder, settings=ExperimentSettings(recogniser=PHONE_MODELS))
+    return minnis2000(toy_corpus, models=folder, settings=ExperimentSettings(recogniser=SMALL))
 
 
 @LONG
 def test_the_row_as_printed_is_the_preset(figures, toy_corpus):
-    model, _ = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine_from_settings(preset="minnis2000"))
+    model, _ = train(toy_corpus, recogniser=SMALL, engine=engine_from_settings(preset="minnis2000"))
     wanted = evaluate(model, toy_corpus)["conditions"]
     for condition, systems in figures["lists"]["test"]["conditions"].items():
         assert systems[PRINTED]["acc"] == pytest.approx(wanted[condition]["channels"]["opening"]["acc"], abs=1e-6)
@@ -87,7 +86,7 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
     def receive(system: str, condition: str, recordings: HeldOutRecordings, clips: Sequence[ComparedClip]) -> None:
         received.append((recordings.utterances[0].split, condition, system, len(clips)))
 
-    settings = ExperimentSettings(recogniser=PHONE_MODELS, receive=receive)
+    settings = ExperimentSettings(recogniser=SMALL, receive=receive)
     again = minnis2000(toy_corpus, models=folder, settings=settings)
     conditions = {(split, c, 2) for split, found in again["lists"].items() for c in found["conditions"]}
     assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in rows())
@@ -98,7 +97,7 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
 @LONG
 def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path, monkeypatch):
     def run() -> dict[str, Any]:
-        return minnis2000(toy_corpus, work=tmp_path, settings=ExperimentSettings(recogniser=PHONE_MODELS))
+        return minnis2000(toy_corpus, work=tmp_path, settings=ExperimentSettings(recogniser=SMALL))
 
     module = "lipmotion_lab.minnis2000.join_figures"
     made: list[None] = []

@@ -12,7 +12,6 @@ from experiments.copies import copied, renamed
 from experiments.test_sections import figures_of
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.units import Lexicon
 from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PhoneticTableOptions
@@ -20,8 +19,9 @@ from lipmotion_lab.report import report
 from lipmotion_lab.report.report import PAGE, PARTS, PartRun, ReportPart, WrittenReport, experiment_report
 from lipmotion_lab.runner import ExperimentSettings
 from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
+from testing import toy
 
-SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))
+SMALL = ExperimentSettings(recogniser=toy.SMALL)
 TWO, SETS = ("hofer2008", "folds"), ("eVis", "phone")
 SCREENS = ((1280, 900, "light"), (1280, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 

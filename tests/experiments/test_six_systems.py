@@ -11,7 +11,6 @@ from experiments.copies import copied
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
@@ -37,10 +36,10 @@ from lipmotion_lab.xie_liu2007.systems import (
     select_systems,
     system_from_arrays,
 )
+from testing.toy import SMALL
 
 LONG = pytest.mark.long
-PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
-SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
+SMALL = ExperimentSettings(recogniser=SMALL)
 MULTISTREAM = "ph-MSHMM"
 CHAINS = [MULTISTREAM, REFERENCE_SYSTEM, MULTISTREAM + TUNED, REFERENCE_SYSTEM + TUNED]
 OTHERS = [MULTISTREAM + ALL_PATHS, BEST_PATH, "trajectory HMM", "mean pose"]
@@ -78,7 +77,7 @@ def test_every_size_condition_and_system(figures):
 
 @LONG
 def test_a_row_is_what_train_and_evaluate_say(figures, toy_corpus):
-    wanted = evaluate(train(toy_corpus, recogniser=PHONE_MODELS)[0], toy_corpus)
+    wanted = evaluate(train(toy_corpus, recogniser=SMALL)[0], toy_corpus)
     for condition, expected_figures in wanted["conditions"].items():
         row = figures["rows"][-1]["conditions"][condition]["trajectory HMM"]
         assert (row["acc"], row["amse"]) == pytest.approx((expected_figures["acc"], expected_figures["amse"]))
@@ -92,7 +91,7 @@ def test_a_row_is_what_train_and_evaluate_say(figures, toy_corpus):
 @pytest.mark.parametrize("name", [MULTISTREAM, REFERENCE_SYSTEM])
 def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     """The arrays of the model file and the motion are the same; conversions of one model differ by that alone."""
-    model = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine_from_settings(preset=name))[0]
+    model = train(toy_corpus, recogniser=SMALL, engine=engine_from_settings(preset=name))[0]
     arrays = model.engine.to_arrays(model.learned)
     kept = read_archive(work / "8" / f"system-{name}.checkpoint")
     assert kept.keys() == {*arrays, "about"}
@@ -181,7 +180,7 @@ def test_eigenlips(visual, toy_corpus):
     made = xieliu2007(toy_corpus, options, settings=settings)
     assert made["rows"][0]["names"] == 8
     assert received == [(name, "audio only") for name in made["rows"][0]["training"]]
-    model = train(toy_corpus, recogniser=PHONE_MODELS, visual=visual)[0]
+    model = train(toy_corpus, recogniser=SMALL, visual=visual)[0]
     expected_figures = evaluate(model, toy_corpus)["conditions"]["audio only"]
     row = made["rows"][0]["conditions"]["audio only"]["trajectory HMM"]
     assert (row["acc"], row["amse"]) == pytest.approx((expected_figures["acc"], expected_figures["amse"]))

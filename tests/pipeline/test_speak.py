@@ -7,13 +7,13 @@ import pytest
 from lipmotion import Corpus, Model, Selection, load_model, read_motion, speak, train, write
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.generate import speak as module
 from lipmotion.pipeline.generate.speak import REST_S, speak_from_corpus
 from lipmotion.speech.voices.installed import default_voice, installed_voices
 from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit
 from lipmotion.units import LIP_CLOSING, Lexicon, is_silent
 from speech import stand_in_voice
+from testing.toy import SMALL
 
 TEXT = "Papa, see Bob. Mama!"
 
@@ -132,8 +132,7 @@ SETTINGS = {"joint_recogniser": False, "articulation": False, "conditions": 0}
 @pytest.fixture(scope="module")
 def selection_model(toy_corpus: Corpus) -> Model:
     engine = engine_named("selection", SETTINGS)
-    small = HmmConfig(mixtures=1, iterations=3)
-    return train(toy_corpus, selection=Selection(None), engine=engine, recogniser=small)[0]
+    return train(toy_corpus, selection=Selection(None), engine=engine, recogniser=SMALL)[0]
 
 
 @pytest.mark.long

@@ -20,16 +20,13 @@ from lipmotion import (
 )
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.speaker_maps import speakers_to_arrays
 from lipmotion.pipeline.generate.explain import chain_posteriors
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
 from pipeline import made
 from pipeline.made import GAIN, OFFSET, corpus_of
-from testing.toy import ToySentence, toy_utterances
-
-SMALL = HmmConfig(mixtures=1, iterations=2)
+from testing.toy import SMALL, ToySentence, toy_utterances
 
 
 @pytest.fixture(scope="module")

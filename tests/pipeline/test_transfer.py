@@ -8,14 +8,13 @@ import lipmotion
 from lipmotion import Corpus, Model, Request, animate, explain, load_model, map_onto, save_model, train, with_person
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.request import Onto
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Constraints, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
 from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
-from testing.toy import ToySentence, toy_motion, toy_utterances
+from testing.toy import SMALL, ToySentence, toy_motion, toy_utterances
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +30,7 @@ def of_two(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
 @pytest.fixture(scope="module")
 def two_model(of_two: Corpus) -> Model:
     engine = engine_named("trajectory", {"articulation": False})
-    return train(of_two, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)[0]
+    return train(of_two, recogniser=SMALL, engine=engine)[0]
 
 
 def request(sentence: ToySentence, onto: Onto | None = None, **more: str) -> Request:
@@ -62,7 +61,7 @@ def test_every_engine(toy_corpus, toy_sentence, ben, engine):
     settings: dict[str, object] = {"articulation": False}  # the toy's mouth does not move as English ones do
     if engine == "coupled":
         settings |= {"chains": "sVis 2vis", "mixtures": 2}
-    model, _ = train(toy_corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine_named(engine, settings))
+    model, _ = train(toy_corpus, recogniser=SMALL, engine=engine_named(engine, settings))
     is_like_ben(model, toy_sentence, ben)
 
 

@@ -8,7 +8,6 @@ import pytest
 from lipmotion import Corpus, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion import posterior_network
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
@@ -17,9 +16,8 @@ from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_ch
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import Utterance
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
-from testing.toy import toy_utterances
+from testing.toy import SMALL, toy_utterances
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
 ENGINE = engine_named("trajectory", {"articulation": False})
 
 

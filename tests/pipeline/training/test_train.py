@@ -8,7 +8,6 @@ import pytest
 from lipmotion import Corpus, Run, Selection, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.space import resample_track
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.other_speakers import VoiceExample
@@ -18,9 +17,9 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import Channel, Motion, Track, Utterance
 from lipmotion.units import Lexicon
 from pipeline import made
-from testing.toy import toy_sentences
+from testing.toy import SMALL, toy_sentences
 
-SMALL, JOINT = HmmConfig(mixtures=1, iterations=2), engine_named("joint", {})
+JOINT = engine_named("joint", {})
 TRAINED = tuple(f"toy0{number}" for number in range(8))
 
 

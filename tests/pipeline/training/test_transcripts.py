@@ -6,7 +6,6 @@ import pytest
 from lipmotion import Corpus, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import MissingDependencyError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training import labels as module
 from lipmotion.pipeline.training.labels import (
     MAX_NAMED_RECORDINGS,
@@ -15,9 +14,8 @@ from lipmotion.pipeline.training.labels import (
 )
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.types import Timeline, Unit, Utterance
-from testing.toy import toy_sentences, toy_utterances
+from testing.toy import SMALL, toy_sentences, toy_utterances
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
 Labelled = list[tuple[Utterance, Timeline[Unit]]]
 
 
