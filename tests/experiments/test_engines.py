@@ -9,17 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.copies import copied
+from experiments.copies import SETTINGS, copied
 from lipmotion import Corpus, Selection, evaluate, load_model
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.testing import speech, timeline
 from lipmotion.types import Progress
 from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines
-from lipmotion_lab.runner import ExperimentSettings
-from testing import toy
 
 LONG = pytest.mark.long
-SMALL = ExperimentSettings(recogniser=toy.SMALL)
+
 CONDITIONS = ["audio only", "with transcript"]
 SPOKEN = speech(timeline(("b", "aa", "t", "iy", "m", "uw", "s", "aa")))
 
@@ -36,7 +34,7 @@ def stages() -> list[Progress]:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path, stages: list[Progress]) -> dict[str, Any]:
-    return engines(toy_corpus, split="test", models=folder, settings=replace(SMALL, monitor=stages.append))
+    return engines(toy_corpus, split="test", models=folder, settings=replace(SETTINGS, monitor=stages.append))
 
 
 @LONG
@@ -79,7 +77,7 @@ def test_the_figures_are_those_of_the_verb_evaluate(figures, folder, toy_corpus,
 def test_a_second_run_trains_nothing(figures, toy_corpus, folder):
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
     received: set[tuple[str, str]] = set()
-    settings = replace(SMALL, receive=lambda system, condition, *_: received.add((condition, system)))
+    settings = replace(SETTINGS, receive=lambda system, condition, *_: received.add((condition, system)))
     again = engines(toy_corpus, split="test", models=folder, settings=settings)
     assert received == {(c, s) for c, found in again["conditions"].items() for s in found["systems"]}
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
@@ -103,21 +101,21 @@ def test_models_of_something_else_are_refused(figures, toy_corpus, folder, tmp_p
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "coupled.lipmotion").write_bytes((folder / "trajectory.lipmotion").read_bytes())
     with pytest.raises(InputError, match="a model of the engine 'trajectory', required 'coupled'; move it away"):
-        engines(toy_corpus, models=tmp_path / "a", settings=SMALL)
+        engines(toy_corpus, models=tmp_path / "a", settings=SETTINGS)
     fewer = copied(
         toy_corpus, tmp_path, lambda u: replace(u, split="test") if u.name in ("toy00", "toy01", "toy03") else u
     )
     wanted = r"minutes 0\.\d, required the training list of this corpus: corpus \['copy'\], minutes 0\.\d; move it"
     with pytest.raises(InputError, match=wanted):
-        engines(fewer, models=folder, settings=SMALL)
+        engines(fewer, models=folder, settings=SETTINGS)
     with pytest.raises(ExportError, match="the corpus"):
-        engines(toy_corpus, models=toy_corpus.path, settings=SMALL)
+        engines(toy_corpus, models=toy_corpus.path, settings=SETTINGS)
     (tmp_path / "file").write_text("")
     with pytest.raises(ExportError, match="is a file; give the name"):
-        engines(toy_corpus, models=tmp_path / "file", settings=SMALL)
+        engines(toy_corpus, models=tmp_path / "file", settings=SETTINGS)
 
 
 def test_recordings_of_the_training_are_not_compared(toy_corpus):
     for split in ("train", None):
         with pytest.raises(CorpusError, match="are in the split that is compared with"):
-            engines(toy_corpus, split=split, settings=SMALL)
+            engines(toy_corpus, split=split, settings=SETTINGS)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.copies import copied, renamed
+from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.speech.recognition.recogniser import cached_recogniser
@@ -20,7 +20,6 @@ from lipmotion_lab.report.sections import folds_section
 from lipmotion_lab.runner import ExperimentSettings
 from testing.toy import SMALL
 
-SMALL = ExperimentSettings(recogniser=SMALL)
 CONDITIONS = ["audio only", "with transcript"]
 RATE_HZ = 25
 OPENING_ROW = (
@@ -31,7 +30,7 @@ OPENING_ROW = (
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus) -> dict[str, Any]:
-    return folds(toy_corpus, count=3, settings=SMALL)
+    return folds(toy_corpus, count=3, settings=SETTINGS)
 
 
 @pytest.fixture(scope="module")

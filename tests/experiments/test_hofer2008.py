@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from experiments.copies import copied, renamed
+from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.joint.engine import JointEngine
@@ -14,10 +14,8 @@ from lipmotion.errors import CorpusError
 from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PhoneticTableOptions, hofer2008
 from lipmotion_lab.report.sections import hofer_section
-from lipmotion_lab.runner import ExperimentSettings
 from testing.toy import SMALL
 
-SMALL = ExperimentSettings(recogniser=SMALL)
 TWO = PhoneticTableOptions(states=(3,), mixtures=(1, 2), motion_mixtures=(1, 2), channels="opening width outer")
 
 
@@ -30,7 +28,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def figures(toy_corpus: Corpus, work: Path) -> dict[str, Any]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
-        return hofer2008(toy_corpus, TWO, work=work, settings=SMALL)
+        return hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
 
 
 @pytest.mark.long
@@ -61,7 +59,7 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(figures, toy_corpus):
 def test_what_was_finished_is_not_trained_again(figures, toy_corpus, work, monkeypatch):
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
     monkeypatch.setattr(JointEngine, "growing_models", None)
-    again = hofer2008(toy_corpus, TWO, work=work, settings=SMALL)
+    again = hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
     assert hofer_section(again).as_text() == hofer_section(figures).as_text()
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.copies import renamed
+from experiments.copies import SETTINGS, renamed
 from lipmotion import Corpus, Selection, evaluate, train
 from lipmotion.errors import CorpusError, InputError
 from lipmotion_lab import learning_curve as module
@@ -15,7 +15,6 @@ from lipmotion_lab.report.sections import learning_section
 from lipmotion_lab.runner import ExperimentSettings
 from testing.toy import SMALL
 
-SMALL = ExperimentSettings(recogniser=SMALL)
 CONDITIONS = ["audio only", "with transcript"]
 
 
@@ -26,7 +25,7 @@ def order(toy_corpus: Corpus) -> tuple[str, ...]:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, order: tuple[str, ...]) -> dict[str, Any]:
-    return learning_curve(toy_corpus, order=order, sizes=[8, 4, 4], settings=SMALL)
+    return learning_curve(toy_corpus, order=order, sizes=[8, 4, 4], settings=SETTINGS)
 
 
 @pytest.mark.long
@@ -62,7 +61,7 @@ def test_minutes_are_those_of_the_utterances(figures, toy_corpus, order):
 
 @pytest.mark.long
 def test_channels_that_are_not_there_are_dashes(toy_corpus, tmp_path):
-    made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SMALL)
+    made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SETTINGS)
     row = made["rows"][0]["conditions"]["audio only"]
     assert (row["acc_width"], row["acc_outer"]) == (None, None)
     assert learning_section(made).table.as_lines()[1].split()[-2:] == ["–", "–"]

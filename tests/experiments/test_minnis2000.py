@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import PHONE_S, costs_of, inventory, target_of
+from experiments.copies import SETTINGS
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.concatenation import pieces_of
@@ -22,7 +23,6 @@ from lipmotion_lab.minnis2000 import (
     rows,
     velocity_change,
 )
-from lipmotion_lab.runner import ExperimentSettings
 from testing.toy import SMALL
 
 LONG = pytest.mark.long
@@ -67,7 +67,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
-    return minnis2000(toy_corpus, models=folder, settings=ExperimentSettings(recogniser=SMALL))
+    return minnis2000(toy_corpus, models=folder, settings=SETTINGS)
 
 
 @LONG
@@ -86,7 +86,7 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
     def receive(system: str, condition: str, recordings: HeldOutRecordings, clips: Sequence[ComparedClip]) -> None:
         received.append((recordings.utterances[0].split, condition, system, len(clips)))
 
-    settings = ExperimentSettings(recogniser=SMALL, receive=receive)
+    settings = replace(SETTINGS, receive=receive)
     again = minnis2000(toy_corpus, models=folder, settings=settings)
     conditions = {(split, c, 2) for split, found in again["lists"].items() for c in found["conditions"]}
     assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in rows())
@@ -97,7 +97,7 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
 @LONG
 def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path, monkeypatch):
     def run() -> dict[str, Any]:
-        return minnis2000(toy_corpus, work=tmp_path, settings=ExperimentSettings(recogniser=SMALL))
+        return minnis2000(toy_corpus, work=tmp_path, settings=SETTINGS)
 
     module = "lipmotion_lab.minnis2000.join_figures"
     made: list[None] = []

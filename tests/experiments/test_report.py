@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from experiments.copies import copied, renamed
+from experiments.copies import SETTINGS, copied, renamed
 from experiments.test_sections import figures_of
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
@@ -19,9 +19,7 @@ from lipmotion_lab.report import report
 from lipmotion_lab.report.report import PAGE, PARTS, PartRun, ReportPart, WrittenReport, experiment_report
 from lipmotion_lab.runner import ExperimentSettings
 from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
-from testing import toy
 
-SMALL = ExperimentSettings(recogniser=toy.SMALL)
 TWO, SETS = ("hofer2008", "folds"), ("eVis", "phone")
 SCREENS = ((1280, 900, "light"), (1280, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 
@@ -137,8 +135,8 @@ def test_other_recordings_or_settings_are_run_again(ran, toy_corpus, tmp_path):
     assert run(toy_corpus, quick=True).made == ["folds"]
     assert "quick run" in Links(tmp_path / "r" / PAGE).text
     assert run(toy_corpus.part(toy_corpus.names()[1:]), quick=True).made == ["folds"]
-    assert run(toy_corpus, quick=True, settings=replace(SMALL, seed=1)).made == ["folds"]
-    assert run(toy_corpus, settings=replace(SMALL, lexicon=Lexicon({"a": (("ax",),)}))).made == ["folds"]
+    assert run(toy_corpus, quick=True, settings=replace(SETTINGS, seed=1)).made == ["folds"]
+    assert run(toy_corpus, settings=replace(SETTINGS, lexicon=Lexicon({"a": (("ax",),)}))).made == ["folds"]
     assert "-o r --only folds --lexicon FILE" in Links(tmp_path / "r" / PAGE).text
     assert len(ran) == len(list((tmp_path / "r" / "models").iterdir())) == 5
 
@@ -187,7 +185,7 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Wri
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in SETS})
         patch.setattr(table1, "QUICK", PhoneticTableOptions(states=(3,), mixtures=(1,)))
-        return experiment_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SMALL)
+        return experiment_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
 
 
 @pytest.mark.long

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.copies import copied
+from experiments.copies import SETTINGS, copied
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
@@ -19,7 +19,6 @@ from lipmotion_lab.evaluation.held_out import (
     load_held_out,
 )
 from lipmotion_lab.report.sections import xie_liu_section
-from lipmotion_lab.runner import ExperimentSettings
 from lipmotion_lab.xie_liu2007 import six_systems, systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_FILES
 from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
@@ -39,7 +38,7 @@ from lipmotion_lab.xie_liu2007.systems import (
 from testing.toy import SMALL
 
 LONG = pytest.mark.long
-SMALL = ExperimentSettings(recogniser=SMALL)
+
 MULTISTREAM = "ph-MSHMM"
 CHAINS = [MULTISTREAM, REFERENCE_SYSTEM, MULTISTREAM + TUNED, REFERENCE_SYSTEM + TUNED]
 OTHERS = [MULTISTREAM + ALL_PATHS, BEST_PATH, "trajectory HMM", "mean pose"]
@@ -61,7 +60,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path, work: Path) -> dict[str, Any]:
     options = ComparisonOptions(systems=SYSTEMS, tuning=BRIEF, transcripts=True)
-    return xieliu2007(toy_corpus, options, sizes=[8, 3], plots=folder, work=work, settings=SMALL)
+    return xieliu2007(toy_corpus, options, sizes=[8, 3], plots=folder, work=work, settings=SETTINGS)
 
 
 @LONG
@@ -139,7 +138,7 @@ def test_it_goes_on_from_what_is_finished(figures, work, toy_corpus, monkeypatch
     monkeypatch.setattr(systems, "train_stages", None)
     monkeypatch.setattr(six_systems, "generate_clips", None)
     options = ComparisonOptions(systems=[*CHAINS, "mean pose"], tuning=BRIEF)
-    again = xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SMALL)
+    again = xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SETTINGS)
     for name in CHAINS:
         kept, rows = (each["rows"][-1]["conditions"]["audio only"][name] for each in (again, figures))
         assert kept == rows
@@ -176,7 +175,7 @@ def test_the_text_names_every_system(figures):
 def test_eigenlips(visual, toy_corpus):
     options = ComparisonOptions(systems=["trajectory HMM"], visual=visual)
     received: list[tuple[str, str]] = []
-    settings = replace(SMALL, receive=lambda *given: received.append(given[:2]))
+    settings = replace(SETTINGS, receive=lambda *given: received.append(given[:2]))
     made = xieliu2007(toy_corpus, options, settings=settings)
     assert made["rows"][0]["names"] == 8
     assert received == [(name, "audio only") for name in made["rows"][0]["training"]]
@@ -218,9 +217,9 @@ def test_without_matplotlib_there_are_no_pictures(toy_corpus, tmp_path, monkeypa
 
 def test_what_cannot_be_chosen(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="no system 'nothing'"):
-        xieliu2007(toy_corpus, ComparisonOptions(systems=["nothing"]), settings=SMALL)
+        xieliu2007(toy_corpus, ComparisonOptions(systems=["nothing"]), settings=SETTINGS)
     with pytest.raises(InputError, match="sizes 9; required: from 1 to 8"):
-        xieliu2007(toy_corpus, ComparisonOptions(systems=[REFERENCE_SYSTEM]), sizes=[9], settings=SMALL)
+        xieliu2007(toy_corpus, ComparisonOptions(systems=[REFERENCE_SYSTEM]), sizes=[9], settings=SETTINGS)
     with pytest.raises(CorpusError, match="are in the split that is compared with"):
         xieliu2007(toy_corpus, order=toy_corpus.names("val"))
     with pytest.raises(CorpusError, match="no utterances of split 'val'"):

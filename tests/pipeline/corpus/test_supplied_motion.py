@@ -8,16 +8,30 @@ from hypothesis import strategies as st
 
 from formats.examples import of_motion, written
 from lipmotion import Corpus, prepare
+from lipmotion.corpora.captured_faces import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
+from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
-from lipmotion.errors import InputError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.formats.c3d import C3dFile, write_c3d
+from lipmotion.formats.sound import write_sound
 from lipmotion.formats.tables import SPEECH_CURVES
-from lipmotion.types import Channel, Motion, Timeline, Unit
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit
 from lipmotion.units import is_silent
-from lipmotion_faces.corpus.supplied import read_supplied_phones, read_supplied_track, source_digests
+from lipmotion_faces.corpus.supplied import (
+    SeparateSound,
+    align_sound,
+    read_supplied_phones,
+    read_supplied_track,
+    separate_sound,
+    source_digests,
+    trim_to_shared,
+)
+from meshes.flame import head
 from meshes.live_link_app import write_take
 from meshes.speech import said
 from pipeline.made import replace_tracking, write_noise
+from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
 
@@ -175,3 +189,202 @@ def test_frames_without_a_face_are_not_seen(tmp_path):
     track = read_supplied_track(MotionFile(tmp_path / "a.csv"), 2.0)
     assert np.flatnonzero(track.seen).tolist() == list(range(30, 90))
     assert track.motion["jawOpen"] == pytest.approx(np.where(track.seen, 0.5, 0.0))
+
+
+RATE = 60.0
+CUT, BEFORE = 4_800, 12_345
+
+
+def write_ramp(path: Path, seconds: float) -> None:
+    """Write a curve that says its own time."""
+    motion = Motion(np.arange(int(seconds * RATE))[:, None] / RATE, RATE, (Channel("jaw", "weight"),))
+    written(path, of_motion(motion))
+
+
+@pytest.fixture
+def recorded_twice_folder(tmp_path: Path) -> Path:
+    """A take of a camera with motion, and the same take as a recorder has it, from earlier on."""
+    chance = np.random.default_rng(5)
+    scene = np.concatenate([np.zeros(2 * RATE_HZ), speech_like(chance, 4.0)])
+    made = clap(chance)
+    scene[RATE_HZ : RATE_HZ + len(made)] += made
+    camera, recorder, late_s = recorded_twice(scene, chance, CUT, BEFORE)
+    assert late_s == pytest.approx((CUT + BEFORE) / RATE_HZ)
+    folder = tmp_path / "studio"
+    folder.mkdir()
+    write_sound(folder / "take.wav", camera)
+    write_sound(folder / "take.recorder.wav", recorder)
+    write_ramp(folder / "take.npz", camera.duration_s)
+    return folder
+
+
+def test_the_recorders_sound_is_used_from_the_right_moment(recorded_twice_folder, tmp_path):
+    (recorded_twice_folder / "take.lab").write_text("10000000 20000000 aa\n")
+    report = prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
+    assert (report.prepared, report.failed) == (("take",), {})
+    assert report.notes["take"] == ("sound 1071.6 ms late, found by the clap",)
+    found = Corpus.open(tmp_path / "corpus").utterance("take")
+    assert (found.source["recorder_file"], found.source["sound_found_by"]) == ("take.recorder.wav", "clap")
+    assert float(found.source["sound_late_ms"]) == pytest.approx(1000 * (CUT + BEFORE) / RATE_HZ, abs=0.1)
+    assert found.track.motion.values[0, 0] == pytest.approx(0)
+    assert found.audio.duration_s == pytest.approx(len(found.track.seen) / RATE, abs=0.02)
+    at = int(np.abs(found.audio.samples).argmax())
+    assert at == pytest.approx(RATE_HZ - CUT, abs=40)
+    assert prepare(recorded_twice_folder, tmp_path / "corpus", workers=1).kept == ("take",)
+    (recorded_twice_folder / "take.recorder.wav").write_bytes((recorded_twice_folder / "take.wav").read_bytes())
+    assert prepare(recorded_twice_folder, tmp_path / "corpus", workers=1).prepared == ("take",)
+
+
+def test_a_long_video_gets_the_recorders_sound_in_its_own_time(recorded_twice_folder):
+    recording = SourceRecording(
+        "take", recorded_twice_folder / "take.wav", None, recorder=recorded_twice_folder / "take.recorder.wav"
+    )
+    own, sound = read_audio(recorded_twice_folder / "take.wav"), separate_sound(recording)
+    assert sound is not None
+    placed = align_sound(sound, own.duration_s)
+    assert len(placed.samples) == len(own.samples)
+    assert np.abs(placed.samples).argmax() == pytest.approx(np.abs(own.samples).argmax(), abs=40)
+    assert separate_sound(replace(recording, recorder=None)) is None
+
+
+def test_a_given_offset_is_used(recorded_twice_folder, tmp_path):
+    (recorded_twice_folder / "take.recorder.wav").unlink()
+    (recorded_twice_folder / "take.lab").write_text("0 10000000 aa\n10000000 30000000 m\n")
+    report = prepare(recorded_twice_folder, tmp_path / "late", offset_ms=250, workers=1)
+    assert report.notes["take"] == ("sound 250.0 ms late, as given",)
+    late = Corpus.open(tmp_path / "late").utterance("take")
+    assert late.track.motion.values[0, 0] == pytest.approx(0)
+    assert late.phones[0].end_s == pytest.approx(0.75)
+    (recorded_twice_folder / "offsets.csv").write_text("name,offset_ms\ntake,-500\n")
+    prepare(recorded_twice_folder, tmp_path / "early", offset_ms=250, workers=1)
+    early = Corpus.open(tmp_path / "early").utterance("take")
+    assert early.track.motion.values[0, 0] == pytest.approx(0.5)
+    whole = Corpus.open(tmp_path / "late").utterance("take").audio.duration_s + 0.25
+    assert early.audio.duration_s == pytest.approx(whole - 0.5, abs=0.03)
+    assert early.phones[0].end_s == pytest.approx(1.0)
+
+
+def test_motion_of_another_length_needs_an_offset(recorded_twice_folder, tmp_path):
+    (recorded_twice_folder / "take.recorder.wav").unlink()
+    write_ramp(recorded_twice_folder / "take.npz", 3.0)
+    with pytest.raises(CorpusError, match="required: the same time from the same start"):
+        prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
+    prepare(recorded_twice_folder, tmp_path / "corpus", offset_ms=1000, workers=1)
+    assert Corpus.open(tmp_path / "corpus").utterance("take").audio.duration_s == pytest.approx(3.0, abs=0.02)
+
+
+def test_what_is_not_clear_is_listed(recorded_twice_folder, tmp_path):
+    chance = np.random.default_rng(9)
+    other = Audio(speech_like(chance, 5.0).astype(np.float32), RATE_HZ)
+    write_sound(recorded_twice_folder / "take.recorder.wav", other)
+    with pytest.raises(CorpusError, match=r"take\.recorder\.wav: the offset of the two sounds is not clear"):
+        prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
+
+
+def ramp_track(frames: int) -> Track:
+    return Track(Motion(np.arange(frames)[:, None] / RATE, RATE, (Channel("jaw"),)), np.ones(frames, bool))
+
+
+@pytest.mark.parametrize("late_s", [-1.234, -0.01, 0.0, 0.777, 2.0])
+def test_sound_and_motion_begin_together(late_s):
+    """The sound is a ramp of its own time, as the motion is."""
+    ramp = Audio((np.arange(4 * RATE_HZ) / RATE_HZ).astype(np.float32), RATE_HZ)
+    audio, found, start_s = trim_to_shared(SeparateSound(ramp, late_s, "x"), ramp_track(300))
+    assert found.motion.values[0, 0] == pytest.approx(start_s)
+    assert audio.samples[0] == pytest.approx(start_s + late_s, abs=1 / RATE_HZ)
+    assert audio.duration_s == pytest.approx(len(found.seen) / RATE, abs=1 / RATE)
+    placed = align_sound(SeparateSound(ramp, late_s, "x"), 5.0)
+    assert len(placed.samples) == 5 * RATE_HZ
+    middle = int(1.5 * RATE_HZ)
+    assert placed.samples[middle] == pytest.approx(1.5 + late_s, abs=1 / RATE_HZ)
+
+
+def test_sounds_that_share_nothing_are_refused():
+    ramp = Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)
+    for late_s in (-20.0, 20.0, 0.9):
+        with pytest.raises(ValueError, match=r"share 0\.\d\d s, required 0.5"):
+            trim_to_shared(SeparateSound(ramp, late_s, "clap"), ramp_track(300))
+
+
+MESH_HZ, MESHES = 60.0, 30
+
+
+def write_sentence(folder: Path, person: str, sentence: str) -> np.ndarray:
+    """Write a sentence as VOCASET has it; return by how much the jaw is lowered, in millimetres [shape=(T,)]."""
+    jaw = 8 * np.sin(np.linspace(0, np.pi, MESHES)) ** 2
+    meshes, sound = folder / "unposedcleaneddata" / person / sentence, folder / "audio" / person / f"{sentence}.wav"
+    for each in (meshes, sound.parent):
+        each.mkdir(parents=True, exist_ok=True)
+    for number, lowered in enumerate(jaw, 1):
+        (meshes / f"{sentence}.{number:06}.ply").write_bytes(head(lowered, "<"))
+    write_noise(sound, 0.5, 1, 22_000)
+    return jaw
+
+
+def test_vocaset_becomes_a_corpus_of_lip_distances(tmp_path):
+    for person in ("FaceTalk_170725_00137_TA", "FaceTalk_170728_03272_TA"):
+        jaw = write_sentence(tmp_path / "voca", person, "sentence01")
+    (tmp_path / "voca/audio/FaceTalk_170725_00137_TA/sentence01.txt").write_text("Hello there.")
+    (tmp_path / "voca/audio/FaceTalk_170728_03272_TA/sentence02.wav").touch()
+    report = prepare(tmp_path / "voca", tmp_path / "corpus", workers=1)
+    assert report.prepared == ("FaceTalk_170725_00137_TA-sentence01", "FaceTalk_170728_03272_TA-sentence01")
+    assert "no meshes (.ply)" in report.failed["FaceTalk_170728_03272_TA-sentence02"]
+    corpus = Corpus.open(tmp_path / "corpus")
+    assert list(corpus.speakers) == ["FaceTalk_170725_00137_TA", "FaceTalk_170728_03272_TA"]
+    said = corpus.utterance(report.prepared[0])
+    assert (said.words, said.track.motion.rate_hz, said.source["licence"][:8]) == (
+        ("hello", "there"),
+        MESH_HZ,
+        "research",
+    )
+    motion = said.track.motion
+    np.testing.assert_allclose(motion["opening"], (1 + jaw) / 90, atol=1e-6)
+    np.testing.assert_allclose(motion["outer"], (16 + jaw) / 90, atol=1e-6)
+    np.testing.assert_allclose(motion["width"], 46 / 90, atol=1e-6)
+    np.testing.assert_allclose(np.ptp(motion["y_152"]), np.ptp(jaw) / 90, atol=1e-6)
+
+
+def test_a_changed_mesh_prepares_again_and_a_missing_one_is_bridged(tmp_path):
+    jaw = write_sentence(tmp_path / "voca", "anna", "s01")
+    prepare(tmp_path / "voca", tmp_path / "corpus", workers=1)
+    assert prepare(tmp_path / "voca", tmp_path / "corpus", workers=1).kept == ("anna-s01",)
+    meshes = tmp_path / "voca/unposedcleaneddata/anna/s01"
+    (meshes / "s01.000001.ply").unlink()
+    (meshes / "s01.000011.ply").unlink()
+    assert prepare(tmp_path / "voca", tmp_path / "corpus", workers=1).prepared == ("anna-s01",)
+    opening = Corpus.open(tmp_path / "corpus").utterance("anna-s01").track.motion["opening"]
+    jaw[[0, 10]] = jaw[1], (jaw[9] + jaw[11]) / 2
+    np.testing.assert_allclose(opening, (1 + jaw) / 90, atol=1e-6)
+
+
+def test_bytes_in_either_order_and_text(tmp_path):
+    for order in ("<", ">", ""):
+        (tmp_path / "a.ply").write_bytes(head(4, order))
+        places = read_vertices(tmp_path / "a.ply", [FLAME_MARKERS["LIP_14"]])
+        np.testing.assert_allclose(places, [[0, -0.065, 0.03]], atol=1e-6)
+
+
+def test_other_meshes_are_refused(tmp_path):
+    good = head(0, "<")
+    nan = np.float32(np.nan).tobytes() * 3 * FLAME_VERTICES
+    for content, message in (
+        (good.replace(b"vertex 5023", b"vertex 5000"), "5000 of 'vertex', required 5023 vertices: of others, no lip"),
+        (good[:20_000], "not a mesh of FLAME in .ply"),
+        (good.replace(b"float x", b"list uchar int x"), "not a mesh of FLAME in .ply"),
+        (good.replace(b"float x", b"real x"), "not a mesh of FLAME in .ply"),
+        (good.replace(b"property float x\n", b""), "not a mesh of FLAME in .ply"),
+        (good.replace(b"format binary_little_endian 1.0\n", b""), "not a mesh of FLAME in .ply"),
+        (good.replace(b"end_header", b"the_header"), "its header has no end"),
+        (good[: good.index(b"end_header") + 11] + nan, "not finite"),
+        (b"", "not a mesh of FLAME in .ply"),
+    ):
+        (tmp_path / "a.1.ply").write_bytes(content)
+        with pytest.raises(InputError, match=message):
+            read_mesh_motion(tmp_path / "a.1.ply", MESH_HZ)
+
+
+def test_only_the_two_folders_are_vocaset(tmp_path):
+    (tmp_path / "audio" / "anna").mkdir(parents=True)
+    (tmp_path / "audio" / "anna" / "a.wav").touch()
+    (tmp_path / "audio" / "anna" / "a.csv").touch()
+    assert discover(tmp_path).kind == "folder of sounds with motion"

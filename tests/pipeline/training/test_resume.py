@@ -1,6 +1,6 @@
 import multiprocessing
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +11,6 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.motion import posterior_network
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import labels as fingerprints
@@ -37,14 +36,6 @@ def stopping_after(events: int) -> Monitor:
             raise Stopped
 
     return monitor
-
-
-@pytest.fixture(scope="module", autouse=True)
-def few_steps() -> Iterator[None]:
-    """A network is trained in one go, so that it must fit between two stops."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(posterior_network, "STEPS", 4.0)
-        yield
 
 
 @pytest.fixture
