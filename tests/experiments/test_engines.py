@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from experiments.copies import SETTINGS, copied
-from lipmotion import Corpus, Selection, evaluate, load_model
+from experiments.copies import SETTINGS, copied, renamed
+from lipmotion import Corpus, Selection, evaluate, load_model, train
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.testing import speech, timeline
-from lipmotion.types import Progress
+from lipmotion.testing import CHANNELS, speech, timeline
+from lipmotion.testing import examples as sentences
+from lipmotion.types import Example, Progress, silent_monitor
+from lipmotion_lab import baselines as network
+from lipmotion_lab import learning_curve as module
+from lipmotion_lab.baselines import REACH, BlstmBaseline, ContextRidge, FrameRegressionModel, MeanPose
 from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines
+from lipmotion_lab.learning_curve import learning_curve
+from lipmotion_lab.report.sections import learning_section
+from lipmotion_lab.runner import ExperimentSettings
+from testing.toy import SMALL
 
 LONG = pytest.mark.long
 
@@ -119,3 +130,197 @@ def test_recordings_of_the_training_are_not_compared(toy_corpus):
     for split in ("train", None):
         with pytest.raises(CorpusError, match="are in the split that is compared with"):
             engines(toy_corpus, split=split, settings=SETTINGS)
+
+
+pytest.importorskip("torch", reason="the extra 'network' is not installed")
+
+
+@pytest.fixture(scope="module")
+def model(examples: list[Example], stages: list[Progress]) -> FrameRegressionModel:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(network, "EPOCHS", 40)
+        patch.setattr(network, "LEAST_STEPS", 1)
+        return BlstmBaseline().fit(examples, stages.append).model
+
+
+def test_held_out_motion_is_predicted(model):
+    held_out = sentences(14, seed=5)[-1]
+    result = BlstmBaseline().generate(model, held_out.speech)
+    assert result.motion.channels == CHANNELS
+    assert result.motion.values.shape == result.variance.shape == held_out.motion.values.shape
+    for name in ("opening", "width"):
+        assert np.corrcoef(result.motion[name], held_out.motion[name])[0, 1] > 0.8
+    assert result.motion["opening"].max() < 1  # values of frames that are not valid are not learned
+
+
+def test_the_same_seed_gives_the_same(examples, monkeypatch):
+    monkeypatch.setattr(network, "EPOCHS", 1)
+    monkeypatch.setattr(network, "LEAST_STEPS", 1)
+    one, same, other = (BlstmBaseline(seed).fit(examples, lambda _: None).model for seed in (0, 0, 1))
+    made = [BlstmBaseline().generate(each, examples[0].speech).motion.values for each in (one, same, other)]
+    assert np.array_equal(made[0], made[1])
+    assert not np.allclose(made[0], made[2])
+
+
+BASELINES: list[type] = [MeanPose, ContextRidge]
+
+
+def valid_motion(examples: list[Example]) -> np.ndarray:
+    return np.concatenate([one.motion.values[one.valid] for one in examples])
+
+
+def test_motion_has_a_row_for_every_feature_frame(examples):
+    for baseline in BASELINES:
+        engine = baseline()
+        fit = engine.fit(examples, silent_monitor)
+        result = engine.generate(fit.model, examples[0].speech)
+        frames = len(examples[0].speech.features.values)
+        assert fit.figures == {"frames": len(valid_motion(examples))}
+        assert (result.motion.rate_hz, result.motion.channels) == (100, CHANNELS)
+        assert result.motion.values.shape == result.variance.shape == (frames, len(CHANNELS))
+        assert np.isfinite(result.motion.values).all()
+        assert (result.variance >= 0).all()
+        assert len(result.trace.frames) == frames
+    unseen = [replace(one, valid=np.zeros_like(one.valid)) for one in examples]
+    with pytest.raises(CorpusError, match="none of 12 examples has motion"):
+        MeanPose().fit(unseen, silent_monitor)
+
+
+def test_the_mean_pose(examples):
+    model = MeanPose().fit(examples, silent_monitor).model
+    made = MeanPose().generate(model, examples[0].speech)
+    assert made.motion.values == pytest.approx(
+        np.broadcast_to(valid_motion(examples).mean(axis=0), made.motion.values.shape)
+    )
+    direct = made.motion.column("opening")
+    assert made.variance[0, direct] == pytest.approx(valid_motion(examples)[:, direct].var())
+
+
+def with_delayed_opening(examples: list[Example], curve: np.ndarray, late: int) -> list[Example]:
+    """Return the examples with an opening that is twice a column of the features, ``late`` frames later."""
+    made = []
+    for one in examples:
+        values = one.motion.values.copy()
+        values[:, one.motion.column("opening")] = 3 + 2 * np.roll(one.speech.features.values @ curve, late)
+        made.append(replace(one, motion=replace(one.motion, values=values)))
+    return made
+
+
+def error(engine, examples: list[Example]) -> float:
+    model = engine.fit(examples, silent_monitor).model
+    made = engine.generate(model, examples[0].speech).motion["opening"]
+    inner = slice(2 * REACH, -2 * REACH)
+    return float(np.abs(made - examples[0].motion["opening"])[inner].max())
+
+
+def test_the_reach_of_the_acoustic_context(examples):
+    column = np.eye(39)[3]
+    assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH)) < 0.2
+    assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH + 8)) > 1
+
+
+@pytest.fixture(scope="module")
+def order(toy_corpus: Corpus) -> tuple[str, ...]:
+    return toy_corpus.names("train")[::-1]
+
+
+@pytest.fixture(scope="module")
+def curve_figures(toy_corpus: Corpus, order: tuple[str, ...]) -> dict[str, Any]:
+    return learning_curve(toy_corpus, order=order, sizes=[8, 4, 4], settings=SETTINGS)
+
+
+@pytest.mark.long
+def test_each_size_once_the_smallest_first(curve_figures):
+    assert [(row["names"], row["used"]) for row in curve_figures["rows"]] == [(4, 4), (8, 8)]
+    assert (curve_figures["split"], curve_figures["clips"], curve_figures["order"]) == ("test", 2, "given")
+    assert all(list(row["conditions"]) == CONDITIONS for row in curve_figures["rows"])
+    assert json.loads(json.dumps(curve_figures, allow_nan=False))
+
+
+@pytest.mark.long
+def test_a_row_is_what_train_and_evaluate_say(curve_figures, toy_corpus, order):
+    names = sorted(order[: curve_figures["rows"][0]["names"]])
+    wanted = evaluate(train(toy_corpus, selection=Selection(names=names), recogniser=SMALL)[0], toy_corpus)
+    assert curve_figures["closed_under"] == wanted["closed_under"]
+    for condition in CONDITIONS:
+        made, said = curve_figures["rows"][0]["conditions"][condition], wanted["conditions"][condition]
+        opening = said["channels"]["opening"]
+        assert [made[key] for key in ("acc", "nrmse", "global_variance")] == [
+            opening[key] for key in ("acc", "nrmse", "global_variance")
+        ]
+        assert made["acc_95"] == pytest.approx(list(said["opening_acc_95"]))
+        assert [made[f"acc_{name}"] for name in ("width", "outer")] == [
+            said["channels"][name]["acc"] for name in ("width", "outer")
+        ]
+
+
+@pytest.mark.long
+def test_minutes_are_those_of_the_utterances(curve_figures, toy_corpus, order):
+    seconds = [len(toy_corpus.utterance(name).audio.samples) / 16_000 for name in order]
+    assert [row["minutes"] for row in curve_figures["rows"]] == pytest.approx(
+        [sum(seconds[:4]) / 60, sum(seconds) / 60]
+    )
+
+
+@pytest.mark.long
+def test_channels_that_are_not_there_are_dashes(toy_corpus, tmp_path):
+    made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SETTINGS)
+    row = made["rows"][0]["conditions"]["audio only"]
+    assert (row["acc_width"], row["acc_outer"]) == (None, None)
+    assert learning_section(made).table.as_lines()[1].split()[-2:] == ["–", "–"]
+
+
+def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_trained_again(
+    toy_corpus, tmp_path, monkeypatch
+):
+    trained: list[list[str]] = []
+    stops = [True]
+
+    def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
+        trained.append(list(names))
+        if len(names) == 8 and stops.pop():
+            stops.append(False)
+            raise KeyboardInterrupt
+        assert tuple(held_out) == toy_corpus.names("test")
+        return SimpleNamespace(recordings=SimpleNamespace(closed_under=0.1), clips={"audio only": []})
+
+    monkeypatch.setattr(module, "SIZES", (3, 9))
+    monkeypatch.setattr("lipmotion_lab.runner.train_and_generate", result)
+    monkeypatch.setattr(module, "_row", lambda *_: {})
+    received: list[tuple[str, str]] = []
+    settings = ExperimentSettings(seed=1, receive=lambda *given: received.append(given[:2]))
+    with pytest.raises(KeyboardInterrupt):
+        learning_curve(toy_corpus, work=tmp_path, settings=settings)
+    del trained[1:]
+    curve_figures = learning_curve(toy_corpus, work=tmp_path, settings=settings)
+    assert [row["names"] for row in curve_figures["rows"]] == [3, 8]
+    assert received == [("3 recordings", "audio only"), ("8 recordings", "audio only")]
+    names = toy_corpus.names("train")
+    mixed = [names[i] for i in np.random.default_rng(1).permutation(8)]
+    assert sorted(mixed[:3]) != list(names[:3])
+    assert trained == [mixed[:3], mixed]
+    assert (curve_figures["order"], curve_figures["seed"], curve_figures["closed_under"]) == ("shuffled", 1, 0.1)
+
+
+def test_what_cannot_be_trained_on(toy_corpus, tmp_path):
+    for order, sizes, words in (
+        ([], None, "the list of utterances to train on is empty; give one name a line"),
+        (None, [], "sizes none; required: from 1 to 8"),
+        (None, [4, 0], "sizes 0, 4; required: from 1 to 8"),
+        (None, [9], "sizes 9; required: from 1 to 8, which is how many names the list has"),
+        (["toy00", "toy01"], [2, 3], "sizes 2, 3; required: from 1 to 2"),
+    ):
+        with pytest.raises(InputError, match=words):
+            learning_curve(toy_corpus, order=order, sizes=sizes)
+    for order, words in (
+        (["toy00", "nobody", "no-one"], r"2 of 3 names to train on \(no-one, nobody\) are not in the corpus"),
+        (["x1", "x2", "x3", "x4", "x5", "x6"], r"6 of 6 names to train on \(x1, x2, x3, x4, x5, ...\) are not"),
+        (["toy00", "toy11"], r"1 of 2 names to train on \(toy11\) are in the split that is compared with"),
+        (["toy00", "toy01", "toy00"], r"1 of 3 names to train on \(toy00\) stand in the list more than once"),
+    ):
+        with pytest.raises(CorpusError, match=words):
+            learning_curve(toy_corpus, order=order)
+    with pytest.raises(CorpusError, match="no utterances of split 'tset'"):
+        learning_curve(toy_corpus, split="tset")
+    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
+        learning_curve(renamed(toy_corpus, tmp_path, "smile", "frown"))
