@@ -8,17 +8,15 @@ from PIL import Image
 
 import lipmotion
 from faces.test_cut_out import draw
-from formats.examples import of_motion
 from lipmotion import Delivery
 from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.formats.keys import Thinning
-from lipmotion.kernels.compiler import numba_works
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.storage.files import sound_reference
-from lipmotion.types import Audio, Channel, Generation, Motion, Pin, Timeline, silent_monitor
+from lipmotion.types import Audio, Channel, Generation, Motion, Pin, Timeline
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
 from lipmotion_faces.characters import fbx
@@ -27,11 +25,8 @@ from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_docum
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
-from lipmotion_faces.outputs.drawn_video import load_drawing, write_drawn_face
 from lipmotion_faces.outputs.scenes import character_scene, delivered_scene, head_scene, write_scene
 from lipmotion_faces.outputs.shown_faces import shown_face
-from lipmotion_faces.portrait.portrait_rasteriser import Rasteriser
-from lipmotion_faces.registry import make_face
 from meshes.heads import head, write_glb
 from programs import gltf_report, gltf_validator, python_with, run_with
 
@@ -259,7 +254,7 @@ def test_blender_makes_fbx_of_it(scene, tmp_path, monkeypatch):
     [(None, MissingDependencyError), ("echo no room >&2; exit 1", ExportError), ("exit 0", ExportError)],
 )
 def test_an_fbx_that_blender_cannot_make_is_refused_and_leaves_no_file(own_head, lines, error, tmp_path, monkeypatch):
-    monkeypatch.setattr(fbx, "find_spec", lambda _: None)
+    monkeypatch.setitem(sys.modules, "bpy", None)
     monkeypatch.setenv("PATH", str(tmp_path))
     program, target = tmp_path / "blender", tmp_path / "out" / "a.fbx"
     target.parent.mkdir()
@@ -276,44 +271,6 @@ def largest_error(scene: Scene, values: list[dict[str, float]]) -> float:
     wanted = scene.weights.at(np.array(TIMES_S))
     named = dict(zip(scene.weights.names, wanted.T, strict=True))
     return max(abs(float(named[name][row]) - at[name]) for row, at in enumerate(values) for name in named)
-
-
-@pytest.fixture
-def drawn_poses(monkeypatch):
-    """Return a list that grows with every picture that is drawn."""
-    drawn = []
-    picture = Rasteriser.picture
-
-    def counted(self, pose, canvas):
-        drawn.append(pose)
-        return picture(self, pose, canvas)
-
-    monkeypatch.setattr(Rasteriser, "picture", counted)
-    return drawn
-
-
-@pytest.fixture
-def rising() -> Generation:
-    return of_motion(Motion(np.linspace(0, 0.2, 40)[:, None], 100.0, (Channel("opening"),)))
-
-
-def write(path, generation, **staging) -> None:
-    sound = Audio(np.zeros(48_000 * 4 // 10, np.float32), 48_000)
-    face = make_face("woman")
-    write_drawn_face(path, generation, sound, 25.0, face, Staging(size=64, **staging), silent_monitor)
-
-
-@pytest.mark.parametrize(("name", "background"), [("a.mp4", "scene"), ("a%d.png", "scene"), ("a.webm", "transparent")])
-def test_every_picture_is_drawn_once(tmp_path, rising, drawn_poses, name, background):
-    write(tmp_path / name, rising, background=background)
-    assert len(drawn_poses) == 10
-    assert len(list(tmp_path.iterdir())) == (10 if "%" in name else 1)
-
-
-@pytest.mark.skipif(not numba_works(), reason="numba is not installed")
-def test_what_draws_is_loaded_by_drawing(drawn_poses):
-    load_drawing(make_face("man"))
-    assert len(drawn_poses) == 1
 
 
 LETTERS = "A B C D E F G H X"

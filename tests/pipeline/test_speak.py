@@ -12,6 +12,7 @@ from lipmotion.pipeline.generate.speak import REST_S, speak_from_corpus
 from lipmotion.speech.voices.installed import default_voice, installed_voices
 from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit
 from lipmotion.units import LIP_CLOSING, Lexicon, is_silent
+from pipeline.made import corpus_of
 from speech import stand_in_voice
 from testing.toy import SMALL
 
@@ -203,9 +204,8 @@ def test_phones_that_were_never_recorded_are_named(toy_corpus, selection_model, 
     assert "jh (" in caplog.text
 
 
-def test_recordings_of_several_people_are_refused(toy_corpus, selection_model, monkeypatch):
-    names = iter("ab" * 20)
-    known = toy_corpus.utterance
-    monkeypatch.setattr(toy_corpus, "utterance", lambda name: replace(known(name), speaker=next(names)))
+def test_recordings_of_several_people_are_refused(toy_corpus, selection_model, tmp_path):
+    utterances = map(toy_corpus.utterance, toy_corpus.names())
+    two = corpus_of(tmp_path / "two", [replace(each, speaker="ab"[n % 2]) for n, each in enumerate(utterances)])
     with pytest.raises(InputError, match="recordings of 2 people"):
-        speak_from_corpus("baby blue", toy_corpus, selection_model)
+        speak_from_corpus("baby blue", two, selection_model)

@@ -25,7 +25,6 @@ from lipmotion import (
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.closure import find_closable_ranges
-from lipmotion.motion.speaker_maps import speakers_to_arrays
 from lipmotion.pipeline.generate.explain import chain_posteriors
 from lipmotion.pipeline.request import Onto
 from lipmotion.speech.sound.audio_files import read_audio
@@ -33,6 +32,7 @@ from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, ReducedVar
 from lipmotion_faces.tracking.frames import VideoSpan
 from pipeline import made
 from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
+from robustness.case import changed_model, npy
 from testing.toy import SMALL, ToySentence, toy_motion, toy_utterances
 
 
@@ -116,15 +116,11 @@ def test_maps_are_in_the_model_file(model, toy_sentence, tmp_path):
         np.testing.assert_allclose(opening(again, toy_sentence, name), opening(model, toy_sentence, name), atol=1e-4)
 
 
-def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path, monkeypatch):
-    def of_jaw(maps: object) -> dict[str, np.ndarray]:
-        arrays = speakers_to_arrays(maps)
-        arrays["channels"] = np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")])
-        return arrays
-
-    monkeypatch.setattr("lipmotion.pipeline.model.speakers_to_arrays", of_jaw)
-    save_model(model, tmp_path / "jaw.lipmotion")
-    again = load_model(tmp_path / "jaw.lipmotion")
+def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path):
+    save_model(model, tmp_path / "people.lipmotion")
+    channels = npy(np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")]))
+    changes = {"speakers/channels.npy": channels}
+    again = load_model(changed_model(tmp_path / "people.lipmotion", tmp_path / "jaw.lipmotion", changes))
     with pytest.raises(InputError, match="'outer'"):
         opening(again, toy_sentence, "ben")
 

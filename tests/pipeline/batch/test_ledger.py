@@ -14,7 +14,6 @@ from lipmotion import Job, Outputs, Request
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch import ledger as settings
-from lipmotion.pipeline.batch import lines as lines_module
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     LARGEST_RECORD_BYTES,
@@ -31,7 +30,7 @@ from lipmotion.pipeline.batch.ledger import (
     read_receipt,
     write_receipt,
 )
-from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, check_names
+from lipmotion.pipeline.batch.lines import MAX_LINES, OWN_FILES, OWN_FOLDER, check_names
 from lipmotion.pipeline.batch.report import (
     COLUMNS,
     Mark,
@@ -454,11 +453,9 @@ def test_names_that_no_file_has(tmp_path, text):
         listed(tmp_path, text)
 
 
-def test_a_list_of_too_many_lines(tmp_path, monkeypatch):
-    monkeypatch.setattr(lines_module, "MAX_LINES", 2)
-    assert len(listed(tmp_path, "a.wav\nb.wav\n")) == 2
-    with pytest.raises(InputError, match="3 lines, required at most 2"):
-        listed(tmp_path, "a.wav\nb.wav\nc.wav\n")
+def test_a_list_of_too_many_lines(tmp_path):
+    with pytest.raises(InputError, match=f"{MAX_LINES + 1} lines, required at most {MAX_LINES}"):
+        listed(tmp_path, "a.wav\n" * (MAX_LINES + 1))
 
 
 @pytest.mark.parametrize(

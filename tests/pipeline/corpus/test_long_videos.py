@@ -188,14 +188,6 @@ def test_progress_is_reported(talk, tmp_path):
     assert (shares[0], shares[-1]) == pytest.approx((0.0, 1.0))
 
 
-def test_a_short_video_is_one_utterance(monkeypatch, tmp_path, talk, scanned):
-    del scanned
-    monkeypatch.setattr(long_videos, "LONG_S", 100.0)
-    report = prepare(talk, tmp_path / "corpus", workers=1)
-    assert report.prepared == ("talk",)
-    assert report.kind == "one video"
-
-
 @pytest.mark.video
 @pytest.mark.recordings
 def test_clips_one_after_the_other(recordings, tmp_path):

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from lipmotion import Corpus, FilmedFace, build_face, load_face, save_face
 from lipmotion.errors import CorpusError, InputError
@@ -70,16 +71,6 @@ def test_of_a_folder_with_lists_the_training_list(make_videos):
     assert names(choose_takes(folder)) == ["b", "d"]
 
 
-def test_long_footage_is_used_in_part_evenly(make_videos, monkeypatch):
-    monkeypatch.setattr(takes, "MOST_FOOTAGE_S", 3.0)
-    found = choose_takes(make_videos(*(f"clip{number}" for number in range(9))))
-    assert 3 <= len(found) <= 4
-    numbers = [int(name[-1]) for name in names(found)]
-    assert numbers[0] <= 1
-    assert numbers[-1] >= 7
-    assert numbers == sorted(set(numbers))
-
-
 def test_one_of_several_people(make_videos, tmp_path):
     make_videos("a", "b", folder="filmed/anna")
     make_videos("c", folder="filmed/ben")
@@ -141,22 +132,19 @@ def test_a_corpus_without_its_videos(tmp_path, make_videos):
         choose_takes(corpus.path, make_videos("other"))
 
 
-def test_long_videos_are_shortened_before_short_ones_are_left_out(make_videos, monkeypatch):
-    """The seconds of a folder are bounded, and not by the first of its videos."""
-    durations = {"a": 300.0, "b": 3.0, "c": 3.0, "d": 7200.0}
-    monkeypatch.setattr(takes, "_duration_s", lambda take: durations[take.name])
-    found = choose_takes(make_videos(*durations))
-    assert names(found) == list(durations)
-    used = [min(take.span.end_s - take.span.start_s, durations[take.name]) for take in found]
-    assert sum(used) == pytest.approx(MOST_FOOTAGE_S)
-    assert used == pytest.approx([117.0, 3.0, 3.0, 117.0])
-
-
-def test_many_long_videos_are_used_in_part(make_videos, monkeypatch):
-    monkeypatch.setattr(takes, "MOST_FOOTAGE_S", 30.0)
-    monkeypatch.setattr(takes, "_duration_s", lambda _: 600.0)
-    found = choose_takes(make_videos("a", "b", "c", "d", "e", "f"))
-    assert [take.span.end_s for take in found] == [takes.LONG_S] * 3
+@pytest.mark.parametrize(
+    ("durations_s", "used_s"),
+    [
+        ((300.0, 3.0, 3.0, 7200.0), {"00": 117.0, "01": 3.0, "02": 3.0, "03": 117.0}),  # before short ones are left out
+        ((600.0,) * 48, {f"{number:02}": takes.LONG_S for number in range(1, 48, 2)}),  # in part, and evenly
+    ],
+)
+def test_footage_of_a_folder_is_bounded(make_videos, monkeypatch, durations_s, used_s):
+    monkeypatch.setattr(takes, "_duration_s", lambda take: durations_s[int(take.name)])
+    found = choose_takes(make_videos(*(f"{number:02}" for number in range(len(durations_s)))))
+    used = {each.name: min(each.span.end_s - each.span.start_s, durations_s[int(each.name)]) for each in found}
+    assert sum(used.values()) == pytest.approx(MOST_FOOTAGE_S)
+    assert used == pytest.approx(used_s)
 
 
 def test_videos_of_the_same_name_are_told_apart(tmp_path, make_videos):
@@ -191,8 +179,7 @@ def tracker(videos: Videos, monkeypatch: pytest.MonkeyPatch) -> Callable[..., No
     """Installs a tracker without errors; in some videos it sees only some frames."""
 
     def start(seen: dict[Path, np.ndarray] | None = None, more: Videos | None = None, least_s: float = 7.0) -> None:
-        monkeypatch.setattr(build, "LEAST_FOOTAGE_S", least_s)
-        install(monkeypatch, videos | (more or {}), seen or {})
+        install(monkeypatch, videos | (more or {}), seen or {}, least_s)
 
     start()
     return start
@@ -206,8 +193,7 @@ def folder_of(videos: Videos) -> Path:
 def built(videos: Videos) -> tuple[FilmedFace, list[Event]]:
     events: list[Event] = []
     with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 7.0)
-        install(monkeypatch, videos, {})
+        install(monkeypatch, videos, {}, 7.0)
         face = build_face(folder_of(videos), name="Anna", workers=1, monitor=events.append)
     return face, events
 
@@ -288,15 +274,8 @@ def test_what_is_not_enough_is_said(videos, tracker, caplog):
 
 
 @pytest.mark.long
-def test_recordings_that_cannot_be_used_are_left_out(videos, tracker, monkeypatch):
-    def film(path: Path, *more: object) -> object:
-        if path.name == "toy00.mp4":
-            raise InputError(f"{path}: no face in 60 of 60 frames")
-        return whole(path, *more)
-
-    tracker(least_s=5.0)
-    whole: Callable[..., Footage] = vars(build)["track_footage"]  # that of the drawn person
-    monkeypatch.setattr(build, "track_footage", film)
+def test_recordings_that_cannot_be_used_are_left_out(videos, tracker):
+    tracker({next(iter(videos)): np.zeros(0, bool)}, least_s=5.0)
     events: list[Event] = []
     face = build_face(folder_of(videos), workers=1, monitor=events.append)
     assert face.about["recordings"] == SENTENCES - 1
@@ -308,10 +287,9 @@ def test_recordings_that_cannot_be_used_are_left_out(videos, tracker, monkeypatc
 
 
 @pytest.mark.long
-def test_footage_without_sound(tracker, tmp_path, monkeypatch):
+def test_footage_without_sound(tracker, tmp_path):
     """The face is built; its jaw cannot follow the energy, and other people's motion cannot be mapped onto it."""
-    monkeypatch.setattr(build, "read_sound", lambda _: None)
-    video = write_video(tmp_path / "mute.mp4", toy_sentences(3)[0])
+    video = write_video(tmp_path / "mute.mp4", toy_sentences(3)[0], silent=True)
     tracker(more={video.path.resolve(): video}, least_s=2.0)
     face = build_face(video.path, workers=1)
     assert face.takes == ()
@@ -354,10 +332,10 @@ def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path):
     assert len(kept.motion.values) == 599
 
 
-def test_silence_is_no_sound(monkeypatch, tmp_path):
-    take = Take("a", tmp_path / "a.mp4", VideoSpan(1.0, 3.0), "", "", ())
-    for count, level, expected_s in ((64_000, 1.0, 2.0), (24_000, 1.0, 0.5), (8000, 1.0, 0.0), (64_000, 0.0, 0.0)):
-        audio = Audio(np.full(count, level, np.float32), 16_000)
-        monkeypatch.setattr(build, "read_audio", lambda *_, audio=audio, **__: audio)
-        found = build.read_sound(take)
-        assert (0 if found is None else found.duration_s) == pytest.approx(expected_s)
+@pytest.mark.parametrize(
+    ("count", "level", "expected_s"), [(64_000, 1, 2.0), (24_000, 1, 0.5), (8000, 1, 0.0), (64_000, 0, 0.0)]
+)
+def test_silence_is_no_sound(tmp_path, count, level, expected_s):
+    wavfile.write(tmp_path / "a.wav", 16_000, np.full(count, 32_767 * level, np.int16))
+    found = build.read_sound(Take("a", tmp_path / "a.wav", VideoSpan(1.0, 3.0), "", "", ()))
+    assert (0 if found is None else found.duration_s) == pytest.approx(expected_s)

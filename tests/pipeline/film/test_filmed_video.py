@@ -13,19 +13,16 @@ from lipmotion import FilmedFace, Outputs, Request, animate, write
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.pipeline.outputs.output import OutputSettings
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Track, Unit
-from lipmotion_faces.appearance.person import Appearance
 from lipmotion_faces.film import background
-from lipmotion_faces.film import filmed_video as module
 from lipmotion_faces.film.background import (
     HEAD_PX,
     BackgroundSequence,
-    best_background,
     chin_px,
     open_background,
     open_stored_background,
 )
 from lipmotion_faces.film.filmed_video import face_codes, is_person_of, make_film, person_shown, write_film
-from lipmotion_faces.filmed.renderer import AS_PRINTED, Background, Stitcher, StitchingOptions
+from lipmotion_faces.filmed.renderer import AS_PRINTED, Background, Stitcher
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE
@@ -264,22 +261,14 @@ def _spoiled(data: np.ndarray) -> np.ndarray:
     return changed
 
 
-def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(filmed_face, brief, tmp_path, monkeypatch):
-    video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
-    stitched, sequence = [], open_stored_background(filmed_face.background)
-
-    class Noted(Stitcher):
-        def __init__(self, appearance: Appearance, options: StitchingOptions) -> None:
-            stitched.append(options.jaw)
-            super().__init__(appearance, options)
-
-    monkeypatch.setattr(module, "Stitcher", Noted)
-    monkeypatch.setattr(module, "open_background", lambda *_, in_time: sequence if in_time else None)
-    make_film(filmed_face, brief)
-    film = make_film(filmed_face, brief, speech=video, fps=50.0, options=Outputs(overlay="mouth"))
-    assert stitched == [True, False]
+def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(filmed_face, brief, video, monkeypatch):
+    install(monkeypatch, {video.path: video}, {})
+    film = make_film(filmed_face, brief, speech=video.path, fps=50.0, options=Outputs(overlay="mouth"))
+    own = open_background(video.path)
     assert film.rate_hz == pytest.approx(25.0)
-    assert film.covered == pytest.approx(sequence.enlarge(1.3).face_box)
+    assert film.covered == pytest.approx(own.enlarge(1.3).face_box)
+    for frame, filmed in zip(film.frames, own.frames(film.count, 25.0), strict=True):
+        assert np.array_equal(frame[225:], filmed.frame[225:])  # the speaker's own jaw
 
 
 def model_of(*speakers: str, corpus: str = "filmed/many") -> Any:
@@ -420,20 +409,6 @@ def test_a_video_as_a_background(video, monkeypatch):
     assert numbers(opened, list(opened.frames(count, 25.0))) == list(range(count))
     assert len(list(opened.frames(2 * count, 25.0))) == 2 * count
     assert opened.face_to_frame[:, :, 2] == pytest.approx(toy_places(count)[:, :, 2], abs=1.0)
-
-
-@pytest.mark.long
-def test_the_best_background_is_one_part(video, monkeypatch):
-    """Of at most some seconds, without cuts, in which the face is seen."""
-    monkeypatch.setattr(background, "register_maps", lambda footage: footage.face_to_image)
-    monkeypatch.setattr(background, "MOST_BACKGROUND_S", 1.0)
-    monkeypatch.setattr(background, "MOST_PART_S", 1.0)
-    best = best_background([footage_of(video)])
-    assert 20 <= len(best.video) <= 25
-    assert len(best.video) == len(best.chin_px) == len(best.face_to_frame)
-    seen = np.arange(len(video.motion.values)) < 25
-    early = best_background([footage_of(video, seen=seen)])
-    assert early.chin_px == pytest.approx(chin_px(footage_of(video))[: len(early.chin_px)])
 
 
 def test_frames_of_odd_sizes_are_cut(sequence):

@@ -2,25 +2,25 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from threading import Barrier
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lipmotion import Delivery, Edits, Model, Request, Session, SessionPictures, Staging, animate, load_model, write
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
+from lipmotion.engines import Engine
 from lipmotion.errors import InputError
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline import session as session_module
-from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
 from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, find_excerpt
-from lipmotion.pipeline.generation import generate_motion
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, measure_prosody
 from lipmotion.storage.sources import sha256_of
-from lipmotion.types import Audio, Generation, Outlook, Pin, Span, Timeline, Unit
+from lipmotion.types import Audio, Constraints, Generation, Outlook, Pin, Span, Speech, Timeline, Unit
 from lipmotion.units import group_words
 from lipmotion_faces.outputs.drawn_video import sound_track
 from lipmotion_faces.outputs.shown_faces import shown_face
@@ -62,22 +62,41 @@ def test_a_session_gives_what_one_pass_gives(session, request_, toy_model):
     assert np.array_equal(session.generate().motion.values, animate(request_, model=toy_model).motion.values)
 
 
-def test_only_what_changed_is_computed_again(session, monkeypatch):
-    calls: list[str] = []
-    for name in ("analyse_speech", "generate_motion"):
-        plain = getattr(session_module, name)
+class Counting:
+    """An engine that notes the seconds of each motion that it makes."""
 
-        def counted(*given: object, name: str = name, plain: object = plain, **more: object) -> object:
-            calls.append(name)
-            return plain(*given, **more)  # type: ignore[operator]
+    def __init__(self, engine: Engine) -> None:
+        self.engine, self.made_s = engine, list[float]()
 
-        monkeypatch.setattr(session_module, name, counted)
-    first = session.generate()
-    session.generate(edited("phone 3 is p"))
-    session.generate(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
-    session.deliver(edited("phone 3 is p", "set intensity 1.5"))
-    assert session.generate() is first  # undone
-    assert calls == ["analyse_speech", "generate_motion", "generate_motion"]
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.engine, name)
+
+    def generate(self, model: Any, speech: Speech, constraints: Constraints | None = None) -> Generation:
+        if {span.label.phone for span in speech.units} - {"sil"}:  # else it is asked for the mouth at rest
+            self.made_s.append(speech.features.duration_s)
+        return self.engine.generate(model, speech, constraints)
+
+
+@pytest.fixture
+def counting(toy_model: Model) -> Model:
+    return replace(toy_model, engine=Counting(toy_model.engine))
+
+
+@pytest.fixture
+def counted(request_: Request, counting: Model) -> Session:
+    return Session(request_, model=counting)
+
+
+def test_only_what_changed_is_computed_again(counted, counting):
+    first, made_s = counted.generate(), counting.engine.made_s
+    assert len(made_s) == 1
+    units = counted.units()
+    counted.generate(edited("phone 3 is p"))
+    counted.generate(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
+    counted.deliver(edited("phone 3 is p", "set intensity 1.5"))
+    assert counted.generate() is first  # undone
+    assert counted.units() is units
+    assert len(made_s) == 2
 
 
 def test_edits_of_phones(session):
@@ -218,31 +237,24 @@ def test_a_locked_span_keeps_channels_that_are_added_later(session):
     assert locked.motion["tongue"][150] == pytest.approx(0.5)
 
 
-@pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """One entry for every motion that a session makes from now on."""
-    made: list[int] = []
-    monkeypatch.setattr(session_module, "generate_motion", lambda *given: made.append(1) or generate_motion(*given))
-    return made
-
-
-def test_many_locks_take_the_motion_once_each(session, made):
+def test_many_locks_take_the_motion_once_each(counted, counting):
     steps = [
         each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
     ]
-    session.generate(edited(*steps))
-    assert 12 <= len(made) <= 14  # of every pin once
-    session.generate(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
-    assert len(made) <= 15
+    counted.generate(edited(*steps))
+    assert 12 <= len(counting.engine.made_s) <= 14  # of every pin once
+    counted.generate(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
+    assert len(counting.engine.made_s) <= 15
 
 
-def test_of_long_motion_less_is_kept(session, made, monkeypatch):
-    monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generate().motion.values))
-    found = [session.generate(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
-    assert session.generate(edited("pin opening 0.1 at 0.5")) is found[1]
-    assert len(made) == 4
-    again = session.generate(edited("pin opening 0.1 at 0.3"))
-    assert (len(made), np.array_equal(again.motion.values, found[0].motion.values)) == (5, True)
+def test_of_long_motion_less_is_kept(counted, counting, monkeypatch):
+    monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(counted.generate().motion.values))
+    counting.engine.made_s.clear()
+    found = [counted.generate(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
+    assert counted.generate(edited("pin opening 0.1 at 0.5")) is found[1]
+    assert len(counting.engine.made_s) == 3
+    again = counted.generate(edited("pin opening 0.1 at 0.3"))
+    assert (len(counting.engine.made_s), np.array_equal(again.motion.values, found[0].motion.values)) == (4, True)
 
 
 def test_edits_of_another_recording_are_refused(session, toy_model, request_):
@@ -313,15 +325,6 @@ def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model, toy_senten
             assert all(np.array_equal(values, alone[number]) for values in found)
 
 
-@pytest.mark.long
-def test_what_comes_next_is_prepared_while_processes_work(request_, toy_model, monkeypatch):
-    prepared: list[object] = []
-    monkeypatch.setattr(session_module, "prepare_search", prepared.append)
-    session = Session(request_, model=toy_model, workers=2, background=lambda: prepared.append("face"))
-    assert list(session._work(abs, [-1, -2, -3])) == [1, 2, 3]
-    assert prepared == [session.request, "face"]
-
-
 TIMES = 12
 """How often the sentence is said in the long recording."""
 UNSEEN = 0.01
@@ -338,28 +341,14 @@ def long_request(toy_sentence: ToySentence, toy_model: Model) -> Request:
     return Request(sound, units=Timeline(tuple(spans)))
 
 
-@pytest.fixture
-def made_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The seconds of each motion that a session makes from now on."""
-    lengths: list[float] = []
-
-    def counted(*given: object) -> Generation:
-        (understood,) = (each for each in given if isinstance(each, SpeechAnalysis))
-        lengths.append(understood.speech.features.duration_s)
-        return generate_motion(*given)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(session_module, "generate_motion", counted)
-    return lengths
-
-
 def parse_number(units: Timeline[Unit], phone: str, after_s: float) -> int:
     return next(n for n, span in enumerate(units, 1) if span.label.phone == phone and span.start_s > after_s)
 
 
 @pytest.mark.long
-def test_around_an_edit_the_motion_is_that_of_the_whole(long_request, toy_model, made_s):
+def test_around_an_edit_the_motion_is_that_of_the_whole(long_request, toy_model, counting):
     """At the first phone, in the middle, at the last one, of a pause, with pins; one edit after another."""
-    session, other = Session(long_request, model=toy_model), Session(long_request, model=toy_model)
+    session, other = Session(long_request, model=counting), Session(long_request, model=toy_model)
     units, lasts_s = session.units(), long_request.recording.duration_s  # type: ignore[union-attr]
     before = session.generate().motion
     middle, edits = parse_number(units, "iy", lasts_s / 2), Edits()
@@ -374,10 +363,10 @@ def test_around_an_edit_the_motion_is_that_of_the_whole(long_request, toy_model,
         f"pin jawOpen 0.6 at {lasts_s / 5:.2f}",
     ):
         edits = edits.then(sentence)
-        made_s.clear()
+        counting.engine.made_s.clear()
         with session.sketching():
             sketch = session.generate(edits)
-        assert sum(made_s) <= 2 * (2 * MARGIN_S + 2 * GRID_S + 5) < lasts_s, sentence
+        assert sum(counting.engine.made_s) <= 2 * (2 * MARGIN_S + 2 * GRID_S + 5) < lasts_s, sentence
         whole = other.generate(edits)
         assert [span.label.phone for span in sketch.units] == [span.label.phone for span in whole.units]
         assert np.abs(sketch.motion["opening"] - whole.motion["opening"]).max() < UNSEEN, sentence

@@ -13,7 +13,6 @@ from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
-from lipmotion.pipeline.training import labels as fingerprints
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
@@ -36,6 +35,13 @@ def stopping_after(events: int) -> Monitor:
             raise Stopped
 
     return monitor
+
+
+@pytest.fixture(autouse=True)
+def few_utterances(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process has one of them to do, and a checkpoint two."""
+    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
+    monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
 
 
 @pytest.fixture
@@ -77,8 +83,7 @@ def whole(corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.long
-def test_stopped_after_any_event(corpus, whole, work, tmp_path, monkeypatch):
-    monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
+def test_stopped_after_any_event(corpus, whole, work, tmp_path):
     count = len(create_events(corpus))
     assert count > 15
     for number in range(1, count + 1, 4):
@@ -134,7 +139,6 @@ def test_a_damaged_checkpoint_is_not_used(corpus, whole, work, tmp_path):
 @pytest.mark.long
 def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monkeypatch):
     """Neither this process's own nor those that the processes it starts would use."""
-    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     with threadpool_limits(1, user_api="blas"):
         assert content(train(corpus, recogniser=CONFIG, run=Run(workers=2))[0], tmp_path) == whole
@@ -142,9 +146,7 @@ def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monk
 
 
 @pytest.mark.long
-def test_stopped_in_two_processes(corpus, whole, work, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
-    monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
+def test_stopped_in_two_processes(corpus, whole, work, tmp_path):
     before = set(multiprocessing.active_children())
     with pytest.raises(Stopped):
         train(corpus, recogniser=CONFIG, run=Run(work=work, monitor=stopping_after(6), workers=2))
@@ -165,7 +167,7 @@ def test_what_is_done_is_not_done_again(corpus, work):
     assert [event for event in again if isinstance(event, Item)] == items
 
 
-def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path, monkeypatch):
+def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path):
     corpus = Corpus.create(tmp_path / "corpus")
     utterance = toy_corpus.utterance("toy00")
     engine, job = engine_named("trajectory", {}), (CONFIG, Lexicon())
@@ -183,9 +185,6 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path, mo
         fingerprint_training(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), GEOMETRY, None),
     ]
     assert len({plain, *others}) == 5
-    with monkeypatch.context() as changed:
-        changed.setattr(fingerprints, "installed_phone_recogniser", lambda: "another")
-        assert digests()[0] not in (plain, *others)
     crops = np.array(utterance.track.crops)
     crops[3, 4, 5] ^= 1
     corpus.add(replace(utterance, track=replace(utterance.track, crops=crops)))

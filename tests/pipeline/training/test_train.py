@@ -15,7 +15,6 @@ from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.motion.space import resample_track
 from lipmotion.pipeline.model import BOTH, EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training import labels as labels_module
-from lipmotion.pipeline.training import train as train_module
 from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.labels import (
     MAX_NAMED_RECORDINGS,
@@ -82,9 +81,8 @@ def labelled(utterance: Utterance) -> Utterance:
 
 
 @pytest.mark.long
-def test_labelled_phones_are_used_as_they_are(toy_corpus, toy_model, tmp_path, monkeypatch):
+def test_labelled_phones_are_used_as_they_are(toy_corpus, toy_model, tmp_path):
     """Nothing is aligned, no transcript is needed, and phone models are trained on what is labelled."""
-    monkeypatch.setattr(train_module, "align_or_recognise", None)
     given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
     given[0] = replace(given[0], words=("not", "what", "is", "said"))
     model, report = train(corpus_of(given, tmp_path), recogniser=SMALL, engine=JOINT)
@@ -121,12 +119,11 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus, tmp_
 
 
 @pytest.mark.long
-def test_without_any_transcript_the_shipped_phones_are_used(toy_corpus, toy_model, tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(train_module, "load_model", lambda: toy_model)
+def test_without_any_transcript_the_shipped_phones_are_used(toy_corpus, tmp_path, caplog):
     silent = corpus_of([replace(utterance, words=None) for utterance in some(toy_corpus)], tmp_path)
     model, report = train(silent, recogniser=SMALL, engine=JOINT)
-    assert model.phones.mixtures is toy_model.phones.mixtures
-    assert not np.array_equal(model.phones.speaker, toy_model.phones.speaker)  # whose voice it is, is learned
+    assert model.phones.mixtures is load_model().phones.mixtures
+    assert not np.array_equal(model.phones.speaker, load_model().phones.speaker)  # whose voice it is, is learned
     assert len(report.used) == 5
     assert "no transcripts in the corpus: its phones are recognised by the shipped model" in caplog.text
 
