@@ -10,22 +10,19 @@ import pytest
 from cli.conftest import is_one_error
 from lipmotion import Corpus
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.curves import bootstrap_interval
 from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab import minnis2000 as minnis_2000
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation import evaluate as evaluation_figures
 from lipmotion_lab.report import sections
 from lipmotion_lab.report.report import PARTS
 from lipmotion_lab.xie_liu2007 import six_systems
 
 
 @pytest.fixture(autouse=True)
-def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few draws of the bootstrap intervals, small phone models, and only two of the paper's unit sets."""
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small phone models, and only two of the paper's unit sets."""
     for module in (runner, table1, six_systems):
         monkeypatch.setattr(module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
-    monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})
 
 

@@ -10,7 +10,7 @@ import sys
 import warnings
 import zipfile
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -160,9 +160,15 @@ def test_warnings(run, make_info):
     assert done == (0, [], [f"{head}{SHOWN} is odd", head + SHOWN, head + SHOWN])
 
 
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
+    """Makes standard error a terminal, or none."""
+    return lambda watched: monkeypatch.setattr(sys.stderr, "isatty", lambda: watched, raising=False)
+
+
 @pytest.mark.parametrize("watched", [False, True])
-def test_progress(capsys, monkeypatch, watched):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: watched, raising=False)
+def test_progress(capsys, terminal, watched):
+    terminal(watched)
     with report_progress(Namespace(machine_readable=False, stopper=Stopper(), events=Events())) as report:
         report.receive(Progress(EVIL, 0, 2, 0.0))
         report.receive(Item(EVIL, "skipped", EVIL))
@@ -273,8 +279,8 @@ def test_where_nobody_watches_only_warnings_and_the_result_are_said(capsys):
     assert capsys.readouterr() == ("done\n", "lipmotion: warning: skipped b: no face\\nanywhere\n")
 
 
-def test_a_terminal_gets_a_bar(capsys, monkeypatch):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+def test_a_terminal_gets_a_bar(capsys, terminal):
+    terminal(True)
     with report_progress(options(machine_readable=False)) as report:
         for event in EVENTS:
             report.receive(event)

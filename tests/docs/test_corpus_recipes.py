@@ -3,7 +3,6 @@
 import json
 import re
 import shlex
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +13,7 @@ from docs.test_links import broken
 from lipmotion import Corpus, load_model
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
-from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.curves import bootstrap_interval
-from lipmotion.pipeline.training import train as train_module
 from lipmotion.types import Track, Utterance
-from lipmotion_lab.evaluation import evaluate as evaluation_figures
 from pipeline.made import replace_tracking
 from testing.toy import toy_utterances
 
@@ -71,8 +66,6 @@ def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return tracks[path.resolve()]
 
     replace_tracking(monkeypatch, track)
-    monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
-    monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -132,20 +132,17 @@ def test_recordings_of_the_training_are_not_compared(toy_corpus):
             engines(toy_corpus, split=split, settings=SETTINGS)
 
 
-pytest.importorskip("torch", reason="the extra 'network' is not installed")
-
-
-@pytest.fixture(scope="module")
-def model(examples: list[Example], stages: list[Progress]) -> FrameRegressionModel:
+def fit_blstm(examples: list[Example], epochs: int, seed: int = 0) -> FrameRegressionModel:
+    pytest.importorskip("torch", reason="the extra 'network' is not installed")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(network, "EPOCHS", 40)
+        patch.setattr(network, "EPOCHS", epochs)
         patch.setattr(network, "LEAST_STEPS", 1)
-        return BlstmBaseline().fit(examples, stages.append).model
+        return BlstmBaseline(seed).fit(examples, silent_monitor).model
 
 
-def test_held_out_motion_is_predicted(model):
+def test_held_out_motion_is_predicted(examples):
     held_out = sentences(14, seed=5)[-1]
-    result = BlstmBaseline().generate(model, held_out.speech)
+    result = BlstmBaseline().generate(fit_blstm(examples, 40), held_out.speech)
     assert result.motion.channels == CHANNELS
     assert result.motion.values.shape == result.variance.shape == held_out.motion.values.shape
     for name in ("opening", "width"):
@@ -153,10 +150,8 @@ def test_held_out_motion_is_predicted(model):
     assert result.motion["opening"].max() < 1  # values of frames that are not valid are not learned
 
 
-def test_the_same_seed_gives_the_same(examples, monkeypatch):
-    monkeypatch.setattr(network, "EPOCHS", 1)
-    monkeypatch.setattr(network, "LEAST_STEPS", 1)
-    one, same, other = (BlstmBaseline(seed).fit(examples, lambda _: None).model for seed in (0, 0, 1))
+def test_the_same_seed_gives_the_same(examples):
+    one, same, other = (fit_blstm(examples, 1, seed) for seed in (0, 0, 1))
     made = [BlstmBaseline().generate(each, examples[0].speech).motion.values for each in (one, same, other)]
     assert np.array_equal(made[0], made[1])
     assert not np.allclose(made[0], made[2])

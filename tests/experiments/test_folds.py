@@ -1,5 +1,5 @@
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -83,6 +83,18 @@ def test_corpora_that_cannot_be(toy_corpus, tmp_path):
         folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
 
 
+def replace_training(
+    monkeypatch: pytest.MonkeyPatch,
+    result: Callable[..., object],
+    figures_of: Callable[[Any], object],
+    row_of: Callable[[Any], object] = lambda figures: {"clips": figures},
+) -> None:
+    """Let functions stand for training with generation, for the figures of clips, and for the row of figures."""
+    monkeypatch.setattr(runner, "train_and_generate", result)
+    monkeypatch.setattr(module, "figures_of", lambda clips, *_: figures_of(clips))
+    monkeypatch.setattr(runner, "opening_row_with_rates", row_of)
+
+
 def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fold with an utterance that has no words lacks a condition, so all folds together lack it."""
     cut: list[tuple[str, ...]] = []
@@ -94,9 +106,7 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
         clips = {condition: [f"{name} {condition}" for name in held_out] for condition in conditions}
         return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1, utterances=[]))
 
-    monkeypatch.setattr(runner, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", lambda clips, *_: sorted(clips))
-    monkeypatch.setattr(runner, "opening_row_with_rates", lambda figures: {"clips": figures})
+    replace_training(monkeypatch, result, sorted)
     figures = folds(toy_corpus, count=3)
     assert sorted(name for held_out in cut for name in held_out) == sorted(toy_corpus.names("train"))
     assert [len(held_out) for held_out in cut] == [3, 3, 2]
@@ -124,12 +134,10 @@ def test_finished_parts_are_not_generated_again(toy_corpus, tmp_path, monkeypatc
     def run(work: Path | None) -> dict[str, Any]:
         return folds(toy_corpus, count=2, by_speaker=False, work=work)
 
-    def as_lists(clips: Sequence[ComparedClip], *_: object) -> list[Any]:
+    def as_lists(clips: Sequence[ComparedClip]) -> list[Any]:
         return [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
 
-    monkeypatch.setattr(runner, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", as_lists)
-    monkeypatch.setattr(runner, "opening_row_with_rates", lambda figures: {"clips": figures})
+    replace_training(monkeypatch, result, as_lists)
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path)
     again = run(tmp_path)
@@ -156,10 +164,8 @@ def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypat
         recordings = SimpleNamespace(closed_under=0.1, utterances=[corpus.utterance(name) for name in held_out])
         return SimpleNamespace(used=names, clips={CONDITIONS[0]: clips}, recordings=recordings)
 
-    monkeypatch.setattr(runner, "train_and_generate", result)
     row = dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6], "false_per_minute": 1.0, "original_per_minute": 2.0}
-    monkeypatch.setattr(module, "figures_of", lambda *_: {})
-    monkeypatch.setattr(runner, "opening_row_with_rates", lambda _: row)
+    replace_training(monkeypatch, result, lambda _: {}, lambda _: row)
     figures = folds(corpus, by_speaker=True)
     assert sorted(map(sorted, left_out)) == [[""], ["anna"], ["ben"], ["eve"]]
     assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(

@@ -277,12 +277,12 @@ def test_what_does_not_fit_is_named_with_its_place() -> None:
 def test_numbers_in_texts_are_of_plain_digits() -> None:
     assert parse_number(" -1.5e3 ") == pytest.approx(-1500)
     assert parse_whole("+12") == 12
-    for given in ("1_0", "٣", "nan", "1e999", "9" * 400, "0x1", "", "1,5"):
+    for written in ("1_0", "٣", "nan", "1e999", "9" * 400, "0x1", "", "1,5"):
         with pytest.raises(InputError, match="required a number"):
-            parse_number(given)
-    for given in ("1_0", "٣", "9" * 5000, "1.0", ""):
+            parse_number(written)
+    for written in ("1_0", "٣", "9" * 5000, "1.0", ""):
         with pytest.raises(InputError, match="required a whole number"):
-            parse_whole(given)
+            parse_whole(written)
 
 
 def test_texts_and_paths_that_no_file_holds() -> None:
@@ -356,12 +356,12 @@ def test_options_come_back() -> None:
 
 
 def test_texts_are_parsed_as_their_types() -> None:
-    for settings, values in (
+    for given_texts, values in (
         (["count=4", "weight=2", "kind=hard"], {"count": 4, "weight": 2.0, "kind": "hard"}),
         (["on=no"], {"on": False}), (["on=TRUE"], {"on": True}), (["free=a=b"], {"free": "a=b"}),
         (["how_many=2"], {"count": 2}), ([], {}),
     ):  # fmt: skip
-        assert Example.values_of(settings) == values
+        assert Example.values_of(given_texts) == values
 
 
 def test_texts_that_cannot_be_parsed() -> None:
