@@ -55,23 +55,6 @@ def test_build_and_info(run, tracker, here):
     assert load_face("anna.face").about["name"] == "Anna"
 
 
-@pytest.mark.long
-def test_what_cannot_be_built(run, tracker, here):
-    video = tracker / "toy00.mp4"
-    before = video.read_bytes()
-    for arguments, code, words in (
-        (["missing.mp4", "-o", "a.face"], 3, "missing.mp4: no such"),
-        ([tracker, "-o", "a.mp4"], 7, "a.mp4: a face is a file ending in .face; name it so"),
-        ([tracker, "-o", "missing/a.face"], 7, "the folder missing does not exist"),
-        ([tracker, "-o", "a.face", "--speaker", "ben"], 3, "no speaker 'ben', a face is that of one person"),
-        ([video, "-o", "a.face"], 3, "s of footage with the face, required 5 s or more"),
-        ([video, "-o", video], 7, "is the footage itself; give another name"),
-    ):
-        check_refused(run("face", "build", *arguments, "--workers", "1"), code, words)
-        assert list(here.iterdir()) == []
-    assert video.read_bytes() == before
-
-
 def test_info(run, filmed_face_file):
     done = run("face", "info", filmed_face_file)
     assert (done.code, done.err) == (0, [])

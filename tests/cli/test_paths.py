@@ -38,6 +38,7 @@ REFUSED = [
     ("the list itself", f"experiment learning-curve {FIGURES} --order t.txt -o t.txt"),
     ("the corpus c", f"experiment xieliu2007 {FIGURES} --plots c/pictures"),
     ("the folder of recordings itself", "corpus prepare r -o r"),
+    ("the footage itself", "face build a.wav -o a.wav"),
     ("the folder of recordings d.unfinished/r", "corpus prepare d.unfinished/r -o d.unfinished"),
 ]
 

@@ -153,27 +153,6 @@ def test_not_a_corpus(tmp_path):
             Corpus.open(tmp_path)
 
 
-def test_a_damaged_utterance(corpus):
-    folder = corpus.folder("one")
-    entry = read_entry(folder)
-    whole = {path.name: path.read_bytes() for path in folder.iterdir()}
-    damages = [
-        ("motion.npy", None),
-        ("seen.npy", b""),
-        ("features.npy", whole["features.npy"][:200]),
-        ("entry.json", b"{"),
-        ("entry.json", b'{"name": "one"}'),
-    ]
-    for rows in ([[0, 1]], [[0.5, 0.2, "aa"]], "aa", [["x", 1, "aa"]]):
-        damages.append(("entry.json", json.dumps(entry | {"phones": rows}).encode()))
-    for name, content in damages:
-        (folder / name).unlink() if content is None else (folder / name).write_bytes(content)
-        with pytest.raises(CorpusError, match=r"one: not a whole utterance .* prepare again"):
-            corpus.utterance("one")
-        (folder / name).write_bytes(whole[name])
-    assert corpus.utterance("one").words == ("bin", "näh")
-
-
 def test_reading_needs_no_video_packages(corpus):
     code = (
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = sys.modules['av'] = None; "

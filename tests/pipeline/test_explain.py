@@ -84,9 +84,8 @@ def test_times_within_and_outside_the_recording(coupled_model, toy_sentence):
     last_s = float(result.motion.time_s[-1])
     (last,) = lipmotion.explain(toy_sentence.audio, at=last_s, model=coupled_model)
     assert last.frame == len(result.motion.values) - 1
-    for time_s in (-0.1, 1e6, float("nan")):
-        with pytest.raises(InputError, match=rf"outside the recording \(0 to {last_s:.2f} s\)"):
-            lipmotion.explain(toy_sentence.audio, at=[0.1, time_s], model=coupled_model)
+    with pytest.raises(InputError, match=rf"outside the recording \(0 to {last_s:.2f} s\)"):
+        lipmotion.explain(toy_sentence.audio, at=[0.1, 1e6], model=coupled_model)
 
 
 UNITS = Timeline((Span(0.0, 0.03, Unit("sil")), Span(0.03, 0.05, Unit("p", "", "papa")), Span(0.05, 0.2, Unit("aa"))))

@@ -68,19 +68,6 @@ def test_what_a_user_must_know_comes_back(toy_model, tmp_path):
     assert load_model(tmp_path / "m.lipmotion").about == about
 
 
-def test_the_header_says_what_there_is_not(toy_model_file, tmp_path):
-    for changes, message in (
-        ({"engine": "concatenative"}, "no engine 'concatenative'; there are: trajectory"),
-        ({"configuration": {"part": 5}}, "no option 'part'; there are: states, "),
-        ({"configuration": {"states": 4}}, "states is 4, required an odd number"),
-        ({"recogniser": {"state": 3}}, "no option 'state'; there are: states, "),
-        ({"recogniser": []}, "damaged"),
-        ({"configuration": None}, "damaged"),
-    ):
-        with pytest.raises(ModelFormatError, match=message):
-            load_model(changed_model(toy_model_file, tmp_path / "m.lipmotion", {}, **changes))
-
-
 def test_models_are_one_short_line():
     model = load_model()
     assert repr(model).startswith("Model(trajectory, geometry, ")
@@ -117,27 +104,6 @@ def test_a_model_with_the_former_names_of_options_is_read(toy_model_file, tmp_pa
     assert model.engine.config == replace(present.config, modulation_filter=0.0)
     with pytest.raises(ModelFormatError, match="trajectory_steps is 3; this option no longer exists, required 0"):
         load_model(changed_model(toy_model_file, tmp_path / "n.lipmotion", {}, configuration={"trajectory_steps": 3}))
-
-
-def test_what_is_no_model(toy_model_file, tmp_path):
-    path = tmp_path / "m.lipmotion"
-    for read in (load_model, read_header):
-        for missing in (tmp_path / "missing.lipmotion", tmp_path):
-            with pytest.raises(InputError, match="no such model"):
-                read(missing)
-        for version in (VERSION + 1, str(VERSION), None):
-            wanted = f"model version {version}, .* reads version {VERSION}; upgrade lipmotion, or"
-            with pytest.raises(ModelFormatError, match=wanted):
-                read(changed_model(toy_model_file, path, {}, version=version))
-        for content in (b"", b"words, not a model", b"PK\3\4", b"PK\5\6" + bytes(18)):
-            path.write_bytes(content)
-            wanted = r"m.lipmotion: not a lipmotion model \(.+\); give a file that"
-            with pytest.raises(ModelFormatError, match=wanted) as caught:
-                read(path)
-            assert "\n" not in str(caught.value)
-        for header in (b"{", b"\xff", b"[]", b'{"format": "lipmotion.motion"}', None):
-            with pytest.raises(ModelFormatError, match="not a lipmotion model"):
-                read(changed_model(toy_model_file, path, {HEADER: header}))
 
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"

@@ -122,16 +122,6 @@ def test_a_corpus_of_several_people(tmp_path, make_videos):
         choose_takes(corpus.path, folder)
 
 
-def test_a_corpus_without_its_videos(tmp_path, make_videos):
-    corpus = prepared(tmp_path / "corpus", ["a.mkv"])
-    with pytest.raises(InputError, match=r"holds the pictures of mouths, but not of faces; .* --recordings FOLDER"):
-        choose_takes(corpus.path)
-    with pytest.raises(InputError, match="no such folder; give the one of the videos of the corpus"):
-        choose_takes(corpus.path, tmp_path / "missing")
-    with pytest.raises(InputError, match=r"holds none of the videos of .*; give the folder that they are in"):
-        choose_takes(corpus.path, make_videos("other"))
-
-
 @pytest.mark.parametrize(
     ("durations_s", "used_s"),
     [
