@@ -6,6 +6,7 @@ import pytest
 from appearance.test_eigenlips import pictures
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import read_archive, write_archive
+from lipmotion_faces.appearance import looping
 from lipmotion_faces.appearance.camera_noise import (
     CameraNoise,
     NoiseSource,
@@ -13,22 +14,12 @@ from lipmotion_faces.appearance.camera_noise import (
     camera_noise_from_arrays,
     estimate_noise,
 )
-from lipmotion_faces.appearance.looping import (
-    BUSY_S,
-    JUMP_LIMIT,
-    FrameDescriptors,
-    LoopOrder,
-    describe_frames,
-    fade_frames,
-    loop_order,
-    row_distances,
-)
 
 RATE_HZ = 25.0
-FADE_FRAMES = fade_frames(RATE_HZ)
+FADE_FRAMES = looping.fade_frames(RATE_HZ)
 
 
-def background(path, blinks=(), noise: float = 0.02) -> FrameDescriptors:
+def background(path, blinks=(), noise: float = 0.02) -> looping.FrameDescriptors:
     """A head whose position is a path [shape=(T,)], and that blinks at some frames."""
     count = len(path)
     draw = np.random.default_rng(2)
@@ -38,7 +29,7 @@ def background(path, blinks=(), noise: float = 0.02) -> FrameDescriptors:
     eyes = 50 + 0.3 * draw.normal(size=(count, 20))
     for blink in blinks:
         eyes[blink - 1 : blink + 3] += np.array([10, 25, 20, 8])[: max(0, count - blink + 1), None]
-    return FrameDescriptors(rows, rows + 1, eyes, np.repeat(position, 6, axis=1))
+    return looping.FrameDescriptors(rows, rows + 1, eyes, np.repeat(position, 6, axis=1))
 
 
 def wander(count: int, seed: int = 0) -> np.ndarray:
@@ -47,17 +38,17 @@ def wander(count: int, seed: int = 0) -> np.ndarray:
     return np.cumsum(steps * 0.3) + np.arange(count) * 0.05
 
 
-def displayed(order: LoopOrder, rows) -> np.ndarray:
+def displayed(order: looping.LoopOrder, rows) -> np.ndarray:
     return (1 - order.weight[:, None]) * rows[order.first] + order.weight[:, None] * rows[order.second]
 
 
-def runs_of(order: LoopOrder) -> list[int]:
+def runs_of(order: looping.LoopOrder) -> list[int]:
     return [after - before for before, after in pairwise([0, *(join.at for join in order.joins), len(order)])]
 
 
 def test_a_long_background_is_shown_as_it_is():
     for count in (1, 30, 75):
-        order = loop_order(background(wander(75)), count, RATE_HZ)
+        order = looping.loop_order(background(wander(75)), count, RATE_HZ)
         assert len(order) == count
         assert order.joins == ()
         np.testing.assert_array_equal(np.diff(order.first), 1)
@@ -67,7 +58,7 @@ def test_a_long_background_is_shown_as_it_is():
 def test_it_begins_and_ends_calmly():
     steps = np.full(200, 1.0)
     steps[[*range(40, 50), *range(140, 150)]] = 0.01
-    order = loop_order(background(np.cumsum(steps) * 0.1), 101, RATE_HZ)
+    order = looping.loop_order(background(np.cumsum(steps) * 0.1), 101, RATE_HZ)
     assert 40 <= order.first[0] < 50
     assert 140 <= order.first[-1] < 150
 
@@ -75,7 +66,7 @@ def test_it_begins_and_ends_calmly():
 def test_a_short_one_goes_to_and_fro():
     descriptors = background(wander(75))
     for count, seed in ((76, 0), (200, 1), (2000, 2)):
-        order = loop_order(descriptors, count, RATE_HZ, seed=seed)
+        order = looping.loop_order(descriptors, count, RATE_HZ, seed=seed)
         assert len(order) == len(list(order)) == count
         assert order.first.min() >= 0
         assert max(order.first.max(), order.second.max()) < 75
@@ -89,9 +80,9 @@ def test_no_step_is_much_larger_than_usual():
     descriptors = background(wander(150))
     rows = descriptors.standardise([(0, 150)])
     usual = np.linalg.norm(np.diff(rows, axis=0), axis=1)
-    order = loop_order(descriptors, 3000, RATE_HZ)
+    order = looping.loop_order(descriptors, 3000, RATE_HZ)
     shown = np.linalg.norm(np.diff(displayed(order, rows), axis=0), axis=1)
-    assert shown.max() <= 1.1 * max(usual.max(), JUMP_LIMIT)
+    assert shown.max() <= 1.1 * max(usual.max(), looping.JUMP_LIMIT)
     turns = [join.cost for join in order.joins if join.kind == "turn"]
     assert max(turns) < 1.5  # of the median speed
 
@@ -99,19 +90,19 @@ def test_no_step_is_much_larger_than_usual():
 def test_a_motion_that_repeats_is_looped_forwards():
     path = 3 * np.sin(2 * np.pi * np.arange(130) / 50)
     descriptors = background(path)
-    order = loop_order(descriptors, 1500, RATE_HZ)
+    order = looping.loop_order(descriptors, 1500, RATE_HZ)
     jumps = [join for join in order.joins if join.kind == "jump"]
     assert len(jumps) >= 3
     for jump in jumps:
-        assert jump.cost < JUMP_LIMIT
+        assert jump.cost < looping.JUMP_LIMIT
     rows = descriptors.standardise([(0, 130)])
     shown = np.linalg.norm(np.diff(displayed(order, rows), axis=0), axis=1)
-    assert shown.max() < JUMP_LIMIT + np.linalg.norm(np.diff(rows, axis=0), axis=1).max()
+    assert shown.max() < looping.JUMP_LIMIT + np.linalg.norm(np.diff(rows, axis=0), axis=1).max()
 
 
 def test_jumps_go_on_in_the_same_direction():
     path = np.abs(np.arange(240) % 80 - 40) * 0.2  # to and fro: the same places, in both directions
-    order = loop_order(background(path), 2000, RATE_HZ)
+    order = looping.loop_order(background(path), 2000, RATE_HZ)
     for at in (join.at for join in order.joins if join.kind == "jump"):
         old, new = order.first[at - FADE_FRAMES], order.first[min(at + FADE_FRAMES, 1999)]
         way = 1 if old > order.first[at - FADE_FRAMES - 1] else -1
@@ -122,21 +113,21 @@ def test_jumps_go_on_in_the_same_direction():
 def test_no_join_in_a_blink_or_near_one():
     again_and_again = np.abs(np.arange(150) % 50) * 0.2
     for path, blinks in ((wander(150), (30, 75, 120)), (again_and_again, (20, 50, 80, 110, 140))):
-        order = loop_order(background(path, blinks), 3000, RATE_HZ)
+        order = looping.loop_order(background(path, blinks), 3000, RATE_HZ)
         assert len(order.joins) > 20
         for last in [*(order.first[join.at - 1] for join in order.joins), order.first[-1]]:
-            assert min(abs(last - blink - 0.5) for blink in blinks) > 2.5 + BUSY_S * RATE_HZ
+            assert min(abs(last - blink - 0.5) for blink in blinks) > 2.5 + looping.BUSY_S * RATE_HZ
 
 
 def test_runs_are_not_short():
-    order = loop_order(background(wander(150)), 4000, RATE_HZ)
+    order = looping.loop_order(background(wander(150)), 4000, RATE_HZ)
     assert min(runs_of(order)[:-1]) >= 0.8 * RATE_HZ
 
 
 def test_what_was_not_shown_comes_first():
     """Four scenes of one head: ten seconds show more than half of them, and scenes follow one another by jumps."""
     path = np.tile(wander(75), 4)
-    order = loop_order(background(path), 1500, RATE_HZ, cuts=(75, 150, 225))
+    order = looping.loop_order(background(path), 1500, RATE_HZ, cuts=(75, 150, 225))
     fresh = [len(set(order.first[n : n + 250].tolist())) / 250 for n in range(0, 1250, 25)]
     assert np.mean(fresh) > 0.6
     assert sum(join.kind == "jump" for join in order.joins) > sum(join.kind == "turn" for join in order.joins)
@@ -144,7 +135,7 @@ def test_what_was_not_shown_comes_first():
 
 def test_the_seed_alone_decides():
     descriptors = background(wander(100))
-    orders = [loop_order(descriptors, 1000, RATE_HZ, seed=seed).first for seed in (4, 4, 5)]
+    orders = [looping.loop_order(descriptors, 1000, RATE_HZ, seed=seed).first for seed in (4, 4, 5)]
     np.testing.assert_array_equal(orders[0], orders[1])
     assert (orders[0] != orders[2]).any()
 
@@ -152,7 +143,7 @@ def test_the_seed_alone_decides():
 def test_only_frames_that_may_be_shown():
     usable = np.ones(120, bool)
     usable[[0, 1, 50, 51, 119]] = False
-    order = loop_order(background(wander(120)), 2000, RATE_HZ, usable=usable, cuts=(90,))
+    order = looping.loop_order(background(wander(120)), 2000, RATE_HZ, usable=usable, cuts=(90,))
     assert usable[order.first].all()
     assert usable[order.second].all()
     crossings = [(a, b) for a, b in pairwise(order.first.tolist()) if (a < 90) != (b < 90)]
@@ -163,16 +154,16 @@ def test_only_frames_that_may_be_shown():
 def test_nothing_to_show_is_refused():
     for count, usable in ((0, None), (5, np.zeros(50, bool)), (5, np.ones(49, bool))):
         with pytest.raises(InputError, match="required at least one of each"):
-            loop_order(background(wander(50)), count, RATE_HZ, usable=usable)
+            looping.loop_order(background(wander(50)), count, RATE_HZ, usable=usable)
 
 
 def test_tiny_and_still_backgrounds():
     for length in (1, 2, 3, 5, 21):
-        order = loop_order(background(wander(length)), 100, RATE_HZ)
+        order = looping.loop_order(background(wander(length)), 100, RATE_HZ)
         assert len(order) == 100
         assert set(order.first.tolist()) <= set(range(length))
         assert np.abs(np.diff(order.first)).max() <= 1
-    assert len(loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)) == 500
+    assert len(looping.loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)) == 500
 
 
 MAP = np.array([[0.7, 0, 80.0], [0, 0.7, 60.0]])
@@ -194,9 +185,9 @@ def maps(moves) -> np.ndarray:
 def distances_of(frames: np.ndarray, moves=None) -> np.ndarray:
     """Distances between frames whose face moves, or not."""
     count = len(frames)
-    descriptors = describe_frames(frames, maps(np.zeros((count, 2)) if moves is None else moves))
+    descriptors = looping.describe_frames(frames, maps(np.zeros((count, 2)) if moves is None else moves))
     assert len(descriptors) == count
-    return row_distances(descriptors.standardise([(0, count)]))
+    return looping.row_distances(descriptors.standardise([(0, count)]))
 
 
 def test_equal_frames_have_no_distance_and_the_mouth_does_not_count():
@@ -213,9 +204,9 @@ def test_equal_frames_have_no_distance_and_the_mouth_does_not_count():
 def test_the_aligned_face_does_not_move():
     still = scene(3)
     moved = np.stack([np.roll(frame, (3 * n, 4 * n), axis=(0, 1)) for n, frame in enumerate(still)])
-    descriptors = describe_frames(moved, maps([(4 * n, 3 * n) for n in range(3)]))
+    descriptors = looping.describe_frames(moved, maps([(4 * n, 3 * n) for n in range(3)]))
     change = np.abs(np.diff(descriptors.eyes, axis=0)).mean()
-    unaligned = describe_frames(moved, maps(np.zeros((3, 2))))
+    unaligned = looping.describe_frames(moved, maps(np.zeros((3, 2))))
     assert change < 0.3 * np.abs(np.diff(unaligned.eyes, axis=0)).mean()
     np.testing.assert_allclose(np.diff(descriptors.place, axis=0), np.tile([4, 4, 4, 3, 3, 3], (2, 1)))
 
@@ -231,7 +222,7 @@ def test_neighbours_differ_by_about_one():
 def test_other_frames_than_maps_are_refused():
     for frames in (scene(3), scene(5), [], [scene(1)[0], *scene(3)[:, :100]]):
         with pytest.raises(InputError, match="required as many"):
-            describe_frames(frames, maps(np.zeros((4, 2))))
+            looping.describe_frames(frames, maps(np.zeros((4, 2))))
 
 
 SIZE = (40, 50)

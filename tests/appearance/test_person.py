@@ -8,7 +8,7 @@ from lipmotion import FilmedFace
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import Channel, Motion
-from lipmotion_faces.appearance import person
+from lipmotion_faces.appearance import motion_map, person
 from lipmotion_faces.appearance.candidates import CANDIDATES
 from lipmotion_faces.appearance.lower_face import (
     CORNER,
@@ -27,17 +27,6 @@ from lipmotion_faces.appearance.lower_face import (
     moved_part,
     relight,
     replaced_part,
-)
-from lipmotion_faces.appearance.motion_map import (
-    COMPONENTS,
-    FRAMES_PER_CENTRE,
-    MOTION_MAP,
-    OUTER_PERCENTAGE,
-    MotionMap,
-    channel_values,
-    fit_motion_map,
-    motion_map_arrays,
-    motion_map_from_arrays,
 )
 from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
 from pipeline.damage import DAMAGES, UNREADABLE, damaged
@@ -224,11 +213,11 @@ def motion(values: np.ndarray) -> Motion:
 
 
 @pytest.fixture(scope="module")
-def fitted() -> MotionMap:
-    return fit_motion_map(poses(), CHANNELS, pictured(poses()))
+def fitted() -> motion_map.MotionMap:
+    return motion_map.fit_motion_map(poses(), CHANNELS, pictured(poses()))
 
 
-def test_a_known_function_is_found(fitted: MotionMap) -> None:
+def test_a_known_function_is_found(fitted: motion_map.MotionMap) -> None:
     unseen = poses(500, seed=1)
     predicted, wanted = fitted.predict(motion(unseen)), pictured(unseen)
     assert predicted.shape == (500, 4)
@@ -240,7 +229,7 @@ def test_a_known_function_is_found(fitted: MotionMap) -> None:
     assert (errors[0] < 0.1 * errors[1]).all()  # no lines
 
 
-def test_a_channel_that_never_moves_is_left_out(fitted: MotionMap) -> None:
+def test_a_channel_that_never_moves_is_left_out(fitted: motion_map.MotionMap) -> None:
     assert fitted.names == ("opening", "width", "weight")
     assert fitted.basis.shape == (3, 3)
     other = poses(20, seed=2)
@@ -252,14 +241,16 @@ def test_a_channel_that_never_moves_is_left_out(fitted: MotionMap) -> None:
 def test_components_have_unit_variance_and_are_as_many_as_move() -> None:
     draw = np.random.default_rng(3)
     for values, count in ((draw.normal(0, 1, (600, 6)) @ draw.normal(0, 0.1, (6, 50)), 6),
-                          (draw.normal(0, 1, (900, 30)), COMPONENTS)):  # fmt: skip
-        found = fit_motion_map(values, tuple(Channel(f"x_{n}") for n in range(values.shape[1])), values[:, :2])
+                          (draw.normal(0, 1, (900, 30)), motion_map.COMPONENTS)):  # fmt: skip
+        found = motion_map.fit_motion_map(
+            values, tuple(Channel(f"x_{n}") for n in range(values.shape[1])), values[:, :2]
+        )
         assert found.basis.shape == (values.shape[1], count)
         components = (values - found.mean) / found.scale @ found.basis
         assert np.cov(components.T) == pytest.approx(np.eye(count), abs=0.01)
 
 
-def test_far_from_all_footage_it_is_as_at_its_edge(fitted: MotionMap) -> None:
+def test_far_from_all_footage_it_is_as_at_its_edge(fitted: motion_map.MotionMap) -> None:
     directions = poses(200, seed=4)[:, [0, 1, 3]] - fitted.mean
     wanted = pictured(poses())
     margin = 0.5 * np.ptp(wanted, axis=0) + 0.01
@@ -275,28 +266,28 @@ def test_far_from_all_footage_it_is_as_at_its_edge(fitted: MotionMap) -> None:
 def test_limits_leave_out_the_outermost_poses() -> None:
     values = poses()
     values[17] = [40.0, -30.0, 0.37, 9.0]  # one frame in which the tracker was wrong
-    found = fit_motion_map(values, CHANNELS, pictured(poses()))
+    found = motion_map.fit_motion_map(values, CHANNELS, pictured(poses()))
     components = (values[:, [0, 1, 3]] - found.mean) / found.scale @ found.basis
     outside = (components < found.limits[0]) | (components > found.limits[1])
     assert outside[17].any()
-    assert outside.mean(axis=0) == pytest.approx([2 * OUTER_PERCENTAGE / 100] * 3, abs=1e-3)
+    assert outside.mean(axis=0) == pytest.approx([2 * motion_map.OUTER_PERCENTAGE / 100] * 3, abs=1e-3)
 
 
-def test_short_footage_is_trusted_less(fitted: MotionMap) -> None:
+def test_short_footage_is_trusted_less(fitted: motion_map.MotionMap) -> None:
     """What footage does not say is the mean picture: coefficients shrink as frames become few."""
     sizes = []
     for frames in (30, 300, FRAMES):
         values, wanted = poses(frames), pictured(poses(frames))
-        found = fitted if frames == FRAMES else fit_motion_map(values, CHANNELS, wanted)
+        found = fitted if frames == FRAMES else motion_map.fit_motion_map(values, CHANNELS, wanted)
         sizes.append((found.predict(motion(values)).std(axis=0)[:3] / wanted.std(axis=0)[:3]).mean())
     assert sizes[0] < 0.6 < sizes[1] < sizes[2] < 1.01
 
 
 def test_the_fewest_frames_give_about_the_mean() -> None:
-    for frames in (FRAMES_PER_CENTRE, 10):
+    for frames in (motion_map.FRAMES_PER_CENTRE, 10):
         values = poses(frames)
-        found = fit_motion_map(values, CHANNELS, pictured(values))
-        assert len(found.centres) == frames // FRAMES_PER_CENTRE
+        found = motion_map.fit_motion_map(values, CHANNELS, pictured(values))
+        assert len(found.centres) == frames // motion_map.FRAMES_PER_CENTRE
         assert found.predict(motion(values)).mean(axis=0) == pytest.approx(pictured(values).mean(axis=0), abs=0.05)
 
 
@@ -304,10 +295,10 @@ def test_motion_that_cannot_be_learned_from() -> None:
     broken = np.where(np.arange(20)[:, None] == 7, np.nan, poses(20))
     for values, targets in ((poses(2), np.zeros((2, 1))), (poses(20), np.zeros((19, 1))), (broken, np.zeros((20, 1)))):
         with pytest.raises(InputError, match="required finite motion of as many frames, at least 3"):
-            fit_motion_map(values, CHANNELS, targets)
+            motion_map.fit_motion_map(values, CHANNELS, targets)
 
 
-def test_motion_that_nobody_can_map(fitted: MotionMap) -> None:
+def test_motion_that_nobody_can_map(fitted: motion_map.MotionMap) -> None:
     blendshapes = Motion(np.zeros((5, 2)), 25.0, (Channel("jawOpen", "weight"), Channel("opening")))
     with pytest.raises(InputError, match=r"no channel 'width' \(2 of the 3 that this face needs are missing\)"):
         fitted.predict(blendshapes)
@@ -317,27 +308,27 @@ def test_motion_that_nobody_can_map(fitted: MotionMap) -> None:
         fitted.predict(motion(values))
 
 
-def test_channels_are_found_by_name(fitted: MotionMap) -> None:
+def test_channels_are_found_by_name(fitted: motion_map.MotionMap) -> None:
     values = poses(50, seed=5)
     order = [3, 1, 2, 0]
     turned = Motion(values[:, order], 25.0, tuple(CHANNELS[n] for n in order))
-    assert channel_values(turned, ("opening", "width")) == pytest.approx(values[:, :2])
+    assert motion_map.channel_values(turned, ("opening", "width")) == pytest.approx(values[:, :2])
     assert fitted.predict(turned) == pytest.approx(fitted.predict(motion(values)))
 
 
-def test_as_arrays_and_back_and_damaged_arrays(fitted: MotionMap) -> None:
-    arrays, values = motion_map_arrays(fitted), motion(poses(50, seed=6))
-    again = motion_map_from_arrays(arrays, 4)
+def test_as_arrays_and_back_and_damaged_arrays(fitted: motion_map.MotionMap) -> None:
+    arrays, values = motion_map.motion_map_arrays(fitted), motion(poses(50, seed=6))
+    again = motion_map.motion_map_from_arrays(arrays, 4)
     assert (again.names, np.array_equal(again.predict(values), fitted.predict(values))) == (fitted.names, True)
-    assert arrays.keys() == MOTION_MAP.keys()
+    assert arrays.keys() == motion_map.MOTION_MAP.keys()
     for name in arrays:
         with pytest.raises(ModelFormatError, match=f"{name} is missing.*build the face again"):
-            motion_map_from_arrays({key: value for key, value in arrays.items() if key != name}, 4)
+            motion_map.motion_map_from_arrays({key: value for key, value in arrays.items() if key != name}, 4)
     broken = list(damaged(arrays, {damage: DAMAGES[damage] for damage in UNREADABLE}))
     assert len(broken) >= 6 * 6
     for _name, _what, changed in broken:
         with pytest.raises(ModelFormatError, match="the map from motion to pictures is damaged"):
-            motion_map_from_arrays(changed, 4)
+            motion_map.motion_map_from_arrays(changed, 4)
     for change, targets, words in (
         ({"scale": np.zeros(3)}, 4, "scale holds 0 to 0, required more than 0"),
         ({"names": np.array(["opening", "width", "width"])}, 4, "channels twice, or limits the wrong way round"),
@@ -346,7 +337,7 @@ def test_as_arrays_and_back_and_damaged_arrays(fitted: MotionMap) -> None:
         ({}, 5, "coefficients of shape"),
     ):
         with pytest.raises(ModelFormatError, match=words):
-            motion_map_from_arrays(arrays | change, targets)
+            motion_map.motion_map_from_arrays(arrays | change, targets)
 
 
 CHIN_PX = 118.0

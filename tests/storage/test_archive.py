@@ -9,17 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
+from lipmotion.storage import schema
 from lipmotion.storage.archive import Checkpoint, array_in, check_archive
 from lipmotion.storage.json_text import as_json, from_json, nan_as_null
-from lipmotion.storage.schema import (
-    BELOW_ONE,
-    NEGATIVE,
-    POSITIVE,
-    ArraySpec,
-    check_arrays,
-    check_index,
-    refuse_undeclared,
-)
 from robustness.case import npy
 
 
@@ -140,14 +132,14 @@ def test_what_is_refused() -> None:
 
 
 TABLE = {
-    "means": ArraySpec(np.float32, "G 3 D", -500, 500),
-    "variances": ArraySpec(np.float32, "G 3 D", POSITIVE),
-    "log_weights": ArraySpec(np.float32, "G", -np.inf, 0),
-    "share": ArraySpec(np.float64, "G", POSITIVE, BELOW_ONE),
-    "log_stay": ArraySpec(np.float64, "G", -10, NEGATIVE),
-    "rows": ArraySpec(np.int32, "n", -1, 9),
-    "names": ArraySpec(np.str_, "D"),
-    "weights": ArraySpec(np.float64, "D", 0, whole=True, optional=True),
+    "means": schema.ArraySpec(np.float32, "G 3 D", -500, 500),
+    "variances": schema.ArraySpec(np.float32, "G 3 D", schema.POSITIVE),
+    "log_weights": schema.ArraySpec(np.float32, "G", -np.inf, 0),
+    "share": schema.ArraySpec(np.float64, "G", schema.POSITIVE, schema.BELOW_ONE),
+    "log_stay": schema.ArraySpec(np.float64, "G", -10, schema.NEGATIVE),
+    "rows": schema.ArraySpec(np.int32, "n", -1, 9),
+    "names": schema.ArraySpec(np.str_, "D"),
+    "weights": schema.ArraySpec(np.float64, "D", 0, whole=True, optional=True),
 }
 
 
@@ -164,14 +156,14 @@ def good() -> dict[str, np.ndarray]:
 
 
 def test_arrays_become_what_the_table_says() -> None:
-    found = check_arrays(good(), TABLE)
+    found = schema.check_arrays(good(), TABLE)
     assert found.sizes == {"G": 4, "D": 2, "n": 0}
     assert {name: found[name].dtype.kind for name in found.arrays} == dict.fromkeys(TABLE.keys() - {"weights"}) | {
         "means": "f", "variances": "f", "log_weights": "f", "share": "f", "log_stay": "f", "rows": "i", "names": "U",
     }  # fmt: skip
     assert (found["means"].dtype, found["share"].dtype, found["rows"].dtype) == (np.float32, np.float64, np.int32)
     assert np.array_equal(found["means"], good()["means"])
-    assert check_arrays(good() | {"weights": np.array([1, 2])}, TABLE)["weights"].tolist() == [1.0, 2.0]
+    assert schema.check_arrays(good() | {"weights": np.array([1, 2])}, TABLE)["weights"].tolist() == [1.0, 2.0]
 
 
 def put(name: str, value: float) -> dict[str, np.ndarray]:
@@ -207,33 +199,33 @@ def test_arrays_that_are_refused() -> None:
         ({"rows": np.array([2**63], np.uint64)}, "rows holds"),
     ):
         with pytest.raises(ValueError, match=says) as caught:
-            check_arrays(good() | changes, TABLE)
+            schema.check_arrays(good() | changes, TABLE)
         assert "\n" not in str(caught.value)
 
 
 def test_a_missing_array_is_named() -> None:
     for name in sorted(TABLE.keys() - {"weights"}):
         with pytest.raises(KeyError, match=f"{name} is missing"):
-            check_arrays({key: array for key, array in good().items() if key != name}, TABLE)
+            schema.check_arrays({key: array for key, array in good().items() if key != name}, TABLE)
 
 
 def test_known_sizes_hold() -> None:
-    assert check_arrays(good(), TABLE, G=4).sizes["G"] == 4
+    assert schema.check_arrays(good(), TABLE, G=4).sizes["G"] == 4
     with pytest.raises(ValueError, match=r"required \(5, 3, D\)"):
-        check_arrays(good(), TABLE, G=5)
+        schema.check_arrays(good(), TABLE, G=5)
     tiny = np.full((4, 3, 2), np.float16(6e-8))  # the smallest number of half precision is more than 0
-    assert (check_arrays(good() | {"variances": tiny}, TABLE)["variances"] > 0).all()
+    assert (schema.check_arrays(good() | {"variances": tiny}, TABLE)["variances"] > 0).all()
 
 
 def test_arrays_that_no_table_has() -> None:
-    refuse_undeclared(good(), TABLE, ["other"])
+    schema.refuse_undeclared(good(), TABLE, ["other"])
     with pytest.raises(ValueError, match="undeclared 'other'"):
-        refuse_undeclared([*good(), "other"], TABLE)
+        schema.refuse_undeclared([*good(), "other"], TABLE)
 
 
 def test_numbers_of_what_there_is() -> None:
-    check_index("rows", np.array([0, 2]), 3)
-    check_index("rows", np.array([], int), 0)
+    schema.check_index("rows", np.array([0, 2]), 3)
+    schema.check_index("rows", np.array([], int), 0)
     for numbers in ([0, 3], [-1]):
         with pytest.raises(ValueError, match=r"rows is .* required 0 to 2"):
-            check_index("rows", np.array(numbers), 3)
+            schema.check_index("rows", np.array(numbers), 3)

@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion import Job, Outputs, Request
 from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.batch import BatchLine, read_lines
+from lipmotion.pipeline.batch import BatchLine, read_lines, report
 from lipmotion.pipeline.batch import ledger as settings
 from lipmotion.pipeline.batch.ledger import (
     DONE,
@@ -31,16 +31,6 @@ from lipmotion.pipeline.batch.ledger import (
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import MAX_LINES, OWN_FILES, OWN_FOLDER, check_names
-from lipmotion.pipeline.batch.report import (
-    COLUMNS,
-    Mark,
-    is_due,
-    merge_marks,
-    rate_doubt,
-    read_marks,
-    write_marks,
-    write_reports,
-)
 from lipmotion.printable import printable
 from lipmotion.storage.locks import LOCK
 
@@ -156,7 +146,7 @@ def test_damaged_rows_are_said_once_and_their_lines_done_again(line, out, caplog
             caplog.clear()
             with open_ledger(Place(str(out), "2"), [line]) as ledger:
                 assert ledger.kept(line, "settings", out) is None, what
-                write_reports([line], ledger, out)
+                report.write_reports([line], ledger, out)
                 ledger.append(record_of(line))
                 assert ledger.kept(line, "settings", out) == record_of(line), what
             if "a line end" not in what:  # it is of a line that this batch has not: nobody looks at it
@@ -284,9 +274,9 @@ GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 
     ],
 )
 def test_what_is_doubtful(worse, better):
-    assert rate_doubt(GOOD | worse) > rate_doubt(GOOD | better)
-    assert rate_doubt(GOOD) == pytest.approx(0)
-    assert rate_doubt(GOOD | {"words": "words", "confidence": 0.07}) > 60
+    assert report.rate_doubt(GOOD | worse) > report.rate_doubt(GOOD | better)
+    assert report.rate_doubt(GOOD) == pytest.approx(0)
+    assert report.rate_doubt(GOOD | {"words": "words", "confidence": 0.07}) > 60
 
 
 def rows_of(page: str) -> list[list]:
@@ -301,7 +291,7 @@ def reported(folder: Path, names: Sequence[str], *records: dict) -> tuple[list[d
         for line, record in zip(lines, records, strict=False):
             own = {"name": line.name, "recording": line.recording, "outputs": {f"{line.name}.json": "0"}}
             ledger.append(base | own | record)
-        table, page = write_reports(lines, ledger, folder)
+        table, page = report.write_reports(lines, ledger, folder)
     with table.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file)), page.read_text(encoding="utf-8")
 
@@ -314,9 +304,9 @@ def test_both_reports_hold_all_lines(tmp_path):
     assert read[0]["error"] == hostile
     assert read[2]["outputs"] == "a.json"
     rows = rows_of(text)
-    assert [row[COLUMNS.index("error")] for row in rows] == [printable(hostile), None, None]
-    assert rows[2][COLUMNS.index("mark") + 1] == ["a.json"]
-    sound = unquote(rows[2][COLUMNS.index("mark") + 2])
+    assert [row[report.COLUMNS.index("error")] for row in rows] == [printable(hostile), None, None]
+    assert rows[2][report.COLUMNS.index("mark") + 1] == ["a.json"]
+    sound = unquote(rows[2][report.COLUMNS.index("mark") + 2])
     assert (tmp_path / sound).resolve() == Path("/x/a.wav")
     assert text.count("</script>") == 2
     assert "default-src 'none'" in text
@@ -334,17 +324,15 @@ def test_no_text_is_a_formula(tmp_path, name):
 @pytest.mark.parametrize("recording", ["", "/\ud800.wav"])
 def test_a_recording_without_an_address_is_not_played(tmp_path, recording):
     _, page = reported(tmp_path, ["a"], {"recording": recording})
-    assert rows_of(page)[0][COLUMNS.index("mark") + 2] is None
+    assert rows_of(page)[0][report.COLUMNS.index("mark") + 2] is None
 
 
 def test_they_are_read_as_they_were_written(tmp_path):
-    marks = {
-        "a": Mark("approve", "2026-01-01"), "=1+1": Mark("redo"), 'b, "c"': Mark("redo", "-2"), "'d": Mark(""),
-        "'=e ": Mark(""),
-    }  # fmt: skip
-    write_marks(tmp_path / "marks.csv", marks)
+    names = ("a", "=1+1", 'b, "c"', "'d", "'=e ")
+    marks = dict(zip(names, map(report.Mark, ("approve", "redo", "redo", "", ""), ("2026-01-01", "", "-2", "", ""))))
+    report.write_marks(tmp_path / "marks.csv", marks)
     assert "'=1+1," in (tmp_path / "marks.csv").read_text()
-    assert read_marks(tmp_path / "marks.csv") == marks
+    assert report.read_marks(tmp_path / "marks.csv") == marks
 
 
 @pytest.mark.parametrize(
@@ -359,20 +347,23 @@ def test_they_are_read_as_they_were_written(tmp_path):
 def test_what_is_refused(tmp_path, text, said):
     (tmp_path / "marks.csv").write_text(text)
     with pytest.raises(InputError, match=said):
-        read_marks(tmp_path / "marks.csv")
+        report.read_marks(tmp_path / "marks.csv")
 
 
 def test_later_marks_are_ahead_and_may_take_back():
-    kept = {"a": Mark("approve"), "b": Mark("redo"), "c": Mark("approve")}
-    assert merge_marks(kept, {"a": Mark("redo", "2"), "b": Mark("")}) == {"a": Mark("redo", "2"), "c": Mark("approve")}
+    kept = {"a": report.Mark("approve"), "b": report.Mark("redo"), "c": report.Mark("approve")}
+    assert report.merge_marks(kept, {"a": report.Mark("redo", "2"), "b": report.Mark("")}) == {
+        "a": report.Mark("redo", "2"),
+        "c": report.Mark("approve"),
+    }
 
 
 def test_a_line_is_due_once_for_each_mark():
-    assert is_due(Mark("redo"), None)
-    assert is_due(Mark("redo"), {})
-    assert not is_due(Mark("redo"), {"redone": ""})
-    assert is_due(Mark("redo", "2"), {"redone": ""})
-    assert not is_due(Mark("approve"), {})
+    assert report.is_due(report.Mark("redo"), None)
+    assert report.is_due(report.Mark("redo"), {})
+    assert not report.is_due(report.Mark("redo"), {"redone": ""})
+    assert report.is_due(report.Mark("redo", "2"), {"redone": ""})
+    assert not report.is_due(report.Mark("approve"), {})
 
 
 def listed(folder: Path, text: str, name: str = "list.txt", kinds: tuple[str, ...] = ("json",)) -> list[BatchLine]:

@@ -18,15 +18,7 @@ from lipmotion.formats.tables import SPEECH_CURVES
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit
 from lipmotion.units import is_silent
-from lipmotion_faces.corpus.supplied import (
-    SeparateSound,
-    align_sound,
-    read_supplied_phones,
-    read_supplied_track,
-    separate_sound,
-    source_digests,
-    trim_to_shared,
-)
+from lipmotion_faces.corpus import supplied
 from meshes.flame import head
 from meshes.live_link_app import write_take
 from meshes.speech import said
@@ -105,9 +97,9 @@ def test_what_does_not_fit_is_listed_and_the_rest_goes_on(studio, tmp_path):
 def test_a_bare_array_at_another_rate_is_noticed(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((50, 2)))
     curves = MotionFile(tmp_path / "a.npy", 30.0, CHANNELS)
-    assert read_supplied_track(curves, 1.7).motion.rate_hz == 30
+    assert supplied.read_supplied_track(curves, 1.7).motion.rate_hz == 30
     with pytest.raises(InputError, match=r"50 frames at 30 Hz last 1\.67 s, the sound lasts 5\.00 s"):
-        read_supplied_track(curves, 5.0)
+        supplied.read_supplied_track(curves, 5.0)
 
 
 def recording(phones: Timeline[Unit] | None) -> SourceRecording:
@@ -119,13 +111,13 @@ def test_silence_is_named_as_recognition_names_it():
         *[(0.1, 0.2, "sp"), (0.2, 0.4, "aa"), (0.4, 0.5, "sil"), (0.5, 0.7, "m"), (0.7, 0.8, "sp")],
         *[(0.8, 1.0, "sil"), (1.0, 1.2, "b"), (1.2, float("inf"), "sil")],
     )
-    found = read_supplied_phones(recording(labelled), 1.3)
+    found = supplied.read_supplied_phones(recording(labelled), 1.3)
     assert found == said(
         *[(0.0, 0.2, "sil"), (0.2, 0.4, "aa"), (0.4, 0.5, "sp"), (0.5, 0.7, "m"), (0.7, 1.0, "sil")],
         *[(1.0, 1.2, "b"), (1.2, 1.3, "sil")],
     )
-    assert read_supplied_phones(recording(None), 1.3) is None
-    assert "phones_sha256" not in source_digests(recording(None))
+    assert supplied.read_supplied_phones(recording(None), 1.3) is None
+    assert "phones_sha256" not in supplied.source_digests(recording(None))
 
 
 @given(
@@ -137,7 +129,7 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
     edges = begin_s + np.cumsum([0, *(length for _, length in phones)])
     labelled = said(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
     duration_s = max(float(edges[-1]) + longer_s, 0.1)
-    found = read_supplied_phones(recording(labelled), duration_s)
+    found = supplied.read_supplied_phones(recording(labelled), duration_s)
     assert found[0].start_s == 0
     assert found[-1].end_s == pytest.approx(duration_s)
     assert all(a.end_s == b.start_s for a, b in zip(found, found.spans[1:], strict=False))
@@ -150,15 +142,15 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
 
 def test_labels_that_go_on_after_the_sound():
     with pytest.raises(InputError, match="are they those of another recording"):
-        read_supplied_phones(recording(said((0, 2, "aa"))), 1.8)
-    assert read_supplied_phones(recording(said((0, 2, "aa"))), 1.95) == said((0, 1.95, "aa"))
+        supplied.read_supplied_phones(recording(said((0, 2, "aa"))), 1.8)
+    assert supplied.read_supplied_phones(recording(said((0, 2, "aa"))), 1.95) == said((0, 1.95, "aa"))
 
 
 def test_a_source_is_not_touched(studio):
     item = replace(recording(said((0, 1, "aa"))), motion_file=MotionFile(studio / "a.npz"))
-    assert set(source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
-    assert source_digests(item) == source_digests(item)
-    assert source_digests(item) != source_digests(replace(item, phones=said((0, 1.001, "aa"))))
+    assert set(supplied.source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
+    assert supplied.source_digests(item) == supplied.source_digests(item)
+    assert supplied.source_digests(item) != supplied.source_digests(replace(item, phones=said((0, 1.001, "aa"))))
 
 
 def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
@@ -186,7 +178,7 @@ def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
 def test_frames_without_a_face_are_not_seen(tmp_path):
     rows = [f"10:00:{n // 60:02d}:{n % 60:02d}.000,{'1,0.5' if 30 <= n < 90 else 0}" for n in range(120)]
     (tmp_path / "a.csv").write_text("\n".join(["Timecode,BlendshapeCount,JawOpen", *rows]))
-    track = read_supplied_track(MotionFile(tmp_path / "a.csv"), 2.0)
+    track = supplied.read_supplied_track(MotionFile(tmp_path / "a.csv"), 2.0)
     assert np.flatnonzero(track.seen).tolist() == list(range(30, 90))
     assert track.motion["jawOpen"] == pytest.approx(np.where(track.seen, 0.5, 0.0))
 
@@ -239,12 +231,12 @@ def test_a_long_video_gets_the_recorders_sound_in_its_own_time(recorded_twice_fo
     recording = SourceRecording(
         "take", recorded_twice_folder / "take.wav", None, recorder=recorded_twice_folder / "take.recorder.wav"
     )
-    own, sound = read_audio(recorded_twice_folder / "take.wav"), separate_sound(recording)
+    own, sound = read_audio(recorded_twice_folder / "take.wav"), supplied.separate_sound(recording)
     assert sound is not None
-    placed = align_sound(sound, own.duration_s)
+    placed = supplied.align_sound(sound, own.duration_s)
     assert len(placed.samples) == len(own.samples)
     assert np.abs(placed.samples).argmax() == pytest.approx(np.abs(own.samples).argmax(), abs=40)
-    assert separate_sound(replace(recording, recorder=None)) is None
+    assert supplied.separate_sound(replace(recording, recorder=None)) is None
 
 
 def test_a_given_offset_is_used(recorded_twice_folder, tmp_path):
@@ -289,11 +281,11 @@ def ramp_track(frames: int) -> Track:
 def test_sound_and_motion_begin_together(late_s):
     """The sound is a ramp of its own time, as the motion is."""
     ramp = Audio((np.arange(4 * RATE_HZ) / RATE_HZ).astype(np.float32), RATE_HZ)
-    audio, found, start_s = trim_to_shared(SeparateSound(ramp, late_s, "x"), ramp_track(300))
+    audio, found, start_s = supplied.trim_to_shared(supplied.SeparateSound(ramp, late_s, "x"), ramp_track(300))
     assert found.motion.values[0, 0] == pytest.approx(start_s)
     assert audio.samples[0] == pytest.approx(start_s + late_s, abs=1 / RATE_HZ)
     assert audio.duration_s == pytest.approx(len(found.seen) / RATE, abs=1 / RATE)
-    placed = align_sound(SeparateSound(ramp, late_s, "x"), 5.0)
+    placed = supplied.align_sound(supplied.SeparateSound(ramp, late_s, "x"), 5.0)
     assert len(placed.samples) == 5 * RATE_HZ
     middle = int(1.5 * RATE_HZ)
     assert placed.samples[middle] == pytest.approx(1.5 + late_s, abs=1 / RATE_HZ)
@@ -303,7 +295,7 @@ def test_sounds_that_share_nothing_are_refused():
     ramp = Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)
     for late_s in (-20.0, 20.0, 0.9):
         with pytest.raises(ValueError, match=r"share 0\.\d\d s, required 0.5"):
-            trim_to_shared(SeparateSound(ramp, late_s, "clap"), ramp_track(300))
+            supplied.trim_to_shared(supplied.SeparateSound(ramp, late_s, "clap"), ramp_track(300))
 
 
 MESH_HZ, MESHES = 60.0, 30
