@@ -10,9 +10,9 @@ import pytest
 
 from children import LIPMOTION, child
 from cli.conftest import RunCommand
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import VISEMES, renamed, write_glb
+from pipeline.made import read_welcome
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
@@ -31,7 +31,7 @@ def test_a_file_becomes_frames_on_the_command_line(run: RunCommand, tmp_path: Pa
 
 
 def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
-    (tmp_path / "a.raw").write_bytes((read_audio(WELCOME).samples[:32_000] * 32767).astype("<i2").tobytes())
+    (tmp_path / "a.raw").write_bytes((read_welcome().samples[:32_000] * 32767).astype("<i2").tobytes())
     command = [*LIPMOTION, "live", "-i", "-", "--to", tmp_path / "a.csv"]
     with (tmp_path / "a.raw").open("rb") as sound, child(command, stdin=sound) as process:
         assert process.communicate()[0] == ""

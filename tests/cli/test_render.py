@@ -11,8 +11,6 @@ from PIL import Image
 
 from cli.conftest import RunCommand, check_refused, is_one_error
 from lipmotion import animate, load_model, read_motion, write
-from lipmotion.errors import InputError
-from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion_faces.characters.character_files import read_character
 from lipmotion_faces.characters.scene import Scene
@@ -85,10 +83,9 @@ def test_sound_and_motion_of_other_lengths(run, motion_file, toy_speech, here):
     assert len(read_motion(here / "cut.csv")[0].values) == pytest.approx(len(read_motion(motion_file)[0].values), abs=2)
 
 
-def test_motion_of_more_than_a_day_is_refused(here: Path) -> None:
+def test_motion_of_more_than_a_day_is_refused(run, here):
     (here / "long.csv").write_text("time_s,opening\n" + "".join(f"{second},0\n" for second in range(86_402)))
-    with pytest.raises(InputError, match="lasts 86401 s, required at most 86400; cut it"):
-        read_generation(here / "long.csv")
+    check_refused(run("render", "long.csv", "-o", "a.json"), 3, "lasts 86401 s, required at most 86400; cut it")
 
 
 def test_a_single_pose_is_written(run, here):

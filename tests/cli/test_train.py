@@ -9,8 +9,6 @@ import pytest
 
 from cli.conftest import check_refused, is_one_error
 from lipmotion import Corpus, Model, adapt, load_model, read_motion, save_model
-from lipmotion.formats.sound import write_sound
-from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.training.train import TrainReport
@@ -21,6 +19,7 @@ from lipmotion_faces.corpus import prepare
 from lipmotion_faces.corpus import sync as offset
 from lipmotion_faces.corpus.coverage import coverage
 from lipmotion_faces.corpus.prepare import PrepareReport
+from pipeline.made import write_sound
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 from testing.toy import toy_sentences
 
@@ -164,7 +163,7 @@ def test_motion_that_was_tracked_is_written_as_files(run, toy_corpus, here):
     done = run("corpus", "motion", toy_corpus.path, "-o", "natural", "--channels", "width,opening")
     assert done == (0, ["natural: the motion of 2 recordings"], [])
     for name in toy_corpus.names("test"):
-        tracked, motion = toy_corpus.utterance(name).track.motion, read_generation(f"natural/{name}.json").motion
+        tracked, motion = toy_corpus.utterance(name).track.motion, read_motion(f"natural/{name}.json")[0]
         assert (motion.names, motion.rate_hz) == (("width", "opening"), tracked.rate_hz)
         assert motion.values == pytest.approx(tracked.selected(("width", "opening")).values, abs=1e-4)
     check_refused(run("corpus", "motion", toy_corpus.path, "-o", "other", "--channels", "pucker"), 3, "pucker")

@@ -18,9 +18,9 @@ from lipmotion.live.consumers import live_link_packet, open_consumer, osc_packet
 from lipmotion.live.face import WEIGHT_NAMES
 from lipmotion.live.network import CausalSteps, SoundFeatures, live_network, silent_step
 from lipmotion.meshes.model.shape_names import ARKIT_52
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion_agents.conversation import Conversation
+from pipeline.made import read_welcome
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 STEP_S = 0.02
@@ -28,7 +28,7 @@ STEP_S = 0.02
 
 @pytest.fixture(scope="module")
 def sound() -> np.ndarray:
-    return read_audio(WELCOME).samples
+    return read_welcome().samples
 
 
 def all_of(stream: Stream, samples: np.ndarray, sizes: list[int]) -> list[LiveFrame]:

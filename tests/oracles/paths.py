@@ -85,8 +85,6 @@ def chain_posteriors(log_emission, log_stay, log_move):
     return posterior, stay, log_likelihood
 
 
-
-
 def path_cost(path, start, steps) -> float:
     """Return the cost of a path, which begins in a state before the first step."""
     return float(start[path[0]] + sum(steps[i, j, frame] for frame, (i, j) in enumerate(pairwise(path))))

@@ -34,15 +34,13 @@ from lipmotion.pipeline.generation import (
 )
 from lipmotion.pipeline.job import is_for_several, list_recordings, plan_outputs
 from lipmotion.pipeline.request import as_request
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
-from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import Audio, Span, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon
+from pipeline.made import features_of, read_welcome, recogniser_of
 from testing.toy import ToySentence
 
 
@@ -186,7 +184,7 @@ def test_the_option_reaches_the_request():
 @pytest.mark.long
 def test_the_words_of_english_are_known(caplog):
     pytest.importorskip("hama.asr")
-    welcome = read_audio(EXAMPLES / "welcome.flac").samples
+    welcome = read_welcome().samples
     for samples, taken in ((welcome, "taken for English"), (welcome[::-1], "not")):
         resolve_language(Request(Audio(np.tile(samples, 4), 16_000), language="auto"))
         assert taken in caplog.messages[-1]
@@ -291,7 +289,7 @@ RECOGNITION = Recognition(RECOGNISED, Timeline(()), 0.0, 0.0, None)
 
 
 def recognised(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
-    phones, features = Recogniser(model.phones, kind), analysed(sentence.audio).mfcc()
+    phones, features = recogniser_of(model, kind), features_of(sentence.audio)
     return recognise_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNITION)
 
 
@@ -315,7 +313,7 @@ def test_the_recogniser_says_what_the_engine_does_not_know(toy_model, toy_senten
 
 
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence):
-    features = analysed(toy_sentence.audio).mfcc()
+    features = features_of(toy_sentence.audio)
     found = build_speech(RecognisingEngine(), toy_sentence.audio, features, toy_sentence.units).log_f0
     assert found is not None
     np.testing.assert_allclose(found, log_f0(toy_sentence.audio), rtol=1e-5)

@@ -329,7 +329,9 @@ def test_a_recording_without_an_address_is_not_played(tmp_path, recording):
 
 def test_they_are_read_as_they_were_written(tmp_path):
     names = ("a", "=1+1", 'b, "c"', "'d", "'=e ")
-    marks = dict(zip(names, map(report.Mark, ("approve", "redo", "redo", "", ""), ("2026-01-01", "", "-2", "", ""))))
+    marks = dict(
+        zip(names, map(report.Mark, ("approve", "redo", "redo", "", ""), ("2026-01-01", "", "-2", "", "")), strict=True)
+    )
     report.write_marks(tmp_path / "marks.csv", marks)
     assert "'=1+1," in (tmp_path / "marks.csv").read_text()
     assert report.read_marks(tmp_path / "marks.csv") == marks

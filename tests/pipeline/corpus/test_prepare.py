@@ -1,3 +1,4 @@
+import json
 import os
 import shutil
 import signal
@@ -9,7 +10,6 @@ import pytest
 
 from children import NOWHERE, child
 from lipmotion import Corpus, prepare
-from lipmotion.corpora.store import read_entry
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.storage.locks import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Track
@@ -293,5 +293,6 @@ def test_real_clips_with_their_words(clips, tmp_path, capfd):
     assert found.source["licence"] == "CC BY 4.0"
     assert found.track.motion.values.shape == (75, 159)
     assert found.audio.duration_s == pytest.approx(2.978)
-    assert read_entry(Corpus.open(report.corpus).folder("bbaf2n"))["settings"]["tracker"].startswith("mediapipe 0.10.")
+    entry = json.loads((report.corpus / "utterances" / "bbaf2n" / "entry.json").read_text())
+    assert entry["settings"]["tracker"].startswith("mediapipe 0.10.")
     assert capfd.readouterr() == ("", "")

@@ -13,7 +13,6 @@ from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.formats.c3d import C3dFile, write_c3d
-from lipmotion.formats.sound import write_sound
 from lipmotion.formats.tables import SPEECH_CURVES
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit
@@ -22,7 +21,7 @@ from lipmotion_faces.corpus import supplied
 from meshes.flame import head
 from meshes.live_link_app import write_take
 from meshes.speech import said
-from pipeline.made import replace_tracking, write_noise
+from pipeline.made import replace_tracking, write_noise, write_sound
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))

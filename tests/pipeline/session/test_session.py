@@ -1,6 +1,7 @@
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from hashlib import sha256
 from threading import Barrier
 from typing import Any
 
@@ -11,7 +12,6 @@ from lipmotion import Delivery, Edits, Model, Request, Session, SessionPictures,
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
 from lipmotion.engines import Engine
 from lipmotion.errors import InputError
-from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
@@ -19,12 +19,12 @@ from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, find_excerp
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, measure_prosody
-from lipmotion.storage.sources import sha256_of
 from lipmotion.types import Audio, Constraints, Generation, Outlook, Pin, Span, Speech, Timeline, Unit
 from lipmotion.units import group_words
 from lipmotion_faces.outputs.drawn_video import sound_track
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.registry import stage_face
+from pipeline.made import write_sound
 from testing.toy import ToySentence
 
 
@@ -533,7 +533,7 @@ def test_edits_of_another_sound_are_refused(toy_speech, toy_model_file, tmp_path
     sound.write_bytes(toy_speech.read_bytes())
     file = create_edit_file(Request(sound, recogniser="own", model=toy_model_file))[0]
     write_edits(file, path)
-    assert read_edits(path).sha256 == sha256_of(toy_speech)
+    assert read_edits(path).sha256 == sha256(toy_speech.read_bytes()).hexdigest()
     other = tmp_path / "other.wav"
     other.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
     model = load_model(toy_model_file)

@@ -3,13 +3,13 @@ import shutil
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lipmotion import Model
 from lipmotion.errors import CorpusError, MissingDependencyError
-from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.training import other_speakers as module
 from lipmotion.pipeline.training.other_speakers import (
     align_recordings,
@@ -17,14 +17,13 @@ from lipmotion.pipeline.training.other_speakers import (
     make_voice_examples,
     synthesise_sentences,
 )
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import FEATURES
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import Audio, Item, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
+from pipeline.made import features_of, recogniser_of, write_sound
 from testing.formant_synthesiser import synthesise
 from testing.toy import toy_sentences
 
@@ -103,7 +102,7 @@ def test_sentences_become_training_data():
     sentences = list(synthesise_sentences(TEXTS))
     for sentence, (features, units, speaker) in zip(sentences, make_voice_examples(sentences), strict=True):
         assert features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, FEATURES)
-        assert features.values == pytest.approx(analysed(sentence.audio).mfcc().values)
+        assert features.values == pytest.approx(features_of(sentence.audio).values)
         assert units == sentence.phones
         assert speaker == sentence.speaker
 
@@ -133,8 +132,8 @@ def write(path: Path, audio: Audio, text: str | None = None) -> None:
 
 
 @pytest.fixture(scope="module")
-def own(toy_model: Model) -> Recogniser:
-    return Recogniser(toy_model.phones, "own")
+def own(toy_model: Model) -> Any:
+    return recogniser_of(toy_model)
 
 
 @pytest.fixture
@@ -189,7 +188,7 @@ def test_real_recordings(recordings, toy_model):
     if not folder.is_dir():
         pytest.skip("speech-open is not here")
     items: list[Item] = []
-    general = Recogniser(toy_model.phones, "general")
+    general = recogniser_of(toy_model, "general")
     sentences = list(align_recordings(folder, general, speakers={"sense_*": "reader"}, monitor=items.append))  # type: ignore[arg-type]
     assert len(sentences) == 11
     assert sum(s.speaker == "reader" for s in sentences) == 5

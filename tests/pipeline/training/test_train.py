@@ -23,13 +23,12 @@ from lipmotion.pipeline.training.labels import (
 )
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.train import describe_training, label_phones
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from pipeline import made
+from pipeline.made import features_of, recogniser_of
 from testing.toy import SMALL, toy_sentences, toy_utterances
 
 JOINT = engine_named("joint", {})
@@ -68,7 +67,7 @@ def test_untranscribed_utterances_are_recognised_and_used(toy_corpus, tmp_path, 
     model, report = train(mixed, recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert "1 of 8 recordings have no words: their phones are recognised" in caplog.text
-    recogniser = Recogniser(model.phones, "own")
+    recogniser = recogniser_of(model)
     found, known = (
         [span.label.phone for span in label_phones(corpus.utterance("toy05"), recogniser, Lexicon())]
         for corpus in (mixed, toy_corpus)
@@ -89,7 +88,7 @@ def test_labelled_phones_are_used_as_they_are(toy_corpus, toy_model, tmp_path):
     assert report.used == TRAINED
     assert report.skipped == {}
     assert set(model.phones.table.units) == set(toy_model.phones.table.units)
-    assert label_phones(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
+    assert label_phones(given[0], recogniser_of(model), Lexicon()) == given[0].phones
 
 
 @pytest.mark.long
@@ -99,9 +98,7 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus, tmp_path):
     assert (report.used, report.skipped) == (TRAINED, {})
     truth = labelled(toy_corpus.utterance("toy11"))
     assert truth.phones is not None
-    recognised = [
-        s.label.phone for s in label_phones(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())
-    ]
+    recognised = [s.label.phone for s in label_phones(replace(truth, phones=None), recogniser_of(model), Lexicon())]
     assert np.mean([span.label.phone in recognised for span in truth.phones]) > 0.8
 
 
@@ -177,7 +174,7 @@ def test_camera_frames_become_model_frames():
 def others() -> Iterator[VoiceExample]:
     """Two speakers of whom nothing was seen."""
     for number, sentence in enumerate(toy_sentences(4)):
-        yield VoiceExample(analysed(sentence.audio).mfcc(), sentence.units, ("bert", "anna")[number % 2])
+        yield VoiceExample(features_of(sentence.audio), sentence.units, ("bert", "anna")[number % 2])
 
 
 def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus):
@@ -438,7 +435,7 @@ def test_figures_of_both(models, toy_model, toy_corpus):
 
 def test_originals_are_the_projected_pictures(models, toy_corpus):
     model = load_model(models[BOTH])
-    found = load_held_out(toy_corpus, Recogniser(model.phones, "own"), visual=model.visual, eigenlips=model.eigenlips)
+    found = load_held_out(toy_corpus, recogniser_of(model), visual=model.visual, eigenlips=model.eigenlips)
     assert found.channels == ("opening", "width", "outer", *(channel.name for channel in model.eigenlips.channels))
     made = generate_clips(found, "with transcript", model.engine, model.learned)
     for clip, name in zip(made, toy_corpus.names("test"), strict=True):
