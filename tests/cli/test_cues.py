@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from children import LIPMOTION, child
 from cli.conftest import Done, RunCommand, check_refused
 from lipmotion import animate, cues, load_model, write_cues
 from lipmotion.cli.command_line import parser
-from lipmotion.cli.main import main
 from lipmotion.pipeline.outputs.cues import cue_text
 
 
@@ -131,10 +131,11 @@ def test_warnings_are_status_lines_too(run, basics):
     assert logging.getLogger().handlers == handlers
 
 
-@pytest.mark.usefixtures("_piped_speech")
-def test_sound_from_a_pipe_is_not_named(here, toy_model_file):
+def test_sound_from_a_pipe_is_not_named(here, toy_speech, toy_model_file):
     """Its file is temporary, and gone when the cues are opened."""
-    assert main(["cues", "-", "--model", str(toy_model_file), "-o", "a.json", "a.xml"]) == 0
+    command = [*LIPMOTION, "cues", "-", "--model", toy_model_file, "-o", "a.json", "a.xml"]
+    with toy_speech.open("rb") as sound, child(command, stdin=sound) as process:
+        assert process.wait() == 0
     assert json.loads((here / "a.json").read_text())["metadata"]["soundFile"] == ""
     assert "<soundFile></soundFile>" in (here / "a.xml").read_text()
 
@@ -290,13 +291,12 @@ def test_a_wrong_line_is_a_message_too(rhubarb):
     assert "--bogus" in failure["reason"]
 
 
-def test_under_its_name(rhubarb, monkeypatch, capsys):
+def test_under_its_name(run_outside):
     """As a link of that name, for programs that look for the program itself."""
-    assert rhubarb("--help").code == 0
-    monkeypatch.setattr(sys, "argv", ["/usr/bin/rhubarb", "--machineReadable", "missing.wav"])
-    capsys.readouterr()
-    assert main() == 3
-    assert json.loads(capsys.readouterr().err.splitlines()[-1])["type"] == "failure"
+    named = "import sys; sys.argv[0] = '/usr/bin/rhubarb'; from lipmotion.cli.main import main; sys.exit(main())"
+    done = run_outside("--machineReadable", "missing.wav", program=(sys.executable, "-c", named))
+    assert done.code == 3
+    assert json.loads(done.err[-1])["type"] == "failure"
 
 
 @pytest.mark.parametrize("verb", ["animate", "words", "cues"])

@@ -6,7 +6,6 @@ import pytest
 
 from cli.conftest import check_refused
 from lipmotion import load_face, save_face
-from lipmotion_faces.film import build
 from pipeline.film.toy_footage import ToyVideo, install, write_videos
 from speech import stand_in_voice
 
@@ -21,8 +20,7 @@ def videos(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, ToyVideo]:
 @pytest.fixture
 def tracker(videos: dict[Path, ToyVideo], monkeypatch: pytest.MonkeyPatch) -> Path:
     """Installs a tracker without errors; returns the folder of the videos."""
-    install(monkeypatch, videos, {})
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
+    install(monkeypatch, videos, {}, 5.0)
     return next(iter(videos)).parent
 
 

@@ -1,6 +1,5 @@
 import argparse
 import ast
-import io
 import json
 import os
 import re
@@ -13,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from children import LIPMOTION, child
 from cli.conftest import check_refused, is_one_error
 from lipmotion import Job, Outputs, Request, read_motion
 from lipmotion.cli import command_line
 from lipmotion.cli.arguments.declared import part_of
-from lipmotion.cli.main import main
 from lipmotion.pipeline.job import DETAILS
 from lipmotion.types import Delivery, Staging
 from meshes.heads import head, write_glb
@@ -303,24 +302,22 @@ def test_a_character_of_several(run, takes, toy_model_file, here):
     assert read_motion(here / "out" / "b.json")[0].names[0] == "jawOpen"
 
 
-@pytest.mark.usefixtures("_piped_speech")
-def test_standard_input_and_output(toy_model_file, here, monkeypatch):
-    written = io.BytesIO()
-    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written))
-    words = ["animate", "-", "--model", str(toy_model_file), "-o", "-", "a.csv", "a.json", "--format", "csv"]
-    assert main(words) == 0
-    assert written.getvalue() == (here / "a.csv").read_bytes()
+def test_standard_input_and_output(toy_model_file, toy_speech, here):
+    words = ["animate", "-", "--model", toy_model_file, "-o", "-", "a.csv", "a.json", "--format", "csv"]
+    with (
+        toy_speech.open("rb") as sound,
+        (here / "out").open("wb") as out,
+        child([*LIPMOTION, *words], stdin=sound, stdout=out) as process,
+    ):
+        assert process.wait() == 0
+    assert (here / "out").read_bytes() == (here / "a.csv").read_bytes()
     assert json.loads((here / "a.json").read_text())["source"] == {}
 
 
-@pytest.mark.usefixtures("here")
-def test_events_go_to_standard_error_beside_motion(run, toy_model_file, toy_speech, monkeypatch):
-    kept = io.BytesIO()
-    monkeypatch.setattr("lipmotion.cli.arguments.paths.write_bytes", lambda path: kept.write(path.read_bytes()))
-    done = run("animate", toy_speech, "--model", toy_model_file, "-o", "-", "--machine-readable")
-    assert (done.code, done.out) == (0, [])
+def test_events_go_to_standard_error_beside_motion(run_outside, toy_model_file, toy_speech):
+    done = run_outside("animate", toy_speech, "--model", toy_model_file, "-o", "-", "--machine-readable")
     assert [json.loads(line)["type"] for line in done.err][0 :: len(done.err) - 1] == ["start", "success"]
-    assert json.loads(kept.getvalue())["format"] == "lipmotion.motion"
+    assert json.loads("\n".join(done.out))["format"] == "lipmotion.motion"
 
 
 @pytest.mark.skipif(not Path("/dev/fd").is_dir(), reason="no files of open pipes")

@@ -160,16 +160,6 @@ def test_names_of_phones():
         assert find_phone(phone + "!9") is None
 
 
-def test_a_file_that_cannot_be_read(tmp_path, monkeypatch):
-    def refused(_path: Path) -> bytes:
-        raise PermissionError(13, "Permission denied")
-
-    (tmp_path / "a.lab").touch()
-    monkeypatch.setattr(Path, "read_bytes", refused)
-    with pytest.raises(InputError, match=r"a\.lab: not a readable label \(Permission denied"):
-        find_labels(tmp_path / "a.mp4")
-
-
 def test_files_beside_a_recording(tmp_path):
     recording = tmp_path / "a.mp4"
     assert find_labels(recording).words is None

@@ -14,7 +14,6 @@ from lipmotion import Model, Request, adapt, animate, load_model, save_model
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.model import hmm_to_arrays
 from lipmotion.motion.eigenlips import eigenlips_to_arrays
-from lipmotion.pipeline import model as module
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.model import VERSION, read_header, shipped_path
 from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
@@ -86,12 +85,6 @@ def test_models_of_engines_are_one_short_line(fixture, request):
 
 def test_the_shipped_model_is_read_once():
     assert load_model() is load_model()
-
-
-def test_a_package_without_a_model_says_so(monkeypatch, tmp_path):
-    monkeypatch.setattr(module, "shipped_path", lambda: tmp_path / "grid-s1.lipmotion")
-    with pytest.raises(ModelFormatError, match="the package holds no model; install it again, or give one"):
-        animate(Audio(np.zeros(16_000, np.float32), 16_000))
 
 
 def test_a_model_with_the_former_names_of_options_is_read(toy_model_file, tmp_path):

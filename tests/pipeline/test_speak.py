@@ -78,19 +78,6 @@ def test_the_sound_is_silent_where_the_units_are(spoken):
     assert loud["aa"] > 5 * loud["sil"]
 
 
-def test_sentences_go_to_the_synthesiser_a_few_at_a_time(
-    stand_in: None,  # noqa: ARG001
-    toy_model: Model,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    with monkeypatch.context() as few:
-        few.setattr(module, "SENTENCES_PER_RUN", 2)
-        together = speak("See Bob. Mama. Papa. See. Bob.", model=toy_model)
-    again = speak("See Bob. Mama. Papa. See. Bob.", model=toy_model)
-    assert np.array_equal(together.sound.samples, again.sound.samples)
-    assert np.array_equal(together.generation.motion.values, again.generation.motion.values)
-
-
 def test_pins_hold(stand_in: None, toy_model: Model) -> None:  # noqa: ARG001
     told = Constraints((Pin(0.5, "opening", 0.07),))
     result = speak(TEXT, model=toy_model, constraints=told).generation

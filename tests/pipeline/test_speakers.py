@@ -28,7 +28,7 @@ from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.generate.explain import chain_posteriors
 from lipmotion.pipeline.request import Onto
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, ReducedVariance, Track, Utterance
+from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
 from pipeline import made
 from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
@@ -76,17 +76,6 @@ def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model, toy_senten
 def test_variances_are_in_the_units_of_the_person(model, toy_sentence):
     mean, ben = (animate(request(toy_sentence, name), model=model) for name in ("", "ben"))
     np.testing.assert_allclose(ben.variance, mean.variance * np.square(model.speakers.of("ben").gain))
-
-
-def test_variances_of_long_recordings(model, toy_sentence, monkeypatch):
-    exact = animate(request(toy_sentence, "ben"), model=model)
-    monkeypatch.setattr("lipmotion.motion.generation.DOUBLE_FRAMES", 10)
-    single = animate(request(toy_sentence, "ben"), model=model)
-    assert isinstance(single.spread, ReducedVariance)
-    assert isinstance(exact.spread, ReducedVariance)  # passages are short, and silence between them lasts for hours
-    assert single.motion.values.dtype == np.float32
-    np.testing.assert_allclose(single.variance, exact.variance, rtol=1e-4)
-    np.testing.assert_allclose(single.motion.values, exact.motion.values, atol=1e-5)
 
 
 def test_pins_hold_in_the_units_of_the_person(model, toy_sentence):

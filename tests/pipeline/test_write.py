@@ -18,7 +18,6 @@ from lipmotion.articulation.delivery import close_on_frame_grid
 from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import ExportError, InputError
-from lipmotion.extensions import Registry
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.pipeline.outputs import output
 from lipmotion.pipeline.outputs.cues import CueOutput, cue_text
@@ -208,11 +207,12 @@ def test_cues_beside_other_outputs_are_those_of_the_function(result, tmp_path):
 
 
 def test_a_kind_of_a_package_is_written_beside_others(result, tmp_path, monkeypatch):
-    kinds = {**output.OUTPUTS.built_in, "words": f"{__name__}:WordOutput", "wrong": f"{__name__}:settings"}
-    monkeypatch.setattr(output, "OUTPUTS", Registry("output", "lipmotion.outputs", kinds))
+    kinds = output.OUTPUTS.built_in
+    monkeypatch.setitem(kinds, "words", f"{__name__}:WordOutput")
+    monkeypatch.setitem(kinds, "wrong", f"{__name__}:settings")
     with pytest.raises(InputError, match="is called an output, 'wrong', by an installed package"):
         write(result, tmp_path / "a.words.csv")
-    del kinds["wrong"]
+    monkeypatch.delitem(kinds, "wrong")
     write(result, [tmp_path / "a.words.csv", tmp_path / "a.json"])
     assert (tmp_path / "a.words.csv").read_text().split() == [span.label.phone for span in result.units]
     silent = replace(result, units=type(result.units)(()))

@@ -13,7 +13,6 @@ import pytest
 from lipmotion import Job, Outputs, Request
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch import BatchLine, read_lines, report
-from lipmotion.pipeline.batch import ledger as settings
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     LARGEST_RECORD_BYTES,
@@ -239,14 +238,6 @@ def test_settings_have_a_fingerprint(tmp_path):
     assert fingerprint_job(drawn) == before
     (tmp_path / "A.png").write_text("another one")
     assert fingerprint_job(drawn) != before
-
-
-def test_a_line_without_the_recogniser_of_phones_is_another_one(monkeypatch):
-    found = set()
-    for name in ("hama", None):
-        monkeypatch.setattr(settings, "installed_phone_recogniser", lambda name=name: name)
-        found.add(fingerprint_job(Job()))
-    assert len(found) == 2
 
 
 @pytest.mark.parametrize("kinds", [(), ("wav",), ("json", "json"), ("cues.json5",), ("",)])
