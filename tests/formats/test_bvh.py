@@ -72,7 +72,7 @@ def test_hierarchy_and_motion(talking_bvh, written_bvh):
     assert lines.count("{") + sum(line.strip() == "{" and line != "{" for line in lines) == 1 + 2 * 52
     channels = sum(int(line.split()[1]) for line in lines if line.strip().startswith("CHANNELS"))
     at = lines.index("MOTION")
-    assert lines[at + 1 : at + 3] == [f"Frames: {FRAMES}", "Frame Time: 0.020000000"]
+    assert lines[at + 1 : at + 3] == [f"Frames: {BVH_FRAMES}", "Frame Time: 0.020000000"]
     rows = np.array([list(map(float, line.split())) for line in lines[at + 3 :]])
     assert rows.shape == (BVH_FRAMES, channels)
     assert not rows[:, :6].any()
