@@ -37,7 +37,7 @@ def stopping_after(events: int) -> Monitor:
     return monitor
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def few_utterances(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process has one of them to do, and a checkpoint two."""
     monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
@@ -83,6 +83,7 @@ def whole(corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("few_utterances")
 def test_stopped_after_any_event(corpus, whole, work, tmp_path):
     count = len(create_events(corpus))
     assert count > 15
@@ -137,6 +138,7 @@ def test_a_damaged_checkpoint_is_not_used(corpus, whole, work, tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("few_utterances")
 def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monkeypatch):
     """Neither this process's own nor those that the processes it starts would use."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
@@ -146,6 +148,7 @@ def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monk
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("few_utterances")
 def test_stopped_in_two_processes(corpus, whole, work, tmp_path):
     before = set(multiprocessing.active_children())
     with pytest.raises(Stopped):
