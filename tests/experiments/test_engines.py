@@ -17,8 +17,7 @@ from lipmotion import Corpus, Selection, evaluate, load_model, train
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.testing import CHANNELS, speech, timeline
 from lipmotion.testing import examples as sentences
-from lipmotion.types import Example, Progress, silent_monitor
-from lipmotion_lab import baselines as network
+from lipmotion.types import Example, Progress, TokenPosteriors, silent_monitor
 from lipmotion_lab import learning_curve as module
 from lipmotion_lab.baselines import REACH, BlstmBaseline, ContextRidge, FrameRegressionModel, MeanPose
 from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines
@@ -132,17 +131,14 @@ def test_recordings_of_the_training_are_not_compared(toy_corpus):
             engines(toy_corpus, split=split, settings=SETTINGS)
 
 
-def fit_blstm(examples: list[Example], epochs: int, seed: int = 0) -> FrameRegressionModel:
-    pytest.importorskip("torch", reason="the extra 'network' is not installed")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(network, "EPOCHS", epochs)
-        patch.setattr(network, "LEAST_STEPS", 1)
-        return BlstmBaseline(seed).fit(examples, silent_monitor).model
+def fitted(examples: list[Example], **options: float) -> FrameRegressionModel:
+    return BlstmBaseline(cells=32, **options).fit(examples, silent_monitor).model
 
 
+@pytest.mark.long
 def test_held_out_motion_is_predicted(examples):
     held_out = sentences(14, seed=5)[-1]
-    result = BlstmBaseline().generate(fit_blstm(examples, 40), held_out.speech)
+    result = BlstmBaseline().generate(fitted(examples, rate=1e-2), held_out.speech)
     assert result.motion.channels == CHANNELS
     assert result.motion.values.shape == result.variance.shape == held_out.motion.values.shape
     for name in ("opening", "width"):
@@ -150,11 +146,20 @@ def test_held_out_motion_is_predicted(examples):
     assert result.motion["opening"].max() < 1  # values of frames that are not valid are not learned
 
 
-def test_the_same_seed_gives_the_same(examples):
-    one, same, other = (fit_blstm(examples, 1, seed) for seed in (0, 0, 1))
-    made = [BlstmBaseline().generate(each, examples[0].speech).motion.values for each in (one, same, other)]
+def test_the_same_seed_gives_the_same_and_all_that_is_heard_counts(examples):
+    heard = []
+    for one in examples[:3]:
+        frames, draw = len(one.speech.features.values), np.random.default_rng(0).normal
+        said = TokenPosteriors(draw(size=(-(-frames // 2), 200)).astype(np.float16), "a test", 1.0)
+        speech = replace(one.speech, posteriors=said, encoding=draw(size=(frames, 64)).astype(np.float16))
+        heard.append(replace(one, speech=speech))
+    models = [fitted(each, seed=seed, steps=0.1) for seed, each in ((0, heard), (0, heard), (1, heard))]
+    made = [BlstmBaseline().generate(each, heard[0].speech).motion.values for each in models]
     assert np.array_equal(made[0], made[1])
     assert not np.allclose(made[0], made[2])
+    assert models[0].learned.network.parameters[0].shape[1] == 4 * 39 + 2 * 120 + 64
+    deaf = replace(heard[0].speech, encoding=-heard[0].speech.encoding)
+    assert not np.allclose(made[0], BlstmBaseline().generate(models[0], deaf).motion.values)
 
 
 BASELINES: list[type] = [MeanPose, ContextRidge]

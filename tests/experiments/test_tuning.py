@@ -12,18 +12,18 @@ from lipmotion.measures import curves
 from lipmotion.testing import examples
 from lipmotion.types import silent_monitor
 from lipmotion_lab.evaluation.held_out import HeldOutRecordings, generate_clips, load_held_out
+from lipmotion_lab.xie_liu2007 import systems
 from lipmotion_lab.xie_liu2007.systems import (
-    CONVERSIONS,
     Trial,
-    TuningOptions,
     best_trial,
     choose_by,
     judge_systems,
-    list_alternatives,
     list_changed_options,
+    measure_clips,
     search_settings,
     split_while_better,
     train_stages,
+    tune_network,
 )
 from pipeline.made import recogniser_of
 
@@ -56,13 +56,9 @@ def test_parameters_are_counted_by_hand():
 
 
 @pytest.mark.long
-def test_every_conversion_is_judged_by_the_correlation_of_what_it_makes(validation):
-    systems = [*train_stages(SMALL, examples(3))]
-    found = [*judge_systems(iter(systems), validation, CONVERSIONS)]
-    assert [(system.engine.config.start, system.engine.config.steps) for _, system in found] == [
-        ("viterbi", 3),
-        ("soft", 1),
-    ]
+def test_systems_are_judged_by_the_correlation_of_what_they_make(validation):
+    found = [*judge_systems(train_stages(SMALL | {"mixtures": 2}, examples(3)), validation)]
+    assert [trial.options["mixtures"] for trial, _ in found] == [1, 2]
     for trial, system in found:
         made = generate_clips(validation, "audio only", system.engine, system.model)
         generated, original = [clip.generated for clip in made], [clip.original for clip in made]
@@ -70,7 +66,18 @@ def test_every_conversion_is_judged_by_the_correlation_of_what_it_makes(validati
         assert trial.amse == pytest.approx(curves.mean_distance(generated, original))
     best = choose_by(lambda trial: -trial.amse, found)
     assert best.tried == tuple(trial for trial, _ in found)
-    assert best.engine.config.start == min(found, key=lambda pair: pair[0].amse)[1].engine.config.start
+    assert best.engine is min(found, key=lambda pair: pair[0].amse)[1].engine
+
+
+@pytest.mark.long
+def test_the_network_with_the_best_settings_is_chosen(validation, monkeypatch):
+    monkeypatch.setattr(systems, "NETWORK_SETTINGS", ([{"cells": 8, "steps": 1.0, "rate": 1e-9}], [{"rate": 1e-2}]))
+    found = tune_network(examples(3), validation, silent_monitor)
+    assert [trial.options["rate"] for trial in found.tried] == [1e-9, 1e-2]
+    best = best_trial(found.tried)
+    assert best.options["rate"] == found.engine.rate
+    made = generate_clips(validation, "audio only", found.engine, found.model)
+    assert measure_clips(made) == pytest.approx((best.acc, best.amse))
 
 
 def test_one_setting_after_another_from_the_best_so_far():
@@ -96,22 +103,6 @@ def test_one_setting_after_another_from_the_best_so_far():
 def test_gaussians_are_split_while_that_is_better():
     found = [(Trial({}, acc, 0.0, 0), None) for acc in (0.5, 0.6, 0.6, 0.9)]
     assert [*split_while_better(found)] == found[:3]
-
-
-def test_what_is_tried_for_which_structure():
-    names = {
-        system: [
-            *dict.fromkeys(
-                name for kind in list_alternatives(options, TuningOptions()) for each in kind for name in each
-            )
-        ]
-        for system, options in SYSTEMS.items()
-    }
-    assert names["ph-HMM"] == ["audio_weight", "mixtures", "states"]
-    multistream = ["audio_weight", "mixtures", "visual_mixtures"]
-    assert names["ph-MSHMM"] == [*multistream, "states"]
-    assert names["ph-vi-CHMM"] == [*multistream, "moves_together", "states"]
-    assert names["ph-FHMM"] == ["audio_weight", "mixtures", "unseen_loss", "start_asynchrony", "states"]
 
 
 def test_options_are_told_where_they_are_not_those_printed():

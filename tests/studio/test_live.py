@@ -209,6 +209,24 @@ def studio(monkeypatch, tmp_path):
         server.shutdown()
 
 
+@pytest.mark.parametrize("wrong", ["{", "[5]", '{"requestID": ID}', '{"requestID": ID, "messageType": "a", "data": 5}'])
+def test_what_does_not_reply_as_vtube_studio_is_asked_again(monkeypatch, tmp_path, wrong):
+    monkeypatch.setattr(vtube, "AGAIN_S", 0.01)
+    monkeypatch.setattr(vtube, "cache_folder", lambda: tmp_path)
+    (tmp_path / "vtube-studio.token").write_bytes(b"\xff")  # damaged
+    requests: Queue[dict[str, Any]] = Queue()
+
+    def handle(connection):
+        requests.put(json.loads(connection.recv()))
+        connection.send(wrong.replace("ID", json.dumps(requests.queue[-1]["requestID"])))
+        connection.recv()
+
+    with serve(handle, "127.0.0.1", 0) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        with open_consumer(f"vtube:127.0.0.1:{server.socket.getsockname()[1]}", print):
+            assert {requests.get(timeout=30)["messageType"] for _ in range(3)} == {"AuthenticationTokenRequest"}
+
+
 def test_vtube_studio_is_asked_once_and_gets_the_newest_frame(studio, tmp_path):
     port, requests = studio
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -20,8 +19,8 @@ from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
-from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
-from lipmotion.pipeline.workers import worker_pool
+from lipmotion.pipeline.training.train import phones_and_examples
+from lipmotion.pipeline.workers import training_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
 from lipmotion.storage.archive import Checkpoint
@@ -43,49 +42,41 @@ from lipmotion_lab.learning_curve import check_training_names, choose_sizes
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
     ALL_PATHS,
+    BLSTM,
     COMPARED_SYSTEMS,
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     SPLIT,
-    TUNED,
-    TUNING,
     TrainedSystem,
-    Trial,
-    TuningOptions,
     as_row,
+    best_trial,
     list_changed_options,
     select_systems,
     system_from_arrays,
     system_to_arrays,
     train_system,
-    tune_options,
     with_inputs_of,
 )
-
-TRIALS = "trials"
 
 
 @dataclass(frozen=True)
 class ComparisonOptions:
     """Which systems are compared, and in which conditions.
 
-    tuning      : how the settings of tuned systems are chosen, on the list ``val``
+    mixtures    : most Gaussians a state where their number is chosen, on the list ``val``
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
     """
 
     systems: Sequence[str] | None = None
-    tuning: TuningOptions = TUNING
+    mixtures: int = 8
     visual: str = GEOMETRY
     transcripts: bool = False
 
 
 DEFAULT_OPTIONS = ComparisonOptions()
 QUICK = ComparisonOptions(
-    systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"],
-    tuning=TuningOptions(
-        clips=runner.QUICK_CLIPS["train"], judges=runner.QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
-    ),
+    systems=[*PAPER_FIGURES, *(name + SPLIT for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"], mixtures=2
 )
 """A small comparison, for the recordings of ``runner.take_quick_part``; conversion by factorial chains is slow."""
 
@@ -105,19 +96,16 @@ def xieliu2007(  # noqa: PLR0913
     """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
 
     order, sizes : train on the first N names of a list, as in ``learning_curve``; by default on all of ``train``
-    The phones in time are computed once for each size and are the same for all systems. The settings of tuned systems
-    are chosen on the list ``val``, with systems trained on the first recordings of the list; then their number of
-    Gaussians, and whether they are better than those printed, with systems of the size itself.
+    The phones in time are computed once for each size and are the same for all systems.
     Raises InputError: no such system, or sizes that the list does not have.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
-    Raises MissingDependencyError: a system or the pictures need a package that is not installed.
+    Raises MissingDependencyError: the pictures need a package that is not installed.
     Raises ExportError: the pictures cannot be written.
     """
     names, seed = select_systems(options.systems), settings.seed
     check_visual(options.visual)
-    tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
     listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), seed)
-    chosen_on_val = tunes or any(COMPARED_SYSTEMS[name].splits for name in names)
+    chosen_on_val = any(COMPARED_SYSTEMS[name].splits for name in names)
     held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
     check_training_names(corpus, listed, (*held_out, *validation))
     steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
@@ -127,14 +115,11 @@ def xieliu2007(  # noqa: PLR0913
     if plots is not None:
         check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
-    shares = np.cumsum([0.3 * sum(steps), *steps]) / (1.3 * sum(steps))
-    trials = (
-        setup.tune(tunes, listed, sub_monitor(settings.monitor, 0, float(shares[0]), "choosing: ")) if tunes else {}
-    )
+    shares = np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
-    for count, (start, stop) in zip(steps, pairwise(shares), strict=False):
+    for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
         part = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
-        trained = setup.train(names, listed[:count], trials, part)
+        trained = setup.train(names, listed[:count], part)
         kept = setup.checkpoint(listed[:count], held_out)
         rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
     recordings = trained.recordings
@@ -143,13 +128,7 @@ def xieliu2007(  # noqa: PLR0913
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "visual": options.visual}
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
-    chosen: dict[str, Any] = {
-        "clips": options.tuning.clips,
-        "judges": options.tuning.judges,
-        "validation": len(validation),
-    }
-    chosen |= {"tried": {name: [as_row(trial) for trial in tried] for name, tried in trials.items()}}
-    return nan_as_null(about | {"tuning": chosen, "rows": rows})
+    return nan_as_null(about | {"validation": len(validation), "rows": rows})
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,25 +149,7 @@ class _TrainingSetup:
     settings: runner.ExperimentSettings
     work: Path | None
 
-    def tune(self, systems: Sequence[str], listed: Sequence[str], monitor: Monitor) -> dict[str, list[Trial]]:
-        """Return what was tried for each of some systems of the paper, trained on the first names of a list."""
-        names = listed[: self.options.tuning.clips]
-        examples, recordings = self._prepared(names, (), sub_monitor(monitor, 0, 0.2))
-        trials = {}
-        for number, name in enumerate(systems):
-            part = sub_monitor(monitor, 0.2 + 0.8 * number / len(systems), 0.2 + 0.8 * (number + 1) / len(systems))
-            kept, stage = self.checkpoint(names), f"trials-{name}"
-            found = kept.load(stage)
-            if found is None:
-                tried = tune_options(name, examples, recordings["val"], self.options.tuning, part)
-                found = {TRIALS: np.array(json.dumps([asdict(trial) for trial in tried]))}
-                kept.save(stage, found)
-            trials[name] = [Trial(**trial) for trial in json.loads(str(found[TRIALS]))]
-        return trials
-
-    def train(
-        self, systems: Sequence[str], names: Sequence[str], trials: Mapping[str, Sequence[Trial]], monitor: Monitor
-    ) -> _TrainedSystems:
+    def train(self, systems: Sequence[str], names: Sequence[str], monitor: Monitor) -> _TrainedSystems:
         """Return systems, trained on the same phones of the utterances ``names``."""
         examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
         kept, trained = self.checkpoint(names), dict[str, TrainedSystem]()
@@ -200,8 +161,7 @@ class _TrainingSetup:
                 trained[name] = system_from_arrays(found)
                 continue
             known = with_inputs_of(name, examples, self.corpus)
-            validation, tuning = recordings.get("val"), self.options.tuning
-            trained[name] = train_system(name, known, validation, trials, trained, tuning, part)
+            trained[name] = train_system(name, known, recordings.get("val"), trained, self.options.mixtures, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 found = system_to_arrays(trained[name])
                 kept.save(f"system-{name}", found)
@@ -217,10 +177,10 @@ class _TrainingSetup:
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
         eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
-        with worker_pool(min(self.settings.workers, len(utterances) // UTTERANCES_PER_WORKER)) as team:
-            phones, examples, _ = phones_and_examples(
-                utterances, config, lexicon, sub_monitor(monitor, 0, 0.7), self.checkpoint(names), team.ordered_map
-            )
+        with training_pool(self.settings.workers, len(utterances)) as each:
+            checkpoint = replace(self.checkpoint(names), parallel_map=each)
+            learning = sub_monitor(monitor, 0, 0.7)
+            phones, examples, _ = phones_and_examples(utterances, config, lexicon, learning, checkpoint)
         read = partial(load_held_out, self.corpus, cached_recogniser(phones), lexicon=lexicon)
         read = partial(read, visual=visual, eigenlips=eigenlips)
         parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
@@ -233,7 +193,7 @@ class _TrainingSetup:
 
     def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
-        everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.tuning), *compared))
+        everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.mixtures), *compared))
         key = runner.PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
         return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
@@ -252,6 +212,8 @@ def _size(
     for name, system in systems.items():
         row: dict[str, Any] = {"seconds": system.seconds, "parameters": None, "options": None}
         row["tried"] = [*map(as_row, system.tried)]
+        if name == BLSTM and system.tried:
+            row |= {key: getattr(best_trial(system.tried), key) for key in ("parameters", "options")}
         if isinstance(system.model, CoupledModel):
             row |= {"parameters": system.model.chains.parameters, "options": list_changed_options(system.engine.config)}
         training[name] = row
@@ -286,14 +248,14 @@ def _paper_pairs(
     """Return how much better each system of the paper is than each that is worse in print, on the same clips."""
     by_acc = sorted(PAPER_FIGURES, key=lambda name: -PAPER_FIGURES[name][1])
     rows = []
-    for ending in ("", SPLIT, TUNED):
+    for ending in ("", SPLIT):
         compared = [name + ending for name in by_acc if name + ending in made]
         pairs = [*combinations(compared, 2)]
         if not ending:
             pairs += [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
             pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
         pairs = [pair for pair in pairs if {*pair} <= made.keys()]
-        statistics = {name: _statistics(recordings, made[name]) for pair in pairs for name in pair}
+        statistics = {name: evaluate.clip_statistics(recordings, made[name]) for pair in pairs for name in pair}
         for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
@@ -305,11 +267,11 @@ def _paper_pairs(
 
 def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
-    reference, rows = _statistics(recordings, made[REFERENCE_SYSTEM]), {}
+    reference, rows = evaluate.clip_statistics(recordings, made[REFERENCE_SYSTEM]), {}
     for system, clips in made.items():
         figures = evaluate.figures_of(clips, recordings, seed)
         row: dict[str, Any] = {}
-        for name, statistic in _statistics(recordings, clips).items():
+        for name, statistic in evaluate.clip_statistics(recordings, clips).items():
             row[name], row[f"{name}_95"] = statistic.value, statistic.interval(seed)
             row[f"{name}_gain_95"] = statistic.gain(reference[name], seed)
         still = not varies(np.concatenate([clip.generated for clip in clips])).any()
@@ -319,19 +281,3 @@ def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[Compared
             row["opening"] = runner.opening_row_with_rates(figures) | {"rmse": rmse}
         rows[system] = row
     return rows
-
-
-def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, evaluate.ClipStatistic]:
-    """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; and the ACC of the opening."""
-    pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
-    parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
-    statistics = {}
-    for part, columns in parts.items():
-        if columns.any():
-            generated = [clip.generated[:, columns] for clip in made]
-            original = [clip.original[:, columns] for clip in made]
-            statistics[f"{part}amse"] = evaluate.distance_statistic(generated, original)
-            statistics[f"{part}acc"] = evaluate.correlation_statistic(generated, original)
-    if OPENING in recordings.channels:
-        statistics["opening_acc"] = evaluate.correlation_statistic(*evaluate.opening_curves(recordings, made))
-    return statistics

@@ -1,4 +1,4 @@
-"""The systems of Xie & Liu 2007, Table 3, with their tuning, the engines of this project beside them, and baselines."""
+"""The systems of Xie & Liu 2007, Table 3, the engines of this project beside them, and baselines."""
 
 from __future__ import annotations
 
@@ -12,51 +12,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.engines import Animator, Engine, engine_named
+from lipmotion.engines import Animator, engine_named
 from lipmotion.engines.coupled.arrays import coupled_arrays
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, SYSTEMS, UNSEEN_LOSS
+from lipmotion.engines.coupled.chains.structures import HMM, SYSTEMS, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import growing_models
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
-from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose, import_torch
+from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
-from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
+from lipmotion_lab.evaluation.held_out import (
+    AUDIO_ONLY,
+    ComparedClip,
+    HeldOutRecordings,
+    generate_clips,
+    generate_compared,
+    make_speech,
+)
 
 Options = Mapping[str, Any]
 TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
 """Factorial chains that are tied together: rare joint states lose 10 nats, and the chains begin a state apart."""
 TOGETHER = {"moves_together": True}
-CONVERSIONS: tuple[Options, ...] = ({"start": "viterbi", "steps": 3}, {"start": "soft", "steps": 1})
-"""Conversions by EM that are tried: from the best path to where it converges, and one step from all paths."""
-
-
-@dataclass(frozen=True)
-class TuningOptions:
-    """What is tried, one kind of setting after another, each from the best before.
-
-    clips           : number of recordings to train on while settings are tried
-    judges          : number of recordings of the list ``val`` by which they are judged
-    mixtures        : most Gaussians a state, of speech; 1, 2, 4, … are tried
-    visual_mixtures : Gaussians a state of lips, then
-    pair_mixtures   : most Gaussians of factorial chains, whose densities are those of pairs of states
-    split           : most Gaussians a state where their number alone is chosen, of both streams and of speech only
-    states          : a unit
-    """
-
-    clips: int = 50
-    judges: int = 8
-    weights: tuple[float, ...] = (1.0, 0.3, 0.1)
-    mixtures: int = 8
-    visual_mixtures: int = 2
-    pair_mixtures: int = 1
-    split: int = 8
-    states: tuple[int, ...] = (3,)
-
-
-TUNING = TuningOptions()
+NETWORK_SETTINGS: tuple[Sequence[Options], ...] = (
+    [{"rate": rate} for rate in (4e-3, 2e-3, 8e-3)],
+    [{"cells": 192}],
+    [{"steps": 100.0}],
+)
+"""Settings of the BLSTM that are tried, one kind after another."""
 
 
 @dataclass(frozen=True)
@@ -77,20 +62,6 @@ class TrainedSystem:
     model: Any
     seconds: float
     tried: Sequence[Trial] = field(default_factory=tuple)
-
-
-def list_alternatives(options: Options, tuning: TuningOptions) -> list[list[dict[str, Any]]]:
-    """Return the kinds of settings that are tried for a system, in order, each with its values."""
-    factorial = options["structure"] == FACTORIAL
-    most = tuning.pair_mixtures if factorial else tuning.mixtures
-    kinds: list[list[dict[str, Any]]] = [[{"audio_weight": weight, "mixtures": most} for weight in tuning.weights]]
-    if options["structure"] != HMM and most > 1:
-        kinds.append([{"visual_mixtures": tuning.visual_mixtures}])
-    if factorial:
-        kinds.append([{"unseen_loss": UNSEEN_LOSS}, TIED])
-    if options["structure"] == COUPLED:
-        kinds.append([TOGETHER])
-    return [*kinds, [{"states": states} for states in tuning.states]]
 
 
 def search_settings(
@@ -123,18 +94,36 @@ def train_stages(
 
 
 def judge_systems(
-    systems: Iterable[TrainedSystem], validation: HeldOutRecordings, conversions: Sequence[Options] = ({},)
+    systems: Iterable[TrainedSystem], validation: HeldOutRecordings
 ) -> Iterator[tuple[Trial, TrainedSystem]]:
     """Yield every system with its figures on validation recordings."""
     for system in systems:
-        for conversion in conversions:
-            engine = CoupledEngine(replace(system.engine.config, **conversion))
-            made = generate_clips(validation, AUDIO_ONLY, engine, system.model)
-            generated, original = [clip.generated for clip in made], [clip.original for clip in made]
-            acc = correlation_statistic(generated, original).value
-            amse = distance_statistic(generated, original).value
-            trial = Trial(engine.config.as_mapping(), acc, amse, system.model.chains.parameters)
-            yield trial, replace(system, engine=engine)
+        made = generate_clips(validation, AUDIO_ONLY, system.engine, system.model)
+        options, parameters = system.engine.config.as_mapping(), system.model.chains.parameters
+        yield Trial(options, *measure_clips(made), parameters), system
+
+
+def measure_clips(made: Sequence[ComparedClip]) -> tuple[float, float]:
+    """Return ACC and AMSE of what a system makes of recordings."""
+    both = [clip.generated for clip in made], [clip.original for clip in made]
+    return correlation_statistic(*both).value, distance_statistic(*both).value
+
+
+def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, monitor: Monitor) -> TrainedSystem:
+    """Return the BLSTM whose learning rate, then cells, then steps are the best on validation recordings."""
+    hearing: Animator[Any] = BlstmBaseline()
+    speech, found = make_speech(validation, AUDIO_ONLY, hearing, None), list[tuple[Trial, TrainedSystem]]()
+
+    def attempt(options: Options) -> list[Trial]:
+        start_s, engine = process_time(), BlstmBaseline(**options)
+        model = engine.fit(examples, monitor).model
+        size = sum(array.size for array in model.learned.network.parameters)
+        trial = Trial(options, *measure_clips(generate_compared(validation, speech, engine, model)), size)
+        found.append((trial, TrainedSystem(engine, model, process_time() - start_s)))
+        return [trial]
+
+    search_settings({}, NETWORK_SETTINGS, attempt)
+    return choose_by(lambda trial: trial.acc, found)
 
 
 def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
@@ -155,8 +144,10 @@ def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, Trained
 
 
 def as_row(trial: Trial) -> dict[str, Any]:
-    """Return a trial as figures; its options are those that ``list_changed_options`` returns."""
-    return asdict(trial) | {"options": list_changed_options(CoupledConfig.parsed(trial.options))}
+    """Return a trial as figures; the options of chains are those that ``list_changed_options`` returns."""
+    options = trial.options
+    chains = "structure" in options
+    return asdict(trial) | {"options": list_changed_options(CoupledConfig.parsed(options)) if chains else options}
 
 
 def list_changed_options(config: CoupledConfig) -> dict[str, Any]:
@@ -180,7 +171,7 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
 """AMSE and ACC of the paper's Table 3: eigenlips of another speaker, so only their order compares."""
 BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
-TUNED, SPLIT, ALL_PATHS = ", tuned", ", K on val", ", all paths"
+SPLIT, ALL_PATHS = ", K on val", ", all paths"
 SOFT = {"start": "soft", "steps": 0}
 ABOUT = "about"
 
@@ -191,15 +182,14 @@ class ComparedSystem:
 
     make          : returns its engine; None: it is the coupled engine with ``options``
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
-    tunes         : the system of the paper whose settings are chosen on validation recordings
-    splits        : only its number of Gaussians is, as in the paper (§7.1)
+    splits        : its number of Gaussians is chosen on validation recordings, as in the paper (§7.1), or settings of a
+                    network, ``NETWORK_SETTINGS``
     when_named    : it is compared only if it is asked for
     """
 
     make: Callable[[], Animator[Any]] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     same_model_as: str = ""
-    tunes: str = ""
     splits: bool = False
     when_named: bool = False
 
@@ -216,7 +206,6 @@ def _engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
 COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     **{name: ComparedSystem(options=SYSTEMS[name]) for name in PAPER_FIGURES},
     **{name + SPLIT: ComparedSystem(options=SYSTEMS[name], splits=True) for name in PAPER_FIGURES},
-    **{name + TUNED: ComparedSystem(options=SYSTEMS[name], tunes=name) for name in PAPER_FIGURES},
     **{f"{name}, tied": ComparedSystem(options=SYSTEMS[name] | TIED) for name in ("ph-FHMM", "ph-vi-FHMM")},
     **{f"{name}, together": ComparedSystem(options=SYSTEMS[name] | TOGETHER) for name in ("ph-CHMM", "ph-vi-CHMM")},
     **{name + ALL_PATHS: ComparedSystem(options=SOFT, same_model_as=name) for name in PAPER_FIGURES},
@@ -224,14 +213,14 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
     "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
     "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
-    BLSTM: ComparedSystem(BlstmBaseline, when_named=True),
+    BLSTM: ComparedSystem(BlstmBaseline, splits=True, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),
     "mean pose": ComparedSystem(MeanPose),
 }
 """The systems of the table, in its order.
 
 The paper's six are those of ``train --preset``, of one Gaussian a state; ``K on val``: with the number of Gaussians
-that was best on validation recordings; ``tuned``: with all settings that were best there;
+that was best on validation recordings;
 ``tied``, ``together``: chains as ``TIED`` and ``TOGETHER`` have them. ``all paths``: expected means given speech, no
 EM; ``best path``: means along the best path, no EM.
 ``own means``: no regression of the visual means on acoustic features.
@@ -239,77 +228,56 @@ EM; ``best path``: means along the best path, no EM.
 
 
 def select_systems(names: Sequence[str] | None) -> list[str]:
-    """Return the systems to compare, in order. Raises InputError: no such system. Raises MissingDependencyError."""
+    """Return the systems to compare, in order. Raises InputError: no such system."""
     if names is None:
         return [name for name, system in COMPARED_SYSTEMS.items() if not system.when_named]
     unknown = [name for name in names if name not in COMPARED_SYSTEMS]
     if unknown:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
-    if BLSTM in names:
-        import_torch()
     chosen = [COMPARED_SYSTEMS[name] for name in names]
-    needed = {REFERENCE_SYSTEM} | {name for system in chosen for name in (system.tunes, system.same_model_as)}
+    needed = {REFERENCE_SYSTEM} | {system.same_model_as for system in chosen}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
-
-
-def tune_options(
-    name: str, examples: Sequence[Example], validation: HeldOutRecordings, tuning: TuningOptions, monitor: Monitor
-) -> list[Trial]:
-    """Return all settings that were tried for a system of the paper, judged by recordings for validation."""
-    judges = validation.first(tuning.judges)
-
-    def attempt(options: Mapping[str, Any]) -> list[Trial]:
-        on_the_way = train_stages(options, examples, monitor)
-        return [trial for trial, _ in judge_systems(on_the_way, judges, CONVERSIONS)]
-
-    return search_settings(SYSTEMS[name], list_alternatives(SYSTEMS[name], tuning), attempt)
 
 
 def with_inputs_of(name: str, examples: Sequence[Example], corpus: Corpus) -> Sequence[Example]:
     """Return examples with what a system takes from their sound, as ``lipmotion train`` gives it to an engine."""
     make = COMPARED_SYSTEMS[name].make
-    engine = make() if make is not None else None
-    if not isinstance(engine, Engine):
+    if make is None:
         return examples
     sound = {example.name: corpus.utterance(example.name).audio for example in examples}
-    return with_sound_inputs(engine, examples, sound, silent_monitor, map)
+    return with_sound_inputs(make(), examples, sound, silent_monitor, map)
 
 
 def train_system(
     name: str,
     examples: Sequence[Example],
     validation: HeldOutRecordings | None,
-    trials: Mapping[str, Sequence[Trial]],
     trained: Mapping[str, TrainedSystem],
-    tuning: TuningOptions,
+    mixtures: int,
     monitor: Monitor,
 ) -> TrainedSystem:
     """Return one trained system.
 
-    validation : recordings that decide between the settings of a tuned system with 1, 2, 4, … Gaussians, and those of
-                 the system as printed; None: no system is tuned
+    validation : recordings that decide between 1, 2, 4, … Gaussians, or settings of a network; None: nothing does
+    mixtures   : most Gaussians a state, of both streams and of speech only
     """
     system = COMPARED_SYSTEMS[name]
     if system.same_model_as:
         twin = trained[system.same_model_as]
         return replace(twin, engine=CoupledEngine(replace(twin.engine.config, **system.options)))
+    if system.make is BlstmBaseline and validation is not None:
+        return tune_network(examples, validation, monitor)
     if system.make is not None:
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
     if system.splits and validation is not None:
         found: list[tuple[Trial, TrainedSystem]] = []
-        for more in [{"visual_mixtures": tuning.split}, {}][: 1 if system.options["structure"] == HMM else 2]:
-            grown = train_stages({**system.options, "mixtures": tuning.split, **more}, examples, monitor)
+        for more in [{"visual_mixtures": mixtures}, {}][: 1 if system.options["structure"] == HMM else 2]:
+            grown = train_stages({**system.options, "mixtures": mixtures, **more}, examples, monitor)
             found += split_while_better(judge_systems(grown, validation))
         return choose_by(lambda trial: trial.acc, found)
-    if not system.tunes or validation is None:
-        *_, last = train_stages(system.options, examples, monitor)
-        return last
-    options = best_trial(trials[system.tunes]).options
-    printed = trained[system.tunes]
-    same = CoupledConfig.parsed(options) == printed.engine.config
-    on_the_way = () if same else train_stages(options, examples, monitor)
-    return choose_by(lambda trial: trial.acc, judge_systems([printed, *on_the_way], validation))
+    *_, last = train_stages(system.options, examples, monitor)
+    return last
 
 
 def system_to_arrays(system: TrainedSystem) -> dict[str, NDArray[Any]]:

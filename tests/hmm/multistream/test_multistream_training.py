@@ -61,8 +61,7 @@ def test_posteriors_are_those_of_all_paths():
         hmm = random_joint(1, states=2, components=components, training=StreamWeights(0.7, 1.2, 0.4, 1, 0.9))
         observed = only(noise(np.random.default_rng(0), 7), *(name for name in STREAMS if name != "f0_slope"))
         prepared = multistream_training.prepare_utterances(hmm, [(observed, ("a", "sp", "b"))])
-        (found,) = multistream_training.iterate_posteriors(hmm, prepared)
-        (item,) = prepared.items
+        ((item, found),) = multistream_training.batch_posteriors(hmm, prepared.leaves(hmm), prepared.items)
         density = [
             [slow.log_density(hmm, observed, prepared.triphones[i], t, hmm.config.training) for i in item.triphones]
             for t in range(7)

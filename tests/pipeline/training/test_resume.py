@@ -10,11 +10,14 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
+from lipmotion.engines.coupled.training import em_steps
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.multistream import multistream_training
+from lipmotion.pipeline import workers
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
-from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.labels import fingerprint_training
+from lipmotion.stats import em
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 
@@ -40,7 +43,7 @@ def stopping_after(events: int) -> Monitor:
 @pytest.fixture
 def few_utterances(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process has one of them to do, and a checkpoint two."""
-    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
+    monkeypatch.setattr(workers, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
 
 
@@ -108,6 +111,26 @@ def test_stopped_again_and_again(corpus, whole, work, tmp_path):
             assert stops < 50
     assert stops > 1
     assert content(model, tmp_path) == whole
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "options"), [("joint", {}), ("coupled", {"chains": "sVis 2vis", "mixtures": 1})])
+def test_finished_shards_are_not_summed_again(corpus, work, tmp_path, monkeypatch, name, options):
+    """The E-steps of a training that is stopped are found again, under what their models and data are."""
+    monkeypatch.setattr(em, "SAVE_S", 0.0)
+    engine, computed = engine_named(name, options), []
+    for module, function in ((multistream_training, "_shard_sums"), (em_steps, "_shard_sums")):
+        usual = getattr(module, function)
+        monkeypatch.setattr(module, function, lambda job, usual=usual: (computed.append(1), usual(job))[1])
+    whole = content(train(corpus, recogniser=CONFIG, engine=engine)[0], tmp_path)
+    count = len(computed)
+    assert count > 3
+    stop = next(i for i, e in enumerate(create_events(corpus)) if getattr(e, "share", 0) > 0.6) + 3
+    with pytest.raises(Stopped):
+        train(corpus, recogniser=CONFIG, engine=engine, run=Run(work=work, monitor=stopping_after(stop)))
+    computed.clear()
+    assert content(train(corpus, recogniser=CONFIG, engine=engine, run=Run(work=work))[0], tmp_path) == whole
+    assert 0 < len(computed) < count
 
 
 @pytest.mark.long

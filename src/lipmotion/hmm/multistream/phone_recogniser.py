@@ -82,7 +82,7 @@ def fit_phone_recogniser(
             units, bounds = units_to_frames(speech.units, observed.frames, PHONES.silence[0], PHONES.unit_of)
             utterances.append(TrainingUtterance(observed, units, bounds))
         inventory = Inventory(PHONES.units, PHONES.silence, CONFIG.states)
-        hmm = train_joint(utterances, inventory, PHONES.classes(), CONFIG, monitor)
+        hmm = train_joint(utterances, inventory, PHONES.classes(), CONFIG, monitor, checkpoint)
         arrays = joint_to_arrays(hmm, np.float32)
         checkpoint.save(_CHECKPOINT, arrays)
     hmm = joint_from_arrays(arrays, CONFIG)
