@@ -12,6 +12,7 @@ import sys
 import wave
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -21,13 +22,12 @@ import pytest
 from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
-from lipmotion import Corpus, Model, save_model, train
+from lipmotion import Corpus, FilmedFace, Model, save_face, save_model, train
 from lipmotion.engines import engine_named
-from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures import curves
 from lipmotion.motion import posterior_network
 from lipmotion.speech.recognition.network.posteriors import Hama
-from lipmotion_faces.filmed.face import FilmedFace, save_face
-from testing.toy import ToySentence, toy_sentences, toy_utterances
+from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
 
 SENTENCES = 12
@@ -50,8 +50,8 @@ settings.load_profile(FIXED)
 
 
 ENOUGH_STEPS = posterior_network.STEPS / 3
-HASTY = {"cli", "experiments", "training"}
-"""Folders of tests whose networks are trained for a few steps."""
+HASTY = {"cli", "docs", "experiments", "training"}
+"""Folders of tests whose networks are trained for a few steps, and whose intervals are of a few draws."""
 MEASURED_S = pytest.StashKey[float]()
 """Processor time of these tests, and of all processes that they waited for, when it was last looked at."""
 
@@ -120,10 +120,12 @@ def short_training() -> Iterator[None]:
 
 @pytest.fixture(scope="module", autouse=True)
 def hasty_training(request: pytest.FixtureRequest) -> Iterator[None]:
-    """In some folders it counts what is trained and what is told of it, not how well it moves."""
+    """In some folders it counts what is trained and what is told of it, not how well it moves, nor how surely."""
     with pytest.MonkeyPatch.context() as patched:
         if HASTY & set(request.path.parts):
             patched.setattr(posterior_network, "STEPS", 4.0)
+            few = partial(curves.bootstrap_interval, draws=50)
+            patched.setattr("lipmotion_lab.evaluation.evaluate.bootstrap_interval", few)
         yield
 
 
@@ -174,10 +176,9 @@ def toy_sentence() -> ToySentence:
 
 def quickly(corpus: Corpus, engine: str = "trajectory", visual: str = "geometry", **options: Any) -> Model:
     """Return a model, trained in a second; its mouth does not move as English ones do."""
-    small = HmmConfig(mixtures=1, iterations=2)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(posterior_network, "STEPS", ENOUGH_STEPS)  # tests that ask for it first may be hasty
-        return train(corpus, recogniser=small, engine=engine_named(engine, options), visual=visual)[0]
+        return train(corpus, recogniser=SMALL, engine=engine_named(engine, options), visual=visual)[0]
 
 
 @pytest.fixture(scope="session")

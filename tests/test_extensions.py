@@ -14,8 +14,9 @@ from lipmotion.corpora.folder import READERS
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry, install_command
-from lipmotion.formats.base import MOTION_FORMATS, MotionFormat, check_motion
-from lipmotion.testing.examples import example
+from lipmotion.formats import MotionFormat
+from lipmotion.formats.base import MOTION_FORMATS, check_motion
+from lipmotion.testing import example
 from lipmotion_faces import FACES, Face, make_face
 
 

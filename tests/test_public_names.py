@@ -1,12 +1,17 @@
 import ast
 import importlib
+import inspect
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import lipmotion
 from children import run_child
+from lipmotion import errors
+from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
+from lipmotion.printable import printable
 
 HEAVY = ("numpy", "scipy", "av", "PIL", "pocketsphinx", "tqdm", "cv2", "mediapipe")
 
@@ -53,3 +58,39 @@ def test_heavy_packages_are_imported_when_they_are_needed() -> None:
 
 def test_the_package_is_typed() -> None:
     assert (Path(lipmotion.__file__).parent / "py.typed").is_file()
+
+
+CLASSES: list[Any] = [value for _, value in inspect.getmembers(errors, inspect.isclass)]
+EXIT_CODES = {
+    "InputError": 3,
+    "CorpusError": 4,
+    "AlignmentError": 5,
+    "ModelFormatError": 6,
+    "ExportError": 7,
+    "MissingDependencyError": 8,
+}
+"""As ``lipmotion --help`` lists them: scripts depend on these numbers."""
+
+
+def test_every_error_has_its_exit_code() -> None:
+    assert {kind.__name__: kind.exit_code for kind in CLASSES if kind is not LipMotionError} == EXIT_CODES
+
+
+def test_all_are_caught_as_one_and_some_are_what_python_calls_them() -> None:
+    assert all(issubclass(kind, LipMotionError) for kind in CLASSES)
+    assert issubclass(InputError, ValueError)
+    assert issubclass(MissingDependencyError, ImportError)
+
+
+def test_the_module_imports_nothing() -> None:
+    tree = ast.parse(inspect.getsource(errors))
+    imports = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert imports == ["from __future__ import annotations"]
+
+
+def test_what_is_printable() -> None:
+    for text in ("plain", "Ünïcödé 語 👩‍👧 ן ک‌ه", "\u00a0\u3000", "back\\slash"):
+        assert printable(text) == text
+    for code in (*range(0x20), *range(0x7F, 0xA0), 0xAD, 0x200E, 0x2028, 0x202E, 0x2066, 0xFEFF, 0xDC80, 0xE0041):
+        assert printable(f"a{chr(code)}b") == "a" + chr(code).encode("unicode_escape").decode() + "b"
+    assert printable(ValueError("two\nlines")) == r"two\nlines"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.speech.sound.audio_files import read_audio
+from pipeline.made import read_welcome
 
 STEP_S = 0.02
 MAMA_S, CLOSED_S = (0.5, 1.1), (0.56, 0.86)
@@ -20,7 +20,7 @@ WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 def read_speech(rate_hz: int = 16_000, channels: int = 1) -> np.ndarray:
     """Return speech of 16 bits, here at 16 kHz whatever the rate is called [shape=(N, channels)]."""
-    samples = np.round(read_audio(WELCOME).samples * 32_767).astype("<i2")
+    samples = np.round(read_welcome().samples * 32_767).astype("<i2")
     places = np.arange(0, len(samples) - 1, 16_000 / rate_hz).astype(int)
     return np.repeat(samples[places, None], channels, axis=1)
 

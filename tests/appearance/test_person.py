@@ -4,14 +4,32 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.errors import InputError
+from lipmotion import FilmedFace
+from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.types import Motion
-from lipmotion_faces.appearance import person
+from lipmotion.types import Channel, Motion
+from lipmotion_faces.appearance import motion_map, person
 from lipmotion_faces.appearance.candidates import CANDIDATES
-from lipmotion_faces.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relight, replaced_part
+from lipmotion_faces.appearance.lower_face import (
+    CORNER,
+    HEIGHT,
+    LARGEST_PX,
+    LEAST_PX,
+    NECK_PX,
+    SIDE_PX,
+    STILL_PX,
+    WIDTH,
+    FaceShape,
+    cheek_light,
+    mouth_ellipse,
+    mouth_part,
+    move_chin,
+    moved_part,
+    relight,
+    replaced_part,
+)
 from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
-from lipmotion_faces.filmed.face import FilmedFace
+from pipeline.damage import DAMAGES, UNREADABLE, damaged
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
 
@@ -170,3 +188,231 @@ def test_footage_that_does_not_fit_together(footage: FootagePictures, wrong: str
     part: Any = () if wrong == "clips" else getattr(footage, wrong)[:-1]
     with pytest.raises(InputError, match=counts):
         learn_appearance(replace(footage, **{wrong: part}))
+
+
+CHANNELS = (Channel("opening"), Channel("width"), Channel("still"), Channel("weight", "weight"))
+FRAMES = 3000
+
+
+def poses(frames: int = FRAMES, seed: int = 0) -> np.ndarray:
+    """Two channels that move alike, one that never does, and one of its own."""
+    draw = np.random.default_rng(seed)
+    opening, own = draw.uniform(0, 0.3, frames), draw.uniform(0, 1, frames)
+    width = 0.6 - 0.4 * opening + draw.uniform(-0.02, 0.02, frames)
+    return np.stack([opening, width, np.full(frames, 0.37), own], axis=1)
+
+
+def pictured(values: np.ndarray) -> np.ndarray:
+    """Teeth that two channels show together, a mouth that darkens ever faster, a line, and what nothing changes."""
+    opening, own = values[:, 0] / 0.3, values[:, 3]
+    return np.stack([opening * own, np.exp(2 * opening) / 4, 2 * opening - own, np.full(len(values), 7.0)], axis=1)
+
+
+def motion(values: np.ndarray) -> Motion:
+    return Motion(values, 25.0, CHANNELS)
+
+
+@pytest.fixture(scope="module")
+def fitted() -> motion_map.MotionMap:
+    return motion_map.fit_motion_map(poses(), CHANNELS, pictured(poses()))
+
+
+def test_a_known_function_is_found(fitted: motion_map.MotionMap) -> None:
+    unseen = poses(500, seed=1)
+    predicted, wanted = fitted.predict(motion(unseen)), pictured(unseen)
+    assert predicted.shape == (500, 4)
+    assert np.abs(predicted - wanted).mean(axis=0) == pytest.approx([0, 0, 0, 0], abs=0.02)
+    with_one = np.column_stack([np.ones(FRAMES), poses()])
+    line = np.linalg.lstsq(with_one, pictured(poses()), rcond=None)[0]
+    linear = np.column_stack([np.ones(500), unseen]) @ line
+    errors = [np.square(values - wanted).mean(axis=0)[:2] for values in (predicted, linear)]
+    assert (errors[0] < 0.1 * errors[1]).all()  # no lines
+
+
+def test_a_channel_that_never_moves_is_left_out(fitted: motion_map.MotionMap) -> None:
+    assert fitted.names == ("opening", "width", "weight")
+    assert fitted.basis.shape == (3, 3)
+    other = poses(20, seed=2)
+    moved = other.copy()
+    moved[:, 2] = 5.0
+    assert fitted.predict(motion(other)) == pytest.approx(fitted.predict(motion(moved)), abs=1e-6)
+
+
+def test_components_have_unit_variance_and_are_as_many_as_move() -> None:
+    draw = np.random.default_rng(3)
+    for values, count in ((draw.normal(0, 1, (600, 6)) @ draw.normal(0, 0.1, (6, 50)), 6),
+                          (draw.normal(0, 1, (900, 30)), motion_map.COMPONENTS)):  # fmt: skip
+        found = motion_map.fit_motion_map(
+            values, tuple(Channel(f"x_{n}") for n in range(values.shape[1])), values[:, :2]
+        )
+        assert found.basis.shape == (values.shape[1], count)
+        components = (values - found.mean) / found.scale @ found.basis
+        assert np.cov(components.T) == pytest.approx(np.eye(count), abs=0.01)
+
+
+def test_far_from_all_footage_it_is_as_at_its_edge(fitted: motion_map.MotionMap) -> None:
+    directions = poses(200, seed=4)[:, [0, 1, 3]] - fitted.mean
+    wanted = pictured(poses())
+    margin = 0.5 * np.ptp(wanted, axis=0) + 0.01
+    for far in (1e5, -1e9):
+        beyond, further = (np.insert(fitted.mean + directions * each, 2, 0.37, axis=1) for each in (far, 3 * far))
+        predicted = fitted.predict(motion(beyond))
+        assert np.isfinite(predicted).all()
+        assert (predicted > wanted.min(axis=0) - margin).all()
+        assert (predicted < wanted.max(axis=0) + margin).all()
+        assert fitted.predict(motion(further)) == pytest.approx(predicted, abs=1e-4)
+
+
+def test_limits_leave_out_the_outermost_poses() -> None:
+    values = poses()
+    values[17] = [40.0, -30.0, 0.37, 9.0]  # one frame in which the tracker was wrong
+    found = motion_map.fit_motion_map(values, CHANNELS, pictured(poses()))
+    components = (values[:, [0, 1, 3]] - found.mean) / found.scale @ found.basis
+    outside = (components < found.limits[0]) | (components > found.limits[1])
+    assert outside[17].any()
+    assert outside.mean(axis=0) == pytest.approx([2 * motion_map.OUTER_PERCENTAGE / 100] * 3, abs=1e-3)
+
+
+def test_short_footage_is_trusted_less(fitted: motion_map.MotionMap) -> None:
+    """What footage does not say is the mean picture: coefficients shrink as frames become few."""
+    sizes = []
+    for frames in (30, 300, FRAMES):
+        values, wanted = poses(frames), pictured(poses(frames))
+        found = fitted if frames == FRAMES else motion_map.fit_motion_map(values, CHANNELS, wanted)
+        sizes.append((found.predict(motion(values)).std(axis=0)[:3] / wanted.std(axis=0)[:3]).mean())
+    assert sizes[0] < 0.6 < sizes[1] < sizes[2] < 1.01
+
+
+def test_the_fewest_frames_give_about_the_mean() -> None:
+    for frames in (motion_map.FRAMES_PER_CENTRE, 10):
+        values = poses(frames)
+        found = motion_map.fit_motion_map(values, CHANNELS, pictured(values))
+        assert len(found.centres) == frames // motion_map.FRAMES_PER_CENTRE
+        assert found.predict(motion(values)).mean(axis=0) == pytest.approx(pictured(values).mean(axis=0), abs=0.05)
+
+
+def test_motion_that_cannot_be_learned_from() -> None:
+    broken = np.where(np.arange(20)[:, None] == 7, np.nan, poses(20))
+    for values, targets in ((poses(2), np.zeros((2, 1))), (poses(20), np.zeros((19, 1))), (broken, np.zeros((20, 1)))):
+        with pytest.raises(InputError, match="required finite motion of as many frames, at least 3"):
+            motion_map.fit_motion_map(values, CHANNELS, targets)
+
+
+def test_motion_that_nobody_can_map(fitted: motion_map.MotionMap) -> None:
+    blendshapes = Motion(np.zeros((5, 2)), 25.0, (Channel("jawOpen", "weight"), Channel("opening")))
+    with pytest.raises(InputError, match=r"no channel 'width' \(2 of the 3 that this face needs are missing\)"):
+        fitted.predict(blendshapes)
+    values = poses(5)
+    values[3, 0] = np.inf
+    with pytest.raises(InputError, match="not finite; give whole curves"):
+        fitted.predict(motion(values))
+
+
+def test_channels_are_found_by_name(fitted: motion_map.MotionMap) -> None:
+    values = poses(50, seed=5)
+    order = [3, 1, 2, 0]
+    turned = Motion(values[:, order], 25.0, tuple(CHANNELS[n] for n in order))
+    assert motion_map.channel_values(turned, ("opening", "width")) == pytest.approx(values[:, :2])
+    assert fitted.predict(turned) == pytest.approx(fitted.predict(motion(values)))
+
+
+def test_as_arrays_and_back_and_damaged_arrays(fitted: motion_map.MotionMap) -> None:
+    arrays, values = motion_map.motion_map_arrays(fitted), motion(poses(50, seed=6))
+    again = motion_map.motion_map_from_arrays(arrays, 4)
+    assert (again.names, np.array_equal(again.predict(values), fitted.predict(values))) == (fitted.names, True)
+    assert arrays.keys() == motion_map.MOTION_MAP.keys()
+    for name in arrays:
+        with pytest.raises(ModelFormatError, match=f"{name} is missing.*build the face again"):
+            motion_map.motion_map_from_arrays({key: value for key, value in arrays.items() if key != name}, 4)
+    broken = list(damaged(arrays, {damage: DAMAGES[damage] for damage in UNREADABLE}))
+    assert len(broken) >= 6 * 6
+    for _name, _what, changed in broken:
+        with pytest.raises(ModelFormatError, match="the map from motion to pictures is damaged"):
+            motion_map.motion_map_from_arrays(changed, 4)
+    for change, targets, words in (
+        ({"scale": np.zeros(3)}, 4, "scale holds 0 to 0, required more than 0"),
+        ({"names": np.array(["opening", "width", "width"])}, 4, "channels twice, or limits the wrong way round"),
+        ({"limits": np.array([[1.0] * 3, [-1.0] * 3])}, 4, "channels twice, or limits the wrong way round"),
+        ({"coefficients": np.zeros((5, 4), np.float32)}, 4, "5 coefficients, required 404"),
+        ({}, 5, "coefficients of shape"),
+    ):
+        with pytest.raises(ModelFormatError, match=words):
+            motion_map.motion_map_from_arrays(arrays | change, targets)
+
+
+CHIN_PX = 118.0
+
+
+def with_line(chin_px: float = CHIN_PX, scale: int = 1, count: int = 1) -> np.ndarray:
+    """Lower faces of one colour, with a soft dark line at the tip of the chin."""
+    y = (np.arange(HEIGHT * scale) + 0.5) / scale + CORNER[1]
+    levels = np.rint(180 - 120 * np.exp(-(((y - chin_px) / 1.5) ** 2))).astype(np.uint8)
+    return np.broadcast_to(levels[:, None, None], (count, HEIGHT * scale, WIDTH * scale, 3)).copy()
+
+
+def line_px(picture: np.ndarray, x: float = 0.0) -> float:
+    """Return how far the line is below the eyes in one column, to a fraction of a pixel."""
+    scale = picture.shape[0] // HEIGHT
+    column = round((x - CORNER[0]) * scale - 0.5)
+    darkness = 180.0 - picture[:, column, 0]
+    y = (np.arange(len(picture)) + 0.5) / scale + CORNER[1]
+    return float((y * darkness).sum() / darkness.sum())
+
+
+def test_the_tip_moves_as_far_as_it_should() -> None:
+    drops = np.array([-9.0, -0.4, 0.0, 0.3, 6.7, 12.0])
+    for scale in (1, 2):
+        pictures = with_line(scale=scale, count=len(drops))
+        moved = move_chin(pictures, np.full(len(drops), CHIN_PX), drops)
+        assert moved.dtype == np.uint8
+        assert [line_px(picture) - line_px(pictures[0]) for picture in moved] == pytest.approx(drops, abs=0.15)
+    chins = np.array([112.0, 125.0])  # elsewhere in every frame
+    moved = move_chin(np.concatenate([with_line(chin) for chin in chins]), chins, np.full(2, 5.0))
+    assert [line_px(picture) for picture in moved] == pytest.approx(chins + 5, abs=0.3)
+    for wanted, done in ((40.0, LARGEST_PX), (-40.0, -LARGEST_PX)):  # no further than a neck allows
+        moved, limit = (move_chin(with_line(), np.array([CHIN_PX]), np.array([drop])) for drop in (wanted, done))
+        assert np.array_equal(moved, limit)
+
+
+def test_what_does_not_move_stays_to_the_bit() -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (2, HEIGHT, WIDTH, 3), np.uint8)
+    before = noise.copy()
+    still = move_chin(noise, np.full(2, CHIN_PX), np.array([0.0, 0.9 * LEAST_PX]))
+    assert np.array_equal(still, before)
+    moved = move_chin(noise, np.full(2, CHIN_PX), np.array([8.0, -8.0]))
+    assert np.array_equal(noise, before)  # the given pictures are not changed
+    y = np.arange(HEIGHT) + 0.5 + CORNER[1]
+    x = np.abs(np.arange(WIDTH) + 0.5 + CORNER[0])
+    untouched = (y[:, None] < STILL_PX) | (y[:, None] > CHIN_PX + 8 + 4 + NECK_PX) | (x[None] >= SIDE_PX[1])
+    assert np.array_equal(moved[:, untouched], before[:, untouched])
+    assert (moved != before)[:, ~untouched].mean() > 0.5
+
+
+def test_the_jaw_moves_less_towards_its_joints() -> None:
+    picture = with_line()
+    moved = move_chin(picture, np.array([CHIN_PX]), np.array([10.0]))
+    steps = [line_px(moved[0], x) - line_px(picture[0], x) for x in (0.5, 20.5, 40.5, 50.5)]
+    assert steps[0] > steps[1] + 0.3 > steps[2] + 1 > steps[3]
+    mirrored = [line_px(moved[0], -x) - line_px(picture[0], -x) for x in (0.5, 20.5, 40.5, 50.5)]
+    assert mirrored == pytest.approx(steps, abs=0.05)
+
+
+def test_the_part_that_may_differ_holds_all_that_does() -> None:
+    for scale in (1, 2):
+        part = moved_part(scale)
+        assert part.shape == (HEIGHT * scale, WIDTH * scale)
+        assert not np.concatenate([part[[0, -1]].ravel(), part[:, [0, -1]].ravel()]).any()
+        inside = replaced_part(FaceShape(44.0, 120.0), scale)
+        assert (part & inside).sum() == inside.sum()
+
+
+def test_no_chin_folds_or_tears() -> None:
+    """A picture that gets lighter downwards still does. Short chins, of children or a tracker's errors, move less."""
+    ramp = np.broadcast_to(np.arange(HEIGHT, dtype=np.uint8)[:, None, None], (HEIGHT, WIDTH, 3))
+    chins = np.repeat([60.0, 80.0, 86.0, 92.0, 99.0, CHIN_PX], 2)
+    drops, above = np.tile([-LARGEST_PX, LARGEST_PX], 6), round(STILL_PX - CORNER[1])
+    for moved in move_chin(np.repeat(ramp[None], 12, axis=0), chins, drops).astype(int):
+        assert np.array_equal(moved[:above], ramp[:above])
+        steps = np.diff(moved[:, WIDTH // 2, 0])
+        assert steps.min() >= 0
+        assert steps.max() <= 5

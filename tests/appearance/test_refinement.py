@@ -102,13 +102,6 @@ def test_parts_of_a_video_are_those_of_the_whole(space: Eigenlips, refiner: Refi
     assert np.abs(np.concatenate(parts).astype(int) - whole).max() <= 1  # products of other sizes may round otherwise
 
 
-def test_blocks_of_distances_do_not_matter(space: Eigenlips, refiner: Refiner, monkeypatch: pytest.MonkeyPatch) -> None:
-    wanted = space.project(HELD_OUT[:30])
-    whole = refiner.choose(wanted)
-    monkeypatch.setattr("lipmotion_faces.appearance.candidates.BLOCK", 7)
-    assert np.array_equal(refiner.choose(wanted), whole)
-
-
 def test_a_change_is_worth_its_cost() -> None:
     costs = np.array([[[0.0, 5.0], [3.0, 0.0], [0.0, 5.0]]], np.float32)
     numbers = np.tile([0, 1], (1, 3, 1))

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from formats.examples import of_motion
+from lipmotion.articulation import expression
 from lipmotion.articulation.liveliness import (
     GAZE_COUNTER_SHARE,
     LARGEST_GLANCE,
@@ -8,7 +10,12 @@ from lipmotion.articulation.liveliness import (
     find_phrases,
     lid_closure,
 )
-from lipmotion.types import Channel, Motion, Prosody, Span, Timeline, Unit
+from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, spoken_mouth
+from lipmotion.pipeline.outputs.deliver import FACTORS, with_detected, with_manners
+from lipmotion.types import Channel, Generation, Motion, Prosody, Span, Timeline, Unit, VoiceEvent
+from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
+from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, format_moods, parse_moods
+from meshes.speech import motion, units
 
 MINUTE = Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),))
 PHRASE = ((0, 3, "aa"), (3, 4, "sil"))
@@ -123,3 +130,145 @@ def test_without_time_and_phones_nothing_fails():
     nothing = Motion(np.zeros((1, 1)), 100.0, (Channel("opening"),))
     moved = compute_liveliness(np.zeros(1), nothing, Timeline(()), None)
     assert len(moved.lids) == len(moved.turn) == 1
+
+
+ACTION_UNITS = {1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 20, 23, 24, 25, 26, 43, 53, 54, 55, 56, 57, 58, 64}
+"""Those that faces show."""
+SOURCES = {"EMFACS", "Ekman2003", "Harrigan1996", "Sundelin2013", "ours"}
+PROTOTYPES = {
+    "happy": {6, 12}, "sad": {1, 4, 15}, "angry": {4, 5, 7, 23}, "afraid": {1, 2, 4, 5, 7, 20}, "disgusted": {9, 15},
+    "surprised": {1, 2, 5, 26},
+}  # fmt: skip
+"""Action units without which an emotion is another one, by EMFACS."""
+
+
+def test_every_mood_has_known_action_units_with_intensities_and_sources():
+    rows = expression.mood_rows()
+    assert {row.mood for row in rows} == {*MOODS}
+    assert len({(row.mood, row.unit) for row in rows}) == len(rows)
+    assert {row.source for row in rows} == SOURCES
+    for row in rows:
+        assert row.unit in ACTION_UNITS
+        assert 0 < row.intensity <= 1
+    for mood, asked in PROTOTYPES.items():
+        assert asked <= {*expression.mood_table()[mood]}
+        assert asked <= {row.unit for row in rows if row.mood == mood and row.source == "EMFACS"}
+
+
+def test_a_mood_comes_and_goes_smoothly_around_its_time():
+    moved = expression.with_moods(motion(), parse_moods("happy:0.6 at 0.5, sad at 1.2"))
+    happy, sad = moved["mood_happy"], moved["mood_sad"]
+    assert happy[10] == sad[10] == 0
+    assert happy[80] == pytest.approx(0.6)
+    assert (happy[-1], sad[-1]) == pytest.approx((0, 1))
+    assert np.abs(np.diff(moved.values[:, -2:], axis=0)).max() < 0.05
+    assert (happy + sad).max() <= 1 + 1e-9
+
+
+def test_from_the_start_a_mood_is_there_at_once_and_others_replace_it():
+    moved = expression.with_moods(motion(), parse_moods("angry"))
+    assert (moved["mood_angry"] == 1).all()
+    again = expression.with_moods(moved, parse_moods("tired:0.5"))
+    assert [name for name in again.names if expression.is_mood(name)] == ["mood_tired"]
+    assert {name: curve[0] for name, curve in expression.read_moods(again).items()} == {"tired": 0.5}
+
+
+def test_neutral_adds_nothing():
+    moved = expression.with_moods(motion(), (MoodKey(0.0, NEUTRAL),))
+    assert moved.names == motion().names
+    assert np.array_equal(moved.values, motion().values)
+    assert not expression.action_units(moved)
+    mouth = spoken_mouth(moved, units())
+    assert not any(getattr(mouth, name).any() for name in EXPRESSED)
+    assert not compute_liveliness(moved.time_s, moved, units(), None).units
+
+
+@pytest.mark.parametrize("mood", MOODS)
+def test_round_lips_stay_round_in_every_mood(mood):
+    plain, mouth = (spoken_mouth(expression.with_moods(motion(), parse_moods(each)), units()) for each in ("", mood))
+    round_ = slice(108, 122)  # in uw
+    assert mouth.width[round_].max() <= plain.width[round_].max() + 0.03
+    assert mouth.width[round_].max() < ROUND_WIDTH + 0.001
+    for name in ("smile", "frown", "stretched", "upper_raise"):
+        assert getattr(mouth, name)[round_].max() < 0.3
+
+
+def test_a_smile_widens_the_mouth_at_rest_and_surprise_opens_it():
+    plain, happy, surprised = (
+        spoken_mouth(expression.with_moods(motion(), parse_moods(mood)), units()) for mood in ("", "happy", "surprised")
+    )
+    assert happy.width[20] > plain.width[20] + 0.1
+    assert happy.smile[20] > 0.8
+    assert plain.contact[20]
+    assert surprised.gap[20] > 0.1
+    assert surprised.contact[92:96].any()  # p
+
+
+def test_the_head_sinks_in_sadness_unless_it_is_still():
+    time_s = np.arange(51) / 25
+    sad = expression.with_moods(motion(), parse_moods("sad"))
+    plain, moved, still = (
+        compute_liveliness(time_s, of, units(), None, head=head)
+        for of, head in ((motion(), True), (sad, True), (sad, False))
+    )
+    assert (moved.turn[:, 1] < plain.turn[:, 1] - 0.05).all()
+    assert not still.turn.any()
+    assert (moved.lids >= 0.15).all()
+
+
+def test_a_mood_comes_and_goes_in_the_upper_face_and_grows_with_accents():
+    time_s = np.arange(0, 60, 0.04)
+    sad = expression.with_moods(Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),)), parse_moods("sad"))
+    accent = np.arange(6001) % 300 > 200
+    voice = Prosody(-40 + 25.0 * accent, 5.0 + 0.3 * accent)
+    still, lively = (compute_liveliness(time_s, sad, units(), voice, brows=brows).unit(1) for brows in (False, True))
+    usual = expression.mood_table()["sad"][1]
+    assert still == pytest.approx(np.full(len(time_s), usual))
+    assert 0.03 < lively.std() < 0.2
+    assert lively.min() > 0.6 * usual
+
+
+def test_channels_are_named_by_mood():
+    assert expression.PREFIX + "happy" in expression.with_moods(motion(), parse_moods("happy")).names
+    assert not expression.is_mood("mood_hungry")
+
+
+@pytest.fixture(scope="module")
+def generation() -> Generation:
+    return of_motion(motion(), units())
+
+
+def test_shouted_vowels_are_more_open_and_mumbled_ones_less(generation: Generation) -> None:
+    assert {*FACTORS} == {PLAIN, *MANNERS}
+    gaps = {}
+    for manner in FACTORS:
+        found = with_manners(generation, parse_moods(manner))
+        mouth = spoken_mouth(found.motion, found.units)
+        assert mouth.contact[55]  # m
+        assert mouth.contact[95]  # p
+        gaps[manner] = float(mouth.gap[75])
+    assert gaps["mumble"] < gaps["whisper"] < 0.7 * gaps[PLAIN] < 0.8 * 0.7 * gaps["shout"]
+
+
+def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Generation) -> None:
+    found = with_manners(generation, parse_moods("shout at 1.05, sad at 1.1, plain at 1.2"))
+    change = np.abs(found.motion.values - generation.motion.values).max(axis=1)
+    assert change[:90].max() == 0
+    assert change[115] > 0
+    assert change[-20:].max() == 0
+    assert with_manners(generation, parse_moods("happy")) is generation
+
+
+@pytest.mark.parametrize(
+    ("asked", "shown"),
+    [
+        ("", "whisper:0.5 at 1, plain at 2, happy at 3, neutral at 4, shout:0.8 at 5, plain at 6"),
+        ("sad", "sad at 0, whisper:0.5 at 1, plain at 2, shout:0.8 at 5, plain at 6"),
+        ("plain", "plain at 0, happy at 3, neutral at 4"),
+        ("mumble at 1, angry at 2", "mumble at 1, angry at 2"),
+    ],
+)
+def test_what_is_detected_is_shown_where_nothing_of_its_kind_is_asked_for(asked: str, shown: str) -> None:
+    kinds = ((1, WHISPER, 0.5), (3, LAUGHTER, 0.9), (4.5, BREATH, 1), (5, SHOUT, 0.8))
+    events = [VoiceEvent(start_s, start_s + 1, kind, strength) for start_s, kind, strength in kinds]
+    assert format_moods(with_detected(parse_moods(asked), events)) == shown

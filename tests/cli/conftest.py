@@ -1,6 +1,4 @@
-import io
 import shutil
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -75,12 +73,6 @@ def takes(here: Path, toy_speech: Path) -> Path:
     for name in ("a.wav", "b.wav"):
         shutil.copy(toy_speech, folder / name)
     return folder
-
-
-@pytest.fixture
-def _piped_speech(toy_speech: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The recording at the standard input."""
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
 
 
 @pytest.fixture

@@ -34,17 +34,6 @@ def test_a_line_that_fails_is_told_by_the_exit_code(run, takes, toy_model_file, 
     assert (here / "out" / "a.json").is_file()
 
 
-def test_what_it_refuses(run, takes, toy_model_file, here):
-    for words, code in [
-        ((takes, "--out", takes / "out"), 7),
-        ((takes, "--out", "out", "--to", "wav"), 7),
-        ((here / "missing", "--out", "out"), 3),
-        ((takes, "--out", "out", "--still", "ears"), 3),
-    ]:
-        done = run("batch", *words, "--model", toy_model_file, "--jobs", "1")
-        assert (done.code, len(done.err)) == (code, 1), done
-
-
 def test_a_check_writes_nothing(run, takes, here):
     done = run("batch", "--check", takes, "--jobs", "1")
     assert done.code == 3

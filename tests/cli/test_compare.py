@@ -1,6 +1,5 @@
 import json
 
-from cli.conftest import check_refused, is_one_error
 from lipmotion import compare
 from lipmotion.measures.evaluation_table import comparison_table
 
@@ -26,20 +25,6 @@ def test_the_figures_are_those_of_the_function(run, here):
         "  mean ACC 1.000",
         "  closures: score 1.000 of 5, precision 1.000 of 5, F1 1.000, timing +0 ms",
     ]
-
-
-def test_what_cannot_be_used(run, here):
-    (here / "a.csv").write_text(WAVE)
-    (here / "b.csv").write_text(WAVE.replace("opening,width", "jawOpen,mouthClose"))
-    (here / "nothing.csv").write_text("")
-    for other, words in (
-        ("nothing.csv", "nothing.csv: "),
-        ("b.csv", "no channel of a.csv"),
-        ("c.csv", "c.csv: cannot"),
-    ):
-        check_refused(run("compare", "a.csv", other, "-o", "figures.json"), 3, words)
-    assert is_one_error(run("compare", "a.csv", "a.csv", "-o", "a.csv"), 7)
-    assert not (here / "figures.json").exists()
 
 
 def test_programs_read_lines_of_json(run, here):

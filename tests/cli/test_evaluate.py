@@ -1,18 +1,7 @@
 import json
-from functools import partial
-
-import pytest
 
 from lipmotion import evaluate, load_model
-from lipmotion.measures.curves import bootstrap_interval
 from lipmotion.measures.evaluation_table import figures_table
-from lipmotion_lab.evaluation import evaluate as evaluation_figures
-
-
-@pytest.fixture(autouse=True)
-def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few draws of the bootstrap intervals."""
-    monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
 
 
 def test_the_figures_are_those_of_the_function(run, toy_corpus, toy_model_file, here):

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from cli.conftest import check_refused
-from lipmotion_faces.film import build
-from lipmotion_faces.filmed.face import load_face, save_face
+from lipmotion import load_face, save_face
 from pipeline.film.toy_footage import ToyVideo, install, write_videos
 from speech import stand_in_voice
 
@@ -21,8 +20,7 @@ def videos(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, ToyVideo]:
 @pytest.fixture
 def tracker(videos: dict[Path, ToyVideo], monkeypatch: pytest.MonkeyPatch) -> Path:
     """Installs a tracker without errors; returns the folder of the videos."""
-    install(monkeypatch, videos, {})
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 5.0)
+    install(monkeypatch, videos, {}, 5.0)
     return next(iter(videos)).parent
 
 
@@ -53,23 +51,6 @@ def test_build_and_info(run, tracker, here):
     info = run("face", "info", "anna.face")
     assert info == (0, done.out[:-1], [])
     assert load_face("anna.face").about["name"] == "Anna"
-
-
-@pytest.mark.long
-def test_what_cannot_be_built(run, tracker, here):
-    video = tracker / "toy00.mp4"
-    before = video.read_bytes()
-    for arguments, code, words in (
-        (["missing.mp4", "-o", "a.face"], 3, "missing.mp4: no such"),
-        ([tracker, "-o", "a.mp4"], 7, "a.mp4: a face is a file ending in .face; name it so"),
-        ([tracker, "-o", "missing/a.face"], 7, "the folder missing does not exist"),
-        ([tracker, "-o", "a.face", "--speaker", "ben"], 3, "no speaker 'ben', a face is that of one person"),
-        ([video, "-o", "a.face"], 3, "s of footage with the face, required 5 s or more"),
-        ([video, "-o", video], 7, "is the footage itself; give another name"),
-    ):
-        check_refused(run("face", "build", *arguments, "--workers", "1"), code, words)
-        assert list(here.iterdir()) == []
-    assert video.read_bytes() == before
 
 
 def test_info(run, filmed_face_file):

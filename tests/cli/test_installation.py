@@ -5,13 +5,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
-from packaging.markers import default_environment
 
 from lipmotion.cli import doctor as doctor_module
-from lipmotion.cli.doctor import EXTRAS, InstalledPart, Requirement, declared_requirements, doctor, requirement
+from lipmotion.cli.doctor import EXTRAS, InstalledPart, Requirement, doctor, requirement
 from lipmotion.errors import LipMotionError
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
@@ -75,17 +73,6 @@ def test_voices(monkeypatch):
     assert "no speech synthesiser is installed; install one: pip install" in found.text
 
 
-def test_folders_that_cannot_be_written(monkeypatch, tmp_path):
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
-    monkeypatch.setattr("os.access", lambda *_: False)
-    monkeypatch.setattr("lipmotion.kernels.compiler.cache_folder", lambda: None)
-    parts = {name: doctor_module.look_at(name) for name in ("temporary folder", "current folder")}
-    assert [parts[name].state for name in ("temporary folder", "current folder")] == ["broken", "absent"]
-    assert "set TMPDIR" in parts["temporary folder"].text
-    kernels = doctor_module.look_at("compiled kernels")
-    assert (kernels.state, "NUMBA_CACHE_DIR" in kernels.text) == ("absent", True)
-
-
 def test_whatever_a_part_raises(monkeypatch):
     def fails() -> str:
         raise OSError("libfoo.so: cannot open")
@@ -93,18 +80,6 @@ def test_whatever_a_part_raises(monkeypatch):
     monkeypatch.setitem(doctor_module._PARTS, "foo", fails)
     found = doctor_module.look_at("foo")
     assert found == InstalledPart("foo", "broken", "OSError: libfoo.so: cannot open; install lipmotion again")
-    monkeypatch.setattr("av.codec.codecs_available", {"aac"})
-    assert "no libx264, so no .mp4" in doctor_module.look_at("FFmpeg").text
-
-
-@pytest.mark.parametrize(("version", "told"), [("4.10.0", "4.10.0, MediaPipe"), ("5.1.0", "another OpenCV lies over")])
-def test_face_tracking(monkeypatch, version, told):
-    monkeypatch.setattr("lipmotion_faces.tracking.packages.import_opencv", lambda: SimpleNamespace(__version__=version))
-    monkeypatch.setattr("lipmotion_faces.tracking.packages.import_solution", lambda _: None)
-    monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
-    found = doctor_module.look_at("face tracking")
-    assert found.state == "works"
-    assert told in found.text
 
 
 def test_no_face_tracking(monkeypatch):
@@ -115,14 +90,6 @@ def test_no_face_tracking(monkeypatch):
     found = doctor_module.look_at("face tracking")
     assert found.state == "absent"
     assert "libGL.so.1" in found.text
-
-
-def test_a_damaged_model(monkeypatch, tmp_path):
-    (tmp_path / "grid.lipmotion").write_bytes(b"damaged")
-    monkeypatch.setattr("lipmotion.pipeline.model.shipped_path", lambda: tmp_path / "grid.lipmotion")
-    found = doctor_module.look_at("model that ships")
-    assert found.state == "broken"
-    assert "not a lipmotion model" in found.text
 
 
 @pytest.mark.long
@@ -203,41 +170,26 @@ def test_requirements_are_read(text, expected):
     assert requirement(text) == expected
 
 
-def test_markers(monkeypatch):
-    machine = {"sys_platform": "darwin", "platform_machine": "arm64", "python_version": "3.9"}
-    monkeypatch.setattr("packaging.markers.default_environment", lambda: default_environment() | machine)
+def test_markers():
+    here = f"sys_platform == '{sys.platform}'"
     for marker, expected in (
         ("", True),
-        ("python_version < '3.13'", True),
-        ("python_version >= '3.10'", False),
-        ("(sys_platform == 'linux' and platform_machine == 'arm64') or (sys_platform == 'darwin')", True),
-        ("sys_platform != 'darwin' or platform_machine != 'arm64'", False),
+        ("python_version < '3.100'", True),
+        ("python_version >= '3.100'", False),
+        (f"({here} and platform_machine == 'none') or ({here})", True),
+        (f"sys_platform != '{sys.platform}' or platform_machine == 'none'", False),
     ):
         assert Requirement("a", "", marker).applies is expected, marker
 
 
-def test_versions(monkeypatch):
-    monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
+def test_versions():
+    found = metadata.version("numpy")
     for versions, expected in (
-        ("", True),
-        (">=4.9", True),
-        (">=4.10,<5", True),
-        ("<4.9", False),
-        ("==4.10.0.84.0", True),
-        ("!=4.10.0.84", False),
-        (">4.10.0.84", False),
+        *[("", True), (">=1.9", True), (">=1.10,<999", True), ("<1.9", False)],
+        *[(f"=={found}.0", True), (f"!={found}", False), (f">{found}", False)],
     ):
-        assert Requirement("a", versions).is_met is expected, versions
-
-
-def test_what_is_not_installed(monkeypatch):
-    def missing(name: str) -> str:
-        raise metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr("importlib.metadata.version", missing)
-    monkeypatch.setattr("importlib.metadata.requires", missing)
-    assert not Requirement("a", "").is_met
-    assert declared_requirements() == ()
+        assert Requirement("numpy", versions).is_met is expected, versions
+    assert not Requirement("no-such-package", "").is_met
 
 
 def test_every_extra_is_explained():

@@ -3,8 +3,6 @@
 import csv
 import json
 import re
-import signal
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +10,9 @@ import pytest
 
 from children import LIPMOTION, child
 from cli.conftest import RunCommand
-from lipmotion.speech.sound import audio_files
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import VISEMES, renamed, write_glb
+from pipeline.made import read_welcome
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
@@ -34,7 +31,7 @@ def test_a_file_becomes_frames_on_the_command_line(run: RunCommand, tmp_path: Pa
 
 
 def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
-    (tmp_path / "a.raw").write_bytes((read_audio(WELCOME).samples[:32_000] * 32767).astype("<i2").tobytes())
+    (tmp_path / "a.raw").write_bytes((read_welcome().samples[:32_000] * 32767).astype("<i2").tobytes())
     command = [*LIPMOTION, "live", "-i", "-", "--to", tmp_path / "a.csv"]
     with (tmp_path / "a.raw").open("rb") as sound, child(command, stdin=sound) as process:
         assert process.communicate()[0] == ""
@@ -43,16 +40,6 @@ def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
     (tmp_path / "a.wav").write_bytes(b"RIFF" + bytes(1_000))
     with (tmp_path / "a.wav").open("rb") as sound, child([*LIPMOTION, "live", "-i", "-"], stdin=sound) as process:
         assert (process.communicate()[0], process.returncode) == ("", 3)
-
-
-def test_a_signal_that_a_package_swallows_ends_it(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
-    def read(path: Path) -> object:
-        with suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGTERM)
-        return read_audio(path)
-
-    monkeypatch.setattr(audio_files, "read_audio", read)
-    assert run("live", WELCOME, "--as-fast-as-possible")[:2] == (143, [])
 
 
 def test_a_character_and_a_rig_get_their_own_curves(run: RunCommand, tmp_path: Path) -> None:

@@ -1,14 +1,21 @@
+import re
 import shutil
 import sys
+from dataclasses import replace
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 from children import PIPE, child, run_child
 from cli.conftest import check_refused, is_one_error
+from lipmotion import load_model, save_model
+from lipmotion.citations import ENGINE_KEYS, bibliography, engine_citations, model_citations
 from lipmotion.cli import main
+from lipmotion.engines import ENGINES
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
+from lipmotion.pipeline.model import read_header, shipped_path
 
 STOPPED = "lipmotion: stopped; run the same command again to go on"
 VERBS = ["animate", "corpus", "train", "evaluate", "info"]
@@ -169,3 +176,106 @@ def test_it_is_named(line, content, named, run, here, toy_speech):
     check_refused(done, 3, f"{file}: is ")
     assert named in done.err[0]
     assert ", required a" in done.err[0]
+
+
+def test_a_model_says_whose_recordings_it_comes_from(run, toy_model_file):
+    done = run("info", toy_model_file)
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0].split() == ["file", str(toy_model_file), "(1.1", "MB)"]
+    header = dict(line.split(maxsplit=1) for line in done.out if len(line.split()) > 1)
+    assert header["licence"] == "synthesised by lipmotion"
+    assert header["engine"] == "trajectory"
+    assert header["utterances"] == "8"
+    assert "states=5" in header["configuration"]
+    assert [line.split()[0] for line in done.out[1:]] == list(read_header(toy_model_file))
+
+
+def test_the_model_inside_is_named_with_its_rights(run, toy_model_file, here):
+    model = load_model(toy_model_file)
+    about = {**model.about, "licence": [], "attribution": []}
+    save_model(replace(model, about=about, prior=load_model()), here / "on.lipmotion")
+    done = run("info", here / "on.lipmotion")
+    assert done.code == 0
+    assert not [line for line in done.out if "{" in line]
+    own = [line.split(maxsplit=1)[1] for line in done.out if line.startswith(("licence", "attribution"))]
+    assert own == ["none stated", "none stated"]
+    prior = {line.split()[1]: line.split(maxsplit=2)[2] for line in done.out if line.startswith("prior ")}
+    assert (prior["engine"], prior["utterances"], prior["licence"]) == ("trajectory", "524", "CC BY 4.0")
+    assert prior["attribution"].startswith("GRID corpus")
+
+
+def test_its_trees_can_be_printed(run, toy_model_file):
+    done = run("info", toy_model_file, "--structure")
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0] == "speech.0"
+    assert sum("leaf (" in line for line in done.out) >= 18
+
+
+def test_the_chains_of_a_coupled_model(run, coupled_model_file):
+    done = run("info", coupled_model_file, "--structure")
+    assert (done.code, done.err) == (0, [])
+    assert done.out[0].startswith("coupled: chains whose transitions depend on all chains")
+    assert "  asynchrony: up to 1 state(s) apart" in done.out
+    assert "chain 2: 2vis, 2 units of 3 states" in done.out
+    assert any(line.startswith("stream geometry: ") and "6 densities of 1 Gaussian" in line for line in done.out)
+    assert any(line.startswith("means of geometry: ") for line in done.out)
+
+
+def test_the_shipped_model_is_the_default(run):
+    done = run("info")
+    assert done.out == run("info", shipped_path()).out
+    assert any(line.startswith("attribution") and "GRID" in line for line in done.out)
+
+
+ROOT = Path(__file__).parents[2]
+
+
+def keys(lines: list[str]) -> list[str]:
+    return re.findall(r"^@\w+\{(\w+),$", "\n".join(lines), flags=re.MULTILINE)
+
+
+def test_the_shipped_model_is_cited_by_default(run):
+    done = run("cite")
+    assert (done.code, done.err) == (0, [])
+    assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["trajectory"], "cooke2006"]
+    assert done.out == run("cite", shipped_path()).out
+
+
+def test_a_model_of_other_recordings(run, coupled_model_file):
+    done = run("cite", coupled_model_file)
+    assert (done.code, done.err) == (0, [])
+    assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["coupled"]]
+
+
+def test_engines_and_keys(run):
+    for name in sorted(ENGINE_KEYS):
+        assert keys(run("cite", name).out) == ["lipmotion", *ENGINE_KEYS[name]]
+    for key in set(bibliography()) - {"lipmotion"}:
+        done = run("cite", key)
+        assert (done.code, done.err, keys(done.out)) == (0, [], [key])
+
+
+def test_every_built_in_engine_names_its_papers():
+    assert set(ENGINE_KEYS) == set(ENGINES.built_in)
+    assert {key for named in ENGINE_KEYS.values() for key in named} <= set(bibliography())
+
+
+def test_what_a_header_adds():
+    header = {"engine": "joint", "visual": "both", "adapted": {}, "attribution": ["GRID corpus, CC BY 4.0", "a; b"]}
+    text = model_citations(header)
+    assert keys(text.splitlines()) == ["lipmotion", *ENGINE_KEYS["joint"], "xieliu2007", "gales1998", "cooke2006"]
+    assert text.endswith("\n% recordings: a; b")
+    assert "another package" in engine_citations("ridge")
+    assert keys(model_citations({"engine": "ridge"}).splitlines()) == ["lipmotion"]
+
+
+def test_the_version_is_this_one():
+    assert f"version = {{{version('lipmotion')}}}" in bibliography()["lipmotion"]
+    assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_every_entry_is_whole():
+    for entry in bibliography().values():
+        assert entry.count("{") == entry.count("}")
+        assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))
+        assert entry.endswith("\n}")

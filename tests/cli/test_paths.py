@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import check_refused, is_one_error
-from lipmotion import Corpus, Run, animate, cues, load_model, prepare, train, write, write_cues
+from lipmotion import Corpus, Request, Run, animate, cues, load_model, prepare, train, write, write_cues
 from lipmotion.cli.command_line import parser
 from lipmotion.errors import ExportError
 from lipmotion.pipeline.model import shipped_path
-from lipmotion.pipeline.request import Request
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
 FIGURES = "c --lexicon l.txt"
@@ -39,6 +38,7 @@ REFUSED = [
     ("the list itself", f"experiment learning-curve {FIGURES} --order t.txt -o t.txt"),
     ("the corpus c", f"experiment xieliu2007 {FIGURES} --plots c/pictures"),
     ("the folder of recordings itself", "corpus prepare r -o r"),
+    ("the footage itself", "face build a.wav -o a.wav"),
     ("the folder of recordings d.unfinished/r", "corpus prepare d.unfinished/r -o d.unfinished"),
 ]
 

@@ -1,19 +1,21 @@
 import json
+import zipfile
+from dataclasses import replace
 from pathlib import Path
 from shutil import copy
 
 import av
 import numpy as np
 import pytest
+from PIL import Image
 
-from cli.conftest import RunCommand, is_one_error
-from lipmotion import read_motion
-from lipmotion.errors import InputError
-from lipmotion.pipeline.outputs.motion_files import read_generation
+from cli.conftest import RunCommand, check_refused, is_one_error
+from lipmotion import animate, load_model, read_motion, write
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.characters.character_files import read_character
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.outputs.scenes import write_scene
-from meshes.heads import head
+from meshes.heads import head, lip_points, write_glb, write_obj
 
 
 @pytest.fixture
@@ -81,21 +83,9 @@ def test_sound_and_motion_of_other_lengths(run, motion_file, toy_speech, here):
     assert len(read_motion(here / "cut.csv")[0].values) == pytest.approx(len(read_motion(motion_file)[0].values), abs=2)
 
 
-def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lipmotion.pipeline.outputs.motion_files.LONGEST_S", 4.0)
-    (here / "long.csv").write_text("time_s,opening\n0,0.1\n1,0\n2,0\n3,0\n4,0\n5,0\n")
-    with pytest.raises(InputError, match="lasts 5 s, required at most 4; cut it"):
-        read_generation(here / "long.csv")
-
-
-def test_files_without_sound_get_no_silence(run, here, monkeypatch):
-    sounds = []
-    monkeypatch.setattr("lipmotion.cli.verbs.render.write_outputs", lambda *given, **_: sounds.append(given[3]))
-    (here / "rig.csv").write_text("time_s,opening\n0,0\n0.1,0.1\n")
-    for name in ("a.json", "a.mp4"):
-        assert run("render", "rig.csv", "-o", name).code == 0
-    assert sounds[0] is None
-    assert len(sounds[1].samples) == 1600
+def test_motion_of_more_than_a_day_is_refused(run, here):
+    (here / "long.csv").write_text("time_s,opening\n" + "".join(f"{second},0\n" for second in range(86_402)))
+    check_refused(run("render", "long.csv", "-o", "a.json"), 3, "lasts 86401 s, required at most 86400; cut it")
 
 
 def test_a_single_pose_is_written(run, here):
@@ -110,3 +100,151 @@ def test_the_rate_of_motion_can_be_given(run, here):
     assert run("render", "a.csv", "--motion-rate", "15", "-o", "b.json", "--curves", "arkit").code == 0
     assert read_motion(here / "b.json")[0].rate_hz == pytest.approx(15)
     assert is_one_error(run("render", "a.csv", "--motion-rate", "0", "-o", "b.json"), 3)
+
+
+def test_motion_files(run, basics, here):
+    done = run(*basics, "-o", "a.json", "a.csv", "-o", "a.npz", "--rate", "50")
+    assert done == (0, ["a.json", "a.csv", "a.npz"], [])
+    assert sorted(path.name for path in here.iterdir()) == ["a.csv", "a.json", "a.npz"]
+    assert read_motion(Path("a.json"))[0].rate_hz == 50
+
+
+@pytest.mark.long
+def test_it_is_the_function_of_the_same_name(run, basics, here, toy_speech, toy_model_file):
+    run(*basics, "-o", "command.json")
+    model = load_model(toy_model_file)
+    write(animate(toy_speech, model=model), ["function.json"], speech=toy_speech, model=model)
+    assert (here / "command.json").read_bytes() == (here / "function.json").read_bytes()
+
+
+def test_a_video(run, basics, here):
+    assert run(*basics, "-o", "a.mp4", "--fps", "5", "--size", "160") == (0, ["a.mp4"], [])
+    assert (here / "a.mp4").stat().st_size > 5000
+
+
+def test_a_transcript(run, basics, here):
+    words = "See Bob, papa — mama!"
+    (here / "words.lab").write_text("\ufeff" + words, encoding="utf-8")
+    for transcript in ("words.lab", words):
+        done = run(*basics, "-o", "a.json", "--transcript", transcript)
+        assert (done.code, done.err) == (0, [])
+        units = json.loads((here / "a.json").read_text())["units"]
+        assert " ".join(unit["phone"] for unit in units) == "sil s iy b aa b p aa p ax m aa m ax sil"
+
+
+@pytest.mark.usefixtures("here")
+def test_outputs_are_checked_before_work_begins(run):
+    for options, code in ((["missing/a.json"], 7), (["a.json", "--rate", "0"], 3), (["a.xyz"], 7)):
+        done = run("animate", "missing.wav", "--model", "missing.lipmotion", "-o", *options)
+        assert is_one_error(done, code)
+        assert "no such" not in done.err[0]
+
+
+def test_a_picture_of_the_posteriors(run, coupled_model_file, toy_speech, here):
+    basics = ("animate", toy_speech, "--model", coupled_model_file, "-o")
+    assert run(*basics, "a.json", "--posteriors", "a.png") == (0, ["a.json", "a.png"], [])
+    with Image.open(here / "a.png") as picture:
+        assert picture.format == "PNG"
+        assert 600 < picture.width <= 2200
+    run(*basics, "b.json")
+    assert (here / "a.json").read_bytes() == (here / "b.json").read_bytes()
+    assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.png", "b.json"]
+
+
+def test_onto_another_person(run, here, toy_model_file, toy_speech, toy_corpus):
+    given = ["animate", toy_speech, "--model", toy_model_file, "-o", "one.npz"]
+    assert run(*given, "--onto", toy_corpus.path).code == 0
+    assert (here / "one.npz").is_file()
+
+
+def test_articulation_in_motion_files(run, basics, here):
+    assert run(*basics, "-o", "a.csv", "--articulation")[0] == 0
+    header = (here / "a.csv").read_text().splitlines()[0].split(",")
+    assert header[-6:] == ["tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth"]
+
+
+def test_the_addon_is_written_or_one_line_says_why_not(run, here):
+    for program, name in (("maya", "a.zip"), ("blender", "a.blend")):
+        assert is_one_error(run("addon", program, "-o", name), 7)
+        assert list(here.iterdir()) == []
+    assert run("addon", "blender", "-o", "a.zip").code == 0
+    assert zipfile.is_zipfile(here / "a.zip")
+
+
+@pytest.mark.long
+def test_scenes_takes_and_scripts_are_written_without_a_character(run, here, basics):
+    names = ["a.glb", "a.usda", "a.livelink.csv", "a.blender.py"]
+    assert run(*basics, "-o", *names, "--rate", "30").code == 0
+    assert sorted(path.name for path in here.iterdir()) == sorted(names)
+    assert (here / "a.usda").read_text().startswith("#usda 1.0")
+    assert "SpatialAudio" in (here / "a.usda").read_text()
+
+
+@pytest.fixture
+def glb(here: Path) -> Path:
+    write_glb(here / "head.glb", head())
+    return here / "head.glb"
+
+
+def test_what_is_in_a_file_is_printed(run, glb):
+    done = run("character", glb, "--write-points", "points.csv", "--picture", "head.png")
+    assert done.code == 0
+    assert done.out[0].startswith("vertices")
+    assert any("moved by       arkit: jawOpen, mouthClose" in line for line in done.out)
+    assert done.out[-2:] == ["points.csv", "head.png"]
+    assert Path("points.csv").read_text().startswith("point,vertex\n61,")
+    assert Path("head.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_table_is_written_calibrated_and_found(run, glb, here):
+    assert run("character", glb, "--write-table").out[-1].endswith("head.glb.character.csv")
+    assert (here / "head.glb.character.csv").read_text(encoding="utf-8-sig").startswith("control,source,gain,offset,")
+    done = run("character", glb, "--open", "jawOpen=0.3", "--closed", "jawOpen=0.02")
+    assert any(line.startswith("table ") for line in done.out)
+    assert "jawOpen        jawOpen: gain 0." in done.out[-2]
+    (here / "rig.csv").write_text("control,source\nJaw,jawOpen\n")
+    assert run("character", "rig.csv", "--open", "Jaw=-20").out[-1] == "rig.csv"
+    assert "Jaw,jawOpen,-" in (here / "rig.csv").read_text(encoding="utf-8-sig")
+    for arguments, message in (
+        (("character", glb, "--open", "0.3"), "--open: '0.3' names no control, required NAME=X"),
+        (("character", "rig.csv"), "state values of its controls"),
+    ):
+        check_refused(run(*arguments), 3, message)
+
+
+def test_the_table_of_a_mouth_that_is_not_found_is_written_to_be_filled_in(run, here):
+    named = tuple(replace(shape, name=f"no {number}") for number, shape in enumerate(head().shapes))
+    write_glb(here / "odd.glb", replace(head(), shapes=named))
+    done = run("character", "odd.glb", "--write-table")
+    assert (done.code, done.out) == (3, ["odd.glb.character.csv"])
+    assert "Say which one does in a table beside the character" in done.err[0]
+    assert (here / "odd.glb.character.csv").read_text(encoding="utf-8-sig").splitlines()[1] == "no 0,,1,0,0,1"
+
+
+def test_a_mesh_without_blendshapes_is_bound_once(run, here, basics):
+    plain = head(shapes=False)
+    write_obj(here / "head.obj", plain)
+    rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
+    (here / "points.csv").write_text("point,vertex\n" + rows)
+    bound = run("character", "head.obj", "--lip-points", "points.csv", "--write-binding", "head.binding")
+    assert bound.code == 0
+    assert (here / "head.binding").exists()
+    done = run(
+        *basics, "--character", "head.obj", "--binding", "head.binding", "-o", "said.mp4", "--fps", "5", "--size", "90"
+    )
+    assert done == (0, ["said.mp4"], [])
+
+
+def test_a_character_speaks(run, glb, basics, here):
+    done = run(*basics, "--character", glb, "-o", "said.mp4", "said.json", "said.glb", "--fps", "3")
+    assert done == (0, ["said.mp4", "said.json", "said.glb"], [])
+    with av.open(str(here / "said.mp4")) as video:
+        assert (video.streams.video[0].width, video.streams.video[0].height) == (1280, 720)
+    motion, units = read_motion(here / "said.json")
+    assert {channel.unit for channel in motion.channels} == {"weight"}
+    assert motion.names[0] == "jawOpen"
+    assert len(units) > 1
+    assert 0 <= motion.values.min() <= motion.values.max() <= 1
+    assert read_character(here / "said.glb").shape_names == head().shape_names
+    stored = json.loads((here / "said.glb").read_bytes()[20:].split(b"\0")[0].rsplit(b"}", 1)[0] + b"}")
+    assert stored["animations"][0]["name"] == "speech"

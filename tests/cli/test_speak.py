@@ -1,5 +1,4 @@
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,7 +6,6 @@ import pytest
 from cli.conftest import check_refused
 from lipmotion import load_model, read_motion, speak, write
 from lipmotion.extensions import install_command
-from lipmotion.speech.voices import installed
 from speech import stand_in_voice
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -62,7 +60,7 @@ def test_voices(run, monkeypatch):
     assert [line.split() for line in done.out] == [["stand-in:one", "en-us"], ["stand-in:two", "en-us"]]
     success = json.loads(run("speak", "--voices", "--machine-readable").out[-1])
     assert success["voices"][0] == {"name": "stand-in:one", "language": "en-us"}
-    monkeypatch.setattr(installed, "SYNTHESISERS", {})
+    stand_in_voice.install(monkeypatch, ())
     assert run("speak", "--voices") == (0, ["no voice is installed"], [])
 
 
@@ -79,8 +77,7 @@ def test_wrong_command_lines(run):
 
 
 def test_without_a_synthesiser_it_says_what_to_install(run, basics, monkeypatch):
-    only = installed.SYNTHESISERS["stand-in"]
-    monkeypatch.setattr(installed, "SYNTHESISERS", {"stand-in": replace(only, voices=tuple)})
+    stand_in_voice.install(monkeypatch, ())
     check_refused(run(*basics, "-o", "a.wav"), 8, f"{install_command('text')}, or: apt install stand-in")
 
 

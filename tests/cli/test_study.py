@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from cli.conftest import check_refused, is_one_error
+from lipmotion import analyse_study
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.locks import lock_folder
-from lipmotion_studio.study.analysis.analyse import analyse_study, analysis_table
+from lipmotion_studio.study.analysis.analyse import analysis_table
 from lipmotion_studio.study.answers import read_answers, write_answers
 from lipmotion_studio.study.store import AnswerSheet, StudyStore
 from study.analysis.simulated import Effects, comparisons, paired_answers, rated_answers, ratings

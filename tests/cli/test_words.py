@@ -3,8 +3,6 @@ from pathlib import Path
 
 import pytest
 
-from cli.conftest import check_refused
-
 pytestmark = pytest.mark.usefixtures("here")
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SAID = "please speak and my lips will move five big blue boats float by"
@@ -27,14 +25,3 @@ def test_for_people_and_programs(run):
     assert " ".join(word["word"] for word in success["words"]) == SAID
     assert success["word_s"] > success["phone_s"]
     assert 0 < success["confidence"] < 1
-
-
-def test_errors(run):
-    for line, code, said in (
-        (["missing.wav"], 3, "no such file"),
-        ([WELCOME, "-o", "words.csv"], 7, "unknown format '.csv'; required one of: .txt .json"),
-        ([WELCOME, "--recogniser", "best"], 3, "unknown recogniser 'best'"),
-        ([WELCOME, "--recogniser", "fast"], 3, "'fast' recognises phones, not words; required one of: auto, w"),
-        ([WELCOME, "--recogniser", "own"], 3, "'own' recognises phones, not words; required one of: auto, wo"),
-    ):
-        check_refused(run("words", *line), code, said)

@@ -8,6 +8,14 @@ import pytest
 
 from children import run_child
 from lipmotion import Corpus
+from lipmotion.corpora.source_recordings import (
+    LARGEST_LIST_BYTES,
+    MAX_MISSING_NAMES,
+    RecordingFolder,
+    SourceRecording,
+    assign_splits,
+    read_names,
+)
 from lipmotion.corpora.store import quantise, read_entry
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
@@ -145,27 +153,6 @@ def test_not_a_corpus(tmp_path):
             Corpus.open(tmp_path)
 
 
-def test_a_damaged_utterance(corpus):
-    folder = corpus.folder("one")
-    entry = read_entry(folder)
-    whole = {path.name: path.read_bytes() for path in folder.iterdir()}
-    damages = [
-        ("motion.npy", None),
-        ("seen.npy", b""),
-        ("features.npy", whole["features.npy"][:200]),
-        ("entry.json", b"{"),
-        ("entry.json", b'{"name": "one"}'),
-    ]
-    for rows in ([[0, 1]], [[0.5, 0.2, "aa"]], "aa", [["x", 1, "aa"]]):
-        damages.append(("entry.json", json.dumps(entry | {"phones": rows}).encode()))
-    for name, content in damages:
-        (folder / name).unlink() if content is None else (folder / name).write_bytes(content)
-        with pytest.raises(CorpusError, match=r"one: not a whole utterance .* prepare again"):
-            corpus.utterance("one")
-        (folder / name).write_bytes(whole[name])
-    assert corpus.utterance("one").words == ("bin", "näh")
-
-
 def test_reading_needs_no_video_packages(corpus):
     code = (
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = sys.modules['av'] = None; "
@@ -232,6 +219,47 @@ def test_described_numbers_that_cannot_be(corpus: Corpus) -> None:
         entry.write_text(json.dumps(described | {key: 10**400}))
         with pytest.raises(CorpusError, match="delete this folder and prepare again"):
             corpus.summary()
+
+
+def recordings(count: int) -> RecordingFolder:
+    found = (SourceRecording(f"name{i}", Path(f"name{i}.wav"), None) for i in range(count))
+    return RecordingFolder("folder", tuple(found))
+
+
+def test_names_elsewhere_are_names_without_a_recording(tmp_path: Path) -> None:
+    (tmp_path / "train.txt").write_text("name0\n/etc/passwd\n../name1\n..\nname0\n")
+    found = assign_splits(recordings(2), tmp_path)
+    assert [(item.name, item.split) for item in found.recordings] == [("name0", "train")]
+    assert sorted(found.problems) == ["-etc-passwd", "..", "..-name1", "name1"]
+
+
+def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
+    (tmp_path / "train.txt").write_text("".join(f"name{i}\n" for i in range(200)))
+    found = assign_splits(recordings(50), tmp_path)
+    assert len(found.recordings) == 50
+    assert len(found.problems) == 150
+
+
+def test_a_list_of_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MAX_MISSING_NAMES + 1)))
+    with pytest.raises(CorpusError, match=f"name {MAX_MISSING_NAMES + 1} recordings .* at most {MAX_MISSING_NAMES}"):
+        assign_splits(recordings(2), tmp_path)
+    (tmp_path / "train.txt").write_bytes(b"\n" * (LARGEST_LIST_BYTES + 1))
+    with pytest.raises(CorpusError, match="required at most 16777216: is it a list"):
+        read_names(tmp_path / "train.txt")
+
+
+def test_a_list_may_name_files(tmp_path: Path) -> None:
+    (tmp_path / "test.txt").write_text("name1.wav\nname2.mkv\nname7.wav\n")
+    dotted = RecordingFolder("folder", (*recordings(3).recordings, SourceRecording("name0.b", Path("c"), None)))
+    (tmp_path / "val.txt").write_text("name0.b\n")
+    found = assign_splits(dotted, tmp_path)
+    splits = {item.name: item.split for item in found.recordings}
+    assert splits == {"name0": "train", "name1": "test", "name2": "test", "name0.b": "val"}
+    assert list(found.problems) == ["name7.wav"]
+    (tmp_path / "val.txt").write_text("name1\n")
+    with pytest.raises(CorpusError, match=r"name1 is in val\.txt and in test\.txt"):
+        assign_splits(recordings(3), tmp_path)
 
 
 def test_a_corpus_by_url_is_that_of_its_folder(toy_corpus):

@@ -1,10 +1,17 @@
 from collections.abc import Iterator
+from functools import partial
 
 import pytest
 
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import Audio, Features, ParallelMap
+
+
+@pytest.fixture(autouse=True)
+def small_phone_models(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lipmotion.pipeline.training.train.HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
 
 
 @pytest.fixture(scope="module")

@@ -12,10 +12,10 @@ from PIL import Image
 import lipmotion
 from docs.site_pages import ROOT
 from lipmotion import Corpus
-from lipmotion.formats.sound import write_sound
 from lipmotion.types import Audio
 from lipmotion_studio.study.answers import write_answers
 from meshes.heads import head, lip_points, write_glb, write_obj
+from pipeline.made import write_sound
 from study.analysis.simulated import Effects, rated_answers, ratings
 from testing.toy import ToySentence, toy_sentences, toy_utterances
 

@@ -2,7 +2,6 @@
 
 import re
 import shlex
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,8 +12,6 @@ from docs.site_pages import ROOT, Block, blocks, pages
 from lipmotion import Corpus
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
-from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.training import train as train_module
 
 TESTED = {
     "README": "test_readme.py", "docs/start": "test_readme.py", "docs/your-face": "docs/test_your_face.py",
@@ -68,7 +65,6 @@ def desk(tmp_path_factory: pytest.TempPathFactory, toy_model_file: Path, coupled
 @pytest.mark.usefixtures("recognised_once")
 @pytest.mark.parametrize("page", dict.fromkeys(block.page for block in HERE))
 def test_blocks_of_a_page_run(page, desk, toy_model, tmp_path, monkeypatch):
-    monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     monkeypatch.chdir(copied(desk, tmp_path / "desk"))
     names: dict[str, object] = {"lipmotion": lipmotion, "corpus": Corpus.open(Path("my-corpus"))}
     names["result"] = lipmotion.animate("speech.wav", transcript=Path("speech.txt"), model=toy_model)

@@ -3,23 +3,16 @@
 import json
 import re
 import shlex
-from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
-from scipy.io import wavfile
 
 from docs.test_links import broken
 from lipmotion import Corpus, load_model
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
-from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.curves import bootstrap_interval
-from lipmotion.pipeline.training import train as train_module
-from lipmotion.types import Track, Utterance
-from lipmotion_lab.evaluation import evaluate as evaluation_figures
-from pipeline.made import replace_tracking
+from lipmotion.types import Track
+from pipeline.made import replace_tracking, write_sound
 from testing.toy import toy_utterances
 
 FOLDER = Path(__file__).parents[2] / "recipes"
@@ -63,7 +56,7 @@ def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for number, utterance in enumerate(said):
         clip = tmp_path / "lrs" / "main" / PEOPLE[number % 3] / f"{number:05}.mp4"
         clip.parent.mkdir(parents=True, exist_ok=True)
-        write_sound(clip, utterance)
+        write_sound(clip, utterance.audio)
         clip.with_suffix(".txt").write_text(f"Text:  {' '.join(utterance.words or ()).upper()}\nConf:  4\n")
         tracks[clip.resolve()] = utterance.track
 
@@ -71,15 +64,8 @@ def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return tracks[path.resolve()]
 
     replace_tracking(monkeypatch, track)
-    monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
-    monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def write_sound(path: Path, utterance: Utterance) -> None:
-    samples = (np.clip(utterance.audio.samples, -1, 1) * 32767).astype("<i2")
-    wavfile.write(path, utterance.audio.rate_hz, samples)
 
 
 @pytest.mark.long

@@ -10,10 +10,10 @@ import pytest
 
 from docs.site_pages import blocks
 from lipmotion.cli.main import main
-from lipmotion.formats.sound import write_sound
 from lipmotion.types import Audio, Timeline
 from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.video.mp4 import write_mp4
+from pipeline.made import write_sound
 from testing.toy import CAMERA_HZ, toy_motion, toy_sentences
 
 SENTENCES = 6

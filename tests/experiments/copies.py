@@ -6,6 +6,10 @@ from pathlib import Path
 
 from lipmotion import Corpus
 from lipmotion.types import Channel, Utterance
+from lipmotion_lab.runner import ExperimentSettings
+from testing.toy import SMALL
+
+SETTINGS = ExperimentSettings(recogniser=SMALL)
 
 
 def copied(corpus: Corpus, folder: Path, change: Callable[[Utterance], Utterance]) -> Corpus:

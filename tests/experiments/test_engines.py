@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from experiments.copies import copied
-from lipmotion import Corpus, Selection, evaluate, load_model
+from experiments.copies import SETTINGS, copied, renamed
+from lipmotion import Corpus, Selection, evaluate, load_model, train
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.hmm.model import HmmConfig
-from lipmotion.testing.examples import speech, timeline
-from lipmotion.types import Progress
+from lipmotion.testing import CHANNELS, speech, timeline
+from lipmotion.testing import examples as sentences
+from lipmotion.types import Example, Progress, TokenPosteriors, silent_monitor
+from lipmotion_lab import learning_curve as module
+from lipmotion_lab.baselines import REACH, BlstmBaseline, ContextRidge, FrameRegressionModel, MeanPose
 from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines
+from lipmotion_lab.learning_curve import learning_curve
+from lipmotion_lab.report.sections import learning_section
 from lipmotion_lab.runner import ExperimentSettings
+from testing.toy import SMALL
 
 LONG = pytest.mark.long
-SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))
+
 CONDITIONS = ["audio only", "with transcript"]
 SPOKEN = speech(timeline(("b", "aa", "t", "iy", "m", "uw", "s", "aa")))
 
@@ -36,7 +44,7 @@ def stages() -> list[Progress]:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path, stages: list[Progress]) -> dict[str, Any]:
-    return engines(toy_corpus, split="test", models=folder, settings=replace(SMALL, monitor=stages.append))
+    return engines(toy_corpus, split="test", models=folder, settings=replace(SETTINGS, monitor=stages.append))
 
 
 @LONG
@@ -79,7 +87,7 @@ def test_the_figures_are_those_of_the_verb_evaluate(figures, folder, toy_corpus,
 def test_a_second_run_trains_nothing(figures, toy_corpus, folder):
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
     received: set[tuple[str, str]] = set()
-    settings = replace(SMALL, receive=lambda system, condition, *_: received.add((condition, system)))
+    settings = replace(SETTINGS, receive=lambda system, condition, *_: received.add((condition, system)))
     again = engines(toy_corpus, split="test", models=folder, settings=settings)
     assert received == {(c, s) for c, found in again["conditions"].items() for s in found["systems"]}
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
@@ -103,21 +111,211 @@ def test_models_of_something_else_are_refused(figures, toy_corpus, folder, tmp_p
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "coupled.lipmotion").write_bytes((folder / "trajectory.lipmotion").read_bytes())
     with pytest.raises(InputError, match="a model of the engine 'trajectory', required 'coupled'; move it away"):
-        engines(toy_corpus, models=tmp_path / "a", settings=SMALL)
+        engines(toy_corpus, models=tmp_path / "a", settings=SETTINGS)
     fewer = copied(
         toy_corpus, tmp_path, lambda u: replace(u, split="test") if u.name in ("toy00", "toy01", "toy03") else u
     )
     wanted = r"minutes 0\.\d, required the training list of this corpus: corpus \['copy'\], minutes 0\.\d; move it"
     with pytest.raises(InputError, match=wanted):
-        engines(fewer, models=folder, settings=SMALL)
+        engines(fewer, models=folder, settings=SETTINGS)
     with pytest.raises(ExportError, match="the corpus"):
-        engines(toy_corpus, models=toy_corpus.path, settings=SMALL)
+        engines(toy_corpus, models=toy_corpus.path, settings=SETTINGS)
     (tmp_path / "file").write_text("")
     with pytest.raises(ExportError, match="is a file; give the name"):
-        engines(toy_corpus, models=tmp_path / "file", settings=SMALL)
+        engines(toy_corpus, models=tmp_path / "file", settings=SETTINGS)
 
 
 def test_recordings_of_the_training_are_not_compared(toy_corpus):
     for split in ("train", None):
         with pytest.raises(CorpusError, match="are in the split that is compared with"):
-            engines(toy_corpus, split=split, settings=SMALL)
+            engines(toy_corpus, split=split, settings=SETTINGS)
+
+
+def fitted(examples: list[Example], **options: float) -> FrameRegressionModel:
+    return BlstmBaseline(cells=32, **options).fit(examples, silent_monitor).model
+
+
+@pytest.mark.long
+def test_held_out_motion_is_predicted(examples):
+    held_out = sentences(14, seed=5)[-1]
+    result = BlstmBaseline().generate(fitted(examples, rate=1e-2), held_out.speech)
+    assert result.motion.channels == CHANNELS
+    assert result.motion.values.shape == result.variance.shape == held_out.motion.values.shape
+    for name in ("opening", "width"):
+        assert np.corrcoef(result.motion[name], held_out.motion[name])[0, 1] > 0.8
+    assert result.motion["opening"].max() < 1  # values of frames that are not valid are not learned
+
+
+def test_the_same_seed_gives_the_same_and_all_that_is_heard_counts(examples):
+    heard = []
+    for one in examples[:3]:
+        frames, draw = len(one.speech.features.values), np.random.default_rng(0).normal
+        said = TokenPosteriors(draw(size=(-(-frames // 2), 200)).astype(np.float16), "a test", 1.0)
+        speech = replace(one.speech, posteriors=said, encoding=draw(size=(frames, 64)).astype(np.float16))
+        heard.append(replace(one, speech=speech))
+    models = [fitted(each, seed=seed, steps=0.1) for seed, each in ((0, heard), (0, heard), (1, heard))]
+    made = [BlstmBaseline().generate(each, heard[0].speech).motion.values for each in models]
+    assert np.array_equal(made[0], made[1])
+    assert not np.allclose(made[0], made[2])
+    assert models[0].learned.network.parameters[0].shape[1] == 4 * 39 + 2 * 120 + 64
+    deaf = replace(heard[0].speech, encoding=-heard[0].speech.encoding)
+    assert not np.allclose(made[0], BlstmBaseline().generate(models[0], deaf).motion.values)
+
+
+BASELINES: list[type] = [MeanPose, ContextRidge]
+
+
+def valid_motion(examples: list[Example]) -> np.ndarray:
+    return np.concatenate([one.motion.values[one.valid] for one in examples])
+
+
+def test_motion_has_a_row_for_every_feature_frame(examples):
+    for baseline in BASELINES:
+        engine = baseline()
+        fit = engine.fit(examples, silent_monitor)
+        result = engine.generate(fit.model, examples[0].speech)
+        frames = len(examples[0].speech.features.values)
+        assert fit.figures == {"frames": len(valid_motion(examples))}
+        assert (result.motion.rate_hz, result.motion.channels) == (100, CHANNELS)
+        assert result.motion.values.shape == result.variance.shape == (frames, len(CHANNELS))
+        assert np.isfinite(result.motion.values).all()
+        assert (result.variance >= 0).all()
+        assert len(result.trace.frames) == frames
+    unseen = [replace(one, valid=np.zeros_like(one.valid)) for one in examples]
+    with pytest.raises(CorpusError, match="none of 12 examples has motion"):
+        MeanPose().fit(unseen, silent_monitor)
+
+
+def test_the_mean_pose(examples):
+    model = MeanPose().fit(examples, silent_monitor).model
+    made = MeanPose().generate(model, examples[0].speech)
+    assert made.motion.values == pytest.approx(
+        np.broadcast_to(valid_motion(examples).mean(axis=0), made.motion.values.shape)
+    )
+    direct = made.motion.column("opening")
+    assert made.variance[0, direct] == pytest.approx(valid_motion(examples)[:, direct].var())
+
+
+def with_delayed_opening(examples: list[Example], curve: np.ndarray, late: int) -> list[Example]:
+    """Return the examples with an opening that is twice a column of the features, ``late`` frames later."""
+    made = []
+    for one in examples:
+        values = one.motion.values.copy()
+        values[:, one.motion.column("opening")] = 3 + 2 * np.roll(one.speech.features.values @ curve, late)
+        made.append(replace(one, motion=replace(one.motion, values=values)))
+    return made
+
+
+def error(engine, examples: list[Example]) -> float:
+    model = engine.fit(examples, silent_monitor).model
+    made = engine.generate(model, examples[0].speech).motion["opening"]
+    inner = slice(2 * REACH, -2 * REACH)
+    return float(np.abs(made - examples[0].motion["opening"])[inner].max())
+
+
+def test_the_reach_of_the_acoustic_context(examples):
+    column = np.eye(39)[3]
+    assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH)) < 0.2
+    assert error(ContextRidge(), with_delayed_opening(examples[:6], column, REACH + 8)) > 1
+
+
+@pytest.fixture(scope="module")
+def order(toy_corpus: Corpus) -> tuple[str, ...]:
+    return toy_corpus.names("train")[::-1]
+
+
+@pytest.fixture(scope="module")
+def curve_figures(toy_corpus: Corpus, order: tuple[str, ...]) -> dict[str, Any]:
+    return learning_curve(toy_corpus, order=order, sizes=[8, 4, 4], settings=SETTINGS)
+
+
+@pytest.mark.long
+def test_each_size_once_the_smallest_first(curve_figures):
+    assert [(row["names"], row["used"]) for row in curve_figures["rows"]] == [(4, 4), (8, 8)]
+    assert (curve_figures["split"], curve_figures["clips"], curve_figures["order"]) == ("test", 2, "given")
+    assert all(list(row["conditions"]) == CONDITIONS for row in curve_figures["rows"])
+    assert json.loads(json.dumps(curve_figures, allow_nan=False))
+
+
+@pytest.mark.long
+def test_a_row_is_what_train_and_evaluate_say(curve_figures, toy_corpus, order):
+    names = sorted(order[: curve_figures["rows"][0]["names"]])
+    wanted = evaluate(train(toy_corpus, selection=Selection(names=names), recogniser=SMALL)[0], toy_corpus)
+    assert curve_figures["closed_under"] == wanted["closed_under"]
+    for condition in CONDITIONS:
+        made, said = curve_figures["rows"][0]["conditions"][condition], wanted["conditions"][condition]
+        opening = said["channels"]["opening"]
+        assert [made[key] for key in ("acc", "nrmse", "global_variance")] == [
+            opening[key] for key in ("acc", "nrmse", "global_variance")
+        ]
+        assert made["acc_95"] == pytest.approx(list(said["opening_acc_95"]))
+        assert [made[f"acc_{name}"] for name in ("width", "outer")] == [
+            said["channels"][name]["acc"] for name in ("width", "outer")
+        ]
+
+
+@pytest.mark.long
+def test_minutes_are_those_of_the_utterances(curve_figures, toy_corpus, order):
+    seconds = [len(toy_corpus.utterance(name).audio.samples) / 16_000 for name in order]
+    assert [row["minutes"] for row in curve_figures["rows"]] == pytest.approx(
+        [sum(seconds[:4]) / 60, sum(seconds) / 60]
+    )
+
+
+@pytest.mark.long
+def test_channels_that_are_not_there_are_dashes(toy_corpus, tmp_path):
+    made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SETTINGS)
+    row = made["rows"][0]["conditions"]["audio only"]
+    assert (row["acc_width"], row["acc_outer"]) == (None, None)
+    assert learning_section(made).table.as_lines()[1].split()[-2:] == ["–", "–"]
+
+
+def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_trained_again(
+    toy_corpus, tmp_path, monkeypatch
+):
+    trained: list[list[str]] = []
+    stops = [True]
+
+    def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
+        trained.append(list(names))
+        if len(names) == 8 and stops.pop():
+            stops.append(False)
+            raise KeyboardInterrupt
+        assert tuple(held_out) == toy_corpus.names("test")
+        return SimpleNamespace(recordings=SimpleNamespace(closed_under=0.1), clips={"audio only": []})
+
+    monkeypatch.setattr(module, "SIZES", (3, 9))
+    monkeypatch.setattr("lipmotion_lab.runner.train_and_generate", result)
+    monkeypatch.setattr(module, "_row", lambda *_: {})
+    received: list[tuple[str, str]] = []
+    settings = ExperimentSettings(seed=1, receive=lambda *given: received.append(given[:2]))
+    with pytest.raises(KeyboardInterrupt):
+        learning_curve(toy_corpus, work=tmp_path, settings=settings)
+    del trained[1:]
+    curve_figures = learning_curve(toy_corpus, work=tmp_path, settings=settings)
+    assert [row["names"] for row in curve_figures["rows"]] == [3, 8]
+    assert received == [("3 recordings", "audio only"), ("8 recordings", "audio only")]
+    names = toy_corpus.names("train")
+    mixed = [names[i] for i in np.random.default_rng(1).permutation(8)]
+    assert sorted(mixed[:3]) != list(names[:3])
+    assert trained == [mixed[:3], mixed]
+    assert (curve_figures["order"], curve_figures["seed"], curve_figures["closed_under"]) == ("shuffled", 1, 0.1)
+
+
+def test_what_cannot_be_trained_on(toy_corpus, tmp_path):
+    for order, sizes, words in (
+        ([], None, "the list of utterances to train on is empty; give one name a line"),
+        (None, [], "sizes none; required: from 1 to 8"),
+        (["toy00", "toy01"], [2, 3], "sizes 2, 3; required: from 1 to 2, which is how many names the list has"),
+    ):
+        with pytest.raises(InputError, match=words):
+            learning_curve(toy_corpus, order=order, sizes=sizes)
+    for order, words in (
+        (["x1", "x2", "x3", "x4", "x5", "x6"], r"6 of 6 names to train on \(x1, x2, x3, x4, x5, ...\) are not"),
+        (["toy00", "toy11"], r"1 of 2 names to train on \(toy11\) are in the split that is compared with"),
+        (["toy00", "toy01", "toy00"], r"1 of 3 names to train on \(toy00\) stand in the list more than once"),
+    ):
+        with pytest.raises(CorpusError, match=words):
+            learning_curve(toy_corpus, order=order)
+    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
+        learning_curve(renamed(toy_corpus, tmp_path, "smile", "frown"))

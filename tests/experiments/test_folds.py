@@ -1,5 +1,5 @@
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,20 +8,27 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.copies import copied, renamed
+from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus, Selection, train
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures import curves
+from lipmotion.measures.closures import closure_figures
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
 from lipmotion_lab import runner
+from lipmotion_lab.evaluation.evaluate import (
+    ClipStatistic,
+    closing_score_statistic,
+    correlation_statistic,
+    distance_statistic,
+    significance_mark,
+)
 from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
 from lipmotion_lab.folds import folds, in_blocks
 from lipmotion_lab.report.sections import blocks_section, folds_section
 from lipmotion_lab.runner import ExperimentSettings
+from testing.toy import SMALL
 
-PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
-SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 CONDITIONS = ["audio only", "with transcript"]
 RATE_HZ = 25
 OPENING_ROW = (
@@ -32,7 +39,7 @@ OPENING_ROW = (
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus) -> dict[str, Any]:
-    return folds(toy_corpus, count=3, settings=SMALL)
+    return folds(toy_corpus, count=3, settings=SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +49,7 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
     mixed = [names[i] for i in np.random.default_rng(0).permutation(len(names))]
     made = []
     for held_out in (mixed[0::3], mixed[1::3], mixed[2::3]):
-        model = train(
-            toy_corpus, selection=Selection(names=sorted(set(names) - set(held_out))), recogniser=PHONE_MODELS
-        )[0]
+        model = train(toy_corpus, selection=Selection(names=sorted(set(names) - set(held_out))), recogniser=SMALL)[0]
         found = load_held_out(toy_corpus, cached_recogniser(model.phones), selection=Selection(names=sorted(held_out)))
         made += generate_clips(found, "with transcript", model.engine, model.learned)
     return made
@@ -78,6 +83,18 @@ def test_corpora_that_cannot_be(toy_corpus, tmp_path):
         folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
 
 
+def replace_training(
+    monkeypatch: pytest.MonkeyPatch,
+    result: Callable[..., object],
+    figures_of: Callable[[Any], object],
+    row_of: Callable[[Any], object] = lambda figures: {"clips": figures},
+) -> None:
+    """Let functions stand for training with generation, for the figures of clips, and for the row of figures."""
+    monkeypatch.setattr(runner, "train_and_generate", result)
+    monkeypatch.setattr(module, "figures_of", lambda clips, *_: figures_of(clips))
+    monkeypatch.setattr(runner, "opening_row_with_rates", row_of)
+
+
 def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fold with an utterance that has no words lacks a condition, so all folds together lack it."""
     cut: list[tuple[str, ...]] = []
@@ -89,9 +106,7 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
         clips = {condition: [f"{name} {condition}" for name in held_out] for condition in conditions}
         return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1, utterances=[]))
 
-    monkeypatch.setattr(runner, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", lambda clips, *_: sorted(clips))
-    monkeypatch.setattr(runner, "opening_row_with_rates", lambda figures: {"clips": figures})
+    replace_training(monkeypatch, result, sorted)
     figures = folds(toy_corpus, count=3)
     assert sorted(name for held_out in cut for name in held_out) == sorted(toy_corpus.names("train"))
     assert [len(held_out) for held_out in cut] == [3, 3, 2]
@@ -119,12 +134,10 @@ def test_finished_parts_are_not_generated_again(toy_corpus, tmp_path, monkeypatc
     def run(work: Path | None) -> dict[str, Any]:
         return folds(toy_corpus, count=2, by_speaker=False, work=work)
 
-    def as_lists(clips: Sequence[ComparedClip], *_: object) -> list[Any]:
+    def as_lists(clips: Sequence[ComparedClip]) -> list[Any]:
         return [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
 
-    monkeypatch.setattr(runner, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", as_lists)
-    monkeypatch.setattr(runner, "opening_row_with_rates", lambda figures: {"clips": figures})
+    replace_training(monkeypatch, result, as_lists)
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path)
     again = run(tmp_path)
@@ -151,10 +164,8 @@ def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypat
         recordings = SimpleNamespace(closed_under=0.1, utterances=[corpus.utterance(name) for name in held_out])
         return SimpleNamespace(used=names, clips={CONDITIONS[0]: clips}, recordings=recordings)
 
-    monkeypatch.setattr(runner, "train_and_generate", result)
     row = dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6], "false_per_minute": 1.0, "original_per_minute": 2.0}
-    monkeypatch.setattr(module, "figures_of", lambda *_: {})
-    monkeypatch.setattr(runner, "opening_row_with_rates", lambda _: row)
+    replace_training(monkeypatch, result, lambda _: {}, lambda _: row)
     figures = folds(corpus, by_speaker=True)
     assert sorted(map(sorted, left_out)) == [[""], ["anna"], ["ben"], ["eve"]]
     assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(
@@ -167,6 +178,72 @@ def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypat
     assert [len(each) for each in left_out] == [2, 2]
     with pytest.raises(InputError, match="5 folds; required: from 2 to 4, which is how many speakers there are"):
         folds(corpus, by_speaker=True, count=5)
+
+
+Clips = list[np.ndarray]
+
+
+@pytest.fixture
+def clips() -> tuple[Clips, Clips, Clips]:
+    """Original curves, curves close to them, and curves less close: six clips of three channels far from 0."""
+    draw = np.random.default_rng(3)
+    original = [draw.normal(size=(int(n), 3)) + 50 for n in draw.integers(20, 40, 6)]
+    near = [0.9 * o + 0.2 * draw.normal(size=o.shape) for o in original]
+    far = [0.4 * o + draw.normal(size=o.shape) for o in original]
+    return original, near, far
+
+
+def test_figures_are_those_of_the_measures(clips):
+    original, near, _ = clips
+    wanted = curves.pooled_correlation(near, original).mean()
+    assert correlation_statistic(near, original).value == pytest.approx(wanted, abs=1e-12)
+    assert distance_statistic(near, original).value == pytest.approx(curves.mean_distance(near, original), abs=1e-12)
+    some, others = [g[:, :1] for g in near], [o[:, :1] for o in original]
+    score = closure_figures([g[:, 0] for g in near], [o[:, 0] for o in original], 50, 25).score
+    assert closing_score_statistic(some, others, 50).value == pytest.approx(100 * score)
+
+
+def test_a_channel_that_stands_still_explains_nothing(clips):
+    original, near, _ = clips
+    still = [np.concatenate([g[:, :2], np.full((len(g), 1), 0.1)], axis=1) for g in near]
+    assert correlation_statistic(still, original).value == pytest.approx(
+        curves.pooled_correlation(still, original).mean(), abs=1e-12
+    )
+
+
+def test_nothing_closes():
+    open_mouth = [np.ones((5, 1))]
+    assert np.isnan(closing_score_statistic(open_mouth, open_mouth, 0.5).value)
+
+
+def test_the_interval_is_that_of_drawn_clips(clips):
+    original, near, far = clips
+    draw = np.random.default_rng(7)
+    drawn = [draw.integers(6, size=6) for _ in range(50)]
+
+    def acc(made: Clips, chosen: np.ndarray) -> float:
+        return float(curves.pooled_correlation([made[i] for i in chosen], [original[i] for i in chosen]).mean())
+
+    one, other = correlation_statistic(near, original), correlation_statistic(far, original)
+    wanted = np.percentile([acc(near, chosen) for chosen in drawn], [2.5, 97.5])
+    assert one.interval(7) == pytest.approx(tuple(wanted), abs=1e-12)
+    paired = np.percentile([acc(near, chosen) - acc(far, chosen) for chosen in drawn], [2.5, 97.5])
+    assert one.gain(other, 7) == pytest.approx(tuple(paired), abs=1e-12)
+    assert significance_mark(one.gain(other, 7)) == "*"
+    assert one.gain(one, 7) == (0, 0)
+
+
+def test_the_interval_of_one_clip_is_its_value():
+    one = ClipStatistic([np.array([3.0, 2.0])], lambda total: float(total[0] / total[1]))
+    assert one.interval(0) == (1.5, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("gain", "wanted"),
+    [((0.1, 0.2), "*"), ((-2, -0.1), "*"), ((-0.1, 0.1), ""), ((0, 0), ""), ((2e-10, 7e-9), ""), ((None, None), "")],
+)
+def test_marks(gain, wanted):
+    assert significance_mark(gain) == wanted
 
 
 def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy_corpus, tmp_path):

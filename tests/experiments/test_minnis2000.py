@@ -1,5 +1,7 @@
+import json
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -7,12 +9,16 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import PHONE_S, costs_of, inventory, target_of
+from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
+from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.engines.selection.concatenation import pieces_of
 from lipmotion.engines.selection.costs import SelectionConfig
-from lipmotion.hmm.model import HmmConfig
+from lipmotion.errors import CorpusError
+from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
+from lipmotion_lab.hofer2008 import PAPER_SCORES, PhoneticTableOptions, hofer2008
 from lipmotion_lab.minnis2000 import (
     ADDITIONS,
     EVERYTHING,
@@ -23,10 +29,10 @@ from lipmotion_lab.minnis2000 import (
     rows,
     velocity_change,
 )
-from lipmotion_lab.runner import ExperimentSettings
+from lipmotion_lab.report.sections import hofer_section
+from testing.toy import SMALL
 
 LONG = pytest.mark.long
-PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 
 
 def test_all_additions_together_are_the_default():
@@ -68,12 +74,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
-    return minnis2000(toy_corpus, models=folder, settings=ExperimentSettings(recogniser=PHONE_MODELS))
+    return minnis2000(toy_corpus, models=folder, settings=SETTINGS)
 
 
 @LONG
 def test_the_row_as_printed_is_the_preset(figures, toy_corpus):
-    model, _ = train(toy_corpus, recogniser=PHONE_MODELS, engine=engine_from_settings(preset="minnis2000"))
+    model, _ = train(toy_corpus, recogniser=SMALL, engine=engine_from_settings(preset="minnis2000"))
     wanted = evaluate(model, toy_corpus)["conditions"]
     for condition, systems in figures["lists"]["test"]["conditions"].items():
         assert systems[PRINTED]["acc"] == pytest.approx(wanted[condition]["channels"]["opening"]["acc"], abs=1e-6)
@@ -87,7 +93,7 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
     def receive(system: str, condition: str, recordings: HeldOutRecordings, clips: Sequence[ComparedClip]) -> None:
         received.append((recordings.utterances[0].split, condition, system, len(clips)))
 
-    settings = ExperimentSettings(recogniser=PHONE_MODELS, receive=receive)
+    settings = replace(SETTINGS, receive=receive)
     again = minnis2000(toy_corpus, models=folder, settings=settings)
     conditions = {(split, c, 2) for split, found in again["lists"].items() for c in found["conditions"]}
     assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in rows())
@@ -98,7 +104,7 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
 @LONG
 def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path, monkeypatch):
     def run() -> dict[str, Any]:
-        return minnis2000(toy_corpus, work=tmp_path, settings=ExperimentSettings(recogniser=PHONE_MODELS))
+        return minnis2000(toy_corpus, work=tmp_path, settings=SETTINGS)
 
     module = "lipmotion_lab.minnis2000.join_figures"
     made: list[None] = []
@@ -117,3 +123,68 @@ def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path, monkeypat
     assert len(made) == 1 + sum(
         len(systems) for found in figures["lists"].values() for systems in found["conditions"].values()
     )
+
+
+TWO = PhoneticTableOptions(states=(3,), mixtures=(1, 2), motion_mixtures=(1, 2), channels="opening width outer")
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("work")
+
+
+@pytest.fixture(scope="module")
+def hofer_figures(toy_corpus: Corpus, work: Path) -> dict[str, Any]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
+        return hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
+
+
+@pytest.mark.long
+def test_a_row_is_what_the_preset_trains_and_evaluate_says(hofer_figures, toy_corpus):
+    assert (hofer_figures["clips"], hofer_figures["trained_on"], len(hofer_figures["tables"])) == (2, 8, 4)
+    evaluated: dict[tuple[str, str], Any] = {}
+    for block in hofer_figures["tables"]:
+        row = block["rows"]["eVis"]
+        pins = "true" if block["pins"] != "as printed" else "false"
+        numbers = f"mixtures={row['gaussians']}", f"motion_mixtures={row['motion_gaussians']}"
+        settings = ["states=3", *numbers, f"closures={pins}", "channels=opening width outer"]
+        if (pins, settings[1]) not in evaluated:
+            engine = engine_from_settings(preset="hofer2008", settings=settings)
+            model = train(toy_corpus, recogniser=SMALL, engine=engine)[0]
+            evaluated[pins, settings[1]] = evaluate(model, toy_corpus)
+        of_condition = evaluated[pins, settings[1]]["conditions"][block["condition"]]
+        opening = of_condition["channels"]["opening"]
+        assert [row[key] for key in ("acc", "jerk", "global_variance")] == pytest.approx(
+            [opening[key] for key in ("acc", "jerk", "global_variance")], abs=0.02
+        )  # a kept model is stored at half precision
+        assert row["score"] == pytest.approx(100 * of_condition["closures"]["score"], abs=1e-9)
+        chosen = f"{row['gaussians']}, {row['motion_gaussians']}"
+        assert row["acc_on_val"][chosen] == max(row["acc_on_val"].values())
+    assert json.loads(json.dumps(hofer_figures, allow_nan=False))
+
+
+@pytest.mark.long
+def test_what_was_finished_is_not_trained_again(hofer_figures, toy_corpus, work, monkeypatch):
+    monkeypatch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
+    monkeypatch.setattr(JointEngine, "growing_models", None)
+    again = hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
+    assert hofer_section(again).as_text() == hofer_section(hofer_figures).as_text()
+
+
+@pytest.mark.long
+def test_pins_move_the_lips_of_the_same_units(hofer_figures):
+    """Of given words: of recognised units, only those that are p b m alone are pinned."""
+    printed, pinned = (
+        block["rows"]["eVis"] for block in hofer_figures["tables"] if block["condition"] == "with transcript"
+    )
+    assert pinned["recall_p_b_m"] == 100
+    assert pinned["nrmse"] != printed["nrmse"]
+    assert pinned["gaussians"] == printed["gaussians"]
+
+
+def test_nothing_to_train_on_or_to_compare_with(toy_corpus, tmp_path):
+    with pytest.raises(CorpusError, match="no utterances of split 'val'"):
+        hofer2008(copied(toy_corpus, tmp_path, partial(replace, split="test")))
+    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
+        hofer2008(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"))

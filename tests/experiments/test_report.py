@@ -1,27 +1,40 @@
+"""Figures that are stored in docs/results: sections of the report, and pages, say of them what follows from them."""
+
+from __future__ import annotations
+
+import csv
+import io
 import json
+import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from html.parser import HTMLParser
+from itertools import product
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
-from experiments.copies import copied, renamed
-from experiments.test_sections import figures_of
+from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.units import Lexicon
 from lipmotion_lab import hofer2008 as table1
+from lipmotion_lab import learning_curve
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PhoneticTableOptions
+from lipmotion_lab.minnis2000 import ADDITIONS
 from lipmotion_lab.report import report
+from lipmotion_lab.report.charts import Dot, draw_curve, draw_dots, draw_rising
 from lipmotion_lab.report.report import PAGE, PARTS, PartRun, ReportPart, WrittenReport, experiment_report
+from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Section, Table
 from lipmotion_lab.runner import ExperimentSettings
+from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
 from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
 
-SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))
 TWO, SETS = ("hofer2008", "folds"), ("eVis", "phone")
 SCREENS = ((1280, 900, "light"), (1280, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 
@@ -137,8 +150,8 @@ def test_other_recordings_or_settings_are_run_again(ran, toy_corpus, tmp_path):
     assert run(toy_corpus, quick=True).made == ["folds"]
     assert "quick run" in Links(tmp_path / "r" / PAGE).text
     assert run(toy_corpus.part(toy_corpus.names()[1:]), quick=True).made == ["folds"]
-    assert run(toy_corpus, quick=True, settings=replace(SMALL, seed=1)).made == ["folds"]
-    assert run(toy_corpus, settings=replace(SMALL, lexicon=Lexicon({"a": (("ax",),)}))).made == ["folds"]
+    assert run(toy_corpus, quick=True, settings=replace(SETTINGS, seed=1)).made == ["folds"]
+    assert run(toy_corpus, settings=replace(SETTINGS, lexicon=Lexicon({"a": (("ax",),)}))).made == ["folds"]
     assert "-o r --only folds --lexicon FILE" in Links(tmp_path / "r" / PAGE).text
     assert len(ran) == len(list((tmp_path / "r" / "models").iterdir())) == 5
 
@@ -187,7 +200,7 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Wri
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in SETS})
         patch.setattr(table1, "QUICK", PhoneticTableOptions(states=(3,), mixtures=(1,)))
-        return experiment_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SMALL)
+        return experiment_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
 
 
 @pytest.mark.long
@@ -219,3 +232,242 @@ def test_a_browser_plays_it_and_nobody_is_kept_out(written, tmp_path):
         )
         assert window.run_until_done(playing)
         assert window.problems() == []
+
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+CONDITIONS = ("audio only", "with transcript")
+LISTS = [f"Unit selection, {part}, {condition}" for part in ("val", "test") for condition in CONDITIONS]
+SIZES = [4, 10, *learning_curve.SIZES, 452]
+CHAINS = [f"Structures of chains, {CONDITIONS[0]}"]
+TABLES: dict[str, tuple[str, str, Callable[..., list[tuple[str, str]]]]] = {
+    "engines.test": ("engines", "engines-test", lambda title, name: [(f"Engines, {title}", name)]),
+    "folds.folds": ("folds", "folds", lambda name: [("Cross-validation, 5 folds", name)]),
+    "hofer2008.all": ("hofer2008", "hofer2008", lambda name: [("Unit sets, 5 states, audio only, as printed", name)]),
+    "xieliu2007.all": ("xieliu2007", "xieliu2007", lambda *names: [*product(CHAINS, filter(None, names))]),
+    "xieliu2007.eigenlips": (
+        *("xieliu2007", "xieliu2007-eigenlips-452"),
+        lambda *names: [*product(CHAINS, filter(None, names))],
+    ),
+    "selection.printed": ("minnis2000", "minnis2000", lambda name: [*product(LISTS, [name])]),
+}
+"""By region: the experiment, its stored figures, and, by the keys of a row, the captions and heads of its rows."""
+
+
+def stored(name: str) -> Any:
+    """Return what an experiment on GRID stored, or a sheet of a page."""
+    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def figures_of(name: str) -> Any:
+    return stored({"engines": "engines-test", "minnis2000": "minnis2000-guide"}.get(name, name))
+
+
+def section_of(name: str) -> Section:
+    return PARTS[name].section(figures_of(name))
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_every_table_and_chart_is_whole(name):
+    section = section_of(name)
+    names = [table.name for table in section.tables]
+    assert len(names) == len(set(names))
+    for table in section.tables:
+        assert all(record[column.key] is not None for record in table.records()[:1] for column in table.columns[:1])
+        keys = {tuple(record) for record in table.records()}
+        assert len(keys) == 1
+    for chart in section.charts:
+        assert ElementTree.fromstring(chart).find("svg").attrib["role"] == "img"  # noqa: S314 (our own)
+    assert section.verdict
+    assert all(sentences for sentences in section.words.values())
+
+
+def test_hofers_pairs_are_counted_from_their_intervals():
+    section, figures = section_of("hofer2008"), figures_of("hofer2008")
+    (block,) = [
+        each
+        for each in figures["tables"]
+        if (each["states"], each["condition"], each["pins"]) == (5, "audio only", "as printed")
+    ]
+    held = sum(pair["score_gain_95"][0] > 0 for pair in block["paper_order"])
+    against = sum(pair["score_gain_95"][1] < 0 for pair in block["paper_order"])
+    assert f"of the paper's 10 pairs {held} held, {against} reversed" in section.verdict
+    assert {name: row["paper"] for name, row in section.table.rows.items()} == PAPER_SCORES
+    assert len(section.more) == len(figures["tables"]) - 1
+
+
+def test_xie_and_lius_figures_stand_beside_ours():
+    section, figures = section_of("xieliu2007"), figures_of("xieliu2007")
+    ours = figures["rows"][-1]["conditions"]["audio only"]
+    for record in section.table.records():
+        assert record["acc"] == ours[record["system"]]["acc"]
+        printed = PAPER_FIGURES.get(record["system"].removesuffix(", K on val"), (None, None))
+        assert (record["paper_amse"], record["paper_acc"]) == printed
+    pairs = [pair for pair in figures["rows"][-1]["pairs"] if {pair["better"], pair["worse"]} <= {*PAPER_FIGURES}]
+    held = sum(pair["amse_95"][1] < 0 for pair in pairs)
+    assert f"Systems as printed: AMSE: of the paper's {len(pairs)} pairs {held} held" in section.words["By AMSE"][0]
+
+
+def test_an_addition_that_helps_is_named_so():
+    section, figures = section_of("minnis2000"), figures_of("minnis2000")
+    rows = figures["lists"]["test"]["conditions"]["audio only"]
+    raised, lowered, left_open = section.words["Each addition alone"]
+    assert ("guide from the sound" in raised) == (rows["guide from the sound"]["acc_gain_95"][0] > 0)
+    named = sum(text.count("(") for text in (raised, lowered, left_open))
+    assert named == len(ADDITIONS.keys() & rows.keys()) > 5
+    assert section.table.caption == "Unit selection, test, audio only"
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_figures_that_are_not_defined_end_no_run(name):
+    def undefined(content: Any) -> Any:
+        """Return figures whose correlations, scores and their intervals are not defined."""
+        if isinstance(content, list):
+            return [undefined(each) for each in content]
+        if not isinstance(content, dict):
+            return content
+        gone = {"acc", "score", "recall_p_b_m", "acc_95", "score_95", "acc_gain_95", "score_gain_95"}
+        return {
+            key: undefined(each)
+            if key not in gone or isinstance(each, dict)
+            else [None, None]
+            if isinstance(each, list)
+            else None
+            for key, each in content.items()
+        }
+
+    section = PARTS[name].section(undefined(figures_of(name)))
+    assert section.verdict
+    assert "nan" not in "".join(map(str, section.charts))
+
+
+def numbers(text: str) -> Counter[str]:
+    """Return the numbers of a text, with signs and marks of significance."""
+    plain = re.sub(r"(?<=\d),(?=\d{3})", "", text.replace("−", "-"))
+    return Counter(re.findall(r"(?<![\w.])[+-]?\d+(?:\.\d+)?\*?", plain))
+
+
+@pytest.mark.parametrize("region", TABLES)
+def test_a_table_on_a_page_has_what_the_verb_prints(region: str) -> None:
+    """Formats in a sheet make its cells, so they are compared with the verb's own text."""
+    experiment, name, lines = TABLES[region]
+    sheet = stored(f"figures/{region.partition('.')[0]}")
+    source, page = sheet["tables"][region.partition(".")[2]], (RESULTS.parent / sheet["page"]).read_text("utf-8")
+    assert source["from"] == f"{name}.json"
+    shown = page.partition(f"<!--figures:{region}-->\n")[2].partition("\n\n")[0]
+    typed, section = len(source["columns"]) - len(source["cells"]), PARTS[experiment].section(stored(name))
+    printed = {table.caption: table.as_lines() for table in section.tables}
+    for row, keys in zip(shown.splitlines()[2:], source["rows"], strict=True):
+        found = numbers(row.split("|", 2)[2])
+        assert found
+        own = [
+            each.partition("  ")[2]
+            for title, head in lines(*keys[typed:])
+            for each in printed[title]
+            if each.startswith(f"{head}  ")
+        ]
+        assert found <= numbers(" ".join(own))
+
+
+def test_stored_figures_are_of_the_whole_corpus() -> None:
+    for split, clips in (("val", 22), ("test", 50)):
+        figures = stored(f"engines-{split}")
+        assert (figures["split"], figures["clips"]) == (split, clips)
+    assert (stored("folds")["folds"], stored("folds")["clips"]) == (5, 452)
+    assert stored("hofer2008")["trained_on"] == 452
+    assert [row["names"] for row in stored("learning-curve")["rows"]] == SIZES
+    assert REFERENCE_SYSTEM in stored("xieliu2007")["rows"][0]["training"]
+
+
+PAPER = {"a": 3.0, "b": 2.0, "c": 1.0}
+
+
+def order(here: dict[str, float | None], signs: dict[str, int], is_error: bool = False) -> PaperOrder:
+    """Return an order of which the intervals of the pairs have some signs."""
+    lies = {1: (0.1, 0.3), -1: (-0.3, -0.1), 0: (-0.1, 0.1)}
+    pairs = [PaperPair(pair[0], pair[1], signs[pair] * 0.2, lies[signs[pair]]) for pair in ("ab", "ac", "bc")]
+    return PaperOrder("ACC", PAPER, here, pairs, "+.1f", is_error)
+
+
+@pytest.mark.parametrize(
+    ("signs", "outcome"),
+    [
+        ((1, 1, 1), "3 held, 0 reversed, 0 open: all held"),
+        ((1, 1, 0), "2 held, 0 reversed, 1 open: more held than reversed"),
+        ((-1, -1, 1), "1 held, 2 reversed, 0 open: more reversed than held"),
+        ((1, -1, 0), "1 held, 1 reversed, 1 open: as many held as reversed"),
+        ((0, 0, 0), "0 held, 0 reversed, 3 open: these recordings say nothing of its order"),
+    ],
+)
+def test_the_verdict_counts_pairs(signs, outcome):
+    found = order({"a": 0.3, "b": 0.2, "c": 0.1}, dict(zip(("ab", "ac", "bc"), signs, strict=True)))
+    assert found.verdict() == f"ACC: of the paper's 3 pairs {outcome}. Best in print: a; here: a."
+
+
+def test_the_smallest_error_is_the_best():
+    found = order({"a": 0.1, "b": None, "c": 0.3}, {"ab": 1, "ac": 1, "bc": 1}, is_error=True)
+    assert found.verdict().endswith("Best in print: c; here: a.")
+    assert found.sentences()[1] == "Here: a 0.1, c 0.3."
+
+
+ROWS = {
+    "a, <b>": {"acc": 0.5, "acc_95": (0.4, 0.6), "acc_gain_95": (0.1, 0.2), "kind": "x"},
+    "c": {"acc": None, "acc_95": (None, None), "acc_gain_95": None, "kind": None},
+}
+TABLE = Table("t", "All & some", (Column("acc", "ACC", ".2f", "a note"), Column("kind", "kind")), ROWS, "c")
+
+
+def test_every_figure_has_its_interval_and_difference_in_the_files():
+    first, second = csv.DictReader(io.StringIO(TABLE.as_csv()))
+    assert first["system"] == "a, <b>"
+    assert [float(first[key]) for key in ("acc", "acc_low", "acc_high")] == [0.5, 0.4, 0.6]
+    assert [float(first[key]) for key in ("acc_difference_low", "acc_difference_high")] == [0.1, 0.2]
+    assert set(second.values()) == {"c", ""}
+    content = TABLE.as_content()
+    assert content["rows"][0]["acc_difference_low"] == 0.1
+    assert (content["reference"], content["columns"]["acc"]) == ("c", "a note")
+
+
+def test_the_page_shows_the_interval_and_a_star():
+    html = TABLE.as_html("folder")
+    assert '<th scope="row">a, &lt;b&gt;</th><td class="number">0.50* <small>0.40–0.60</small></td><td>x</td>' in html
+    assert '<th scope="row">c</th><td class="number">–</td><td>–</td>' in html
+    assert 'href="folder/tables/t.csv"' in html
+    assert "difference from c leaves out 0" in html
+
+
+def test_a_table_without_rows():
+    empty = Table("t", "none", (Column("acc", "ACC", ".2f"),), {})
+    assert (empty.as_csv().strip(), empty.records()) == ("system", [])
+
+
+def test_figures_intervals_and_the_papers_stand_on_one_axis():
+    rows = [Dot("a", 0.5, (0.4, 0.6), 0.9), Dot("<b>", 0.7, (None, None)), Dot("c", None)]
+    drawing = ElementTree.fromstring(draw_dots("ACC", "ACC", rows)).find("svg")  # noqa: S314 (our own)
+    first, second = (float(each.attrib["cx"]) for each in drawing.findall("circle"))
+    (interval,) = (each for each in drawing.findall("line") if each.attrib["class"] == "interval")
+    low, high = float(interval.attrib["x1"]), float(interval.attrib["x2"])
+    (paper,) = drawing.findall("path")
+    assert high - low == pytest.approx(second - first, abs=0.3)
+    assert (low + high) / 2 == pytest.approx(first, abs=0.3)
+    assert float(paper.attrib["d"][1:].split()[0]) - first == pytest.approx(2 * (second - first), abs=0.3)
+    assert "<b> 0.7" in drawing.attrib["aria-label"]
+
+
+def test_a_curve_has_both_motions_and_what_is_marked():
+    time_s = np.arange(5) / 25
+    made = ElementTree.fromstring(draw_curve("x", time_s, np.zeros(5), np.arange(5.0), [(-0.1, 0.04, "p")])).find("svg")  # noqa: S314 (our own)
+    assert [line.attrib["class"] for line in made.findall("polyline")] == ["recorded", "generated"]
+    assert float(made.find("rect").attrib["x"]) == 34
+
+
+def test_a_still_motion_is_drawn():
+    assert "polyline" in draw_curve("x", np.arange(3.0), np.zeros(3), np.zeros(3), [])
+    assert "nan" not in draw_dots("a", "b", [Dot("still", 0.0, (0.0, 0.0))])
+
+
+def test_a_curve_over_numbers_rises_with_them():
+    lines = {"a": [(10.0, Dot("10", 0.1, (0.0, 0.2))), (100.0, Dot("100", 0.3, (0.2, 0.4)))]}
+    drawing = ElementTree.fromstring(draw_rising("t", "n", lines)).find("svg")  # noqa: S314 (our own)
+    (x1, y1), (x2, y2) = (map(float, p.split(",")) for p in drawing.find("polyline").attrib["points"].split())
+    assert x2 > x1
+    assert y2 < y1

@@ -9,8 +9,7 @@ from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.measures import curves
-from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.testing.examples import examples
+from lipmotion.testing import examples
 from lipmotion.types import silent_monitor
 from lipmotion_lab.evaluation.held_out import HeldOutRecordings, generate_clips, load_held_out
 from lipmotion_lab.xie_liu2007 import systems
@@ -26,13 +25,14 @@ from lipmotion_lab.xie_liu2007.systems import (
     train_stages,
     tune_network,
 )
+from pipeline.made import recogniser_of
 
 SMALL = SYSTEMS["ph-MSHMM"] | {"chains": "viseme", "states": 2}
 
 
 @pytest.fixture(scope="module")
 def validation(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
-    phones = Recogniser(toy_model.phones, "own")
+    phones = recogniser_of(toy_model)
     return load_held_out(toy_corpus, phones, selection=Selection("val"), channels=("opening", "width"))
 
 

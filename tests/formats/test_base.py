@@ -3,15 +3,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats import base, motion_suffix, motion_suffixes, read_motion, readable_suffixes, write_motion
-from lipmotion.formats.base import MOTION_FORMATS, MotionFormat, format_rows, read_members
-from lipmotion.types import Channel, Generation, Motion, Timeline
+from lipmotion.formats import (
+    MotionFormat,
+    base,
+    motion_suffix,
+    motion_suffixes,
+    read_motion,
+    readable_suffixes,
+    write_motion,
+)
+from lipmotion.formats.base import MOTION_FORMATS, format_rows, read_members
+from lipmotion.formats.sound import write_sound
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.resampling import at_speech_rate
+from lipmotion.types import Audio, Channel, Generation, Motion, ReducedVariance, Timeline, from_sixteen_bits
 
 EXACT = (".json", ".csv", ".npz", ".c3d")
 """Formats that hold any channels."""
@@ -104,10 +116,9 @@ def test_a_missing_and_a_damaged_file_are_named(tmp_path, suffix):
             read_motion(path)
 
 
-def test_rows_are_the_rounded_values(monkeypatch):
-    for block, precision in ((1, "f4"), (7, "f8"), (50, "f8"), (2000, "f4")):
-        monkeypatch.setattr(base, "BLOCK_ROWS", block)
-        values = np.random.default_rng(0).normal(0, 3, (50, 7)).astype(precision)
+def test_rows_are_the_rounded_values():
+    for rows, precision in ((50, "f4"), (50, "f8"), (2 * base.BLOCK_ROWS + 7, "f8")):
+        values = np.random.default_rng(0).normal(0, 3, (rows, 7)).astype(precision)
         parsed = np.array([[float(number) for number in row.split(",")] for row in format_rows(values)])
         assert (parsed == np.round(values.astype(float), 5)).all()
     plain = ["0.00000,0.00000,0.00000,0.00001,123456.00000"]
@@ -146,14 +157,136 @@ def test_what_is_no_json_and_rows_of_other_things_are_refused() -> None:
         assert not isinstance(caught.value, json.JSONDecodeError)
 
 
-def test_lists_have_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(base, "MAX_ITEMS", 3)
-    monkeypatch.setattr(base, "MAX_ROWS", 3)
-    assert read_members('{"units": [1, 2, 3], "values": [[1], [2], [3]]}', "values")["units"] == [1, 2, 3]
-    with pytest.raises(ValueError, match="a list of more than 3 items"):
-        read_members('{"units": [1, 2, 3, 4]}', "values")
-    monkeypatch.setattr(base, "MAX_ROWS", 4)
-    assert read_members('{"units": [1, 2, 3, 4]}', "values", "units")["units"] == [1, 2, 3, 4]
-    monkeypatch.setattr(base, "MAX_ROWS", 3)
-    with pytest.raises(ValueError, match="more than 3 rows of values"):
-        read_members('{"values": [[1], [2], [3], [4]]}', "values")
+@pytest.fixture
+def path(tmp_path, generation):
+    path = tmp_path / "a.json"
+    write_motion(path, generation, source={"file": "Größe.wav"}, model={"engine": "trajectory"})
+    return path
+
+
+def test_the_document_is_as_specified(path, generation):
+    text = path.read_text(encoding="utf-8")
+    assert "-0.00000" not in text
+    document = json.loads(text)
+    values = document.pop("values")
+    assert document == {
+        "format": "lipmotion.motion",
+        "version": 1,
+        "rate_hz": 100.0,
+        "channels": [{"name": "opening", "unit": "eye_distance"}, {"name": "x_17", "unit": "metre"}],
+        "units": [
+            {"start_s": 0.0, "end_s": 0.3, "phone": "sil", "unit": "sil"},
+            {"start_s": 0.3, "end_s": 0.45, "phone": "m", "unit": "m", "word": "mama"},
+        ],
+        "source": {"file": "Größe.wav"},
+        "model": {"engine": "trajectory"},
+    }
+    assert values == np.round(generation.motion.values, 5).tolist()
+
+
+WRONG: list[tuple[dict[str, object], str]] = [
+    ({"format": "other"}, "not a motion document"),
+    ({"version": 2}, "version 2, this lipmotion reads up to 1: upgrade lipmotion"),
+    ({"version": "1"}, "version '1', required 1"),
+    ({"rate_hz": 0}, "rate is 0"),
+    ({"rate_hz": "fast"}, "damaged"),
+    ({"channels": [{"name": "opening"}]}, "unit is missing"),
+    ({"channels": []}, "shape"),
+    ({"values": [[1.0], [1.0, 2.0]]}, "damaged"),
+    ({"values": [1.0, 2.0]}, "shape"),
+    ({"values": [[float("nan"), 1.0]]}, "not finite"),
+    ({"units": [{"start_s": 0.3, "end_s": 0.1, "phone": "m", "unit": "m"}]}, "before its start"),
+    ({"units": 3}, "damaged"),
+    ({"recognised": 3}, "damaged"),
+    ({"recognised": [[0.0, 0.3, "sil"]]}, "damaged"),
+    ({"recognised": [[0.0, 0.3, "sil", 1.5]]}, "1.5, required a number from 0 to 1"),
+]
+
+
+def test_what_is_wrong_is_said(path, generation):
+    assert read_motion(path)[1] == generation.units
+    document = json.loads(path.read_text(encoding="utf-8"))
+    for change, message in WRONG:
+        path.write_text(json.dumps({**document, **change}), encoding="utf-8")
+        with pytest.raises(InputError, match=message):
+            read_motion(path)
+    for missing in ("rate_hz", "channels", "units"):
+        path.write_text(json.dumps({key: document[key] for key in document if key != missing}), encoding="utf-8")
+        with pytest.raises(InputError, match=f"{missing} is missing"):
+            read_motion(path)
+
+
+@pytest.fixture
+def npz_path(tmp_path, generation):
+    npz_path = tmp_path / "a.npz"
+    write_motion(npz_path, generation, source={"file": "Größe.wav"}, model={})
+    return npz_path
+
+
+def test_arrays_are_not_rounded_and_plain(npz_path, generation):
+    motion, _ = read_motion(npz_path)
+    assert (motion.values == generation.motion.values).all()
+    assert motion.channels == generation.motion.channels
+    with np.load(npz_path, allow_pickle=False) as arrays:
+        assert set(arrays) == {"values", "standard_deviations", "document"}
+        document = json.loads(str(arrays["document"]))
+    assert "values" not in document
+    assert document["source"] == {"file": "Größe.wav"}
+
+
+def test_every_value_has_a_standard_deviation(tmp_path, generation):
+    spread = np.random.default_rng(3).uniform(0.01, 4, generation.motion.values.shape)
+    npz_path = tmp_path / "b.npz"
+    write_motion(npz_path, replace(generation, spread=spread), source={}, model={})
+    with np.load(npz_path, allow_pickle=False) as arrays:
+        np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(spread), rtol=1e-6)
+    reduced = ReducedVariance(spread[:, :1], np.array([[1.0, 4.0]]))
+    write_motion(npz_path, replace(generation, spread=reduced), source={}, model={})
+    with np.load(npz_path, allow_pickle=False) as arrays:
+        np.testing.assert_allclose(arrays["standard_deviations"], np.sqrt(spread[:, :1] * [1, 4]), rtol=1e-6)
+    assert (read_motion(npz_path)[0].values == generation.motion.values).all()
+
+
+RATE_HZ = 22_050
+
+
+def tone(duration_s: float = 2.0, level: float = 0.5) -> Audio:
+    count = round(duration_s * RATE_HZ)
+    return Audio((level * np.sin(np.arange(count) * 0.1)).astype(np.float32), RATE_HZ)
+
+
+@pytest.mark.parametrize("rate_hz", [16_000, 22_050, 44_100])
+def test_sixteen_bits_come_back_as_they_were_and_are_read_so(tmp_path: Path, rate_hz: int) -> None:
+    values = np.resize(np.array([-32_768, -32_767, -1, 0, 1, 20_000, 32_766, 32_767], np.int16), 70_000)
+    sound = Audio(from_sixteen_bits(values), rate_hz)
+    for name in ("a.wav", "a.flac"):
+        write_sound(tmp_path / name, sound)
+        assert np.array_equal(read_audio(tmp_path / name, rate_hz).samples, sound.samples)
+        assert np.array_equal(read_audio(tmp_path / name).samples, at_speech_rate(sound).samples)
+
+
+@pytest.mark.parametrize(("name", "level"), [("a.wav", 0.5), ("a.FLAC", 0.5), ("a.wav", 2.0)])
+def test_samples_survive_and_too_loud_ones_are_clipped(tmp_path: Path, name: str, level: float) -> None:
+    write_sound(tmp_path / name, tone(level=level))
+    read = read_audio(tmp_path / name, RATE_HZ)
+    np.testing.assert_allclose(read.samples, np.clip(tone(level=level).samples, -1, 1), atol=1e-4)
+    with av.open(str(tmp_path / name)) as container:
+        assert container.streams.audio[0].rate == RATE_HZ
+
+
+def test_a_compressed_sound_is_as_long_and_as_loud(tmp_path: Path) -> None:
+    write_sound(tmp_path / "a.ogg", tone())
+    read = read_audio(tmp_path / "a.ogg", RATE_HZ)
+    assert read.duration_s == pytest.approx(2.0, abs=0.03)
+    assert np.abs(read.samples[RATE_HZ // 2 : RATE_HZ]).max() == pytest.approx(0.5, abs=0.05)
+
+
+def test_errors_leave_nothing(tmp_path: Path) -> None:
+    for name, audio, message in (
+        ("a.mp3", tone(), "unknown format '.mp3'; required one of: .wav .flac .ogg"),
+        ("a.wav", Audio(np.zeros(0, np.float32), RATE_HZ), "the sound has no samples"),
+        ("no/a.wav", tone(), "the folder .* does not exist"),
+    ):
+        with pytest.raises(ExportError, match=message):
+            write_sound(tmp_path / name, audio)
+        assert list(tmp_path.iterdir()) == []

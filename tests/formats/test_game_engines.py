@@ -1,11 +1,22 @@
+import ast
 import re
+import zipfile
+from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from formats.examples import generation, written
-from lipmotion.errors import ExportError
+from formats.examples import generation, of_motion, written
+from lipmotion.articulation.contact import opening_to_gap
+from lipmotion.errors import ExportError, InputError
+from lipmotion.formats import read_motion, write_motion
+from lipmotion.formats.blender import write_addon
+from lipmotion.formats.fap import FAP, MOUTH_TO_NOSE, PARAMETERS, STEPS, move_faps
+from lipmotion.types import WEIGHT, Channel, Generation, Motion
+from meshes.speech import motion, units
 
 TRACK = re.compile(
     r'tracks/(\d+)/type = "blend_shape"\ntracks/\1/imported = false\ntracks/\1/enabled = true\n'
@@ -117,3 +128,164 @@ def test_held_poses_have_constant_tangents(tmp_path: Path) -> None:
     keys = curves(text, "m_FloatCurves")["blendShape.aa"]
     assert [(round(key["time"], 3), key["value"]) for key in keys] == [(0, 25), (0.333, 75), (0.667, 50), (1, 50)]
     assert {(key["inSlope"], key["outSlope"], key["tangentMode"]) for key in keys} == {(np.inf, np.inf, 103)}
+
+
+NONE = ["0"] * 68
+
+
+def fap_generation(frames: int = 50, rate_hz: float = 25.0) -> Generation:
+    values = np.rint(np.random.default_rng(5).normal(0, 200, (frames, len(PARAMETERS))))
+    channels = tuple(Channel(f"fap{number}_{name}", FAP) for number, name, *_ in PARAMETERS)
+    return of_motion(Motion(values, rate_hz, channels))
+
+
+@pytest.mark.parametrize("rate_hz", [25.0, 29.97, 100.0])
+def test_parameters_come_back(tmp_path, rate_hz):
+    written = fap_generation(rate_hz=rate_hz)
+    write_motion(tmp_path / "a.fap", written, source={"file": "my talk.wav"}, model={})
+    motion, units = read_motion(tmp_path / "a.fap")
+    assert (motion.channels, motion.rate_hz, len(units)) == (written.motion.channels, rate_hz, 0)
+    np.testing.assert_array_equal(motion.values, written.motion.values)
+    first = (tmp_path / "a.fap").read_text().splitlines()[0]
+    assert first == f"2.1 my_talk {rate_hz:g} 50"
+
+
+def marks(*numbers: int) -> str:
+    return " ".join("1" if number in numbers else "0" for number in range(1, 69))
+
+
+def read(tmp_path: Path, *lines: str) -> Motion:
+    (tmp_path / "a.fap").write_text("\n".join(lines))
+    return read_motion(tmp_path / "a.fap")[0]
+
+
+def test_files_of_others(tmp_path):
+    """Visemes and expressions are passed over, other parameters named by their number; what is not given stays."""
+    motion = read(
+        tmp_path,
+        *("# a comment", "2.1 face.fap 25 3"),
+        *(marks(1, 2, 3, 19), "0 7 0 0 0 1 0 0 0 0 0 11 22"),
+        *(marks(3), "1 33"),
+        *(marks(), "2"),
+    )
+    assert motion.names == ("fap3_open_jaw", "fap19")
+    assert motion.values.tolist() == [[11, 22], [33, 22], [33, 22]]
+
+
+WRONG = [
+    ([], "begins with ''"),
+    (["1.0 a 25 1"], "begins with '1.0 a 25 1', required 2.1 NAME FPS FRAMES"),
+    (["2.1 a 25"], "begins with '2.1 a 25', required 2.1 NAME FPS FRAMES"),
+    (["2.1 a 25 0"], "0 frames, required 1 to"),
+    (["2.1 a 25 999999999999"], "999999999999 frames, required"),
+    (["2.1 a 25 2", marks(3), "0 5"], "frame 1 of 2 has 0 marks, required 68"),
+    (["2.1 a 25 1", marks(3) + " 1", "0 5"], "has 69 marks"),
+    (["2.1 a 25 1", marks(3), "0 5 6"], "frame 0 of 1 has 2 values, required 1"),
+    (["2.1 a 25 1", marks(3), "0 wide"], "invalid literal"),
+    (["2.1 a 25 1", marks(3), "0 99999999999999999999"], "has a value over 1000000"),
+    (["2.1 a nan 1", marks(3), "0 5"], "rate is nan Hz"),
+]
+
+
+def test_what_is_wrong_is_said(tmp_path):
+    for lines, message in WRONG:
+        with pytest.raises(InputError, match=message):
+            read(tmp_path, *lines)
+    other = replace(fap_generation(), motion=Motion(np.zeros((2, 1)), 25.0, (Channel("opening"),)))
+    with pytest.raises(ExportError, match="no parameters of MPEG-4 but opening"):
+        write_motion(tmp_path / "a.fap", other, source={}, model={})
+
+
+def test_lips_rest_at_0_meet_in_p_and_m_and_go_as_the_standard_says():
+    """Values are whole; a gap is its share of the unit."""
+    parameters = move_faps(motion(), units())
+    np.testing.assert_allclose(parameters.values, np.rint(parameters.values), atol=1e-12)
+    assert np.abs(parameters.values[5:30]).max() <= 1
+    apart = -(parameters["fap4_lower_t_midlip"] + parameters["fap5_raise_b_midlip"])
+    assert np.abs(apart[[55, 95]]).max() <= 1
+    gap = opening_to_gap(motion()["opening"][75:76].astype(np.float64))
+    assert apart[75] / STEPS * MOUTH_TO_NOSE == pytest.approx(float(gap[0]), abs=0.002)
+    assert parameters["fap3_open_jaw"][75] > 0
+    assert parameters["fap5_raise_b_midlip"][75] < 0
+    assert parameters["fap4_lower_t_midlip"][75] < 0
+    assert parameters["fap6_stretch_l_cornerlip"][115] < 0  # oo is narrow
+    assert parameters["fap7_stretch_r_cornerlip"][115] < 0
+
+
+def run(path: Path) -> dict[str, Any]:
+    """Return what the script defines, without running it as a program."""
+    names: dict[str, Any] = {"__name__": "script", "__file__": str(path)}
+    exec(compile(path.read_text(), str(path), "exec"), names)  # noqa: S102
+    return names
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    names = ("jawOpen", 'odd "name"\\')
+    moved = Motion(np.random.default_rng(5).random((7, 2)), 100.0, tuple(Channel(name, WEIGHT) for name in names))
+    source = {"file": "a.wav", "path": "../a 'b'.wav", "start_s": "0.25"}
+    write_motion(tmp_path / "a.blender.py", of_motion(moved, stepped=("jawOpen", "width")), source=source, model={})
+    return tmp_path / "a.blender.py"
+
+
+def test_it_holds_curves_rate_and_sound(path: Path) -> None:
+    names = run(path)
+    assert names["RATE_HZ"] == pytest.approx(100.0)
+    assert names["SOUND"] == "../a 'b'.wav"
+    assert names["STEPPED"] == ("jawOpen",)
+    assert names["SOUND_S"] == pytest.approx(0.25)
+    assert list(names["MOTION"]) == ["jawOpen", 'odd "name"\\']
+    assert names["spelling"]("mouthSmile_L") == "mouthsmileleft"
+    assert {"key_frames", "key_shapes", "at_frames", "main"} <= set(names)
+    assert names["MOTION"]["jawOpen"] == pytest.approx(np.random.default_rng(5).random((7, 2))[:, 0].tolist(), abs=1e-5)
+
+
+def test_it_imports_nothing_but_the_standard_library_and_bpy(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+    modules = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    modules += [each.name for node in ast.walk(tree) if isinstance(node, ast.Import) for each in node.names]
+    assert set(modules) <= {"__future__", "typing", "bisect", "bpy", "csv", "json", "math", "os", "re"}
+    assert all(node.level == 0 for node in ast.walk(tree) if isinstance(node, ast.ImportFrom))
+
+
+def test_the_archive_has_one_folder_with_code_and_manifest(tmp_path: Path) -> None:
+    for name in ("a.zip", "b.zip"):
+        write_addon("blender", tmp_path / name)
+    assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
+        names = archive.namelist()
+        texts = {name: archive.read(name).decode() for name in names}
+    assert {Path(name).parts[0] for name in names} == {"lipmotion_blender"}
+    assert 'blender_version_min = "4.2.0"' in texts["lipmotion_blender/blender_manifest.toml"]
+    assert "bl_info" in texts["lipmotion_blender/__init__.py"]
+    for name, text in texts.items():
+        if name.endswith(".py"):
+            imported = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]
+            named = [each.names[0].name if isinstance(each, ast.Import) else each.module or "" for each in imported]
+            assert not [each for each in named if each.startswith(("lipmotion", "numpy"))]
+
+
+def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
+    for program, name, message in (
+        ("maya", "a.zip", "no add-on for 'maya', required one of blender"),
+        ("blender", "a.py", "unknown format '.py'; Blender installs a .zip"),
+        ("blender", "missing/a.zip", "does not exist"),
+    ):
+        with pytest.raises(ExportError, match=message):
+            write_addon(program, tmp_path / name)
+        assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("installed", "version"), [(None, "0.0.0"), ("1.2.3", "1.2.3"), ("1.2.3.dev4", "1.2.3")])
+def test_the_version_is_three_numbers_also_where_nothing_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, installed: str | None, version: str
+) -> None:
+    def found(name: str) -> str:
+        if installed is None:
+            raise metadata.PackageNotFoundError(name)
+        return installed
+
+    monkeypatch.setattr(metadata, "version", found)
+    write_addon("blender", tmp_path / "a.zip")
+    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
+        assert f'\nversion = "{version}"\n' in archive.read("lipmotion_blender/blender_manifest.toml").decode()

@@ -1,22 +1,21 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from lipmotion import load_model
+from lipmotion import Request, load_model
 from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis, analyse_speech
 from lipmotion.pipeline.generation import predict_outlook
-from lipmotion.pipeline.request import Request
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import UNKNOWN_PHONES, close_gaps, is_silent
 from meshes.speech import said
+from pipeline.made import read_welcome
 
 Row = tuple[float, float, str]
 ROWS: list[Row] = [(0.0, 0.4, "sil"), (0.4, 0.5, "m"), (0.5, 0.7, "aa")]
@@ -84,13 +83,13 @@ WELCOME = Path("examples/welcome.flac")
 
 
 @pytest.fixture(scope="module")
-def audio() -> AnalysedAudio:
+def audio() -> Any:
     """Real speech of five seconds."""
-    return analysed(read_audio(WELCOME))
+    return read_welcome()
 
 
 @pytest.fixture(scope="module")
-def right(audio: AnalysedAudio) -> Timeline[Unit]:
+def right(audio: Any) -> Timeline[Unit]:
     """Its phones in time."""
     words = WELCOME.with_suffix(".txt").read_text()
     return analyse_speech(load_model(), Request(audio, transcript=words)).speech.units
@@ -104,7 +103,7 @@ def followed(audio: Audio, units: Timeline[Unit]) -> tuple[SpeechAnalysis, float
 
 
 def test_right_phones_are_followed_without_a_word(
-    audio: AnalysedAudio, right: Timeline[Unit], caplog: pytest.LogCaptureFixture
+    audio: Any, right: Timeline[Unit], caplog: pytest.LogCaptureFixture
 ) -> None:
     understood, confidence = followed(audio, right)
     assert understood.speech.units == right
@@ -118,7 +117,7 @@ needs_network = pytest.mark.skipif(installed_phone_recogniser() is None, reason=
 @needs_network
 @pytest.mark.parametrize("explicit", [False, True])
 def test_phones_that_end_while_somebody_speaks(
-    audio: AnalysedAudio, right: Timeline[Unit], explicit: bool, caplog: pytest.LogCaptureFixture
+    audio: Any, right: Timeline[Unit], explicit: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     """What they leave open is recognised, what they call silence stays silent; both are named with their times."""
     half = [span for span in right if span.end_s < 2.5]
@@ -155,7 +154,7 @@ def test_phones_that_end_while_somebody_speaks(
     ],
 )
 def test_phones_at_other_times_than_they_are_said(
-    audio: AnalysedAudio,
+    audio: Any,
     right: Timeline[Unit],
     change: Callable[[Timeline[Unit]], Timeline[Unit]],
     problem: str,
@@ -180,7 +179,7 @@ def test_phones_where_nothing_is_said(right: Timeline[Unit], caplog: pytest.LogC
 
 @pytest.mark.parametrize("known", [True, False])
 def test_unknown_phones_are_those_of_the_word_or_recognised(
-    audio: AnalysedAudio, right: Timeline[Unit], known: bool, caplog: pytest.LogCaptureFixture
+    audio: Any, right: Timeline[Unit], known: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     word = "welcome" if any(span.label.word == "welcome" for span in right) else right[1].label.word
     there = [span for span in right if span.label.word == word]

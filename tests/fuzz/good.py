@@ -5,8 +5,7 @@ from pathlib import Path
 from fuzz.inputs import Good
 from lipmotion import Corpus, save_model, train
 from lipmotion.engines import engine_named
-from lipmotion.hmm.model import HmmConfig
-from testing.toy import toy_utterances
+from testing.toy import SMALL, toy_utterances
 
 SENTENCES = 6
 ENGINES: dict[str, dict[str, object]] = {
@@ -23,7 +22,7 @@ def make_good(folder: Path) -> Good:
         corpus.add(utterance)
     for name, options in ENGINES.items():
         engine = engine_named(name, options)
-        model, _ = train(corpus, recogniser=HmmConfig(mixtures=1, iterations=2), engine=engine)
+        model, _ = train(corpus, recogniser=SMALL, engine=engine)
         save_model(model, folder / f"{name}.lipmotion")
     return good_in(folder)
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from fuzz import judge
 from fuzz.campaign import CampaignRecord, campaign
 from fuzz.inputs import Files, Good, Reader, picked_up
 from fuzz.judge import CRASH, ERROR, HANG, IMPLAUSIBLE, LEFT, MEMORY, READ, REFUSED, Result, read_result
@@ -100,13 +99,6 @@ def read_with(error: Exception, folder: Path) -> Result:
         raise error
 
     return read_result(Reader("planted", seeds, read), FILES, folder / "bad", NOWHERE)
-
-
-def test_a_message_that_is_no_short_printable_line(tmp_path, monkeypatch):
-    for line, kind in {"short": REFUSED, "x" * 5000: ERROR, "a\nb": ERROR, "\x1b[2J": ERROR, "\x9b2J": ERROR}.items():
-        monkeypatch.setattr(judge, "outcome", lambda _, line=line: (3, line))
-        assert read_with(InputError("anything"), tmp_path).kind == kind
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_messages_are_alike_whatever_they_quote(tmp_path):

@@ -2,8 +2,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from lipmotion.measures import closures
 from lipmotion.measures.curves import (
+    MIN_CLIPS,
+    MIN_SCORE,
+    best_offset,
+    bootstrap_interval,
     correlation,
     global_variance_ratio,
     jerk_ratio,
@@ -15,10 +21,13 @@ from lipmotion.measures.curves import (
     normalised_rmse,
     per_clip_correlation,
     pooled_correlation,
+    pooled_offset,
     rmse,
     select_moving,
+    shift_scores,
     upper_face_deviation,
 )
+from oracles import matching
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -206,3 +215,246 @@ def test_upper_face_deviation_is_how_much_more_the_original_varies_about_its_res
     assert upper_face_deviation([original], [made], rest) == pytest.approx(-(1 - 0.5) / 2)
     raised = made + np.array([0, 0.5, 0])  # a face that is held otherwise does not vary
     assert upper_face_deviation([raised[:, 1:]], [made[:, 1:]], rest[1:]) == pytest.approx(0)
+
+
+def acc(generated, original) -> float:
+    return float(pooled_correlation(generated, original)[0])
+
+
+def bootstrap_clips(seed: int, count: int = 12):
+    draw = np.random.default_rng(seed)
+    original = [draw.normal(0, 1, (40, 1)) for _ in range(count)]
+    return [clip + draw.normal(0, 0.7, clip.shape) for clip in original], original
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=10)
+def test_the_interval_holds_the_figure_itself(seed):
+    generated, original = bootstrap_clips(seed)
+    low, high = bootstrap_interval(acc, generated, original, seed=0, draws=200)
+    assert low < acc(generated, original) < high
+    assert high - low < 0.3
+
+
+def test_clips_are_drawn_whole_and_together():
+    """Every clip has its own value, generated and original alike, so clips that were drawn separately would differ."""
+    values = [np.full((3, 1), float(n)) for n in range(5)]
+    assert bootstrap_interval(mean_distance, values, values, seed=0, draws=50) == (0, 0)
+
+
+def test_95_percent_of_the_draws_lie_inside():
+    """The mean of 200 values is nearly normal: 1.96 standard errors to either side."""
+    values = np.abs(np.random.default_rng(4).normal(5, 1, 200))
+    generated, original = [np.full((1, 1), value) for value in values], [np.zeros((1, 1))] * 200
+    low, high = bootstrap_interval(mean_distance, generated, original, seed=0)
+    assert (low + high) / 2 == pytest.approx(values.mean(), abs=0.02)
+    assert high - low == pytest.approx(2 * 1.96 * values.std() / np.sqrt(200), rel=0.07)
+
+
+RATE_HZ = 100.0
+REACH = 40
+
+
+def wave(start: float, count: int = 300, seed: int = 0) -> NDArray[np.float64]:
+    """Return a band-limited random curve, from any start on."""
+    draw = np.random.default_rng(seed)
+    time = start + np.arange(count)
+    return sum(
+        np.sin(2 * np.pi * hertz / RATE_HZ * time + phase)
+        for hertz, phase in zip(draw.uniform(0.5, 7, 25), draw.uniform(0, 6.3, 25), strict=True)
+    )
+
+
+def scores(late_frames: float, seed: int = 0, noise: float = 0.0, valid: NDArray[np.bool_] | None = None):
+    measured = wave(0, seed=seed) + noise * np.random.default_rng(seed).normal(size=300)
+    valid = np.ones(300, bool) if valid is None else valid
+    return shift_scores(wave(-late_frames, seed=seed), measured, valid, REACH)
+
+
+@settings(max_examples=40)
+@given(st.floats(-30, 30), st.integers(0, 20))
+def test_a_shift_is_found(late_frames: float, seed: int) -> None:
+    found = best_offset(scores(late_frames, seed), RATE_HZ)
+    assert found.late_s == pytest.approx(late_frames / RATE_HZ, abs=0.002)
+    assert found.known
+    assert found.low_s == found.late_s == found.high_s
+
+
+def test_scores_are_plain_correlations() -> None:
+    draw = np.random.default_rng(1)
+    predicted, measured, valid = draw.normal(size=60), draw.normal(size=50), draw.random(50) > 0.2
+    found = shift_scores(predicted, measured, valid, 12)
+    for shift in range(-12, 13):
+        pairs = [(predicted[t + shift], measured[t]) for t in range(50) if valid[t] and 0 <= t + shift < 60]
+        expected = np.corrcoef(np.array(pairs).T)[0, 1]
+        assert found[shift + 12] == pytest.approx(expected if len(pairs) >= 25 else 0)
+
+
+def test_frames_without_a_face_do_not_count() -> None:
+    valid = np.ones(300, bool)
+    valid[80:140] = False
+    measured = wave(0)
+    measured[80:140] = 1e3
+    assert best_offset(shift_scores(wave(-7), measured, valid, REACH), RATE_HZ).late_s == pytest.approx(0.07, abs=0.001)
+
+
+def test_unlike_curves_are_not_known() -> None:
+    found = [
+        best_offset(shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH), RATE_HZ)
+        for n in range(20)
+    ]
+    assert sum(each.known for each in found) <= 4
+
+
+def test_a_repeating_curve_is_not_known() -> None:
+    time_s = np.arange(300) / RATE_HZ
+    beat = np.sin(2 * np.pi * 5 * time_s)
+    found = best_offset(shift_scores(beat, beat, np.ones(300, bool), REACH), RATE_HZ)
+    assert found.score > 0.9
+    assert not found.known
+
+
+def test_clips_together_know_better_than_each() -> None:
+    clips = [scores(6.0, seed, noise=12.0) for seed in range(30)]
+    found = pooled_offset(clips, RATE_HZ)
+    worst_s = max(abs(best_offset(clip, RATE_HZ).late_s - 0.06) for clip in clips)
+    assert abs(found.late_s - 0.06) < 0.01 < worst_s
+    assert found.low_s <= found.late_s <= found.high_s
+    assert found.low_s < 0.06 < found.high_s or found.high_s - found.low_s < 0.01
+
+
+def test_clips_that_correlate_little_and_agree_are_known_together() -> None:
+    """As those of a voice that the prediction has not learned: 0 of 13 are known alone."""
+    clips = [scores(6.0, seed, noise=12.0) for seed in range(13)]
+    assert not any(best_offset(clip, RATE_HZ).known for clip in clips)
+    found = pooled_offset(clips, RATE_HZ)
+    assert found.score < MIN_SCORE
+    assert found.known
+    assert not pooled_offset(clips[: MIN_CLIPS - 1], RATE_HZ).known
+    others = [shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH) for n in range(len(clips))]
+    assert not pooled_offset(others, RATE_HZ).known
+    assert found == pooled_offset(clips, RATE_HZ)
+
+
+def test_clips_shorter_than_the_shifts() -> None:
+    for count in (1, 5, 30, 40, 50, 80):
+        curve = wave(0, count)
+        found = shift_scores(curve, curve, np.ones(count, bool), REACH)
+        assert found.shape == (2 * REACH + 1,)
+        assert found[: max(REACH - count // 2, 0)] == pytest.approx(0)
+        assert found[REACH] == pytest.approx(1 if count > 1 else 0)
+
+
+FRAMES = st.lists(st.integers(0, 14), max_size=5, unique=True).map(lambda frames: np.array(sorted(frames), np.intp))
+
+
+def opening(closed: list[int], frames: int = 30) -> np.ndarray:
+    """Return an opening of 1, and of 0 (closed) in given frames."""
+    curve = np.ones(frames)
+    curve[closed] = 0
+    return curve
+
+
+def test_threshold_is_a_tenth_of_the_95th_percentile_of_all_frames():
+    curves = [np.linspace(0, 1, 101), np.linspace(0, 1, 101)]
+    assert closures.closed_threshold(curves) == pytest.approx(0.095, abs=1e-3)
+    assert closures.closed_threshold(curves, share=0.25) == pytest.approx(0.2375, abs=1e-3)
+
+
+def test_a_closing_is_the_first_closed_frame_after_an_open_one():
+    curve = np.array([0.0, 0.0, 1.0, 0.05, 0.0, 1.0, 1.0, 0.0])
+    assert closures.find_closings(curve, 0.1).tolist() == [3, 7]  # closed from the start is no closing
+    assert closures.find_closings(curve, 0.05).tolist() == [4, 7]  # the threshold itself is open
+    assert closures.find_closings(curve[:1], 0.1).tolist() == []
+
+
+@given(generated=FRAMES, original=FRAMES)
+@settings(max_examples=60)
+def test_as_many_as_possible_are_matched_one_to_one_at_the_least_distance(generated, original):
+    pairs = closures.match_closings(generated, original)
+    assert len({g for g, _ in pairs}) == len({o for _, o in pairs}) == len(pairs)
+    assert all(abs(g - o) <= 2 for g, o in pairs)
+    distance = sum(abs(g - o) for g, o in pairs)
+    assert (len(pairs), distance) == matching.best(generated.tolist(), original.tolist(), 2)
+
+
+def test_matching_by_hand():
+    for generated, original, pairs in (
+        ([8, 11], [10], [(11, 10)]),
+        ([7], [10], []),
+        ([9, 12], [10, 11], [(9, 10), (12, 11)]),
+        ([10, 12], [8, 10], [(10, 8), (12, 10)]),  # nearest first finds one
+    ):
+        assert closures.match_closings(np.array(generated), np.array(original)) == pairs
+    assert closures.match_closings(np.array([10, 12]), np.array([11])) in ([(10, 11)], [(12, 11)])
+
+
+@given(some=FRAMES, others=FRAMES)
+def test_near_counts_whichever_is_near(some, others):
+    assert closures.count_matches(some, others) == sum(any(abs(a - b) <= 2 for b in others) for a in some)
+
+
+def test_figures_by_hand():
+    original, generated = [opening([5, 12, 20]), opening([3])], [opening([7, 20, 27]), opening([10])]
+    figures = closures.closure_figures(generated, original, 0.1, 25.0)
+    assert (figures.score, figures.precision, figures.f1) == pytest.approx((2 / 4, 2 / 4, 2 * 2 / (4 + 4)))
+    assert figures.timing_ms == pytest.approx(1000 * 1 / 25)  # the median of 2 frames late and on time
+    assert (figures.original, figures.generated) == (4, 4)
+    figures = closures.closure_figures([opening([11])], [opening([10, 12])], 0.1, 25.0)
+    assert (figures.score, figures.precision) == (1, 1)  # Hofer's: a point for every original that has one near it
+    assert figures.f1 == pytest.approx(2 / 3)  # matched once
+    assert abs(figures.timing_ms) == pytest.approx(40)
+
+
+def test_a_mouth_that_never_moves_has_no_figures():
+    flat = [np.ones(20)]
+    figures = closures.closure_figures(flat, flat, 0.1, 25.0)
+    assert (figures.original, figures.generated) == (0, 0)
+    assert np.isnan([figures.score, figures.precision, figures.f1, figures.timing_ms]).all()
+    lost = closures.closure_figures(flat, [opening([5], 20)], 0.1, 25.0)
+    assert lost.score == lost.f1 == 0
+    assert np.isnan(lost.precision)
+
+
+def test_phone_closures_by_hand():
+    """25 fps; the phones last from frame 5 to 7, 15 to 17 and 24 to 26, each with a frame before and after."""
+    phones = [[(0.2, 0.28), (0.6, 0.68), (0.96, 1.04)]]
+    original = [opening([6, 14, 20])]  # closes in the first, one frame ahead of the second, and elsewhere
+    generated = [opening([8, 12, 25])]  # one frame behind the first, misses the second; the third does not count
+    figures = closures.phone_closures(generated, original, phones, speech_s=30.0, threshold=0.1, rate_hz=25.0)
+    assert figures.intervals == 2
+    assert figures.recall == pytest.approx(1 / 2)
+    assert figures.false_per_minute == pytest.approx(1 / 0.5)  # frame 12
+    assert figures.original_per_minute == pytest.approx(1 / 0.5)  # frame 20
+
+
+def test_intervals_are_taken_one_frame_longer_at_both_ends():
+    """The frames at 0.20, 0.24 and 0.28 s lie inside, so 4 to 8 count."""
+    for interval_s in ((0.2, 0.28), (0.165, 0.315)):
+        for frame in range(30):
+            figures = closures.phone_closures([opening([frame])], [opening([frame])], [[interval_s]], 60.0, 0.1, 25.0)
+            assert figures.intervals == (4 <= frame <= 8)
+            assert figures.false_per_minute == (not 4 <= frame <= 8 and frame > 0)  # closed from the start is none
+
+
+def test_phones_beyond_the_clip_and_clips_without_phones():
+    curves = [opening([6]), opening([29])]
+    figures = closures.phone_closures(curves, curves, [[], [(1.16, 1.4), (2.0, 2.1)]], 60.0, 0.1, 25.0)
+    assert (figures.recall, figures.intervals) == (1, 1)
+    assert figures.false_per_minute == 1
+    nothing = closures.phone_closures(curves, curves, [[], []], 0.0, 0.1, 25.0)
+    assert np.isnan([nothing.recall, nothing.false_per_minute, nothing.original_per_minute]).all()
+
+
+@given(clips=st.lists(st.tuples(FRAMES, FRAMES), min_size=1, max_size=4))
+@settings(max_examples=40)
+def test_closings_found_clip_by_clip_add_up_to_the_score(clips):
+    generated, original = ([opening(list(clip[side]))[:, None] for clip in clips] for side in (0, 1))
+    hits, count = closures.clip_closure_counts(generated, original, 0.5)
+    for (g, o), hit, wanted in zip(zip(generated, original, strict=True), hits, count, strict=True):
+        times = [closures.find_closings(side[:, 0], 0.5).tolist() for side in (g, o)]
+        assert wanted.tolist() == [len(times[1])]
+        assert hit.tolist() == [sum(any(abs(a - b) <= 2 for a in times[0]) for b in times[1])]
+    whole = closures.closure_figures([g[:, 0] for g in generated], [o[:, 0] for o in original], 0.5, 25)
+    assert whole.original == sum(count)
+    assert whole.score == pytest.approx(np.sum(hits) / np.sum(count) if np.sum(count) else np.nan, nan_ok=True)

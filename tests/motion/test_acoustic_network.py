@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import CorpusError
-from lipmotion.motion import acoustic_network, network_steps
+from lipmotion.motion import acoustic_network
 from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.network_steps import STEP, interpolate_steps
-from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.motion.predictors import Predictor, PredictorTraining
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.testing.examples import example
+from lipmotion.testing import example
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example
 
 
@@ -31,15 +31,18 @@ def example_in_conditions(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tupl
     return replace(one, speech=speech, condition_spectra=tuple(versions)), slow * [0.1, 0.02] + [0.3, 0.6]
 
 
+def fit(training: PredictorTraining, steps: int) -> Predictor:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(acoustic_network, "MIN_STEPS", steps)
+        patch.setattr(acoustic_network, "BATCH_SIZE", 4)
+        return AcousticNetwork.fit(training).predictor
+
+
 @pytest.fixture(scope="module")
 def trained() -> AcousticNetwork:
     """A small network."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(acoustic_network, "MIN_STEPS", 60)
-    patch.setattr(acoustic_network, "BATCH_SIZE", 4)
     examples, values = zip(*(example_in_conditions(seed, (1.0, 0.8, 1.25)) for seed in range(6)), strict=True)
-    result = AcousticNetwork.fit(PredictorTraining(examples, values, 2)).predictor
-    patch.undo()
+    result = fit(PredictorTraining(examples, values, 2), 60)
     assert isinstance(result, AcousticNetwork)
     return result
 
@@ -79,13 +82,11 @@ def test_a_network_without_a_part_or_with_a_scale_of_nothing_is_refused(trained:
         AcousticNetwork.from_arrays(arrays, 2)
 
 
-def test_a_stopped_training_goes_on_from_its_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(acoustic_network, "MIN_STEPS", 2)
+def test_a_stopped_training_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
+    """Else more steps would lead elsewhere."""
     examples, values = zip(*(example_in_conditions(seed) for seed in range(2)), strict=True)
     training = PredictorTraining(examples, values, 2, checkpoint=Checkpoint(tmp_path, "job"))
-    first = AcousticNetwork.fit(training).predictor.arrays()
-    monkeypatch.setattr(network_steps, "fit_network", lambda *_: pytest.fail("trained again"))
-    again = AcousticNetwork.fit(training).predictor.arrays()
+    first, again = fit(training, 2).arrays(), fit(training, 9).arrays()
     np.testing.assert_allclose(again["network_output"], first["network_output"])
 
 

@@ -6,7 +6,7 @@ import pytest
 from lipmotion.motion import articulation
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.curves import with_dynamics
-from lipmotion.testing.examples import examples, timeline
+from lipmotion.testing import examples, timeline
 
 OPENING, WIDTH = articulation.ARTICULATORS.index("opening"), articulation.ARTICULATORS.index("width")
 

@@ -9,7 +9,7 @@ from lipmotion.motion import generation as module
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.modulation_filter import REACH, ModulationFilter
 from lipmotion.motion.variance_scaling import LARGEST_FACTOR, VarianceScaling
-from lipmotion.testing.examples import PHONES, examples, speech, timeline
+from lipmotion.testing import PHONES, examples, speech, timeline
 from lipmotion.types import Constraints, Pin, silent_monitor
 
 ENGINE = engine_named("trajectory", {})

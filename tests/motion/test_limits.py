@@ -15,7 +15,7 @@ from lipmotion.motion.closure import (
 from lipmotion.motion.limits import MotionLimits, check_poses, check_rest, check_spread, measure_limits
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.pca import Pca
-from lipmotion.testing.examples import PHONES, examples, speech
+from lipmotion.testing import PHONES, examples, speech
 from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit, silent_monitor
 
 POSES = np.array([[0.0, 0.5], [0.3, 0.6], [0.1, 0.55]])

@@ -15,7 +15,7 @@ from lipmotion.motion.modulation_filter import (
     learn_filter,
 )
 from lipmotion.storage.schema import format_errors
-from lipmotion.testing.examples import examples
+from lipmotion.testing import examples
 from lipmotion.types import FRAME_RATE_HZ
 
 RNG = np.random.default_rng(0)

@@ -6,7 +6,7 @@ import pytest
 from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.predictors import PredictorFit, PredictorTraining, split_folds
 from lipmotion.motion.prior_regression import PriorRegression
-from lipmotion.testing.examples import example
+from lipmotion.testing import example
 from lipmotion.types import SPECTRUM_BANDS, Example, PriorOutput
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import load_model
+from lipmotion import Request, load_model
 from lipmotion.motion import unseen_speaker
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.closure import REACH_S, find_closable_ranges
@@ -13,8 +13,7 @@ from lipmotion.motion.general_motion import hear_articulators
 from lipmotion.motion.space import MotionSpace
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.model import with_prior
-from lipmotion.pipeline.request import Request
-from lipmotion.testing.examples import timeline
+from lipmotion.testing import timeline
 from lipmotion.types import Constraints, Generation, Pin, Span, Speech, Timeline, Unit
 from lipmotion.units import VOWELS
 

@@ -1,4 +1,4 @@
-"""What tests of several rooms make: corpora of utterances, and sounds of noise."""
+"""What tests of several rooms make: corpora, sounds and their features, recognisers, and a character that is read."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from lipmotion import Corpus
+from lipmotion import Corpus, Model
 from lipmotion.errors import MissingDependencyError
-from lipmotion.types import Timeline, Track, Unit, Utterance
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio, Features, Timeline, Track, Unit, Utterance
 from lipmotion_faces.corpus import prepare
 from testing.toy import toy_sentences, toy_utterances
 
@@ -23,6 +26,7 @@ def corpus_of(folder: Path, utterances: Iterable[Utterance]) -> Corpus:
     return corpus
 
 
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
 """How ben's opening, width and outer differ from those of the toy: he never closes his mouth wholly."""
 
@@ -57,8 +61,26 @@ def replace_tracking(monkeypatch: pytest.MonkeyPatch, track: Callable[..., Track
     monkeypatch.setattr(prepare, "track", track)
 
 
+def features_of(audio: Audio) -> Features:
+    return analysed(audio).mfcc()
+
+
+def read_welcome() -> AnalysedAudio:
+    """Return real speech of five seconds, of a voice that the shipped model does not know."""
+    return analysed(read_audio(WELCOME))
+
+
+def recogniser_of(model: Model, kind: str = "own") -> Recogniser:
+    return Recogniser(model.phones, kind)
+
+
+def write_sound(path: Path, audio: Audio) -> None:
+    """Write samples as a WAV file of 16 bits."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    wavfile.write(path, audio.rate_hz, np.round(np.clip(audio.samples, -1, 1) * 32_767).astype("<i2"))
+
+
 def write_noise(path: Path, seconds: float = 1.0, seed: int = 0, rate_hz: int = 16_000) -> None:
     """Write noise as a WAV file, whatever its suffix is."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     samples = np.random.default_rng(seed).integers(-9000, 9000, int(seconds * rate_hz))
-    wavfile.write(path, rate_hz, samples.astype("<i2"))
+    write_sound(path, Audio((samples / 32_767).astype(np.float32), rate_hz))

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from lipmotion import Model, animate, write
+from lipmotion import Model, Request, animate, write
 from lipmotion.errors import InputError
-from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
 from lipmotion.units import Lexicon

@@ -87,12 +87,6 @@ def test_what_a_file_cannot_say(tmp_path, content, words):
     assert str(error.value).startswith(str(tmp_path / "scene.toml"))
 
 
-def test_an_old_python_is_named(monkeypatch):
-    monkeypatch.setattr("sys.version_info", (3, 10, 4))
-    with pytest.raises(InputError, match=r"read by Python 3\.11 or newer"):
-        Job.from_file("scene.toml")
-
-
 def test_a_job_writes_what_animate_and_write_do(toy_speech, toy_model_file, tmp_path):
     made = [tmp_path / name for name in ("job.json", "calls.json")]
     outputs = Outputs((str(made[0]),), fps=30, channels=("width", "tongue"))

@@ -1,18 +1,27 @@
+"""No array of a model, whatever is done to it, gives motion that no face has."""
+
 import io
+import warnings
 import zipfile
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lipmotion import animate, load_model, save_model
+from lipmotion import Model, Request, adapt, animate, load_model, save_model
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.pipeline import model as module
+from lipmotion.hmm.model import hmm_to_arrays
+from lipmotion.motion.eigenlips import eigenlips_to_arrays
+from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.model import VERSION, read_header, shipped_path
+from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
 from lipmotion.storage.archive import HEADER
 from lipmotion.types import Audio, Generation
+from pipeline.damage import DAMAGES, LARGEST_DIFFERENCE, QUICK, UNREADABLE, animated, damaged, distance, refused
 from robustness.case import changed_model
+from testing.toy import ToySentence, toy_sentences
 
 
 def test_saved_and_loaded_it_moves_the_same(toy_model, toy_model_file, toy_speech):
@@ -58,19 +67,6 @@ def test_what_a_user_must_know_comes_back(toy_model, tmp_path):
     assert load_model(tmp_path / "m.lipmotion").about == about
 
 
-def test_the_header_says_what_there_is_not(toy_model_file, tmp_path):
-    for changes, message in (
-        ({"engine": "concatenative"}, "no engine 'concatenative'; there are: trajectory"),
-        ({"configuration": {"part": 5}}, "no option 'part'; there are: states, "),
-        ({"configuration": {"states": 4}}, "states is 4, required an odd number"),
-        ({"recogniser": {"state": 3}}, "no option 'state'; there are: states, "),
-        ({"recogniser": []}, "damaged"),
-        ({"configuration": None}, "damaged"),
-    ):
-        with pytest.raises(ModelFormatError, match=message):
-            load_model(changed_model(toy_model_file, tmp_path / "m.lipmotion", {}, **changes))
-
-
 def test_models_are_one_short_line():
     model = load_model()
     assert repr(model).startswith("Model(trajectory, geometry, ")
@@ -91,12 +87,6 @@ def test_the_shipped_model_is_read_once():
     assert load_model() is load_model()
 
 
-def test_a_package_without_a_model_says_so(monkeypatch, tmp_path):
-    monkeypatch.setattr(module, "shipped_path", lambda: tmp_path / "grid-s1.lipmotion")
-    with pytest.raises(ModelFormatError, match="the package holds no model; install it again, or give one"):
-        animate(Audio(np.zeros(16_000, np.float32), 16_000))
-
-
 def test_a_model_with_the_former_names_of_options_is_read(toy_model_file, tmp_path):
     former = {
         "parts": 5, "silent_parts": 13, "listens": True, "axes": 150, "full_range": True, "joint": True,
@@ -107,27 +97,6 @@ def test_a_model_with_the_former_names_of_options_is_read(toy_model_file, tmp_pa
     assert model.engine.config == replace(present.config, modulation_filter=0.0)
     with pytest.raises(ModelFormatError, match="trajectory_steps is 3; this option no longer exists, required 0"):
         load_model(changed_model(toy_model_file, tmp_path / "n.lipmotion", {}, configuration={"trajectory_steps": 3}))
-
-
-def test_what_is_no_model(toy_model_file, tmp_path):
-    path = tmp_path / "m.lipmotion"
-    for read in (load_model, read_header):
-        for missing in (tmp_path / "missing.lipmotion", tmp_path):
-            with pytest.raises(InputError, match="no such model"):
-                read(missing)
-        for version in (VERSION + 1, str(VERSION), None):
-            wanted = f"model version {version}, .* reads version {VERSION}; upgrade lipmotion, or"
-            with pytest.raises(ModelFormatError, match=wanted):
-                read(changed_model(toy_model_file, path, {}, version=version))
-        for content in (b"", b"words, not a model", b"PK\3\4", b"PK\5\6" + bytes(18)):
-            path.write_bytes(content)
-            wanted = r"m.lipmotion: not a lipmotion model \(.+\); give a file that"
-            with pytest.raises(ModelFormatError, match=wanted) as caught:
-                read(path)
-            assert "\n" not in str(caught.value)
-        for header in (b"{", b"\xff", b"[]", b'{"format": "lipmotion.motion"}', None):
-            with pytest.raises(ModelFormatError, match="not a lipmotion model"):
-                read(changed_model(toy_model_file, path, {HEADER: header}))
 
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
@@ -163,3 +132,132 @@ def test_vowels_open_and_silence_rests(welcome):
     assert opening[:10].max() < 0.02
     assert opening[-10:].max() < 0.02
     assert np.abs(np.diff(opening)).max() < 0.04  # smooth: no jump between frames of 10 ms
+
+
+@pytest.fixture(scope="module")
+def adapted(toy_model: Model, toy_speech: Path) -> Model:
+    return adapt(toy_model, [toy_speech, toy_sentences(3)[1].audio])
+
+
+@pytest.fixture(scope="module")
+def adapted_file(adapted: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("adapted") / "adapted.lipmotion"
+    save_model(adapted, path)
+    return path
+
+
+def test_only_the_adaptation_changes(toy_model, adapted):
+    assert toy_model.adaptation is None
+    assert adapted.adaptation is not None
+    assert adapted.phones is toy_model.phones
+    assert adapted.learned is toy_model.learned
+    about = dict(adapted.about)
+    assert about.pop("adapted")["recordings"] == 2
+    assert about == toy_model.about
+
+
+def test_it_is_used_from_then_on(adapted, toy_speech):
+    """With one that turns features about, phones, or their times, are others."""
+    odd = replace(adapted, adaptation=replace(adapted.adaptation, own=-adapted.adaptation.own))
+    for words in (None, "see papa"):
+        request = Request(toy_speech, transcript=words, recogniser="own")
+        assert animate(request, model=odd).units != animate(request, model=adapted).units
+
+
+def test_a_saved_and_loaded_adaptation_gives_the_same_phones(adapted, adapted_file, toy_speech):
+    again = load_model(adapted_file)
+    assert np.array_equal(again.adaptation.own, adapted.adaptation.own)
+    assert np.array_equal(again.adaptation.general, adapted.adaptation.general)
+    assert read_header(adapted_file)["adapted"] == adapted.about["adapted"]
+    request = Request(toy_speech, recogniser="fast")
+    before, after = (animate(request, model=model).units for model in (adapted, again))
+    assert [span.label.phone for span in before] == [span.label.phone for span in after]
+
+
+@pytest.mark.long
+def test_an_earlier_adaptation_is_forgotten(adapted, toy_model, toy_speech):
+    again, fresh = (adapt(model, [toy_speech]) for model in (adapted, toy_model))
+    assert np.array_equal(again.adaptation.own, fresh.adaptation.own)
+    assert again.about == fresh.about
+
+
+def test_a_list_of_recordings_is_required(toy_model):
+    for given in ([], "one.wav", Path("one.wav"), Audio(np.zeros(16_000, np.float32), 16_000)):
+        with pytest.raises(InputError, match="required: one or more recordings of the speaker"):
+            adapt(toy_model, given)
+
+
+ENGINES = ("toy_model", "joint_model", "coupled_model", "pictured_model")
+
+
+@pytest.fixture
+def quiet() -> Iterator[None]:
+    """An overflow is detected by its consequences."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def absurd(model: Model, sentence: ToySentence, damages: tuple[str, ...]) -> tuple[list[str], int, int]:
+    """Return what gave absurd motion, or was not noticed; how much was refused, and how much was harmless."""
+    speech = analyse(model, Request(sentence.audio, recogniser="own"))
+    arrays = model.engine.to_arrays(model.learned)
+    whole = animated(model, arrays, speech)
+    assert whole is not None
+    found, refusals, harmless = [], 0, 0
+    for name, what, changed in damaged(arrays, {damage: DAMAGES[damage] for damage in damages}):
+        motion = animated(model, changed, speech)
+        number = arrays[name].dtype.kind in "fiu" and arrays[name].size > 1
+        if motion is None:
+            refusals += 1
+        elif distance(motion, whole) > LARGEST_DIFFERENCE or (number and what in UNREADABLE):
+            found.append(f"{name}: {what}")
+        else:
+            harmless += 1
+    return found, refusals, harmless
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("quiet")
+@pytest.mark.parametrize("name", ENGINES)
+def test_damaged_arrays_of_an_engine(name, toy_sentence, request):
+    found, refusals, harmless = absurd(request.getfixturevalue(name), toy_sentence, QUICK)
+    assert found == []
+    assert refusals > 60
+    assert harmless < refusals / 4
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("quiet")
+def test_damaged_arrays_of_all_other_parts(pictured_model):
+    model = pictured_model
+    assert model.eigenlips is not None
+    parts = {
+        "phones": hmm_to_arrays(model.phones),
+        "eigenlips": eigenlips_to_arrays(model.eigenlips),
+        "adaptation": adaptation_arrays(identity_adaptation(1.0, 0.5)),
+    }
+    read = [
+        f"{part}/{name}: {what}"
+        for part, arrays in parts.items()
+        for name, what, changed in damaged(arrays, {damage: DAMAGES[damage] for damage in UNREADABLE})
+        if arrays[name].dtype.kind != "U" and not refused(part, model, changed)
+    ]
+    assert not any(refused(part, model, arrays) for part, arrays in parts.items())
+    assert read == []
+
+
+UNDECLARED = {
+    "toy_model": ("more", "points", "joint/more"),
+    "joint_model": ("more", "joint_more", "joint_f0/more", "joint_more/means"),
+    "coupled_model": ("more", "chain_9/units", "group_0/more", "group_7/tie", "around/more", "visual_1/scale"),
+}
+
+
+@pytest.mark.parametrize("name", UNDECLARED)
+def test_an_array_that_nothing_declares(name, request):
+    model: Model = request.getfixturevalue(name)
+    arrays = model.engine.to_arrays(model.learned)
+    for more in UNDECLARED[name]:
+        with pytest.raises(ModelFormatError, match=r"damaged \(.*undeclared "):
+            model.engine.from_arrays(arrays | {more: np.zeros(3)})

@@ -1,15 +1,20 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from lipmotion import Model, load_model, read_motion, speak, write
+from lipmotion import Corpus, Model, Selection, load_model, read_motion, speak, train, write
+from lipmotion.engines import engine_named
+from lipmotion.errors import InputError
 from lipmotion.pipeline.generate import speak as module
-from lipmotion.pipeline.generate.speak import REST_S
+from lipmotion.pipeline.generate.speak import REST_S, speak_from_corpus
 from lipmotion.speech.voices.installed import default_voice, installed_voices
 from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit
-from lipmotion.units import LIP_CLOSING, is_silent
+from lipmotion.units import LIP_CLOSING, Lexicon, is_silent
+from pipeline.made import corpus_of
 from speech import stand_in_voice
+from testing.toy import SMALL
 
 TEXT = "Papa, see Bob. Mama!"
 
@@ -73,19 +78,6 @@ def test_the_sound_is_silent_where_the_units_are(spoken):
     assert loud["aa"] > 5 * loud["sil"]
 
 
-def test_sentences_go_to_the_synthesiser_a_few_at_a_time(
-    stand_in: None,  # noqa: ARG001
-    toy_model: Model,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    with monkeypatch.context() as few:
-        few.setattr(module, "SENTENCES_PER_RUN", 2)
-        together = speak("See Bob. Mama. Papa. See. Bob.", model=toy_model)
-    again = speak("See Bob. Mama. Papa. See. Bob.", model=toy_model)
-    assert np.array_equal(together.sound.samples, again.sound.samples)
-    assert np.array_equal(together.generation.motion.values, again.generation.motion.values)
-
-
 def test_pins_hold(stand_in: None, toy_model: Model) -> None:  # noqa: ARG001
     told = Constraints((Pin(0.5, "opening", 0.07),))
     result = speak(TEXT, model=toy_model, constraints=told).generation
@@ -120,3 +112,87 @@ def test_a_real_voice_closes_the_lips_in_time():
     for span in closing:
         assert opening[round(span.start_s * 100) : round(span.end_s * 100) + 1].min() < 0.1 * np.percentile(opening, 95)
     assert is_silent(spoken.generation.units[0].label.phone)
+
+
+SETTINGS = {"joint_recogniser": False, "articulation": False, "conditions": 0}
+
+
+@pytest.fixture(scope="module")
+def selection_model(toy_corpus: Corpus) -> Model:
+    engine = engine_named("selection", SETTINGS)
+    return train(toy_corpus, selection=Selection(None), engine=engine, recogniser=SMALL)[0]
+
+
+@pytest.mark.long
+def test_a_recorded_sentence_is_said_by_its_recording(toy_corpus, selection_model):
+    name = toy_corpus.names()[0]
+    utterance = toy_corpus.utterance(name)
+    assert utterance.words
+    assert repr(selection_model.learned).startswith("SelectionModel(12 recordings, ")
+    sound, generation = speak_from_corpus(" ".join(utterance.words), toy_corpus, selection_model)
+    spoken = [span for span in generation.units if span.label.phone not in ("sil", "sp")]
+    assert [span.label.phone for span in spoken] == [
+        phone for word in utterance.words for phone in Lexicon().pronunciations(word)[0]
+    ]
+    sources = {span.label.unit.split(" ")[0] for span in spoken}
+    assert sources <= set(toy_corpus.names())
+    assert sound.duration_s == pytest.approx(generation.units[-1].end_s, abs=0.02)
+    assert len(generation.motion.values) == pytest.approx(sound.duration_s * 100, abs=2)
+
+
+def test_sound_and_motion_are_in_step(toy_corpus, selection_model):
+    sound, generation = speak_from_corpus("Mama now, see papa.", toy_corpus, selection_model)
+    opening = generation.motion["opening"]
+    loud = np.array([np.abs(sound.samples[n * 160 : (n + 1) * 160]).max() for n in range(len(sound.samples) // 160)])
+    for span in generation.units:
+        inside = slice(int(span.start_s * 100) + 2, int(span.end_s * 100) - 1)
+        if span.label.phone == "aa" and inside.stop - inside.start > 2:
+            assert opening[inside].max() > 0.12
+            assert loud[inside].max() > 0.05
+        if span.label.phone == "m":
+            assert opening[int(span.start_s * 100) : int(span.end_s * 100) + 1].min() < 0.08
+    assert generation.units[0].label.phone == "sil"
+    assert generation.units[0].end_s <= REST_S + 1e-6
+
+
+def test_sources_are_the_recordings_whose_sound_is_joined(toy_corpus, selection_model):
+    sound, generation = speak_from_corpus("baby blue", toy_corpus, selection_model)
+    found = []
+    for span in generation.units:
+        recording, times = span.label.unit.split(" ")[:2]
+        if span.label.phone in ("sil", "sp") or span.duration_s < 0.05:
+            continue
+        start_s, end_s = map(float, times.split("-"))
+        source = toy_corpus.utterance(recording).audio.samples
+        middle = (span.start_s + span.end_s) / 2
+        piece = sound.samples[int((middle - 0.01) * 16_000) : int((middle + 0.01) * 16_000)]
+        area = np.asarray(source[max(int((start_s - 0.05) * 16_000), 0) : int((end_s + 0.05) * 16_000)], float)
+        likeness = np.correlate(area, piece, "valid")
+        norms = np.sqrt(np.convolve(area**2, np.ones(len(piece)), "valid") * float(piece @ piece))
+        if float(piece @ piece) > 1e-3:
+            found.append((likeness / np.maximum(norms, 1e-9)).max())
+    assert np.mean(np.array(found) > 0.8) > 0.6  # motion is chosen again, by the features of the joined sound
+
+
+def test_a_model_without_recordings_is_refused(toy_corpus, toy_model):
+    with pytest.raises(InputError, match="--engine selection"):
+        speak_from_corpus("baby blue", toy_corpus, toy_model)
+
+
+def test_another_corpus_is_refused(selection_model, tmp_path):
+    with pytest.raises(InputError, match="lacks"):
+        speak_from_corpus("baby blue", Corpus.create(tmp_path / "empty"), selection_model)
+
+
+def test_phones_that_were_never_recorded_are_named(toy_corpus, selection_model, caplog):
+    speak_from_corpus("baby blue", toy_corpus, selection_model)
+    assert "do not have" not in caplog.text
+    speak_from_corpus("judge", toy_corpus, selection_model)
+    assert "jh (" in caplog.text
+
+
+def test_recordings_of_several_people_are_refused(toy_corpus, selection_model, tmp_path):
+    utterances = map(toy_corpus.utterance, toy_corpus.names())
+    two = corpus_of(tmp_path / "two", [replace(each, speaker="ab"[n % 2]) for n, each in enumerate(utterances)])
+    with pytest.raises(InputError, match="recordings of 2 people"):
+        speak_from_corpus("baby blue", two, selection_model)

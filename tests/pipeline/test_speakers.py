@@ -1,35 +1,49 @@
 import logging
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lipmotion import Corpus, Model, Selection, animate, evaluate, explain, load_model, save_model, train
+import lipmotion
+from lipmotion import (
+    Corpus,
+    Edits,
+    Model,
+    Request,
+    Selection,
+    Session,
+    animate,
+    evaluate,
+    explain,
+    load_model,
+    map_onto,
+    save_model,
+    train,
+    with_person,
+)
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import find_closable_ranges
-from lipmotion.motion.speaker_maps import speakers_to_arrays
-from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.explain import chain_posteriors
-from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.session import Session
-from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
+from lipmotion.pipeline.request import Onto
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
+from lipmotion_faces.tracking.frames import VideoSpan
 from pipeline import made
-from pipeline.made import GAIN, OFFSET, corpus_of
-from testing.toy import ToySentence, toy_utterances
-
-SMALL = HmmConfig(mixtures=1, iterations=2)
+from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
+from robustness.case import changed_model, npy
+from testing.toy import SMALL, ToySentence, toy_motion, toy_utterances
 
 
 @pytest.fixture(scope="module")
-def people(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+def two_people(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
     return corpus_of(tmp_path_factory.mktemp("people") / "corpus", made.people())
 
 
 @pytest.fixture(scope="module")
-def model(people: Corpus) -> Model:
-    return train(people, recogniser=SMALL)[0]
+def model(two_people: Corpus) -> Model:
+    return train(two_people, recogniser=SMALL)[0]
 
 
 def request(sentence: ToySentence, speaker: str = "") -> Request:
@@ -64,17 +78,6 @@ def test_variances_are_in_the_units_of_the_person(model, toy_sentence):
     np.testing.assert_allclose(ben.variance, mean.variance * np.square(model.speakers.of("ben").gain))
 
 
-def test_variances_of_long_recordings(model, toy_sentence, monkeypatch):
-    exact = animate(request(toy_sentence, "ben"), model=model)
-    monkeypatch.setattr("lipmotion.motion.generation.DOUBLE_FRAMES", 10)
-    single = animate(request(toy_sentence, "ben"), model=model)
-    assert isinstance(single.spread, ReducedVariance)
-    assert isinstance(exact.spread, ReducedVariance)  # passages are short, and silence between them lasts for hours
-    assert single.motion.values.dtype == np.float32
-    np.testing.assert_allclose(single.variance, exact.variance, rtol=1e-4)
-    np.testing.assert_allclose(single.motion.values, exact.motion.values, atol=1e-5)
-
-
 def test_pins_hold_in_the_units_of_the_person(model, toy_sentence):
     pins = (Pin(0.1, "opening", 0.0), Pin(0.9, "opening", 0.17), Pin(0.93, "opening", 0.0), Pin(1.2, "width", 0.5))
     for speaker in ("anna", "ben"):
@@ -102,22 +105,18 @@ def test_maps_are_in_the_model_file(model, toy_sentence, tmp_path):
         np.testing.assert_allclose(opening(again, toy_sentence, name), opening(model, toy_sentence, name), atol=1e-4)
 
 
-def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path, monkeypatch):
-    def of_jaw(maps: object) -> dict[str, np.ndarray]:
-        arrays = speakers_to_arrays(maps)
-        arrays["channels"] = np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")])
-        return arrays
-
-    monkeypatch.setattr("lipmotion.pipeline.model.speakers_to_arrays", of_jaw)
-    save_model(model, tmp_path / "jaw.lipmotion")
-    again = load_model(tmp_path / "jaw.lipmotion")
+def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path):
+    save_model(model, tmp_path / "people.lipmotion")
+    channels = npy(np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")]))
+    changes = {"speakers/channels.npy": channels}
+    again = load_model(changed_model(tmp_path / "people.lipmotion", tmp_path / "jaw.lipmotion", changes))
     with pytest.raises(InputError, match="'outer'"):
         opening(again, toy_sentence, "ben")
 
 
-def test_evaluation_compares_each_with_their_own_motion(people, model):
+def test_evaluation_compares_each_with_their_own_motion(two_people, model):
     own, mean = (
-        evaluate(each, people, selection=Selection("test"), recogniser="own")
+        evaluate(each, two_people, selection=Selection("test"), recogniser="own")
         for each in (model, replace(model, speakers=None))
     )
     condition = "with transcript"
@@ -126,8 +125,8 @@ def test_evaluation_compares_each_with_their_own_motion(people, model):
     assert "strangers" not in mean
 
 
-def test_strangers_are_named_and_get_the_mean_person(people, model, tmp_path):
-    cleo = replace(people.utterance(people.names("test")[0]), speaker="cleo")
+def test_strangers_are_named_and_get_the_mean_person(two_people, model, tmp_path):
+    cleo = replace(two_people.utterance(two_people.names("test")[0]), speaker="cleo")
     corpus = corpus_of(tmp_path / "cleo", [cleo])
     figures = evaluate(model, corpus, selection=Selection(None), recogniser="own")
     assert figures["strangers"] == ["cleo"]
@@ -142,18 +141,18 @@ def test_an_explanation_is_in_the_units_of_the_person(model, toy_sentence):
             assert value.value == pytest.approx(motion[name][explanation.frame], abs=1e-9)
 
 
-def test_one_person_is_not_mapped(people):
+def test_one_person_is_not_mapped(two_people):
     model, _ = train(
-        people, selection=Selection("train", ("anna",)), recogniser=SMALL, engine=engine_named("joint", {})
+        two_people, selection=Selection("train", ("anna",)), recogniser=SMALL, engine=engine_named("joint", {})
     )
     assert model.speakers is None
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["joint", "coupled"])
-def test_other_engines(people, toy_sentence, engine):
+def test_other_engines(two_people, toy_sentence, engine):
     settings = {"chains": "sVis 2vis", "mixtures": 2} if engine == "coupled" else {}
-    model, _ = train(people, recogniser=SMALL, engine=engine_named(engine, settings))
+    model, _ = train(two_people, recogniser=SMALL, engine=engine_named(engine, settings))
     anna, ben = (opening(model, toy_sentence, name) for name in ("anna", "ben"))
     assert np.ptp(ben) / np.ptp(anna) == pytest.approx(GAIN[0], abs=0.15)
     pins = Constraints((Pin(0.9, "opening", 0.01),))
@@ -173,8 +172,8 @@ def captured(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
 
 
 @pytest.mark.long
-def test_channels_that_all_have_are_trained_on(people, tmp_path, caplog):
-    footage = [people.utterance(name) for name in people.names("train")[:6]]
+def test_channels_that_all_have_are_trained_on(two_people, tmp_path, caplog):
+    footage = [two_people.utterance(name) for name in two_people.names("train")[:6]]
     jaw = (Channel("jaw", "weight"), Channel("width"), Channel("opening"))
     capture = [captured(utterance, jaw) for utterance in toy_utterances(6, seed=1)[:3]]
     capture = [replace(utterance, name=f"capture-{utterance.name}") for utterance in capture]
@@ -188,9 +187,192 @@ def test_channels_that_all_have_are_trained_on(people, tmp_path, caplog):
     assert generated.motion.names == ("width", "opening")
 
 
-def test_no_common_channel_is_an_error(people, tmp_path):
+def test_no_common_channel_is_an_error(two_people, tmp_path):
     weights = tuple(Channel(name, "weight") for name in ("opening", "jaw"))
     strange = [captured(utterance, weights) for utterance in toy_utterances(3)[:1]]
-    corpus = corpus_of(tmp_path / "apart", [people.utterance(people.names("train")[1]), *strange])
+    corpus = corpus_of(tmp_path / "apart", [two_people.utterance(two_people.names("train")[1]), *strange])
     with pytest.raises(CorpusError, match=r"2 kinds of motion without a common channel: .*opening, jaw.*--speaker"):
         train(corpus, recogniser=SMALL)
+
+
+@pytest.fixture(scope="module")
+def ben(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+    return corpus_of(tmp_path_factory.mktemp("ben") / "corpus", [of_ben(each) for each in toy_utterances(8, seed=1)])
+
+
+@pytest.fixture(scope="module")
+def of_two(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+    return corpus_of(tmp_path_factory.mktemp("two") / "corpus", people(seed=1))
+
+
+@pytest.fixture(scope="module")
+def two_model(of_two: Corpus) -> Model:
+    engine = engine_named("trajectory", {"articulation": False})
+    return train(of_two, recogniser=SMALL, engine=engine)[0]
+
+
+def request_onto(sentence: ToySentence, onto: Onto | None = None, **more: str) -> Request:
+    return Request(sentence.audio, units=sentence.units, onto=onto, pauses="natural", **more)
+
+
+def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) -> None:
+    """Raise AssertionError unless the motion is that of the model, in ben's place and range."""
+    own, mapped = (
+        animate(request_onto(sentence), model=model),
+        animate(request_onto(sentence, onto, **more), model=model),
+    )
+    wanted = OFFSET + GAIN * toy_motion(sentence.units, 100.0).values
+    ranges = [np.ptp(np.percentile(values, [2, 98], axis=0), axis=0) for values in (mapped.motion.values, wanted)]
+    np.testing.assert_allclose(ranges[0] / ranges[1], 1, atol=0.3)
+    assert np.abs(np.median(mapped.motion.values, axis=0) - np.median(wanted, axis=0)).max() < 0.03
+    for name in own.motion.names:
+        assert np.corrcoef(own.motion[name], mapped.motion[name])[0, 1] > 0.98
+    for frames in find_closable_ranges(sentence.units, len(mapped.motion.values)):
+        assert mapped.motion["opening"][frames].min() == pytest.approx(OFFSET[0], abs=0.02)
+
+
+@pytest.mark.long
+def test_onto_the_person_of_a_corpus(toy_model, toy_sentence, ben):
+    is_like_ben(toy_model, toy_sentence, ben.path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ["coupled", "selection"])
+def test_every_engine(toy_corpus, toy_sentence, ben, engine):
+    settings: dict[str, object] = {"articulation": False}  # the toy's mouth does not move as English ones do
+    if engine == "coupled":
+        settings |= {"chains": "sVis 2vis", "mixtures": 2}
+    model, _ = train(toy_corpus, recogniser=SMALL, engine=engine_named(engine, settings))
+    is_like_ben(model, toy_sentence, ben)
+
+
+def test_variance_and_pins_and_explanations_are_of_the_person(toy_model, toy_sentence, ben):
+    person = map_onto(toy_model, ben)
+    own, mapped = (animate(request_onto(toy_sentence, onto), model=toy_model) for onto in (None, person))
+    np.testing.assert_allclose(mapped.variance, own.variance * np.square(person.gain))
+    pins = Constraints((Pin(0.9, "opening", 0.17), Pin(1.2, "width", 0.5)))
+    pinned = animate(request_onto(toy_sentence, person), model=toy_model, constraints=pins).motion
+    for pin in pins.pins:
+        assert pinned[pin.channel][round(pin.time_s * 100)] == pytest.approx(pin.value, abs=1e-9)
+    (explanation,) = explain(request_onto(toy_sentence, person), at=0.9, model=toy_model)
+    assert explanation.motion["opening"].value == pytest.approx(mapped.motion["opening"][90], abs=1e-9)
+
+
+@pytest.mark.long
+def test_a_person_of_the_model_onto_another(two_model, toy_sentence, ben):
+    """Whoever of the model's people speaks, the motion is in ben's place and range."""
+    people = [
+        animate(request_onto(toy_sentence, ben, speaker=name), model=two_model).motion for name in ("", "anna", "ben")
+    ]
+    ranges = np.stack([np.ptp(np.percentile(motion.values, [5, 95], axis=0), axis=0) for motion in people])
+    np.testing.assert_allclose(ranges / ranges[2], 1, atol=0.15)
+    anna = animate(request_onto(toy_sentence, speaker="anna"), model=two_model).motion
+    assert np.ptp(anna["opening"]) > 1.3 * np.ptp(people[1]["opening"])
+    with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
+        animate(request_onto(toy_sentence, ben, speaker="cleo"), model=two_model)
+
+
+def test_onto_one_person_of_a_corpus_of_several(toy_model, toy_sentence, of_two):
+    is_like_ben(toy_model, toy_sentence, of_two, onto_speaker="ben")
+    for more, found in (({}, "2 speakers"), ({"onto_speaker": "cleo"}, "no speaker 'cleo'")):
+        with pytest.raises(InputError, match=rf"{found}, required one of: anna, ben; name it \(--onto-speaker\)"):
+            animate(request_onto(toy_sentence, of_two, **more), model=toy_model)
+
+
+def test_onto_a_person_of_another_model(toy_model, two_model, toy_sentence, tmp_path):
+    save_model(two_model, tmp_path / "two.lipmotion")
+    mapped = animate(request_onto(toy_sentence, tmp_path / "two.lipmotion", onto_speaker="ben"), model=toy_model).motion
+    wanted = animate(request_onto(toy_sentence, speaker="ben"), model=two_model).motion
+    own = animate(request_onto(toy_sentence), model=toy_model).motion
+    assert np.abs(mapped.values - wanted.values).mean() < 0.4 * np.abs(own.values - wanted.values).mean()
+    with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
+        animate(request_onto(toy_sentence, two_model, onto_speaker="cleo"), model=toy_model)
+    with pytest.raises(InputError, match=r"measured in some speech; give a request \(speech=\.\.\.\)"):
+        map_onto(toy_model, two_model)
+
+
+def test_onto_the_person_of_a_video(toy_model, toy_sentence, toy_speech, monkeypatch):
+    """The video is as short as a sentence, so that the gain counts in part."""
+    tracked = []
+
+    def track(path: Path, *, crops: bool, span: VideoSpan) -> Track:
+        tracked.append((path, crops, span.end_s))
+        return of_ben(toy_utterances(3)[0]).track
+
+    monkeypatch.setattr("lipmotion_faces.transfer.track", track)
+    own, mapped = (animate(request_onto(toy_sentence, onto), model=toy_model).motion for onto in (None, toy_speech))
+    assert tracked == [(toy_speech, False, 60.0)]
+    ratio = np.ptp(mapped["opening"]) / np.ptp(own["opening"])
+    assert GAIN[0] < ratio < 0.95
+    assert mapped["width"].mean() == pytest.approx(OFFSET[1] + GAIN[1] * own["width"].mean(), abs=0.03)
+    with pytest.raises(InputError, match="a video has no speaker 'ben' by name"):
+        map_onto(toy_model, toy_speech, onto_speaker="ben")
+
+
+def test_a_map_is_kept_in_a_model(toy_model, toy_sentence, ben, tmp_path):
+    person = map_onto(toy_model, ben)
+    known = with_person(with_person(toy_model, "ben", person), "cleo", replace(person, gain=2 * person.gain))
+    save_model(known, tmp_path / "known.lipmotion")
+    again = load_model(tmp_path / "known.lipmotion")
+    assert again.about["speakers"] == ["ben", "cleo"]
+    wanted = animate(request_onto(toy_sentence, person), model=toy_model).motion
+    found = animate(request_onto(toy_sentence, speaker="ben"), model=again).motion
+    np.testing.assert_allclose(found.values, wanted.values, atol=1e-3)
+    unmapped = animate(request_onto(toy_sentence), model=toy_model).motion
+    np.testing.assert_allclose(
+        animate(request_onto(toy_sentence), model=again).motion.values, unmapped.values, atol=1e-3
+    )
+    for name in ("ben", ""):
+        with pytest.raises(InputError, match="required another name than: , ben, cleo"):
+            with_person(known, name, person)
+
+
+@pytest.mark.long
+def test_a_person_joins_those_of_a_model(two_model, toy_sentence, ben):
+    person = map_onto(two_model, ben)
+    known = with_person(two_model, "other", person)
+    found = animate(request_onto(toy_sentence, speaker="other"), model=known).motion
+    np.testing.assert_allclose(found.values, animate(request_onto(toy_sentence, person), model=two_model).motion.values)
+    anna, same = (
+        animate(request_onto(toy_sentence, speaker="anna"), model=model).motion.values for model in (known, two_model)
+    )
+    np.testing.assert_allclose(anna, same)
+
+
+def test_other_channels_are_refused(toy_model, toy_sentence, tmp_path):
+    def weights(utterance: Utterance) -> Utterance:
+        channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
+        motion = replace(utterance.track.motion, channels=channels)
+        return replace(utterance, track=replace(utterance.track, motion=motion))
+
+    corpus = corpus_of(tmp_path / "weights", [weights(each) for each in toy_utterances(3)])
+    with pytest.raises(InputError, match=r"weights: its motion has no channel 'opening'.*3 of 3 are missing"):
+        animate(request_onto(toy_sentence, corpus), model=toy_model)
+
+
+def test_no_face_and_no_speech_are_refused(toy_model, toy_sentence, tmp_path):
+    unseen = [
+        replace(each, track=replace(each.track, seen=np.zeros_like(each.track.seen))) for each in toy_utterances(3)
+    ]
+    corpus = corpus_of(tmp_path / "unseen", unseen)
+    with pytest.raises(InputError, match=r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
+        animate(request_onto(toy_sentence, corpus), model=toy_model)
+    with pytest.raises(InputError, match="the corpus is empty"):
+        animate(request_onto(toy_sentence, Corpus.create(tmp_path / "empty")), model=toy_model)
+
+
+@pytest.mark.recordings
+@pytest.mark.video
+def test_onto_a_real_person(recordings):
+    """A face that rests with parted lips: the third of a second of it counts for nearly half of the way."""
+    pytest.importorskip("mediapipe")
+    from lipmotion_faces.tracking.track import track
+
+    video = recordings / "grid-others" / "brbk7n.mpg"
+    rest = np.median(track(video, crops=False).motion["opening"][:8])
+    sound = read_audio(video)  # after a second of its room: before speech the mouth opens
+    audio = Audio(np.concatenate([np.resize(sound.samples[:1600], sound.rate_hz), sound.samples]), sound.rate_hz)
+    own, mapped = (
+        lipmotion.animate(Request(audio, onto=onto, pauses="natural")).motion["opening"] for onto in (None, video)
+    )
+    assert abs(np.median(mapped[:20]) - rest) < 0.7 * abs(np.median(own[:20]) - rest)

@@ -1,20 +1,50 @@
 """``pipeline.outputs.output``: one result, several files, all or none."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 import pytest
 
-from lipmotion import read_motion, write
+import lipmotion
+from lipmotion import Delivery, FilmedFace, Outputs, Request, animate, cues, read_motion, write, write_cues
+from lipmotion.articulation.contact import find_closures
+from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.articulation.delivery import close_on_frame_grid
 from lipmotion.articulation.phone_targets import GESTURES
+from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.outputs.motion_files import with_articulation
-from lipmotion.types import Generation
+from lipmotion.formats.cues import CUE_FORMATS
+from lipmotion.pipeline.outputs import output
+from lipmotion.pipeline.outputs.cues import CueOutput, cue_text
+from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
+from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
+from lipmotion.pipeline.outputs.motion_files import MotionOutput, with_articulation
+from lipmotion.pipeline.outputs.output import (
+    LabelOutput,
+    Output,
+    OutputSettings,
+    Performance,
+    SoundOutput,
+    create_outputs,
+    plan,
+    shift_prosody,
+)
+from lipmotion.types import Audio, Generation, Prosody, Timeline
+from lipmotion.types.audio import LAUGHTER
+from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
+from lipmotion_faces.characters.character_files import load_character
+from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
+from lipmotion_faces.outputs.scenes import SceneOutput, delivered_scene
+from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
+from meshes.heads import head, write_glb
+from speech.made_voices import laugh, pulses, recording, said, vowels
+from testing.toy import toy_sentences
 
 
 def test_several_files_at_once(result, toy_model, toy_speech, tmp_path):
@@ -123,9 +153,253 @@ def test_articulatory_channels_are_written_where_they_are_asked_for(result, toy_
 
 
 @pytest.mark.parametrize("temporary", [False, True])
-def test_scenes_name_no_sound_that_will_be_gone(result, toy_speech, tmp_path, monkeypatch, temporary):
-    named = []
-    monkeypatch.setattr("lipmotion_faces.outputs.scenes.delivered_scene", lambda _: True)
-    monkeypatch.setattr("lipmotion_faces.outputs.scenes.write_scene", lambda *_, sound: named.append(sound))
-    write(result, [tmp_path / "a.glb"], speech=toy_speech, temporary=temporary)
-    assert named == [None if temporary else toy_speech]
+def test_scenes_name_no_sound_that_will_be_gone(result, toy_speech, tmp_path, temporary):
+    write(result, [tmp_path / "a.usda"], speech=toy_speech, temporary=temporary)
+    assert (toy_speech.name in (tmp_path / "a.usda").read_text()) != temporary
+
+
+class WordOutput(Output):
+    """``.words.csv``: the phones, as an installed package may write them."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: ARG003
+        return (".words.csv",)
+
+    def prepare(self, performance: Performance) -> Callable[[], None]:
+        phones = [span.label.phone for span in performance.generation.units]
+        if not phones:
+            raise ExportError(f"{self.path}: no phones")
+        return lambda: self.path.write_text(" ".join(phones)) and None
+
+
+@pytest.fixture
+def settings() -> OutputSettings:
+    return OutputSettings(shown_face("portrait"), sounded=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("a.json", MotionOutput), ("a.LIVELINK.csv", MotionOutput), ("a.cues.json", CueOutput),
+        ("a.Cues.TSV", CueOutput), ("cues.json", MotionOutput), ("a.mp4", VideoOutput), ("a.MOV", VideoOutput),
+        ("a%05d.png", PicturesOutput), ("a.glb", SceneOutput), ("a.textgrid", LabelOutput), ("a.flac", SoundOutput),
+    ],
+)  # fmt: skip
+def test_a_name_asks_for_a_kind(name, kind, settings):
+    assert type(plan(name, settings)) is kind
+
+
+def test_what_no_kind_writes_is_refused(settings, tmp_path):
+    for name in ("a.xyz", "a.png", "a"):
+        with pytest.raises(ExportError, match="required one of") as error:
+            plan(name, settings)
+        assert {".json", ".mp4", ".glb", ".wav", "%05d.png", ".cues.tsv"} <= {*str(error.value).split()}
+    with pytest.raises(ExportError, match=r"unknown format '\.wav'"):
+        plan("a.wav", replace(settings, sounded=False))
+    with pytest.raises(InputError, match="the frame rate is 101"):
+        create_outputs([tmp_path / "a.cues.tsv"], replace(settings, outputs=Outputs(fps=101.0)))
+
+
+def test_cues_beside_other_outputs_are_those_of_the_function(result, tmp_path):
+    write(result, [tmp_path / "a.cues.tsv", tmp_path / "a.csv"])
+    write_cues(cues(result), tmp_path / "b.tsv")
+    assert (tmp_path / "a.cues.tsv").read_bytes() == (tmp_path / "b.tsv").read_bytes()
+
+
+def test_a_kind_of_a_package_is_written_beside_others(result, tmp_path, monkeypatch):
+    kinds = output.OUTPUTS.built_in
+    monkeypatch.setitem(kinds, "words", f"{__name__}:WordOutput")
+    monkeypatch.setitem(kinds, "wrong", f"{__name__}:settings")
+    with pytest.raises(InputError, match="is called an output, 'wrong', by an installed package"):
+        write(result, tmp_path / "a.words.csv")
+    monkeypatch.delitem(kinds, "wrong")
+    write(result, [tmp_path / "a.words.csv", tmp_path / "a.json"])
+    assert (tmp_path / "a.words.csv").read_text().split() == [span.label.phone for span in result.units]
+    silent = replace(result, units=type(result.units)(()))
+    with pytest.raises(ExportError, match="no phones"):
+        write(silent, [tmp_path / "b.json", tmp_path / "b.words.csv"])
+    assert not (tmp_path / "b.json").exists()
+
+
+def test_cues_of_several_formats(result, tmp_path):
+    sheet = lipmotion.cues(result)
+    paths = [tmp_path / f"é.{form}" for form in CUE_FORMATS]
+    lipmotion.write_cues(sheet, paths, speech="é.wav")
+    for path, form in zip(paths, CUE_FORMATS, strict=True):
+        assert path.read_text() == cue_text(sheet, speech="é.wav", form=form)
+
+
+def test_results_that_have_no_cues(result):
+    with pytest.raises(ExportError, match="has no phones"):
+        lipmotion.cues(replace(result, units=Timeline(())))
+    broken = result.motion.values.copy()
+    broken[3, 0] = np.nan
+    with pytest.raises(ExportError, match="not finite"):
+        lipmotion.cues(replace(result, motion=replace(result.motion, values=broken)))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("late", [0, 37])
+def test_each_line_of_a_stem_has_the_motion_and_the_cues_of_the_line_alone(toy_model, late):
+    """Three lines at levels 15 dB apart, one of them with an offset, in digital silence; on the frames and beside them.
+
+    Motion is that of the line alone but for rounding; within a line nothing follows from the others.
+    """
+    rng, rate_hz = np.random.default_rng(0), 16_000
+    stem, lines = np.zeros(24 * rate_hz, np.float32), []
+    for number, (decibels, offset) in enumerate(((0, 0.0), (-15, 0.002), (-30, 0.0))):
+        said = np.pad(toy_sentences(3)[number].audio.samples, (rate_hz * number // 2, rate_hz // 2))
+        line = 10 ** (decibels / 20) * (said + 1e-4 * rng.standard_normal(len(said))) + offset
+        at = (2 + 8 * number) * rate_hz + late
+        stem[at : at + len(line)] = line
+        lines.append((2 + 8 * number, line.astype(np.float32)))
+    together = lipmotion.animate(Audio(stem, rate_hz), model=toy_model)
+    shown, opening, outside = list_frame_shapes(lipmotion.cues(together)), together.motion["opening"].copy(), 0.0
+    for at_s, line in lines:
+        alone = lipmotion.animate(Audio(line, rate_hz), model=toy_model)
+        values, cues = alone.motion.values, list_frame_shapes(lipmotion.cues(alone))[:-2]
+        frames = slice(100 * at_s, 100 * at_s + len(values))
+        assert together.motion.values[frames] == pytest.approx(values, abs=0.005)
+        assert any(shape != "X" for shape in cues)
+        assert shown[24 * at_s :][: len(cues)] == cues
+        opening[frames.start - 60 : frames.stop + 60] = outside = opening[100]
+    assert opening == pytest.approx(outside)
+
+
+@pytest.mark.parametrize("offset_ms", [500.0, -250.0])
+def test_files_say_when_the_sound_begins(generation, offset_ms, toy_speech, tmp_path):
+    delivery = Delivery(offset_ms=offset_ms)
+    paths = [tmp_path / "a.json", tmp_path / "a.blender.py"]
+    write(generation, paths, speech=toy_speech, delivery=delivery, curves="arkit", channels=["jawOpen"])
+    assert json.loads(paths[0].read_text())["source"] == {"file": toy_speech.name, "start_s": f"{offset_ms / 1000:g}"}
+    assert f"SOUND_S = {offset_ms / 1000!r}\n" in paths[1].read_text()
+    scene = delivered_scene(
+        Performance(generation, OutputSettings(shown_face("head"), outputs=Outputs(rate_hz=12.0), delivery=delivery))
+    )
+    assert scene.sound_s == pytest.approx(offset_ms / 1000)
+
+
+def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(generation, tmp_path):
+    write_glb(tmp_path / "head.glb", head())
+    character = load_character(tmp_path / "head.glb")
+    larger = Delivery(intensity=2)
+    both = with_curves(generation, "arkit")[0]
+    before, after = both.motion["jawOpen"], deliver_to_face(both, larger, 25.0, character).motion["jawOpen"]
+    assert after.max() > 1.3 * before.max()
+    plain, doubled = (deliver_to_face(generation, each, 25.0).motion["opening"] for each in (Delivery(), larger))
+    assert doubled.max() > 1.5 * plain.max()
+
+
+@pytest.mark.parametrize("offset_ms", [30.0, -30.0, 0.0])
+def test_loudness_and_pitch_move_together(offset_ms):
+    prosody = Prosody(np.arange(10.0) - 40, np.arange(10.0) / 10)
+    moved, by = shift_prosody(prosody, Delivery(offset_ms=offset_ms)), round(offset_ms / 10)
+    assert len(moved.level_db) == len(moved.log_f0) == 10 + by
+    assert moved.level_db[max(by, 0) :] == pytest.approx(prosody.level_db[max(-by, 0) :])
+    assert moved.log_f0[max(by, 0) :] == pytest.approx(prosody.log_f0[max(-by, 0) :])
+    assert (moved.level_db[: max(by, 0)] == -40).all()  # quiet, and without a pitch
+    assert np.isnan(moved.log_f0[: max(by, 0)]).all()
+
+
+@pytest.mark.parametrize("rate_hz", [12.0, 23.976])
+def test_closures_between_two_frames_of_a_slow_file_are_kept(generation, rate_hz, tmp_path):
+    narrow = generation.motion.values.copy()
+    column, closed = (
+        generation.motion.column("opening"),
+        [each.frame for each in find_closures(generation.motion, generation.units)],
+    )
+    narrow[50:100, column] = 0.1
+    narrow[closed, column] = 0.0
+    spiky = replace(generation, motion=replace(generation.motion, values=narrow))
+    write(spiky, tmp_path / "a.csv", rate_hz=rate_hz, channels=["opening"])
+    opening = read_motion(tmp_path / "a.csv")[0]["opening"]
+    assert opening[[round(frame / 100 * rate_hz) for frame in closed]] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_eyes_and_head_move_on_while_the_mouth_is_held(generation, tmp_path):
+    smooth, delivery = with_curves(generation, "face")[0], Delivery(min_hold_ms=400)
+    assert max(np.abs(smooth.motion[name]).max() for name in ("eyeBlinkLeft", "headYaw")) > 1e-3
+    steps = hold_mouth(smooth, delivery.hold_frames(100), [])
+    for name in ("eyeBlinkLeft", "headYaw", "browInnerUp"):
+        assert steps.motion[name] == pytest.approx(smooth.motion[name])
+        assert name not in steps.stepped
+    mouth = steps.motion["jawOpen"]
+    changes = np.flatnonzero(np.abs(np.diff(mouth)) > 1e-9) + 1
+    assert np.diff([0, *changes, len(mouth)]).min() >= 40
+    write(smooth, tmp_path / "a.livelink.csv", delivery=delivery, rate_hz=100)
+    assert read_motion(tmp_path / "a.livelink.csv")[0]["headYaw"] == pytest.approx(smooth.motion["headYaw"], abs=1e-5)
+    assert {"jawOpen", "opening"} <= set(steps.stepped)
+
+
+def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(generation):
+    found = deliver(generation, Delivery(mood="happy:0.5, neutral at 1.0", intensity=2.0, offset_ms=500)).motion
+    assert found.names == (*generation.motion.names, "mood_happy")
+    assert found["mood_happy"][[0, 100, -1]] == pytest.approx([0.5, 0.5, 0.0])
+    again = deliver(replace(generation, motion=found), Delivery())
+    assert np.array_equal(again.motion.values, found.values)
+
+
+def test_words_say_the_mood_after_the_one_that_is_asked_for(generation):
+    tagged = replace(generation, moods=(MoodKey(1.0, "sad"),))
+    assert deliver(tagged, Delivery()).motion["mood_sad"][[0, -1]] == pytest.approx([0, 1])
+    both = deliver(tagged, Delivery(mood="happy")).motion
+    assert (both["mood_happy"][0], both["mood_sad"][-1]) == (1, 1)
+    assert both["mood_happy"][-1] == pytest.approx(0)
+
+
+def test_neutral_is_what_no_mood_is(generation):
+    plain, neutral = (deliver(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
+    assert neutral.names == plain.names
+    assert np.array_equal(neutral.values, plain.values)
+
+
+def test_a_filmed_face_has_the_mood_of_its_footage(generation, caplog):
+    person = ShownPerson(FilmedFace(None, None, ()))  # type: ignore[arg-type] # nothing of it is needed
+    with pytest.raises(InputError, match="the mood of its footage"):
+        person.check_video(Path("a.mp4"), OutputSettings(face=person, delivery=Delivery(mood="happy")))
+    person.check_video(Path("a.mp4"), OutputSettings(face=person, delivery=Delivery(mood="whisper")))
+    person.check_drawable(Path("a.mp4"), replace(generation, moods=(MoodKey(0, "shout"), MoodKey(1, "sad", 0.5))))
+    assert caplog.messages == ["a.mp4: a filmed face has the mood of its footage; not shown: sad:0.5"]
+
+
+def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation):
+    afraid = deliver(generation, Delivery(mood="afraid"))
+    curves = make_curves(afraid.motion, afraid.units, "vowels")
+    assert {*curves.names} - {*make_curves(generation.motion, generation.units, "vowels").names} >= {"sad", "surprised"}
+    assert (curves["sad"][0], curves["surprised"][0]) == pytest.approx((0.5, 0.5))
+    pressed = curves["closed"] > 0
+    assert pressed.any()
+    assert curves["surprised"][pressed] == pytest.approx(0)
+
+
+def test_moods_move_on_while_the_mouth_is_held(generation):
+    found = deliver_to_face(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
+    assert "mood_sad" not in found.stepped
+    assert len(np.unique(found.motion["mood_sad"])) > 6
+
+
+@pytest.fixture(scope="module")
+def request_with_laughter() -> Request:
+    audio = recording((0.5, vowels(pulses(1.0, 120))), (2.0, laugh(6)))
+    return Request(audio, units=said(audio.duration_s, (0.5, 1.5)))
+
+
+def test_a_face_laughs_where_laughter_is_detected(toy_model, request_with_laughter):
+    laughing = animate(request_with_laughter, model=toy_model)
+    (event,) = laughing.events
+    assert event.kind == LAUGHTER
+    opening = laughing.motion["opening"]
+    loudest_s = max(event.calls, key=lambda call: call[1])[0]
+    assert opening[round(loudest_s * 100)] == pytest.approx(LAUGH_GAP, rel=0.1)
+    happy = deliver(laughing, Delivery()).motion["mood_happy"]
+    assert happy[round(loudest_s * 100)] > 0.7
+    assert not happy[:150].any()
+    assert "mood_happy" not in deliver(laughing, Delivery(mood="neutral")).motion.names
+
+
+def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(toy_model, request_with_laughter):
+    plain = animate(replace(request_with_laughter, manner="asked"), model=toy_model)
+    laughing = animate(request_with_laughter, model=toy_model)
+    assert not plain.events
+    assert plain.motion["opening"][200:].max() < 0.05
+    assert np.array_equal(plain.motion.values[50:150], laughing.motion.values[50:150])

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 import lipmotion
 from lipmotion import Corpus, Model, Selection, train
 from lipmotion.engines import engine_named
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.types import Audio, Generation
-from testing.toy import toy_sentences, toy_utterances
+from testing.toy import SMALL, toy_sentences, toy_utterances
 
 RATE_HZ = 16_000
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
@@ -67,9 +66,7 @@ def trained() -> Results:
             corpus.add(utterance)
         for name, (engine_name, options) in TRAINED.items():
             engine = engine_named(engine_name, options)
-            model, _ = train(
-                corpus, engine=engine, recogniser=HmmConfig(mixtures=1, iterations=2), selection=Selection(None)
-            )
+            model, _ = train(corpus, engine=engine, recogniser=SMALL, selection=Selection(None))
             yield from animated(f"{name}, trained here", model, toy_sentences(3)[0].audio)
 
 

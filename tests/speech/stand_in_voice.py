@@ -30,8 +30,8 @@ def say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedS
         yield SynthesisedSentence(read_audio(path), types.Timeline(spans), path)
 
 
-def install(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make it the only synthesiser."""
-    only = Synthesiser("stand-in", "stand-in", lambda: VOICES, say, ARPABET_PHONES)
+def install(monkeypatch: pytest.MonkeyPatch, voices: tuple[SyntheticVoice, ...] = VOICES) -> None:
+    """Make it the only synthesiser, with some voices."""
+    only = Synthesiser("stand-in", "stand-in", lambda: voices, say, ARPABET_PHONES)
     monkeypatch.setattr(installed, "SYNTHESISERS", {"stand-in": only})
     monkeypatch.setattr(installed, "DEFAULT_VOICES", (("stand-in", "two"),))

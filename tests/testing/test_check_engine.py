@@ -1,5 +1,6 @@
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 
 from lipmotion.engines import Engine, Fit
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.formats import MotionFormat
+from lipmotion.formats.base import MOTION_FORMATS
 from lipmotion.motion import (
     LEARNED_MOTION_ARRAYS,
     fit_motion,
@@ -15,8 +18,12 @@ from lipmotion.motion import (
     with_unit_names,
 )
 from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors, refuse_undeclared
-from lipmotion.testing import ENGINE_CHECKS, ContractError, TrainedEngine, check_engine
+from lipmotion.testing import ENGINE_CHECKS, ContractError, TrainedEngine, check_engine, check_exporter
 from lipmotion.types import Configuration, Generation, Rule, StateTrace, option
+from lipmotion_faces import Face, make_face
+from lipmotion_faces.testing import check_face
+from lipmotion_faces.tracking.track import track
+from testing.toy import LIPS_TOUCH, toy_motion, toy_sentences, write_toy_recordings
 
 MEANS = {"means": ArraySpec(np.float64, "N Q")}
 
@@ -179,3 +186,111 @@ def test_an_error_of_the_engine_names_the_check(error):
 def test_a_configuration_that_is_none_is_noticed():
     with pytest.raises(ContractError, match="configuration can be stored"):
         check_engine(MeanPoses(None))  # type: ignore[arg-type]
+
+
+class Bars(Face):
+    """A small face that keeps the contract."""
+
+    def render(self, motion: Any, units: Any, *, fps: float = 25.0) -> Iterator[Any]:  # noqa: ARG002
+        if not fps > 0 or not np.isfinite(motion.values).all():
+            raise InputError("not drawable")
+        for value in motion.resampled(fps)["opening"]:
+            yield np.full((64, 64, 3), int(np.clip(value, 0, 1) * 255), np.uint8)
+
+
+def draw(frames: Callable[[list[Any]], list[Any]], *, checked: bool = True) -> Face:
+    class Changed(Bars):
+        def render(self, motion: Any, units: Any, *, fps: float = 25.0) -> Iterator[Any]:
+            if not checked:
+                motion, fps = replace(motion, values=np.nan_to_num(motion.values)), max(fps, 1.0)
+            return iter(frames(list(super().render(motion, units, fps=fps))))
+
+    return Changed()
+
+
+def test_faces_that_keep_the_contract():
+    check_face(Bars())
+    check_face(make_face("portrait"))
+
+
+def test_faces_that_break_it():
+    for face, words in (
+        (draw(lambda frames: frames[1:]), "frames, required"),
+        (draw(lambda frames: [frame[:63] for frame in frames]), "H and W even"),
+        (draw(lambda frames: [frame.astype(float) for frame in frames]), "not uint8"),
+        (draw(lambda frames: [frames[0]] * len(frames)), "does not move"),
+        (
+            draw(lambda frames: [np.random.default_rng().integers(0, 255, x.shape).astype(np.uint8) for x in frames]),
+            "other pixels",
+        ),
+        (draw(lambda frames: frames, checked=False), "not finite: no error"),
+    ):
+        with pytest.raises(ContractError, match=words):
+            check_face(face)
+
+
+def test_formats_that_keep_the_contract():
+    for name in MOTION_FORMATS.names:
+        check_exporter(MOTION_FORMATS.load(name))
+
+
+def nothing(path: Path, *_: Any) -> None:
+    """Write an empty file."""
+    path.write_bytes(b"")
+
+
+def by_chance(path: Path, *_: Any) -> None:
+    """Write other bytes each time."""
+    path.write_bytes(np.random.default_rng().bytes(16))
+
+
+def test_formats_that_break_it():
+    npz = MOTION_FORMATS.load("npz")
+
+    def wrong(path: Path) -> Any:
+        motion, units = npz.read(path)  # type: ignore[misc]
+        return replace(motion, values=motion.values + 0.01), units
+
+    def slower(path: Path) -> Any:
+        motion, units = npz.read(path)  # type: ignore[misc]
+        return replace(motion, rate_hz=motion.rate_hz / 2), units
+
+    for broken, words in (
+        (MotionFormat(nothing), "no file, or an empty one"),
+        (MotionFormat(by_chance), "other bytes"),
+        (MotionFormat(npz.write, wrong), "values come back that differ"),
+        (MotionFormat(npz.write, slower), "Hz come back"),
+    ):
+        with pytest.raises(ContractError, match=words):
+            check_exporter(broken)
+
+
+FPS = 25.0
+
+
+@pytest.mark.parametrize("rate_hz", [25.0, 30.0, 100.0])
+def test_the_mouth_is_shut_in_silence_and_touches_in_p_b_m(rate_hz):
+    for sentence in toy_sentences(12):
+        motion = toy_motion(sentence.units, rate_hz)
+        first, last = sentence.units.spans[0].end_s, sentence.units.spans[-1].start_s
+        quiet = (motion.time_s < first - 0.1) | (motion.time_s > last + 0.1)
+        assert quiet.sum() > 0.5 * rate_hz
+        assert (motion["opening"][quiet] == 0).all()
+        for span in sentence.units:
+            inside = (motion.time_s >= span.start_s) & (motion.time_s < span.end_s)
+            if span.label.phone in LIPS_TOUCH:
+                assert motion["opening"][inside].min() == 0
+            elif span.label.phone == "aa":
+                assert motion["opening"][inside].max() > 0.2
+
+
+@pytest.mark.long
+@pytest.mark.video
+def test_toy_faces_can_be_tracked(tmp_path):
+    pytest.importorskip("mediapipe")
+    for path, sentence in zip(write_toy_recordings(tmp_path, sentences=3), toy_sentences(3), strict=True):
+        tracked, known = track(path, crops=False), toy_motion(sentence.units, FPS)["opening"]
+        opening = tracked.motion["opening"]
+        assert tracked.seen.all()
+        assert np.corrcoef(opening, known)[0, 1] > 0.9
+        assert np.median(opening[known == 0]) < 0.3 * np.percentile(opening, 95)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
@@ -67,6 +68,8 @@ CAMERA_HZ = 25.0
 FACE_HEIGHT = 256
 _GRID_HZ = 1000
 MOTION_HZ = 100.0
+SMALL = HmmConfig(mixtures=1, iterations=2)
+"""Phone models that are trained in a second."""
 
 
 @dataclass(frozen=True, eq=False)

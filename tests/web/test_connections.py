@@ -37,9 +37,14 @@ def port() -> Iterator[int]:
 
     application = Starlette(routes=[Route("/{name}", replied)])
     with pytest.MonkeyPatch.context() as patch, open_socket("127.0.0.1", 0) as place:
-        for name, value in {"HEADERS_S": 0.2, "STALLED_S": 0.2, "FIRST_READ_S": 0.01, "MAX_OF_ONE": 5}.items():
+        for name, value in {
+            "HEADERS_S": 0.2,
+            "STALLED_S": 0.2,
+            "FIRST_READ_S": 0.01,
+            "MAX_OF_ONE": 5,
+            "MAX_CONNECTIONS": 8,
+        }.items():
             patch.setattr(connections, name, value)
-        patch.setattr(connections, "MAX_CONNECTIONS", 8)
         config = uvicorn.Config(application, lifespan="off", log_level="error", http=connections.PunctualConnection)
         server = uvicorn.Server(config)
         thread = Thread(target=server.run, args=([place],), daemon=True)

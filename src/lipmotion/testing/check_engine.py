@@ -64,12 +64,8 @@ def check_exporter(exporter: MotionFormat) -> None:
         if exporter.read is None:
             return
         motion, _ = exporter.read(path)
-    required = [
-        channel.name
-        for channel in given.channels
-        if channel.unit != RADIAN and channel.name not in (*ARKIT_OTHERS, CLOSED)
-    ]
-    require(set(required) <= set(motion.names), f"channels {motion.names} come back, required {required}")
+    required = {channel.name for channel in given.channels if channel.unit != RADIAN} - {*ARKIT_OTHERS, CLOSED}
+    require(required <= {*motion.names}, f"channels {motion.names} come back, required {sorted(required)}")
     require(abs(motion.rate_hz - given.rate_hz) < 1e-6, f"{motion.rate_hz} Hz come back, required {given.rate_hz}")
     require(len(motion.values) == len(given.values), f"{len(motion.values)} frames come back")
     difference = max(float(np.abs(motion[name] - given[name]).max()) for name in {*given.names} & {*motion.names})

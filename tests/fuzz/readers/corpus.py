@@ -10,8 +10,8 @@ import numpy as np
 from fuzz.inputs import Files, Good, picked_up
 from fuzz.readers.plausible import check_motion, require
 from lipmotion import Corpus
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.types import Audio, Motion, Span, Timeline, Track, Unit, Utterance
+from pipeline.made import features_of
 
 SAMPLES, FRAMES = 8000, 13
 PIXELS = (4, 6, 3)
@@ -40,7 +40,7 @@ def _half_a_second(utterance: Utterance) -> Utterance:
     audio = Audio(utterance.audio.samples[:SAMPLES].copy(), utterance.audio.rate_hz)
     motion = utterance.track.motion
     short = Motion(motion.values[:FRAMES], motion.rate_hz, motion.channels)
-    return replace(utterance, audio=audio, features=analysed(audio).mfcc(), track=Track(short, np.ones(FRAMES, bool)))
+    return replace(utterance, audio=audio, features=features_of(audio), track=Track(short, np.ones(FRAMES, bool)))
 
 
 def _corpus(utterance: Utterance) -> Files:

@@ -10,9 +10,9 @@ import numpy as np
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
+from lipmotion import load_face, save_face
 from lipmotion.types import Motion
 from lipmotion_faces.film.filmed_video import make_film
-from lipmotion_faces.filmed.face import load_face, save_face
 from testing.toy_face import toy_face
 
 FRAMES = 3

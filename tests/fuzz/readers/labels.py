@@ -4,8 +4,8 @@ import json
 import math
 from pathlib import Path
 
+from formats.test_labels import TIERS, long_form
 from formats.test_reported_cases import LINES, OTHERS, SERVICES, SPEAKERS
-from formats.test_textgrid import TIERS, long_form
 from formats.test_transcripts import OF_LINES, OF_WORDS
 from formats.timing_samples import SAMPLES
 from fuzz.inputs import Files, Good

@@ -9,11 +9,11 @@ from typing import Any
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import good_model, refuse_constant, require, short_speech
-from lipmotion.formats.sound import write_sound
 from lipmotion_studio.requests import TOKEN_HEADER
 from lipmotion_studio.study.application import study_application
 from lipmotion_studio.study.manifest import check_videos
 from lipmotion_studio.study.store import StudyStore
+from pipeline.made import write_sound
 from studio.open_studio import HOST, TOKEN, open_studio
 from study.asgi import Application, ask
 from study.small_study import small_study

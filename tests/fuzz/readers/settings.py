@@ -28,7 +28,7 @@ from lipmotion_studio.study.answers import COLUMNS, read_answers
 from lipmotion_studio.study.manifest import MANIFEST, read_study
 from lipmotion_studio.trainer import Trainer
 from lipmotion_studio.votes import read_votes
-from pipeline.session.test_edit_files import SENTENCES
+from pipeline.session.test_session import SENTENCES
 from study.small_study import small_study
 
 TRAINING = "training/state.json"

@@ -27,7 +27,6 @@ from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finish_line
 from lipmotion.pipeline.workers import WorkerDiedError
 from lipmotion.types import Item
-from lipmotion_faces.outputs.shown_faces import shown_face
 
 
 @pytest.fixture
@@ -76,23 +75,6 @@ def test_the_outputs_are_those_of_animate(sounds, settings, tmp_path):
     assert rows["three"]["words"] != "transcript"
     assert "is text, required a recording" in rows["broken"]["error"]
     assert rows["one"]["closures_heard"] >= rows["one"]["closures_made"] >= 1
-
-
-@pytest.mark.long
-def test_the_face_of_another_person_is_mapped_onto_once(filmed_face, toy_model, tmp_path, monkeypatch):
-    mapped, requests = list[str](), list[Request]()
-    monkeypatch.setattr(
-        one_line, "load_provided", lambda _: lambda *_, speaker: mapped.append(speaker) or Path("a map")
-    )
-    other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
-    lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
-    monkeypatch.setattr(one_line, "run", lambda job, **_: requests.append(job.request))
-    for model, line in ((other, lines[0]), (other, lines[1]), (toy_model, lines[0])):
-        shared = (model, shown_face(filmed_face), None)
-        monkeypatch.setattr(one_line, "_share", lambda *_, shared=shared: shared)
-        one_line._write_line(LineWork(line, Job(), "", Place(str(tmp_path), "a run")))
-    assert [request.onto for request in requests] == [Path("a map"), Path("a map"), None]
-    assert mapped == [""]
 
 
 def test_what_was_done_is_kept(sounds, settings, tmp_path):
@@ -254,14 +236,6 @@ def test_an_output_that_cannot_be_written_is_a_line_that_fails(sounds, settings,
     assert rows["deep/two"]["outcome"] == "failed"
     assert (out / "three.json").is_file()
     assert sorted(path.name for path in out.iterdir() if path.name.startswith(".")) == []
-
-
-def test_an_output_that_cannot_be_renamed_is_a_line_that_fails(sounds, settings, tmp_path, monkeypatch):
-    work = waiting(sounds, settings, tmp_path / "out")[0]
-    monkeypatch.setattr("lipmotion.pipeline.batch.one_line.check_target", lambda _: None)
-    (tmp_path / "out" / f"{work.line.name}.json").mkdir(parents=True)
-    record = finish_line(work)
-    assert (record["outcome"], record["outputs"]) == ("failed", {})
 
 
 def test_a_bug_that_one_line_meets_does_not_end_the_batch(sounds, settings, tmp_path, monkeypatch):

@@ -1,14 +1,18 @@
+import csv
 import hashlib
 import json
+import logging
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
 from lipmotion import Job, Outputs, Request
-from lipmotion.errors import ExportError
-from lipmotion.pipeline.batch import ledger as settings
+from lipmotion.errors import ExportError, InputError
+from lipmotion.pipeline.batch import BatchLine, read_lines, report
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     LARGEST_RECORD_BYTES,
@@ -25,8 +29,8 @@ from lipmotion.pipeline.batch.ledger import (
     read_receipt,
     write_receipt,
 )
-from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
-from lipmotion.pipeline.batch.report import write_reports
+from lipmotion.pipeline.batch.lines import MAX_LINES, OWN_FILES, OWN_FOLDER, check_names
+from lipmotion.printable import printable
 from lipmotion.storage.locks import LOCK
 
 CONTENT = b"motion"
@@ -141,7 +145,7 @@ def test_damaged_rows_are_said_once_and_their_lines_done_again(line, out, caplog
             caplog.clear()
             with open_ledger(Place(str(out), "2"), [line]) as ledger:
                 assert ledger.kept(line, "settings", out) is None, what
-                write_reports([line], ledger, out)
+                report.write_reports([line], ledger, out)
                 ledger.append(record_of(line))
                 assert ledger.kept(line, "settings", out) == record_of(line), what
             if "a line end" not in what:  # it is of a line that this batch has not: nobody looks at it
@@ -236,15 +240,243 @@ def test_settings_have_a_fingerprint(tmp_path):
     assert fingerprint_job(drawn) != before
 
 
-def test_a_line_without_the_recogniser_of_phones_is_another_one(monkeypatch):
-    found = set()
-    for name in ("hama", None):
-        monkeypatch.setattr(settings, "installed_phone_recogniser", lambda name=name: name)
-        found.add(fingerprint_job(Job()))
-    assert len(found) == 2
-
-
 @pytest.mark.parametrize("kinds", [(), ("wav",), ("json", "json"), ("cues.json5",), ("",)])
 def test_kinds_that_cannot_be_written(kinds):
     with pytest.raises(ExportError, match=r"required some of: json, csv|given twice"):
         check_kinds(kinds)
+
+
+GOOD = {"outcome": "done", "words": "transcript", "confidence": 1.0, "range_db": 50.0, "warnings": []}
+GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 0.1, "advice": []}
+
+
+@pytest.mark.parametrize(
+    ("worse", "better"),
+    [
+        ({"outcome": "failed"}, {"words": "no speech"}),
+        ({"words": "no speech"}, {"warnings": ["a"]}),
+        ({"warnings": ["a", "b"]}, {"warnings": ["a"]}),
+        ({"words": "words", "confidence": 0.3}, {"words": "words", "confidence": 0.6}),
+        ({"words": "phones", "confidence": 0.1}, {"words": "words", "confidence": 0.6}),
+        ({"confidence": 0.5}, {"confidence": 0.9}),
+        ({"range_db": 10.0}, {}),
+        ({"closures_made": 1}, {}),
+        ({"motion": 0.3}, {"motion": 0.6}),
+    ],
+)
+def test_what_is_doubtful(worse, better):
+    assert report.rate_doubt(GOOD | worse) > report.rate_doubt(GOOD | better)
+    assert report.rate_doubt(GOOD) == pytest.approx(0)
+    assert report.rate_doubt(GOOD | {"words": "words", "confidence": 0.07}) > 60
+
+
+def rows_of(page: str) -> list[list]:
+    return json.loads(page.partition('id="data">')[2].partition("</script>")[0])
+
+
+def reported(folder: Path, names: Sequence[str], *records: dict) -> tuple[list[dict[str, str]], str]:
+    """Write the reports of lines, of which the first have these records; return the rows of the table, and the page."""
+    lines = [BatchLine(name, f"/x/{name}.wav") for name in names]
+    base = GOOD | {"run": "1", "fingerprint": "f", "inputs": []}
+    with open_ledger(Place(str(folder), "1"), lines) as ledger:
+        for line, record in zip(lines, records, strict=False):
+            own = {"name": line.name, "recording": line.recording, "outputs": {f"{line.name}.json": "0"}}
+            ledger.append(base | own | record)
+        table, page = report.write_reports(lines, ledger, folder)
+    with table.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file)), page.read_text(encoding="utf-8")
+
+
+def test_both_reports_hold_all_lines(tmp_path):
+    hostile = "</script><b>=1+1\u202e,\"'\n"
+    read, text = reported(tmp_path, ["a", "b/c", "d"], {}, {"outcome": "failed", "error": hostile, "outputs": {}})
+    assert [row["name"] for row in read] == ["b/c", "d", "a"]
+    assert [row["outcome"] for row in read] == ["failed", "missing", "done"]
+    assert read[0]["error"] == hostile
+    assert read[2]["outputs"] == "a.json"
+    rows = rows_of(text)
+    assert [row[report.COLUMNS.index("error")] for row in rows] == [printable(hostile), None, None]
+    assert rows[2][report.COLUMNS.index("mark") + 1] == ["a.json"]
+    sound = unquote(rows[2][report.COLUMNS.index("mark") + 2])
+    assert (tmp_path / sound).resolve() == Path("/x/a.wav")
+    assert text.count("</script>") == 2
+    assert "default-src 'none'" in text
+    assert "http" not in text.replace("http-equiv", "")
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+a", "-a", "@a"])
+def test_no_text_is_a_formula(tmp_path, name):
+    (row,), page = reported(tmp_path, [name], {"range_db": -3.0, "warnings": [name, "a"]})
+    assert (row["name"], row["outputs"], row["warnings"]) == (f"'{name}", f"'{name}.json", f"'{name} | a")
+    assert row["range_db"] == "-3.0"
+    assert rows_of(page)[0][0] == name
+
+
+@pytest.mark.parametrize("recording", ["", "/\ud800.wav"])
+def test_a_recording_without_an_address_is_not_played(tmp_path, recording):
+    _, page = reported(tmp_path, ["a"], {"recording": recording})
+    assert rows_of(page)[0][report.COLUMNS.index("mark") + 2] is None
+
+
+def test_they_are_read_as_they_were_written(tmp_path):
+    names = ("a", "=1+1", 'b, "c"', "'d", "'=e ")
+    marks = dict(
+        zip(names, map(report.Mark, ("approve", "redo", "redo", "", ""), ("2026-01-01", "", "-2", "", "")), strict=True)
+    )
+    report.write_marks(tmp_path / "marks.csv", marks)
+    assert "'=1+1," in (tmp_path / "marks.csv").read_text()
+    assert report.read_marks(tmp_path / "marks.csv") == marks
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("name\na\n", "no column 'mark'"),
+        ("name,mark\na,again\n", "row 2: the mark is 'again', required approve or redo"),
+        ("name,mark\na,redo\na,approve\n", "row 3: 'a' is marked twice"),
+        ("", "no column 'name'"),
+    ],
+)
+def test_what_is_refused(tmp_path, text, said):
+    (tmp_path / "marks.csv").write_text(text)
+    with pytest.raises(InputError, match=said):
+        report.read_marks(tmp_path / "marks.csv")
+
+
+def test_later_marks_are_ahead_and_may_take_back():
+    kept = {"a": report.Mark("approve"), "b": report.Mark("redo"), "c": report.Mark("approve")}
+    assert report.merge_marks(kept, {"a": report.Mark("redo", "2"), "b": report.Mark("")}) == {
+        "a": report.Mark("redo", "2"),
+        "c": report.Mark("approve"),
+    }
+
+
+def test_a_line_is_due_once_for_each_mark():
+    assert report.is_due(report.Mark("redo"), None)
+    assert report.is_due(report.Mark("redo"), {})
+    assert not report.is_due(report.Mark("redo"), {"redone": ""})
+    assert report.is_due(report.Mark("redo", "2"), {"redone": ""})
+    assert not report.is_due(report.Mark("approve"), {})
+
+
+def listed(folder: Path, text: str, name: str = "list.txt", kinds: tuple[str, ...] = ("json",)) -> list[BatchLine]:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return read_lines(path, kinds)
+
+
+def test_a_folder_gives_its_recordings_with_their_relative_names(tmp_path):
+    for name in ("b/two.wav", "a/one.FLAC", "a/one.txt", ".hidden/x.wav", "a/.y.wav", "notes.md"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    lines = read_lines(tmp_path, ("json",))
+    assert [line.name for line in lines] == ["a/one", "b/two"]
+    assert [line.recording for line in lines] == [str(tmp_path / "a/one.FLAC"), str(tmp_path / "b/two.wav")]
+
+
+def test_a_list_of_paths(tmp_path):
+    lines = listed(tmp_path, "a/x, y.wav\n\n./b.wav\n")
+    assert [line.name for line in lines] == ["a/x, y", "b"]
+    assert lines[1].recording == str(tmp_path / "b.wav")
+
+
+def test_recordings_outside_of_the_folder_of_the_list(tmp_path):
+    (tmp_path / "lists").mkdir()
+    lines = listed(tmp_path / "lists", f"../sounds/s1/a.wav\n{tmp_path}/sounds/s2/a.wav\n")
+    assert [line.name for line in lines] == ["s1/a", "s2/a"]
+
+
+@pytest.mark.parametrize(("name", "mark"), [("t.csv", ","), ("t.tsv", "\t"), ("t.csv", ";")])
+def test_a_table(tmp_path, name, mark, caplog):
+    rows = [
+        ["File", "transcript", "output", "speaker", "note"],
+        ["a.wav", '"Hello, you; there"', "act1/hello.json", "anna", "x"],
+    ]
+    with caplog.at_level(logging.WARNING):
+        lines = listed(tmp_path, "\n".join(mark.join(row) for row in rows), name)
+    assert lines == [BatchLine("act1/hello", str(tmp_path / "a.wav"), "Hello, you; there", "anna")]
+    assert "columns that are not used: note" in caplog.text
+
+
+def test_outputs_may_be_named_with_the_suffix_of_one_of_their_kinds(tmp_path):
+    names = ("a.json", "b.cues.json", "c.take")
+    text = "file,output\n" + "".join(f"{number}.wav,{name}\n" for number, name in enumerate(names))
+    lines = listed(tmp_path, text, "t.csv", ("json", "cues.json"))
+    assert [line.name for line in lines] == ["a", "b", "c.take"]
+
+
+def test_short_rows_are_filled_and_long_ones_refused(tmp_path):
+    assert listed(tmp_path, "file,transcript\na.wav\n") == [BatchLine("a", str(tmp_path / "a.wav"))]
+    with pytest.raises(InputError, match="row 2: 3 columns, required at most the 2"):
+        listed(tmp_path, "file,transcript\na.wav,hello,you\n")
+    with pytest.raises(InputError, match="row 3: no recording in the column 'file'"):
+        listed(tmp_path, "file,transcript\na.wav,x\n,hello\n")
+
+
+def test_nothing_to_do_is_an_error(tmp_path):
+    with pytest.raises(InputError, match="no recordings in it"):
+        read_lines(tmp_path, ("json",))
+    with pytest.raises(InputError, match="no such file or folder"):
+        read_lines(tmp_path / "missing", ("json",))
+    with pytest.raises(InputError, match="no recordings"):
+        listed(tmp_path, "\n")
+
+
+@pytest.mark.parametrize("text", ["a.wav\na.flac\n", "a.wav\nA.wav\n", "a.wav\na.wav\n", "é.wav\ne\u0301.flac\n"])
+def test_two_lines_with_one_name_are_refused(tmp_path, text):
+    with pytest.raises(ExportError, match="rename one of them"):
+        listed(tmp_path, text)
+
+
+@pytest.mark.parametrize("text", ["a\0b.wav\n", "file,output\na.wav,x\ty\n", "~nobody/a.wav\n"])
+def test_names_that_no_file_has(tmp_path, text):
+    if text.startswith("~"):  # only a shell knows homes
+        assert listed(tmp_path, text)[0].recording == str(tmp_path / "~nobody/a.wav")
+        return
+    with pytest.raises(InputError, match="control characters"):
+        listed(tmp_path, text)
+
+
+def test_a_list_of_too_many_lines(tmp_path):
+    with pytest.raises(InputError, match=f"{MAX_LINES + 1} lines, required at most {MAX_LINES}"):
+        listed(tmp_path, "a.wav\n" * (MAX_LINES + 1))
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["a", "a.json/b"], "be the folder of"),
+        (["B.JSON/b", "b"], "be the folder of"),
+        (["report.csv/b"], "be the folder of"),
+        (["x" * 251], "more than 255 bytes"),
+        (["é" * 130 + "/x"], "more than 255 bytes"),
+        (["take.LiveLink"], "would be called as .livelink.csv"),
+        (["Report"], "the batch itself"),
+        (["a", "a.cues"], "would be written for"),  # as json and as cues.json
+        *(([name], "outside the folder") for name in ("../a", "/a", ".a", "a/.batch/b", "")),
+        *(([name], "Windows") for name in ("CON", "nul", "a/aux", "aux/a", "com1.take", "NUL .b", "a./b", "a /b")),
+    ],
+)
+def test_names_that_cannot_be_files_together(names, message):
+    with pytest.raises(ExportError, match=message):
+        check_names([BatchLine(name, f"/{n}.wav") for n, name in enumerate(names)], ("json", "csv", "cues.json"))
+
+
+def test_names_that_are_only_alike():
+    names = ["a", "a.jso/b", "a/b", "x" * 240, "take.1", "take.livelink.2"]
+    check_names([BatchLine(name, f"/{name}.wav") for name in names], ("json", "csv", "livelink.csv"))
+    check_names([BatchLine(name, "/a.wav") for name in ("take.livelink", "report", "a", "a.cues")], ("json",))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no such time")
+def test_another_file_of_the_same_size_and_time_is_noticed(tmp_path):
+    path, other = tmp_path / "a.wav", tmp_path / "b.wav"
+    path.write_bytes(b"a")
+    (file,) = input_files(BatchLine("a", str(path)))
+    path.touch()
+    assert file.is_unchanged()
+    other.write_bytes(b"b")
+    status = path.stat()
+    other.replace(path)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert not file.is_unchanged()

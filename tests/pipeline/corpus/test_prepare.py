@@ -1,3 +1,4 @@
+import json
 import os
 import shutil
 import signal
@@ -9,11 +10,9 @@ import pytest
 
 from children import NOWHERE, child
 from lipmotion import Corpus, prepare
-from lipmotion.corpora.store import read_entry
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.storage.locks import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Track
-from lipmotion_faces.corpus import prepare as module
 from pipeline.made import replace_tracking, write_noise
 
 
@@ -155,19 +154,15 @@ def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("tracked")
-def test_an_interrupted_run_goes_on_where_it_stopped(studio, tmp_path, monkeypatch):
+def test_an_interrupted_run_goes_on_where_it_stopped(studio, tmp_path):
     prepare(studio, tmp_path / "whole", workers=1)
-    good = module.track  # type: ignore[attr-defined]
 
-    def interrupted(path: Path, *, crops: bool, tracker: str) -> Track:
-        if path.stem == "b":
+    def interrupt(event: Progress | Item) -> None:
+        if isinstance(event, Item):
             raise KeyboardInterrupt
-        return good(path, crops=crops, tracker=tracker)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(module, "track", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            prepare(studio, tmp_path / "corpus", workers=1)
+    with pytest.raises(KeyboardInterrupt):
+        prepare(studio, tmp_path / "corpus", workers=1, monitor=interrupt)
     assert Corpus.open(tmp_path / "corpus").names() == ("a",)
     report = prepare(studio, tmp_path / "corpus", workers=1)
     assert (report.kept, report.prepared) == (("a",), ("b", "c"))
@@ -298,5 +293,6 @@ def test_real_clips_with_their_words(clips, tmp_path, capfd):
     assert found.source["licence"] == "CC BY 4.0"
     assert found.track.motion.values.shape == (75, 159)
     assert found.audio.duration_s == pytest.approx(2.978)
-    assert read_entry(Corpus.open(report.corpus).folder("bbaf2n"))["settings"]["tracker"].startswith("mediapipe 0.10.")
+    entry = json.loads((report.corpus / "utterances" / "bbaf2n" / "entry.json").read_text())
+    assert entry["settings"]["tracker"].startswith("mediapipe 0.10.")
     assert capfd.readouterr() == ("", "")

@@ -8,16 +8,21 @@ from hypothesis import strategies as st
 
 from formats.examples import of_motion, written
 from lipmotion import Corpus, prepare
+from lipmotion.corpora.captured_faces import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
+from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
-from lipmotion.errors import InputError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.tables import SPEECH_CURVES
-from lipmotion.types import Channel, Motion, Timeline, Unit
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit
 from lipmotion.units import is_silent
-from lipmotion_faces.corpus.supplied import read_supplied_phones, read_supplied_track, source_digests
+from lipmotion_faces.corpus import supplied
+from meshes.flame import head
 from meshes.live_link_app import write_take
 from meshes.speech import said
-from pipeline.made import replace_tracking, write_noise
+from pipeline.made import replace_tracking, write_noise, write_sound
+from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
 
@@ -91,9 +96,9 @@ def test_what_does_not_fit_is_listed_and_the_rest_goes_on(studio, tmp_path):
 def test_a_bare_array_at_another_rate_is_noticed(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((50, 2)))
     curves = MotionFile(tmp_path / "a.npy", 30.0, CHANNELS)
-    assert read_supplied_track(curves, 1.7).motion.rate_hz == 30
+    assert supplied.read_supplied_track(curves, 1.7).motion.rate_hz == 30
     with pytest.raises(InputError, match=r"50 frames at 30 Hz last 1\.67 s, the sound lasts 5\.00 s"):
-        read_supplied_track(curves, 5.0)
+        supplied.read_supplied_track(curves, 5.0)
 
 
 def recording(phones: Timeline[Unit] | None) -> SourceRecording:
@@ -105,13 +110,13 @@ def test_silence_is_named_as_recognition_names_it():
         *[(0.1, 0.2, "sp"), (0.2, 0.4, "aa"), (0.4, 0.5, "sil"), (0.5, 0.7, "m"), (0.7, 0.8, "sp")],
         *[(0.8, 1.0, "sil"), (1.0, 1.2, "b"), (1.2, float("inf"), "sil")],
     )
-    found = read_supplied_phones(recording(labelled), 1.3)
+    found = supplied.read_supplied_phones(recording(labelled), 1.3)
     assert found == said(
         *[(0.0, 0.2, "sil"), (0.2, 0.4, "aa"), (0.4, 0.5, "sp"), (0.5, 0.7, "m"), (0.7, 1.0, "sil")],
         *[(1.0, 1.2, "b"), (1.2, 1.3, "sil")],
     )
-    assert read_supplied_phones(recording(None), 1.3) is None
-    assert "phones_sha256" not in source_digests(recording(None))
+    assert supplied.read_supplied_phones(recording(None), 1.3) is None
+    assert "phones_sha256" not in supplied.source_digests(recording(None))
 
 
 @given(
@@ -123,7 +128,7 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
     edges = begin_s + np.cumsum([0, *(length for _, length in phones)])
     labelled = said(*((a, b, p) for a, b, (p, _) in zip(edges, edges[1:], phones, strict=False)))
     duration_s = max(float(edges[-1]) + longer_s, 0.1)
-    found = read_supplied_phones(recording(labelled), duration_s)
+    found = supplied.read_supplied_phones(recording(labelled), duration_s)
     assert found[0].start_s == 0
     assert found[-1].end_s == pytest.approx(duration_s)
     assert all(a.end_s == b.start_s for a, b in zip(found, found.spans[1:], strict=False))
@@ -136,15 +141,15 @@ def test_phones_tile_the_sound(phones, begin_s, longer_s):
 
 def test_labels_that_go_on_after_the_sound():
     with pytest.raises(InputError, match="are they those of another recording"):
-        read_supplied_phones(recording(said((0, 2, "aa"))), 1.8)
-    assert read_supplied_phones(recording(said((0, 2, "aa"))), 1.95) == said((0, 1.95, "aa"))
+        supplied.read_supplied_phones(recording(said((0, 2, "aa"))), 1.8)
+    assert supplied.read_supplied_phones(recording(said((0, 2, "aa"))), 1.95) == said((0, 1.95, "aa"))
 
 
 def test_a_source_is_not_touched(studio):
     item = replace(recording(said((0, 1, "aa"))), motion_file=MotionFile(studio / "a.npz"))
-    assert set(source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
-    assert source_digests(item) == source_digests(item)
-    assert source_digests(item) != source_digests(replace(item, phones=said((0, 1.001, "aa"))))
+    assert set(supplied.source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
+    assert supplied.source_digests(item) == supplied.source_digests(item)
+    assert supplied.source_digests(item) != supplied.source_digests(replace(item, phones=said((0, 1.001, "aa"))))
 
 
 def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
@@ -172,6 +177,205 @@ def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
 def test_frames_without_a_face_are_not_seen(tmp_path):
     rows = [f"10:00:{n // 60:02d}:{n % 60:02d}.000,{'1,0.5' if 30 <= n < 90 else 0}" for n in range(120)]
     (tmp_path / "a.csv").write_text("\n".join(["Timecode,BlendshapeCount,JawOpen", *rows]))
-    track = read_supplied_track(MotionFile(tmp_path / "a.csv"), 2.0)
+    track = supplied.read_supplied_track(MotionFile(tmp_path / "a.csv"), 2.0)
     assert np.flatnonzero(track.seen).tolist() == list(range(30, 90))
     assert track.motion["jawOpen"] == pytest.approx(np.where(track.seen, 0.5, 0.0))
+
+
+RATE = 60.0
+CUT, BEFORE = 4_800, 12_345
+
+
+def write_ramp(path: Path, seconds: float) -> None:
+    """Write a curve that says its own time."""
+    motion = Motion(np.arange(int(seconds * RATE))[:, None] / RATE, RATE, (Channel("jaw", "weight"),))
+    written(path, of_motion(motion))
+
+
+@pytest.fixture
+def recorded_twice_folder(tmp_path: Path) -> Path:
+    """A take of a camera with motion, and the same take as a recorder has it, from earlier on."""
+    chance = np.random.default_rng(5)
+    scene = np.concatenate([np.zeros(2 * RATE_HZ), speech_like(chance, 4.0)])
+    made = clap(chance)
+    scene[RATE_HZ : RATE_HZ + len(made)] += made
+    camera, recorder, late_s = recorded_twice(scene, chance, CUT, BEFORE)
+    assert late_s == pytest.approx((CUT + BEFORE) / RATE_HZ)
+    folder = tmp_path / "studio"
+    folder.mkdir()
+    write_sound(folder / "take.wav", camera)
+    write_sound(folder / "take.recorder.wav", recorder)
+    write_ramp(folder / "take.npz", camera.duration_s)
+    return folder
+
+
+def test_the_recorders_sound_is_used_from_the_right_moment(recorded_twice_folder, tmp_path):
+    (recorded_twice_folder / "take.lab").write_text("10000000 20000000 aa\n")
+    report = prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
+    assert (report.prepared, report.failed) == (("take",), {})
+    assert report.notes["take"] == ("sound 1071.6 ms late, found by the clap",)
+    found = Corpus.open(tmp_path / "corpus").utterance("take")
+    assert (found.source["recorder_file"], found.source["sound_found_by"]) == ("take.recorder.wav", "clap")
+    assert float(found.source["sound_late_ms"]) == pytest.approx(1000 * (CUT + BEFORE) / RATE_HZ, abs=0.1)
+    assert found.track.motion.values[0, 0] == pytest.approx(0)
+    assert found.audio.duration_s == pytest.approx(len(found.track.seen) / RATE, abs=0.02)
+    at = int(np.abs(found.audio.samples).argmax())
+    assert at == pytest.approx(RATE_HZ - CUT, abs=40)
+    assert prepare(recorded_twice_folder, tmp_path / "corpus", workers=1).kept == ("take",)
+    (recorded_twice_folder / "take.recorder.wav").write_bytes((recorded_twice_folder / "take.wav").read_bytes())
+    assert prepare(recorded_twice_folder, tmp_path / "corpus", workers=1).prepared == ("take",)
+
+
+def test_a_long_video_gets_the_recorders_sound_in_its_own_time(recorded_twice_folder):
+    recording = SourceRecording(
+        "take", recorded_twice_folder / "take.wav", None, recorder=recorded_twice_folder / "take.recorder.wav"
+    )
+    own, sound = read_audio(recorded_twice_folder / "take.wav"), supplied.separate_sound(recording)
+    assert sound is not None
+    placed = supplied.align_sound(sound, own.duration_s)
+    assert len(placed.samples) == len(own.samples)
+    assert np.abs(placed.samples).argmax() == pytest.approx(np.abs(own.samples).argmax(), abs=40)
+    assert supplied.separate_sound(replace(recording, recorder=None)) is None
+
+
+def test_a_given_offset_is_used(recorded_twice_folder, tmp_path):
+    (recorded_twice_folder / "take.recorder.wav").unlink()
+    (recorded_twice_folder / "take.lab").write_text("0 10000000 aa\n10000000 30000000 m\n")
+    report = prepare(recorded_twice_folder, tmp_path / "late", offset_ms=250, workers=1)
+    assert report.notes["take"] == ("sound 250.0 ms late, as given",)
+    late = Corpus.open(tmp_path / "late").utterance("take")
+    assert late.track.motion.values[0, 0] == pytest.approx(0)
+    assert late.phones[0].end_s == pytest.approx(0.75)
+    (recorded_twice_folder / "offsets.csv").write_text("name,offset_ms\ntake,-500\n")
+    prepare(recorded_twice_folder, tmp_path / "early", offset_ms=250, workers=1)
+    early = Corpus.open(tmp_path / "early").utterance("take")
+    assert early.track.motion.values[0, 0] == pytest.approx(0.5)
+    whole = Corpus.open(tmp_path / "late").utterance("take").audio.duration_s + 0.25
+    assert early.audio.duration_s == pytest.approx(whole - 0.5, abs=0.03)
+    assert early.phones[0].end_s == pytest.approx(1.0)
+
+
+def test_motion_of_another_length_needs_an_offset(recorded_twice_folder, tmp_path):
+    (recorded_twice_folder / "take.recorder.wav").unlink()
+    write_ramp(recorded_twice_folder / "take.npz", 3.0)
+    with pytest.raises(CorpusError, match="required: the same time from the same start"):
+        prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
+    prepare(recorded_twice_folder, tmp_path / "corpus", offset_ms=1000, workers=1)
+    assert Corpus.open(tmp_path / "corpus").utterance("take").audio.duration_s == pytest.approx(3.0, abs=0.02)
+
+
+def test_what_is_not_clear_is_listed(recorded_twice_folder, tmp_path):
+    chance = np.random.default_rng(9)
+    other = Audio(speech_like(chance, 5.0).astype(np.float32), RATE_HZ)
+    write_sound(recorded_twice_folder / "take.recorder.wav", other)
+    with pytest.raises(CorpusError, match=r"take\.recorder\.wav: the offset of the two sounds is not clear"):
+        prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
+
+
+def ramp_track(frames: int) -> Track:
+    return Track(Motion(np.arange(frames)[:, None] / RATE, RATE, (Channel("jaw"),)), np.ones(frames, bool))
+
+
+@pytest.mark.parametrize("late_s", [-1.234, -0.01, 0.0, 0.777, 2.0])
+def test_sound_and_motion_begin_together(late_s):
+    """The sound is a ramp of its own time, as the motion is."""
+    ramp = Audio((np.arange(4 * RATE_HZ) / RATE_HZ).astype(np.float32), RATE_HZ)
+    audio, found, start_s = supplied.trim_to_shared(supplied.SeparateSound(ramp, late_s, "x"), ramp_track(300))
+    assert found.motion.values[0, 0] == pytest.approx(start_s)
+    assert audio.samples[0] == pytest.approx(start_s + late_s, abs=1 / RATE_HZ)
+    assert audio.duration_s == pytest.approx(len(found.seen) / RATE, abs=1 / RATE)
+    placed = supplied.align_sound(supplied.SeparateSound(ramp, late_s, "x"), 5.0)
+    assert len(placed.samples) == 5 * RATE_HZ
+    middle = int(1.5 * RATE_HZ)
+    assert placed.samples[middle] == pytest.approx(1.5 + late_s, abs=1 / RATE_HZ)
+
+
+def test_sounds_that_share_nothing_are_refused():
+    ramp = Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)
+    for late_s in (-20.0, 20.0, 0.9):
+        with pytest.raises(ValueError, match=r"share 0\.\d\d s, required 0.5"):
+            supplied.trim_to_shared(supplied.SeparateSound(ramp, late_s, "clap"), ramp_track(300))
+
+
+MESH_HZ, MESHES = 60.0, 30
+
+
+def write_sentence(folder: Path, person: str, sentence: str) -> np.ndarray:
+    """Write a sentence as VOCASET has it; return by how much the jaw is lowered, in millimetres [shape=(T,)]."""
+    jaw = 8 * np.sin(np.linspace(0, np.pi, MESHES)) ** 2
+    meshes, sound = folder / "unposedcleaneddata" / person / sentence, folder / "audio" / person / f"{sentence}.wav"
+    for each in (meshes, sound.parent):
+        each.mkdir(parents=True, exist_ok=True)
+    for number, lowered in enumerate(jaw, 1):
+        (meshes / f"{sentence}.{number:06}.ply").write_bytes(head(lowered, "<"))
+    write_noise(sound, 0.5, 1, 22_000)
+    return jaw
+
+
+def test_vocaset_becomes_a_corpus_of_lip_distances(tmp_path):
+    for person in ("FaceTalk_170725_00137_TA", "FaceTalk_170728_03272_TA"):
+        jaw = write_sentence(tmp_path / "voca", person, "sentence01")
+    (tmp_path / "voca/audio/FaceTalk_170725_00137_TA/sentence01.txt").write_text("Hello there.")
+    (tmp_path / "voca/audio/FaceTalk_170728_03272_TA/sentence02.wav").touch()
+    report = prepare(tmp_path / "voca", tmp_path / "corpus", workers=1)
+    assert report.prepared == ("FaceTalk_170725_00137_TA-sentence01", "FaceTalk_170728_03272_TA-sentence01")
+    assert "no meshes (.ply)" in report.failed["FaceTalk_170728_03272_TA-sentence02"]
+    corpus = Corpus.open(tmp_path / "corpus")
+    assert list(corpus.speakers) == ["FaceTalk_170725_00137_TA", "FaceTalk_170728_03272_TA"]
+    said = corpus.utterance(report.prepared[0])
+    assert (said.words, said.track.motion.rate_hz, said.source["licence"][:8]) == (
+        ("hello", "there"),
+        MESH_HZ,
+        "research",
+    )
+    motion = said.track.motion
+    np.testing.assert_allclose(motion["opening"], (1 + jaw) / 90, atol=1e-6)
+    np.testing.assert_allclose(motion["outer"], (16 + jaw) / 90, atol=1e-6)
+    np.testing.assert_allclose(motion["width"], 46 / 90, atol=1e-6)
+    np.testing.assert_allclose(np.ptp(motion["y_152"]), np.ptp(jaw) / 90, atol=1e-6)
+
+
+def test_a_changed_mesh_prepares_again_and_a_missing_one_is_bridged(tmp_path):
+    jaw = write_sentence(tmp_path / "voca", "anna", "s01")
+    prepare(tmp_path / "voca", tmp_path / "corpus", workers=1)
+    assert prepare(tmp_path / "voca", tmp_path / "corpus", workers=1).kept == ("anna-s01",)
+    meshes = tmp_path / "voca/unposedcleaneddata/anna/s01"
+    (meshes / "s01.000001.ply").unlink()
+    (meshes / "s01.000011.ply").unlink()
+    assert prepare(tmp_path / "voca", tmp_path / "corpus", workers=1).prepared == ("anna-s01",)
+    opening = Corpus.open(tmp_path / "corpus").utterance("anna-s01").track.motion["opening"]
+    jaw[[0, 10]] = jaw[1], (jaw[9] + jaw[11]) / 2
+    np.testing.assert_allclose(opening, (1 + jaw) / 90, atol=1e-6)
+
+
+def test_bytes_in_either_order_and_text(tmp_path):
+    for order in ("<", ">", ""):
+        (tmp_path / "a.ply").write_bytes(head(4, order))
+        places = read_vertices(tmp_path / "a.ply", [FLAME_MARKERS["LIP_14"]])
+        np.testing.assert_allclose(places, [[0, -0.065, 0.03]], atol=1e-6)
+
+
+def test_other_meshes_are_refused(tmp_path):
+    good = head(0, "<")
+    nan = np.float32(np.nan).tobytes() * 3 * FLAME_VERTICES
+    for content, message in (
+        (good.replace(b"vertex 5023", b"vertex 5000"), "5000 of 'vertex', required 5023 vertices: of others, no lip"),
+        (good[:20_000], "not a mesh of FLAME in .ply"),
+        (good.replace(b"float x", b"list uchar int x"), "not a mesh of FLAME in .ply"),
+        (good.replace(b"float x", b"real x"), "not a mesh of FLAME in .ply"),
+        (good.replace(b"property float x\n", b""), "not a mesh of FLAME in .ply"),
+        (good.replace(b"format binary_little_endian 1.0\n", b""), "not a mesh of FLAME in .ply"),
+        (good.replace(b"end_header", b"the_header"), "its header has no end"),
+        (good[: good.index(b"end_header") + 11] + nan, "not finite"),
+        (b"", "not a mesh of FLAME in .ply"),
+    ):
+        (tmp_path / "a.1.ply").write_bytes(content)
+        with pytest.raises(InputError, match=message):
+            read_mesh_motion(tmp_path / "a.1.ply", MESH_HZ)
+
+
+def test_only_the_two_folders_are_vocaset(tmp_path):
+    (tmp_path / "audio" / "anna").mkdir(parents=True)
+    (tmp_path / "audio" / "anna" / "a.wav").touch()
+    (tmp_path / "audio" / "anna" / "a.csv").touch()
+    assert discover(tmp_path).kind == "folder of sounds with motion"

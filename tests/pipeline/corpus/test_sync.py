@@ -1,3 +1,4 @@
+import json
 import shutil
 from dataclasses import replace
 from itertools import pairwise
@@ -7,14 +8,13 @@ import numpy as np
 import pytest
 
 from lipmotion import Corpus
-from lipmotion.corpora.store import read_entry
 from lipmotion.measures.curves import best_offset
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit, Utterance
 from lipmotion_faces.corpus import sync as module
 from lipmotion_faces.corpus.sync import clip_scores, offsets, sync
 from lipmotion_faces.tracking.track import track
+from pipeline.made import features_of
 
 RATE_HZ = 16_000
 COUNT = 4
@@ -40,7 +40,7 @@ def utterance(seed: int, late_s: float, collection: str) -> Utterance:
     return Utterance(
         f"{collection}{seed}",
         audio,
-        analysed(audio).mfcc(),
+        features_of(audio),
         found,
         ("a",),
         "train",
@@ -83,7 +83,7 @@ def test_sync_moves_what_is_late_once(corpus):
         np.testing.assert_allclose(one.audio.samples, before[name][shift:], atol=1e-4)
         assert float(one.source["offset_removed_ms"]) == pytest.approx(1000 * late_s, abs=0.1)
         assert one.features.values.shape[0] == len(one.audio.samples) // 160 + 1
-        assert read_entry(again.folder(name))["settings"] == {"recipe": "9"}
+        assert json.loads((again.folder(name) / "entry.json").read_text())["settings"] == {"recipe": "9"}
     assert abs(offsets(again).collections["there"].late_s) < 0.005
     assert "there" not in sync(again)
     assert module.move_sound(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
@@ -141,7 +141,7 @@ def test_other_speakers_on_video(recordings, tmp_path, late_s):
         sound = np.pad(sound, (shift, 0), mode="reflect") if shift > 0 else sound[-shift:]
         audio = Audio(np.ascontiguousarray(sound), RATE_HZ)
         one = Utterance(
-            path.stem, audio, analysed(audio).mfcc(), track(path, crops=False), None, "test", {"collection": "others"}
+            path.stem, audio, features_of(audio), track(path, crops=False), None, "test", {"collection": "others"}
         )
         corpus.add(one)
         found = best_offset(clip_scores(one), 100.0)

@@ -96,14 +96,10 @@ def test_what_does_not_move_is_named():
 @pytest.mark.parametrize(
     ("other", "words"),
     [
-        (weights("mouthClose"), "has no channel of the reference in the same unit: it has mouthClose"),
         (Motion(np.zeros((60, 1)), 60.0, (Channel("jawOpen"),)), r"it has jawOpen \(eye_distance\), required one of"),
-        (weights("jawOpen", frames=3), "3 common frames, required 4 or more"),
         (weights("jawOpen", frames=0), "motion 1: the motion has no frames"),
         (moved(weights("jawOpen"), "jawOpen", np.full(60, np.nan)), "values that are not finite"),
-        ("missing.json", "missing.json: cannot be read"),
-        ("a.wav", "cannot read motion from '.wav'; use one of .json"),
-        ("a.bvh", "cannot read motion from '.bvh'"),
+        ("a.bvh", "cannot read motion from '.bvh'; use one of .json"),
     ],
 )
 def test_what_cannot_be_compared(other, words):

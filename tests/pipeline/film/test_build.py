@@ -1,20 +1,158 @@
 from collections.abc import Callable
+from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
-from lipmotion.errors import InputError
+from lipmotion import Corpus, FilmedFace, build_face, load_face, save_face
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
 from lipmotion_faces.film import build
-from lipmotion_faces.film.build import Take, build_face
-from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
+from lipmotion_faces.film import build as takes
+from lipmotion_faces.film.build import MOST_FOOTAGE_S, Take, choose_takes
 from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video, write_videos
-from testing.toy import toy_sentences
+from speech.sounds import tone, write_sound
+from testing.toy import toy_sentences, toy_utterances
 from testing.toy_face import toy_chin_px
+
+MakeVideos = Callable[..., Path]
+
+
+@pytest.fixture
+def make_videos(tmp_path: Path) -> MakeVideos:
+    """Writes videos of a second into a folder."""
+
+    def make(*names: str, folder: str = "filmed/anna") -> Path:
+        directory = tmp_path / folder
+        first: Path | None = None
+        for name in names:
+            path = directory / f"{name}.mkv"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if first is None:
+                first = write_sound(path, tone(16_000), 16_000, "flac", video=True)
+            else:
+                path.write_bytes(first.read_bytes())
+        return directory
+
+    return make
+
+
+def names(found: list[takes.Take]) -> list[str]:
+    return [take.name for take in found]
+
+
+def test_one_video(make_videos):
+    video = make_videos("a") / "a.mkv"
+    (take,) = choose_takes(video)
+    assert (take.name, take.file, take.collection, take.speaker) == ("a", video, "filmed/anna", "")
+    assert (take.span.start_s, take.span.end_s) == (0.0, MOST_FOOTAGE_S)
+
+
+def test_a_folder(make_videos):
+    folder = make_videos("a", "b", "c")
+    found = choose_takes(folder)
+    assert names(found) == ["a", "b", "c"]
+    assert {take.collection for take in found} == {"filmed/anna"}
+    assert all(take.file.parent == folder for take in found)
+    assert found[0].span.end_s == float("inf")
+
+
+def test_of_a_folder_with_lists_the_training_list(make_videos):
+    folder = make_videos("a", "b", "c", "d")
+    (folder / "train.txt").write_text("b\nd\n")
+    (folder / "test.txt").write_text("a\n")
+    (folder / "val.txt").write_text("c\n")
+    assert names(choose_takes(folder)) == ["b", "d"]
+
+
+def test_one_of_several_people(make_videos, tmp_path):
+    make_videos("a", "b", folder="filmed/anna")
+    make_videos("c", folder="filmed/ben")
+    folder = tmp_path / "filmed"
+    found = choose_takes(folder, speaker="anna")
+    assert [take.speaker for take in found] == ["anna", "anna"]
+    assert {Path(take.file).stem for take in found} == {"a", "b"}
+    with pytest.raises(InputError, match=r"2 speakers, a face is that of one person; name it \(--speaker\): anna, ben"):
+        choose_takes(folder)
+    with pytest.raises(InputError, match=r"no speaker 'cleo', a face is that of one person; name it .*: anna, ben"):
+        choose_takes(folder, speaker="cleo")
+
+
+def test_no_videos(tmp_path):
+    with pytest.raises(InputError, match="no such"):
+        choose_takes(tmp_path / "missing.mp4")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(CorpusError, match="no videos in it"):
+        choose_takes(tmp_path / "empty")
+    (tmp_path / "empty.mp4").touch()
+    with pytest.raises(InputError, match="the file is empty; give a video"):
+        choose_takes(tmp_path / "empty.mp4")
+
+
+def prepared(folder: Path, files: list[str], speakers: tuple[str, ...] = ("",)) -> Corpus:
+    """Return a corpus that says which videos it was prepared from."""
+    corpus = Corpus.create(folder)
+    for number, (utterance, file) in enumerate(zip(toy_utterances(max(3, len(files))), files, strict=False)):
+        source = {"file": file, "licence": "CC BY 4.0", "attribution": "anna", "collection": "filmed/anna"}
+        corpus.add(replace(utterance, source=source, speaker=speakers[number % len(speakers)], split="train"))
+    return corpus
+
+
+def test_a_corpus_with_its_videos(tmp_path, make_videos):
+    folder = make_videos("a", "b", "c")
+    corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "gone.mkv"])
+    found = choose_takes(corpus.path, folder)
+    assert names(found) == ["toy00", "toy01"]
+    assert [take.file.name for take in found] == ["a.mkv", "b.mkv"]
+    assert {take.collection for take in found} == {"filmed/anna"}
+    assert dict(found[0].rights) == {"licence": "CC BY 4.0", "attribution": "anna"}
+
+
+def test_a_corpus_of_several_people(tmp_path, make_videos):
+    folder = make_videos("a", "b", "c", "d")
+    corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "c.mkv", "d.mkv"], ("anna", "ben"))
+    assert [take.file.name for take in choose_takes(corpus.path, folder, "ben")] == ["b.mkv", "d.mkv"]
+    with pytest.raises(InputError, match=r"2 speakers, a face is that of one person"):
+        choose_takes(corpus.path, folder)
+
+
+@pytest.mark.parametrize(
+    ("durations_s", "used_s"),
+    [
+        ((300.0, 3.0, 3.0, 7200.0), {"00": 117.0, "01": 3.0, "02": 3.0, "03": 117.0}),  # before short ones are left out
+        ((600.0,) * 48, {f"{number:02}": takes.LONG_S for number in range(1, 48, 2)}),  # in part, and evenly
+    ],
+)
+def test_footage_of_a_folder_is_bounded(make_videos, monkeypatch, durations_s, used_s):
+    monkeypatch.setattr(takes, "_duration_s", lambda take: durations_s[int(take.name)])
+    found = choose_takes(make_videos(*(f"{number:02}" for number in range(len(durations_s)))))
+    used = {each.name: min(each.span.end_s - each.span.start_s, durations_s[int(each.name)]) for each in found}
+    assert sum(used.values()) == pytest.approx(MOST_FOOTAGE_S)
+    assert used == pytest.approx(used_s)
+
+
+def test_videos_of_the_same_name_are_told_apart(tmp_path, make_videos):
+    """Every person of GRID says the same sentences, in files of the same names."""
+    make_videos("x", folder="filmed/anna")
+    ben = write_sound(make_videos("y", folder="filmed/ben") / "x.mkv", tone(16_000, 0.9), 16_000, "flac", video=True)
+    for file in (ben, tmp_path / "filmed/anna/x.mkv"):
+        corpus = Corpus.create(tmp_path / f"corpus-{file.parent.name}")
+        source = {"file": "x.mkv", "bytes": str(file.stat().st_size), "sha256": sha256(file.read_bytes()).hexdigest()}
+        for utterance in toy_utterances(3)[:1]:
+            corpus.add(replace(utterance, source=source, split="train"))
+        (found,) = choose_takes(corpus.path, tmp_path / "filmed")
+        assert found.file == file
+    (tmp_path / "other").mkdir()
+    other = write_sound(tmp_path / "other" / "x.mkv", tone(16_000, 0.5), 16_000, "flac", video=True)
+    with pytest.raises(InputError, match="holds none of the videos"):
+        choose_takes(corpus.path, other.parent)
+
 
 SENTENCES = 3
 Videos = dict[Path, ToyVideo]
@@ -31,8 +169,7 @@ def tracker(videos: Videos, monkeypatch: pytest.MonkeyPatch) -> Callable[..., No
     """Installs a tracker without errors; in some videos it sees only some frames."""
 
     def start(seen: dict[Path, np.ndarray] | None = None, more: Videos | None = None, least_s: float = 7.0) -> None:
-        monkeypatch.setattr(build, "LEAST_FOOTAGE_S", least_s)
-        install(monkeypatch, videos | (more or {}), seen or {})
+        install(monkeypatch, videos | (more or {}), seen or {}, least_s)
 
     start()
     return start
@@ -46,8 +183,7 @@ def folder_of(videos: Videos) -> Path:
 def built(videos: Videos) -> tuple[FilmedFace, list[Event]]:
     events: list[Event] = []
     with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 7.0)
-        install(monkeypatch, videos, {})
+        install(monkeypatch, videos, {}, 7.0)
         face = build_face(folder_of(videos), name="Anna", workers=1, monitor=events.append)
     return face, events
 
@@ -128,15 +264,8 @@ def test_what_is_not_enough_is_said(videos, tracker, caplog):
 
 
 @pytest.mark.long
-def test_recordings_that_cannot_be_used_are_left_out(videos, tracker, monkeypatch):
-    def film(path: Path, *more: object) -> object:
-        if path.name == "toy00.mp4":
-            raise InputError(f"{path}: no face in 60 of 60 frames")
-        return whole(path, *more)
-
-    tracker(least_s=5.0)
-    whole: Callable[..., Footage] = vars(build)["track_footage"]  # that of the drawn person
-    monkeypatch.setattr(build, "track_footage", film)
+def test_recordings_that_cannot_be_used_are_left_out(videos, tracker):
+    tracker({next(iter(videos)): np.zeros(0, bool)}, least_s=5.0)
     events: list[Event] = []
     face = build_face(folder_of(videos), workers=1, monitor=events.append)
     assert face.about["recordings"] == SENTENCES - 1
@@ -148,10 +277,9 @@ def test_recordings_that_cannot_be_used_are_left_out(videos, tracker, monkeypatc
 
 
 @pytest.mark.long
-def test_footage_without_sound(tracker, tmp_path, monkeypatch):
+def test_footage_without_sound(tracker, tmp_path):
     """The face is built; its jaw cannot follow the energy, and other people's motion cannot be mapped onto it."""
-    monkeypatch.setattr(build, "read_sound", lambda _: None)
-    video = write_video(tmp_path / "mute.mp4", toy_sentences(3)[0])
+    video = write_video(tmp_path / "mute.mp4", toy_sentences(3)[0], silent=True)
     tracker(more={video.path.resolve(): video}, least_s=2.0)
     face = build_face(video.path, workers=1)
     assert face.takes == ()
@@ -194,10 +322,10 @@ def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path):
     assert len(kept.motion.values) == 599
 
 
-def test_silence_is_no_sound(monkeypatch, tmp_path):
-    take = Take("a", tmp_path / "a.mp4", VideoSpan(1.0, 3.0), "", "", ())
-    for count, level, expected_s in ((64_000, 1.0, 2.0), (24_000, 1.0, 0.5), (8000, 1.0, 0.0), (64_000, 0.0, 0.0)):
-        audio = Audio(np.full(count, level, np.float32), 16_000)
-        monkeypatch.setattr(build, "read_audio", lambda *_, audio=audio, **__: audio)
-        found = build.read_sound(take)
-        assert (0 if found is None else found.duration_s) == pytest.approx(expected_s)
+@pytest.mark.parametrize(
+    ("count", "level", "expected_s"), [(64_000, 1, 2.0), (24_000, 1, 0.5), (8000, 1, 0.0), (64_000, 0, 0.0)]
+)
+def test_silence_is_no_sound(tmp_path, count, level, expected_s):
+    wavfile.write(tmp_path / "a.wav", 16_000, np.full(count, 32_767 * level, np.int16))
+    found = build.read_sound(Take("a", tmp_path / "a.wav", VideoSpan(1.0, 3.0), "", "", ()))
+    assert (0 if found is None else found.duration_s) == pytest.approx(expected_s)

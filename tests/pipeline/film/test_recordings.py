@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from cli.conftest import here, run
-from lipmotion import animate
-from lipmotion.pipeline.request import Request
+from lipmotion import Request, animate, load_face
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
 from lipmotion_faces.film.filmed_video import make_film, write_film
-from lipmotion_faces.filmed.face import load_face
 from lipmotion_faces.tracking.track import track
 
 __all__ = ["here", "run"]
@@ -37,8 +35,7 @@ def some_clips(clips: list[Path], tmp_path_factory: pytest.TempPathFactory) -> P
 
 @pytest.fixture(scope="module")
 def built(some_clips: Path) -> Path:
-    from lipmotion_faces.film.build import build_face
-    from lipmotion_faces.filmed.face import save_face
+    from lipmotion import build_face, save_face
 
     path = some_clips.parent / "someone.face"
     save_face(build_face(some_clips, workers=1), path)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion.errors import InputError
 from lipmotion.types import Audio, Channel, Motion, Track
 from lipmotion_faces.film import background, build
 from lipmotion_faces.tracking.footage import Footage
@@ -63,12 +64,20 @@ def footage_of(video: ToyVideo, span: VideoSpan = WHOLE, seen: np.ndarray | None
     )
 
 
-def install(monkeypatch: pytest.MonkeyPatch, videos: Mapping[Path, ToyVideo], seen: Mapping[Path, np.ndarray]) -> None:
-    """Let the tracker know these videos."""
+def install(
+    monkeypatch: pytest.MonkeyPatch,
+    videos: Mapping[Path, ToyVideo],
+    seen: Mapping[Path, np.ndarray],
+    least_s: float = build.LEAST_FOOTAGE_S,
+) -> None:
+    """Let the tracker know these videos, and so many seconds be enough for a face."""
 
     def track_footage(path: Path, span: VideoSpan = WHOLE) -> Footage:
+        if path.resolve() in seen and not len(seen[path.resolve()]):
+            raise InputError(f"{path}: no face in 60 of 60 frames")
         return footage_of(videos[path.resolve()], span, seen.get(path.resolve()))
 
+    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", least_s)
     for module in (build, background):
         monkeypatch.setattr(module, "track_footage", track_footage)
     monkeypatch.setattr(background, "register_maps", lambda footage: footage.face_to_image)  # needs OpenCV

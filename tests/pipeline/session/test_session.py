@@ -1,25 +1,30 @@
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from hashlib import sha256
 from threading import Barrier
+from typing import Any
 
 import numpy as np
 import pytest
 
-from lipmotion import Delivery, Edits, Model, Session, animate, write
+from lipmotion import Delivery, Edits, Model, Request, Session, SessionPictures, Staging, animate, load_model, write
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
+from lipmotion.engines import Engine
 from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
-from lipmotion.pipeline.edit_files import EditFile
-from lipmotion.pipeline.generation import generate_motion
+from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits, write_edits
+from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
+from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, find_excerpt
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, measure_prosody
-from lipmotion.pipeline.request import Request
-from lipmotion.types import Audio, Timeline, Unit
+from lipmotion.types import Audio, Constraints, Generation, Outlook, Pin, Span, Speech, Timeline, Unit
+from lipmotion.units import group_words
 from lipmotion_faces.outputs.drawn_video import sound_track
-from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.registry import stage_face
+from pipeline.made import write_sound
 from testing.toy import ToySentence
 
 
@@ -57,22 +62,41 @@ def test_a_session_gives_what_one_pass_gives(session, request_, toy_model):
     assert np.array_equal(session.generate().motion.values, animate(request_, model=toy_model).motion.values)
 
 
-def test_only_what_changed_is_computed_again(session, monkeypatch):
-    calls: list[str] = []
-    for name in ("analyse_speech", "generate_motion"):
-        plain = getattr(session_module, name)
+class Counting:
+    """An engine that notes the seconds of each motion that it makes."""
 
-        def counted(*given: object, name: str = name, plain: object = plain, **more: object) -> object:
-            calls.append(name)
-            return plain(*given, **more)  # type: ignore[operator]
+    def __init__(self, engine: Engine) -> None:
+        self.engine, self.made_s = engine, list[float]()
 
-        monkeypatch.setattr(session_module, name, counted)
-    first = session.generate()
-    session.generate(edited("phone 3 is p"))
-    session.generate(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
-    session.deliver(edited("phone 3 is p", "set intensity 1.5"))
-    assert session.generate() is first  # undone
-    assert calls == ["analyse_speech", "generate_motion", "generate_motion"]
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.engine, name)
+
+    def generate(self, model: Any, speech: Speech, constraints: Constraints | None = None) -> Generation:
+        if {span.label.phone for span in speech.units} - {"sil"}:  # else it is asked for the mouth at rest
+            self.made_s.append(speech.features.duration_s)
+        return self.engine.generate(model, speech, constraints)
+
+
+@pytest.fixture
+def counting(toy_model: Model) -> Model:
+    return replace(toy_model, engine=Counting(toy_model.engine))
+
+
+@pytest.fixture
+def counted(request_: Request, counting: Model) -> Session:
+    return Session(request_, model=counting)
+
+
+def test_only_what_changed_is_computed_again(counted, counting):
+    first, made_s = counted.generate(), counting.engine.made_s
+    assert len(made_s) == 1
+    units = counted.units()
+    counted.generate(edited("phone 3 is p"))
+    counted.generate(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
+    counted.deliver(edited("phone 3 is p", "set intensity 1.5"))
+    assert counted.generate() is first  # undone
+    assert counted.units() is units
+    assert len(made_s) == 2
 
 
 def test_edits_of_phones(session):
@@ -222,31 +246,24 @@ def test_a_locked_span_keeps_channels_that_are_added_later(session):
     assert locked.motion["tongue"][150] == pytest.approx(0.5)
 
 
-@pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """One entry for every motion that a session makes from now on."""
-    made: list[int] = []
-    monkeypatch.setattr(session_module, "generate_motion", lambda *given: made.append(1) or generate_motion(*given))
-    return made
-
-
-def test_many_locks_take_the_motion_once_each(session, made):
+def test_many_locks_take_the_motion_once_each(counted, counting):
     steps = [
         each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
     ]
-    session.generate(edited(*steps))
-    assert 12 <= len(made) <= 14  # of every pin once
-    session.generate(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
-    assert len(made) <= 15
+    counted.generate(edited(*steps))
+    assert 12 <= len(counting.engine.made_s) <= 14  # of every pin once
+    counted.generate(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
+    assert len(counting.engine.made_s) <= 15
 
 
-def test_of_long_motion_less_is_kept(session, made, monkeypatch):
-    monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(session.generate().motion.values))
-    found = [session.generate(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
-    assert session.generate(edited("pin opening 0.1 at 0.5")) is found[1]
-    assert len(made) == 4
-    again = session.generate(edited("pin opening 0.1 at 0.3"))
-    assert (len(made), np.array_equal(again.motion.values, found[0].motion.values)) == (5, True)
+def test_of_long_motion_less_is_kept(counted, counting, monkeypatch):
+    monkeypatch.setattr(session_module, "MAX_CACHED_FRAMES", len(counted.generate().motion.values))
+    counting.engine.made_s.clear()
+    found = [counted.generate(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
+    assert counted.generate(edited("pin opening 0.1 at 0.5")) is found[1]
+    assert len(counting.engine.made_s) == 3
+    again = counted.generate(edited("pin opening 0.1 at 0.3"))
+    assert (len(counting.engine.made_s), np.array_equal(again.motion.values, found[0].motion.values)) == (4, True)
 
 
 def test_edits_of_another_recording_are_refused(session, toy_model, request_):
@@ -318,10 +335,226 @@ def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model, toy_senten
             assert all(np.array_equal(values, alone[number]) for values in found)
 
 
+TIMES = 12
+"""How often the sentence is said in the long recording."""
+UNSEEN = 0.01
+"""Most by which the opening may be off until the whole is made, in eye distances: 0.6 mm."""
+
+
+@pytest.fixture(scope="module")
+def long_request(toy_sentence: ToySentence, toy_model: Model) -> Request:
+    units = Session(Request(toy_sentence.audio, " ".join(toy_sentence.words)), model=toy_model).units()
+    each_s = toy_sentence.audio.duration_s
+    spans = [span for n in range(TIMES) for span in units.shifted(n * each_s)]
+    sound = Audio(np.tile(toy_sentence.audio.samples, TIMES), toy_sentence.audio.rate_hz)
+    spans[-1] = replace(spans[-1], end_s=sound.duration_s)
+    return Request(sound, units=Timeline(tuple(spans)))
+
+
+def parse_number(units: Timeline[Unit], phone: str, after_s: float) -> int:
+    return next(n for n, span in enumerate(units, 1) if span.label.phone == phone and span.start_s > after_s)
+
+
 @pytest.mark.long
-def test_what_comes_next_is_prepared_while_processes_work(request_, toy_model, monkeypatch):
-    prepared: list[object] = []
-    monkeypatch.setattr(session_module, "prepare_search", prepared.append)
-    session = Session(request_, model=toy_model, workers=2, background=lambda: prepared.append("face"))
-    assert list(session._work(abs, [-1, -2, -3])) == [1, 2, 3]
-    assert prepared == [session.request, "face"]
+def test_around_an_edit_the_motion_is_that_of_the_whole(long_request, toy_model, counting):
+    """At the first phone, in the middle, at the last one, of a pause, with pins; one edit after another."""
+    session, other = Session(long_request, model=counting), Session(long_request, model=toy_model)
+    units, lasts_s = session.units(), long_request.recording.duration_s  # type: ignore[union-attr]
+    before = session.generate().motion
+    middle, edits = parse_number(units, "iy", lasts_s / 2), Edits()
+    silent = parse_number(units, "sil", lasts_s / 4)
+    for sentence in (
+        f"phone {middle} is p",
+        f"phone {middle} ends {units[middle - 1].end_s + 0.02:.3f}",
+        "phone 2 is aa",
+        f"phone {len(units) - 1} is m",
+        f"remove phone {silent}",
+        f"pin opening 0.31 at {lasts_s / 3:.2f}",
+        f"pin jawOpen 0.6 at {lasts_s / 5:.2f}",
+    ):
+        edits = edits.then(sentence)
+        counting.engine.made_s.clear()
+        with session.sketching():
+            sketch = session.generate(edits)
+        assert sum(counting.engine.made_s) <= 2 * (2 * MARGIN_S + 2 * GRID_S + 5) < lasts_s, sentence
+        whole = other.generate(edits)
+        assert [span.label.phone for span in sketch.units] == [span.label.phone for span in whole.units]
+        assert np.abs(sketch.motion["opening"] - whole.motion["opening"]).max() < UNSEEN, sentence
+        assert sketch.motion["opening"].min() >= 0
+    after = session.generate(edits)  # without sketching: the same as if nothing had been there before
+    assert after.motion.values == pytest.approx(whole.motion.values, abs=1e-6)
+    assert np.abs(after.motion["opening"] - before["opening"]).max() > 0.1
+    with session.sketching(), pytest.raises(InputError, match="9999"):
+        session.generate(edits.then("pin opening 0.1 at 9999"))
+
+
+def test_what_lies_far_apart_is_made_whole():
+    units, frames = Timeline(tuple(Span(n / 10, (n + 1) / 10, Unit("aa")) for n in range(600))), 6001
+    assert find_excerpt(units, units, (), frames) is None
+    near = find_excerpt(units, units, [Pin(30.0, "opening", 0.1), Pin(31.0, "opening", 0.1)], frames)
+    assert near.frames.start % 100 == 0
+    assert near.frames.start / 100 <= 30 - MARGIN_S
+    assert near.frames.stop / 100 >= 31 + MARGIN_S
+    far = [Pin(1.0, "opening", 0.1), Pin(2.0 + LONGEST_S, "opening", 0.1)]
+    assert find_excerpt(units, units, far, frames) is None
+
+
+SENTENCES = (
+    "word 3 is blue",
+    "word 3 is tear said t eh r",
+    "say how are you from 1.0 to 2.5",
+    "say hello zoe from 1.0 to 2.5 with zoe z ow iy, hello hh eh l ow",
+    "phone 12 is p",
+    "phone 12 begins 1.2",
+    "phone 12 ends 1.24",
+    "split phone 3 at 0.7",
+    "remove phone 2",
+    "insert m from 0.5 to 0.56",
+    "pin jawOpen 1e-05 at 1.2",
+    "pin opening 0.1 at 1.2 slope -0.5",
+    "unpin opening at 1.2",
+    "gain 1.3 from 1.0 to 2.0",
+    "gain jawOpen 0.8 from 1.0 to 2.0",
+    "draw opening 0.1 0.12 0.0 from 1.0 to 1.5",
+    "hold from 1.0 to 1.3",
+    "lock from 1.0 to 1.5",
+    "unlock from 1.0 to 1.5",
+    "mood happy:0.7 at 1.2",
+    "set intensity 1.2",
+)
+
+
+def test_every_kind_of_edit_is_a_sentence():
+    steps = [parse_step(sentence) for sentence in SENTENCES]
+    assert {step.form for step in steps} == set(STEPS)
+    assert tuple(map(str, steps)) == SENTENCES
+    assert [parse_step(str(step)) for step in steps] == steps
+
+
+@pytest.mark.parametrize(
+    ("sentence", "message"),
+    [
+        ("phone twelve is p", "is no edit; required one of: phone NUMBER is PHONE; phone NUMBER begins"),
+        ("jump", "is no edit; required one of: word NUMBER is WORD"),
+        ("pin opening 1,2 at 1", "is no edit; required one of: pin CHANNEL VALUE at TIME; pin"),
+        ("pin opening nan at 1", "is no edit"),
+        ("gain 9 from 0 to 1", "the gain is 9, required 0 to 3"),
+        ("word 1 is tear said t eh R", "unknown phone 'R'"),
+        ("word 1 is tear said t sil", "a word has no silence in it"),
+        ("say hello from 2 to 1", "required an end after the start"),
+        ("say zoe from 1 to 2 with zoe", "'zoe' has no phones; required WORD PHONES, WORD"),
+        ("say zoe from 1 to 2 with zoe z sil", "a word has no silence in it"),
+        ("say zoe from 2 to 1 with zoe z ow iy", "required an end after the start"),
+        ("hold from 2 to 1", "required an end after the start"),
+        ("draw opening 0.1 from 1 to 2", "1 values are drawn, required 2 to"),
+        ("lock from 2 to 1", "required an end after the start"),
+        ("mood gloomy at 1", "the mood is 'gloomy', required one of: neutral, happy"),
+        ("mood happy,sad at 1", "required one mood"),
+        ("set loudness 2", "nothing is called 'loudness'; required one of: intensity"),
+        ("set intensity loud", "required a number"),
+        ("set intensity 9", "required 0 to 3"),
+        ("set stepped maybe", "required one of: true, false"),
+    ],
+)
+def test_sentences_that_state_no_edit(sentence, message):
+    with pytest.raises(InputError, match=message):
+        parse_step(sentence)
+
+
+def test_delivery_and_staging_are_set_where_nothing_else_is_asked_for():
+    edits = Edits().then("set intensity 1.2", "set stepped true", "set size 360", "set intensity 1.3")
+    assert edits.delivery() == Delivery(intensity=1.3, stepped=True)
+    assert edits.delivery(Delivery(intensity=2.0)).intensity == 2.0
+    assert edits.staging() == Staging(size=360)
+
+
+def test_moods_are_added_to_those_that_are_asked_for():
+    edits = Edits().then("mood sad at 2.0", "mood happy:0.7 at 1.0", "mood angry at 2.0")
+    assert edits.delivery().mood == "happy:0.7 at 1, angry at 2"
+    assert edits.delivery(Delivery(mood="tired")).mood == "tired at 0, happy:0.7 at 1, angry at 2"
+    assert Edits().then("set mood tense:0.5").delivery().mood == "tense:0.5"
+
+
+@pytest.mark.parametrize("suffix", [".json", ".toml"])
+def test_what_is_written_is_read_again(tmp_path, suffix):
+    path = tmp_path / f"a.edits{suffix}"
+    spans = (Span(0.0, 0.3, Unit("sil")), Span(0.3, 1 / 3 + 0.1, Unit("p", "sil-p+l", 'pl"ease', confidence=0.25)))
+    outlook = Outlook("words", 0.5, None, 30.5, ("a \\ transcript",))
+    file = EditFile(
+        Edits().then(*SENTENCES),
+        Request(tmp_path / "in" / "a b.wav", pauses="natural"),
+        Timeline(spans),
+        outlook,
+        sha256="ab",
+    )
+    write_edits(file, path)
+    if suffix == ".toml" and sys.version_info < (3, 11):
+        with pytest.raises(InputError, match=r"read by Python 3\.11"):
+            read_edits(path)
+        return
+    found = read_edits(path)
+    assert (found.edits, found.units, found.outlook) == (file.edits, file.units, file.outlook)
+    assert (found.named, found.sha256) == (file.named, "ab")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[]", "not a file of edits"),
+        ("{", "not a file of edits"),
+        ('{"format": "lipmotion.edits", "version": 9}', "edits of version 9, required 1"),
+        ('{"format": "lipmotion.edits", "version": 1, "stops": []}', "unknown member 'stops'"),
+        ('{"format": "lipmotion.edits", "version": 1, "steps": "lock"}', "required a list"),
+        ('{"format": "lipmotion.edits", "version": 1, "steps": ["jump"]}', "'jump' is no edit"),
+        ('{"format": "lipmotion.edits", "version": 1, "units": [{"phone": "p"}]}', "start_s"),
+    ],
+)
+def test_files_that_are_refused(tmp_path, text, message):
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_edits(path)
+
+
+def test_a_file_holds_the_moods_of_tags(toy_sentence, toy_model_file, tmp_path):
+    words, recording = toy_sentence.words, tmp_path / "a.wav"
+    write_sound(recording, toy_sentence.audio)
+    tagged = f"[happy:0.5] {words[0]} [angry] {' '.join(words[1:])}"
+    file = create_edit_file(Request(recording, tagged, model=toy_model_file))[0]
+    first, second = (step for step in file.edits.steps if isinstance(step, MoodStep))
+    assert (str(first), second.mood) == ("mood happy:0.5 at 0.0", "angry")
+    spoken = [span for span in group_words(file.units or Timeline(())) if span.label]
+    assert second.time_s == pytest.approx(spoken[1].start_s)
+
+
+def test_a_file_replays_what_was_recognised(toy_speech, toy_model_file, tmp_path):
+    """The phones in the file are the base: the motion is that of the session in which they were edited."""
+    asked = Request(toy_speech, recogniser="own", model=toy_model_file)
+    path, edits = tmp_path / "a.json", Edits().then("phone 3 is p", "pin jawOpen 0.2 at 1.0")
+    write_edits(replace(create_edit_file(asked)[0], edits=edits), path)
+    read = read_edits(path)
+    plain = animate(Request(toy_speech, recogniser="own"), model=load_model(toy_model_file), edits=edits)
+    replayed = read.session().generate(read.edits)
+    assert np.array_equal(replayed.motion.values, plain.motion.values)
+    assert (replayed.units, replayed.outlook, replayed.curve_edits) == (plain.units, plain.outlook, plain.curve_edits)
+
+
+def test_edits_of_another_sound_are_refused(toy_speech, toy_model_file, tmp_path):
+    """Of the same length, and wherever it lies; without a digest, as in earlier files, they are taken."""
+    sound, path = tmp_path / "a.wav", tmp_path / "a.edits.json"
+    sound.write_bytes(toy_speech.read_bytes())
+    file = create_edit_file(Request(sound, recogniser="own", model=toy_model_file))[0]
+    write_edits(file, path)
+    assert read_edits(path).sha256 == sha256(toy_speech.read_bytes()).hexdigest()
+    other = tmp_path / "other.wav"
+    other.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
+    model = load_model(toy_model_file)
+    phones = [span.label.phone for span in file.units or ()]
+    assert [span.label.phone for span in animate(toy_speech, model=model, edits=path).units] == phones
+    with pytest.raises(InputError, match="another recording"):
+        animate(other, model=model, edits=path)
+    other.replace(sound)
+    with pytest.raises(InputError, match="another recording"):
+        read_edits(path).session()
+    unknown = replace(file, sha256="")
+    assert [span.label.phone for span in animate(sound, model=model, edits=unknown).units] == phones

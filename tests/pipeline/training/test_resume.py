@@ -1,6 +1,6 @@
 import multiprocessing
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +13,9 @@ from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.training import em_steps
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream import multistream_training
-from lipmotion.motion import posterior_network
 from lipmotion.pipeline import workers
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
-from lipmotion.pipeline.training import labels as fingerprints
 from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.stats import em
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
@@ -42,12 +40,11 @@ def stopping_after(events: int) -> Monitor:
     return monitor
 
 
-@pytest.fixture(scope="module", autouse=True)
-def few_steps() -> Iterator[None]:
-    """A network is trained in one go, so that it must fit between two stops."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(posterior_network, "STEPS", 4.0)
-        yield
+@pytest.fixture
+def few_utterances(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process has one of them to do, and a checkpoint two."""
+    monkeypatch.setattr(workers, "UTTERANCES_PER_WORKER", 1)
+    monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
 
 
 @pytest.fixture
@@ -89,8 +86,8 @@ def whole(corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.long
-def test_stopped_after_any_event(corpus, whole, work, tmp_path, monkeypatch):
-    monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
+@pytest.mark.usefixtures("few_utterances")
+def test_stopped_after_any_event(corpus, whole, work, tmp_path):
     count = len(create_events(corpus))
     assert count > 15
     for number in range(1, count + 1, 4):
@@ -164,9 +161,9 @@ def test_a_damaged_checkpoint_is_not_used(corpus, whole, work, tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("few_utterances")
 def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monkeypatch):
     """Neither this process's own nor those that the processes it starts would use."""
-    monkeypatch.setattr(workers, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     with threadpool_limits(1, user_api="blas"):
         assert content(train(corpus, recogniser=CONFIG, run=Run(workers=2))[0], tmp_path) == whole
@@ -174,9 +171,8 @@ def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monk
 
 
 @pytest.mark.long
-def test_stopped_in_two_processes(corpus, whole, work, tmp_path, monkeypatch):
-    monkeypatch.setattr(workers, "UTTERANCES_PER_WORKER", 1)
-    monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
+@pytest.mark.usefixtures("few_utterances")
+def test_stopped_in_two_processes(corpus, whole, work, tmp_path):
     before = set(multiprocessing.active_children())
     with pytest.raises(Stopped):
         train(corpus, recogniser=CONFIG, run=Run(work=work, monitor=stopping_after(6), workers=2))
@@ -197,7 +193,7 @@ def test_what_is_done_is_not_done_again(corpus, work):
     assert [event for event in again if isinstance(event, Item)] == items
 
 
-def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path, monkeypatch):
+def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path):
     corpus = Corpus.create(tmp_path / "corpus")
     utterance = toy_corpus.utterance("toy00")
     engine, job = engine_named("trajectory", {}), (CONFIG, Lexicon())
@@ -215,9 +211,6 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path, mo
         fingerprint_training(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), GEOMETRY, None),
     ]
     assert len({plain, *others}) == 5
-    with monkeypatch.context() as changed:
-        changed.setattr(fingerprints, "installed_phone_recogniser", lambda: "another")
-        assert digests()[0] not in (plain, *others)
     crops = np.array(utterance.track.crops)
     crops[3, 4, 5] ^= 1
     corpus.add(replace(utterance, track=replace(utterance.track, crops=crops)))

@@ -1,26 +1,37 @@
-from collections.abc import Iterable, Iterator
+import logging
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lipmotion import Corpus, Run, Selection, save_model, train
+from lipmotion import Corpus, Run, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError, InputError
-from lipmotion.hmm.model import HmmConfig
+from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.measures.evaluation_table import figures_table
+from lipmotion.motion import posterior_network
+from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.motion.space import resample_track
-from lipmotion.pipeline.training import train as module
+from lipmotion.pipeline.model import BOTH, EIGENLIPS, GEOMETRY
+from lipmotion.pipeline.training import labels as labels_module
+from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
+from lipmotion.pipeline.training.labels import (
+    MAX_NAMED_RECORDINGS,
+    warn_of_doubtful_transcripts,
+    warn_of_missing_transcripts,
+)
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.train import describe_training, label_phones
-from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.types import Channel, Motion, Track, Utterance
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
+from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import Lexicon
+from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from pipeline import made
-from testing.toy import toy_sentences
+from pipeline.made import features_of, recogniser_of
+from testing.toy import SMALL, toy_sentences, toy_utterances
 
-SMALL, JOINT = HmmConfig(mixtures=1, iterations=2), engine_named("joint", {})
+JOINT = engine_named("joint", {})
 TRAINED = tuple(f"toy0{number}" for number in range(8))
 
 
@@ -56,7 +67,7 @@ def test_untranscribed_utterances_are_recognised_and_used(toy_corpus, tmp_path, 
     model, report = train(mixed, recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert "1 of 8 recordings have no words: their phones are recognised" in caplog.text
-    recogniser = Recogniser(model.phones, "own")
+    recogniser = recogniser_of(model)
     found, known = (
         [span.label.phone for span in label_phones(corpus.utterance("toy05"), recogniser, Lexicon())]
         for corpus in (mixed, toy_corpus)
@@ -69,16 +80,15 @@ def labelled(utterance: Utterance) -> Utterance:
 
 
 @pytest.mark.long
-def test_labelled_phones_are_used_as_they_are(toy_corpus, toy_model, tmp_path, monkeypatch):
+def test_labelled_phones_are_used_as_they_are(toy_corpus, toy_model, tmp_path):
     """Nothing is aligned, no transcript is needed, and phone models are trained on what is labelled."""
-    monkeypatch.setattr(module, "align_or_recognise", None)
     given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
     given[0] = replace(given[0], words=("not", "what", "is", "said"))
     model, report = train(corpus_of(given, tmp_path), recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert report.skipped == {}
     assert set(model.phones.table.units) == set(toy_model.phones.table.units)
-    assert label_phones(given[0], Recogniser(model.phones, "own"), Lexicon()) == given[0].phones
+    assert label_phones(given[0], recogniser_of(model), Lexicon()) == given[0].phones
 
 
 @pytest.mark.long
@@ -88,9 +98,7 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus, tmp_path):
     assert (report.used, report.skipped) == (TRAINED, {})
     truth = labelled(toy_corpus.utterance("toy11"))
     assert truth.phones is not None
-    recognised = [
-        s.label.phone for s in label_phones(replace(truth, phones=None), Recogniser(model.phones, "own"), Lexicon())
-    ]
+    recognised = [s.label.phone for s in label_phones(replace(truth, phones=None), recogniser_of(model), Lexicon())]
     assert np.mean([span.label.phone in recognised for span in truth.phones]) > 0.8
 
 
@@ -108,12 +116,11 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus, tmp_
 
 
 @pytest.mark.long
-def test_without_any_transcript_the_shipped_phones_are_used(toy_corpus, toy_model, tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(module, "load_model", lambda: toy_model)
+def test_without_any_transcript_the_shipped_phones_are_used(toy_corpus, tmp_path, caplog):
     silent = corpus_of([replace(utterance, words=None) for utterance in some(toy_corpus)], tmp_path)
     model, report = train(silent, recogniser=SMALL, engine=JOINT)
-    assert model.phones.mixtures is toy_model.phones.mixtures
-    assert not np.array_equal(model.phones.speaker, toy_model.phones.speaker)  # whose voice it is, is learned
+    assert model.phones.mixtures is load_model().phones.mixtures
+    assert not np.array_equal(model.phones.speaker, load_model().phones.speaker)  # whose voice it is, is learned
     assert len(report.used) == 5
     assert "no transcripts in the corpus: its phones are recognised by the shipped model" in caplog.text
 
@@ -167,7 +174,7 @@ def test_camera_frames_become_model_frames():
 def others() -> Iterator[VoiceExample]:
     """Two speakers of whom nothing was seen."""
     for number, sentence in enumerate(toy_sentences(4)):
-        yield VoiceExample(analysed(sentence.audio).mfcc(), sentence.units, ("bert", "anna")[number % 2])
+        yield VoiceExample(features_of(sentence.audio), sentence.units, ("bert", "anna")[number % 2])
 
 
 def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus):
@@ -215,3 +222,246 @@ def test_configurations_are_used_and_every_stage_is_reported(toy_corpus):
     assert model.phones.table.count("aa") == 2
     assert list(dict.fromkeys(steps))[:2] == ["learning phones: flat start", "learning phones: pronunciations"]
     assert "learning motion: trees" in steps
+
+
+Labelled = list[tuple[Utterance, Timeline[Unit]]]
+
+
+@pytest.fixture(scope="module")
+def right_transcripts() -> Labelled:
+    """Utterances whose transcripts are right, with their phones in time."""
+    sentences = toy_sentences(12)[:3]
+    return [(utterance, said.units) for utterance, said in zip(toy_utterances(12)[:3], sentences, strict=True)]
+
+
+def messages(caplog: pytest.LogCaptureFixture) -> list[str]:
+    assert all(record.levelno == logging.WARNING for record in caplog.records)
+    return [record.getMessage() for record in caplog.records]
+
+
+@pytest.mark.long
+def test_training_names_the_transcripts_of_something_else_and_what_has_none(tmp_path, caplog):
+    corpus = Corpus.create(tmp_path / "corpus")
+    changed = {2: ("squash", "six", "fish", "chefs"), 4: None, 5: ()}
+    for number, utterance in enumerate(toy_utterances(12)):
+        corpus.add(replace(utterance, words=changed.get(number, utterance.words), phones=None))
+    train(corpus, recogniser=SMALL, engine=engine_named("joint", {}))
+    missing, wrong = (text for text in messages(caplog) if "transcript" in text)
+    assert missing.startswith("2 of 8 recordings have no transcript, or an empty one (toy04, toy05): their phones are")
+    assert wrong.startswith("1 of 6 transcripts seem not to be what is said (toy02): the model learns wrong lips")
+
+
+def test_right_transcripts_are_not_named(right_transcripts, caplog):
+    warn_of_doubtful_transcripts(right_transcripts)
+    warn_of_missing_transcripts([utterance for utterance, _ in right_transcripts])
+    assert not caplog.records
+
+
+def test_words_that_are_left_out(right_transcripts, caplog):
+    """Half of the sentence stands as silence."""
+    utterance, units = right_transcripts[0]
+    spans = list(units)
+    half = [replace(span, label=Unit("sil")) if number > 2 else span for number, span in enumerate(spans)]
+    merged = [*half[:3], replace(half[3], end_s=half[-1].end_s)]
+    warn_of_doubtful_transcripts([(utterance, Timeline(tuple(merged)))])
+    assert [text[:62] for text in messages(caplog)] == [
+        "1 of 1 transcripts seem to leave out words that are said (toy0"
+    ]
+
+
+def test_labelled_phones_are_believed(right_transcripts, caplog):
+    (utterance, units), (_, others) = right_transcripts[:2]
+    warn_of_doubtful_transcripts([(replace(utterance, phones=units), others)])
+    assert not caplog.records
+
+
+def test_without_general_models_nothing_is_measured(right_transcripts, caplog, monkeypatch):
+    def missing(*_: object) -> None:
+        raise MissingDependencyError("no pocketsphinx")
+
+    monkeypatch.setattr(labels_module, "transcript_fit", missing)
+    warn_of_doubtful_transcripts([(right_transcripts[0][0], right_transcripts[1][1])])
+    assert not caplog.records
+
+
+def test_only_some_are_named(right_transcripts, caplog):
+    named = right_transcripts[0][0]
+    many = [
+        replace(named, name=f"take{number:02d}", words=None, phones=None) for number in range(MAX_NAMED_RECORDINGS + 4)
+    ]
+    warn_of_missing_transcripts([named, *many])
+    (text,) = messages(caplog)
+    assert "14 of 15 recordings" in text
+    assert "take09 and 4 more)" in text
+    warn_of_missing_transcripts(many)  # that none has words is said elsewhere
+    assert len(caplog.records) == 1
+
+
+def test_of_two_alignments_the_better_one_counts(right_transcripts, caplog, monkeypatch):
+    """It may cover more of the speech and fit it worse."""
+    first, second = TranscriptFit(DOUBTFUL_SCORE, ((0.0, 3.0),), 4.0), TranscriptFit(DOUBTFUL_SCORE - 0.1, (), 4.0)
+    fits = iter([first, second, second, first])
+    monkeypatch.setattr(labels_module, "transcript_fit", lambda *_: next(fits))
+    for _ in range(2):
+        warn_of_doubtful_transcripts(right_transcripts[:1], lambda utterance: utterance.phones)  # type: ignore[arg-type,return-value]
+    assert ["leave out words" in text for text in messages(caplog)] == [True, True]
+
+
+ENGINE = engine_named("trajectory", {"articulation": False})
+
+
+@pytest.fixture(scope="module")
+def utterances() -> list[Utterance]:
+    return toy_utterances(12)[:4]
+
+
+@pytest.fixture(scope="module")
+def space(utterances: list[Utterance]) -> Eigenlips:
+    return train_eigenlips(utterances, 4)
+
+
+@pytest.fixture(scope="module")
+def models(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A model of the pictures, and one of pictures and points, as they are saved."""
+    folder = tmp_path_factory.mktemp("visual")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(posterior_network, "STEPS", 25.0)  # pictures do not follow as simply as the toy's channels
+        for visual in (EIGENLIPS, BOTH):
+            save_model(train(toy_corpus, recogniser=SMALL, engine=ENGINE, visual=visual)[0], folder / visual)
+    return {visual: folder / visual for visual in (EIGENLIPS, BOTH)}
+
+
+def crops(given: Sequence[Utterance]) -> list[np.ndarray]:
+    return [np.asarray(utterance.track.crops) for utterance in given]
+
+
+def test_pictures_are_taken_evenly_from_the_frames_that_are_seen(utterances):
+    """Those that are not seen are white here: not one of them is taken."""
+    given, kept = [], []
+    for number, utterance in enumerate(utterances):
+        seen = np.arange(len(utterance.track.seen)) % 3 != number % 3
+        pictures = np.where(seen[:, None, None, None], utterance.track.crops, 255).astype(np.uint8)
+        given.append(replace(utterance, track=replace(utterance.track, crops=pictures, seen=seen)))
+        kept.append(pictures[seen])
+    everything = np.concatenate(kept)
+    frames = ((np.arange(50) + 0.5) * len(everything) / 50).astype(int)
+    assert np.array_equal(train_eigenlips(given, 4, 50).basis, fit_eigenlips(everything[frames], 4).basis)
+
+
+def test_an_utterance_that_was_never_seen_gives_no_picture(utterances):
+    hidden = replace(
+        utterances[1], track=replace(utterances[1].track, seen=np.zeros(len(utterances[1].track.seen), bool))
+    )
+    some = train_eigenlips([utterances[0], hidden, utterances[2]], 3)
+    assert np.array_equal(some.basis, train_eigenlips([utterances[0], utterances[2]], 3).basis)
+    with pytest.raises(CorpusError, match="no face is seen in 1 utterances; prepare a corpus of videos with faces"):
+        train_eigenlips([hidden])
+
+
+def test_motion_has_the_channels_that_are_learned(utterances, space):
+    one = utterances[0]
+    assert with_visual_channels(one, GEOMETRY, None) is one
+    pictured, both = (with_visual_channels(one, visual, space).track.motion for visual in (EIGENLIPS, BOTH))
+    assert pictured.channels == space.channels
+    assert np.array_equal(pictured.values, space.project(crops([one])[0]))
+    assert both.channels == (*one.track.motion.channels, *space.channels)
+    assert np.array_equal(both.values, np.concatenate([one.track.motion.values, pictured.values], axis=1))
+    assert pictured.rate_hz == both.rate_hz == one.track.motion.rate_hz
+
+
+def test_what_is_missing_is_reported(utterances, space, tmp_path):
+    blind = replace(utterances[0], track=replace(utterances[0].track, crops=None))
+    words = f"{blind.name}: no mouth pictures, which eigenlips need; prepare its video again without --no-crops"
+    with pytest.raises(CorpusError, match=words):
+        train_eigenlips([utterances[1], blind])
+    with pytest.raises(CorpusError, match=words):
+        with_visual_channels(blind, BOTH, space)
+    with pytest.raises(InputError, match="visual 'both' without eigenlips"):
+        with_visual_channels(utterances[0], BOTH, None)
+    with pytest.raises(InputError, match="visual is 'pixels', required one of: geometry, eigenlips, both"):
+        with_visual_channels(utterances[0], "pixels", None)
+    corpus = Corpus.create(tmp_path / "corpus")
+    corpus.add(blind)
+    with pytest.raises(CorpusError, match=words):
+        train(corpus, visual=EIGENLIPS)
+    with pytest.raises(InputError, match="visual is 'lips'"):
+        train(corpus, visual="lips")
+
+
+@pytest.mark.long
+def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models, toy_corpus):
+    """Saved, loaded, and asked for the mouth of a sentence of the test list."""
+    model = load_model(models[EIGENLIPS])
+    held_out = toy_corpus.utterance(toy_corpus.names("test")[0])
+    motion = animate(held_out.audio, transcript=" ".join(held_out.words or ()), model=model).motion
+    assert motion.channels == model.eigenlips.channels
+    times_s = np.arange(len(held_out.track.seen)) / held_out.track.motion.rate_hz
+    drawn = model.eigenlips.restore(motion.at(times_s)).astype(float)
+    real = crops([held_out])[0].astype(float)
+    still = np.abs(real - model.eigenlips.mean.T.reshape(56, 72, 3)).mean()
+    assert np.abs(drawn - real).mean() < 0.5 * still
+
+
+def test_figures_of_pictures(models, toy_corpus):
+    figures = evaluate(load_model(models[EIGENLIPS]), toy_corpus, recogniser="own")
+    assert figures["closed_under"] is None
+    for condition in figures["conditions"].values():
+        lips = condition["eigenlips"]
+        assert list(condition) == ["channels", "acc", "amse", "leading", "lag_ms", "eigenlips"]
+        assert condition["channels"] == {}
+        assert len(lips["channels"]) == 90
+        assert lips["acc"] == pytest.approx(np.mean([row["acc"] for row in lips["channels"].values()]))
+        assert (condition["acc"], condition["amse"]) == (lips["acc"], lips["amse"])
+        assert lips["channels"]["lips_r_01"]["acc"] > 0.85
+        assert condition["leading"] in lips["channels"]
+    assert "90 eigenlips" in figures_table(figures)
+    assert "lips_r_01 " not in figures_table(figures).replace("lag of lips_r_01 ", "")
+
+
+def test_figures_of_both(models, toy_model, toy_corpus):
+    """The eigenlips stand apart: figures of the lip distances are of these alone."""
+    figures, plain = (evaluate(model, toy_corpus, recogniser="own") for model in (load_model(models[BOTH]), toy_model))
+    assert figures["closed_under"] == plain["closed_under"]
+    for name, condition in figures["conditions"].items():
+        assert set(condition) == set(plain["conditions"][name]) | {"eigenlips"}
+        assert list(condition["channels"]) == ["opening", "width", "outer"]
+        assert condition["acc"] == pytest.approx(np.mean([row["acc"] for row in condition["channels"].values()]))
+        assert condition["acc"] > 0.8
+        assert condition["amse"] < 0.1  # eye distances
+        assert condition["eigenlips"]["amse"] > 10  # grey levels
+        assert condition["leading"] == "opening"
+    assert "AMSE of the eigenlips" in figures_table(figures)
+
+
+def test_originals_are_the_projected_pictures(models, toy_corpus):
+    model = load_model(models[BOTH])
+    found = load_held_out(toy_corpus, recogniser_of(model), visual=model.visual, eigenlips=model.eigenlips)
+    assert found.channels == ("opening", "width", "outer", *(channel.name for channel in model.eigenlips.channels))
+    made = generate_clips(found, "with transcript", model.engine, model.learned)
+    for clip, name in zip(made, toy_corpus.names("test"), strict=True):
+        images = crops([toy_corpus.utterance(name)])[0]
+        assert np.array_equal(clip.original[:, 3:], model.eigenlips.project(images))
+
+
+@pytest.mark.long
+def test_the_joint_engine_learns_pictures_too(toy_corpus):
+    engine = engine_named("joint", {})
+    model, _ = train(
+        toy_corpus,
+        selection=Selection(names=toy_corpus.names("train")[:4]),
+        recogniser=SMALL,
+        engine=engine,
+        visual=EIGENLIPS,
+    )
+    assert (
+        evaluate(model, toy_corpus)["conditions"]["with transcript"]["eigenlips"]["channels"]["lips_r_01"]["acc"] > 0.5
+    )
+
+
+def test_motion_files_hold_the_coefficients_and_videos_need_an_opening(models, toy_speech, tmp_path):
+    result = animate(toy_speech, model=models[EIGENLIPS])
+    write(result, [tmp_path / "a.npz", tmp_path / "a.json"])
+    for name in ("a.npz", "a.json"):
+        assert read_motion(tmp_path / name)[0].channels == result.motion.channels
+    with pytest.raises(ExportError, match="no channel 'opening' to draw a face from"):
+        write(result, tmp_path / "a.mp4", speech=toy_speech)

@@ -1,0 +1,439 @@
+"""Requests to analysed speech: what they name, their language, their words, and what engines are given."""
+
+import json
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+import lipmotion
+from lipmotion import Model, Request, animate, load_model
+from lipmotion.engines import Engine, Inputs
+from lipmotion.errors import ExportError, InputError
+from lipmotion.pipeline.analysis import speech_analysis as pipeline_analysis
+from lipmotion.pipeline.analysis.language import (
+    detect_english,
+    format_words,
+    recognise_words,
+    resolve_language,
+    warn_of_another_language,
+    write_words,
+)
+from lipmotion.pipeline.analysis.read_request import read_request, read_text_or_file
+from lipmotion.pipeline.analysis.speech_analysis import analyse, analyse_speech, build_speech, recognise_speech
+from lipmotion.pipeline.generation import (
+    LESS_NOISE,
+    MAPPED_CONFIDENCE,
+    OWN_MODEL,
+    TRANSCRIPT,
+    WHOLE_TRANSCRIPT,
+    predict_outlook,
+)
+from lipmotion.pipeline.job import is_for_several, list_recordings, plan_outputs
+from lipmotion.pipeline.request import as_request
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.recognition.agreement import TranscriptFit
+from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
+from lipmotion.speech.voices.espeak import LanguageLexicon
+from lipmotion.types import Audio, Span, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
+from lipmotion.units import Lexicon
+from pipeline.made import features_of, read_welcome, recogniser_of
+from testing.toy import ToySentence
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.usefixtures("here")
+def test_a_text_is_itself():
+    texts = ["hello there", "see p. 3", "", "α" * 3000, "a/b/c", "the file words.txt", "..", "\n"]
+    for text in (*texts, "é" * 130, "é" * 130 + ".abc", "你好.世界", "a" * 300 + ".txt"):
+        assert read_text_or_file(text) == text
+
+
+def test_a_file_is_its_content(here):
+    (here / "words").write_text("näh\n", encoding="utf-8-sig")
+    assert read_text_or_file("words") == "näh\n"
+
+
+def test_subtitles_keep_their_times(here):
+    (here / "words.srt").write_text("1\n00:00:01,000 --> 00:00:02,500\n<i>Hello</i> there\n")
+    transcript = read_text_or_file("words.srt")
+    assert isinstance(transcript, TimedTranscript)
+    assert transcript.words == ("hello", "there")
+    assert (transcript.lines[0].start_s, transcript.lines[0].end_s) == pytest.approx((1.0, 2.5))
+
+
+def test_a_name_in_a_folder_that_exists_is_no_text(here):
+    (here / "subs").mkdir()
+    for name in ("subs/nofile", "./nofile", "../nofile", "subs/../nofile", "nofile.txt"):
+        with pytest.raises(InputError, match=r"nofile(\.txt)?: no such transcript file"):
+            read_text_or_file(name)
+    assert read_text_or_file("either/or") == "either/or"
+    assert read_text_or_file("subs/ nofile") == "subs/ nofile"
+    assert read_text_or_file("x" * 5000 + "/a") == "x" * 5000 + "/a"
+
+
+def test_files_stay_in_order_and_folders_are_listed(tmp_path):
+    for name in ("b.wav", "a.MP4", "notes.txt"):
+        (tmp_path / name).touch()
+    assert list_recordings([Path("z.wav"), tmp_path]) == [Path("z.wav"), tmp_path / "a.MP4", tmp_path / "b.wav"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="no sounds and no videos in it"):
+        list_recordings([tmp_path / "empty"])
+
+
+def test_folders_and_templates(tmp_path):
+    planned = plan_outputs([Path("in/a.wav"), Path("b.c.flac")], ["out/", "x/{name}-take.mp4"], ["json", "csv"])
+    assert planned == [["out/a.json", "out/a.csv", "x/a-take.mp4"], ["out/b.c.json", "out/b.c.csv", "x/b.c-take.mp4"]]
+    assert is_for_several(str(tmp_path))
+    assert not is_for_several("a.json")
+
+
+def test_outputs_that_would_be_written_twice():
+    with pytest.raises(ExportError, match=r"o/a\.json: would be written for x/a\.wav and for y/a\.wav"):
+        plan_outputs([Path("x/a.wav"), Path("y/a.wav")], ["o/"], ["json"])
+    with pytest.raises(ExportError, match=r"a\.json: is one file, and there are 2 recordings"):
+        plan_outputs([Path("a.wav"), Path("b.wav")], ["a.json"], ["json"])
+
+
+@pytest.mark.parametrize("output", ["out/", "{name}.json", "out/{name}/a.json"])
+def test_a_recording_that_is_called_as_a_device_names_no_output(output):
+    for name in ("CON.wav", "nul .flac"):
+        with pytest.raises(ExportError, match="Windows"):
+            plan_outputs([Path(name)], [output], ["json"])
+    assert plan_outputs([Path("CON.wav")], ["../a.json"], ["json"]) == [["../a.json"]]
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SILENCE = Audio(np.zeros(16_000, np.float32), 16_000)
+USER = Lexicon({"papa": (("p", "aa", "p", "aa"),), "2": (("m", "aa"),)})
+
+
+def test_english_stays_as_it_is():
+    request = Request(SILENCE, "two papas")
+    assert resolve_language(request) is request
+
+
+def test_another_language_has_its_own_words_and_lexicon(tmp_path):
+    (tmp_path / "words.txt").write_text("¡Papa, 2!", encoding="utf-8")
+    for transcript in ("¡Papa, 2!", tmp_path / "words.txt"):
+        request = resolve_language(
+            read_request(Request(SILENCE, transcript, lexicon=USER, language="es"), is_typed=False)
+        )
+        assert isinstance(request.transcript, TimedTranscript)
+        assert request.transcript.words == ("papa", "2")
+        assert isinstance(request.lexicon, LanguageLexicon)
+        assert request.lexicon.pronunciations("2") == (("m", "aa"),)
+
+
+def test_written_forms_in_subtitles_are_not_read_as_english():
+    written = tuple(map(TimedWord, ("perro", "$20M", "&", "St.", "21")))
+    user = Lexicon(dict.fromkeys(("perro", "20m", "st", "21"), (("m", "aa"),)))
+    request = resolve_language(
+        Request(SILENCE, TimedTranscript((TranscriptLine(written),)), lexicon=user, language="es")
+    )
+    assert isinstance(request.transcript, TimedTranscript)
+    assert request.transcript.words == ("perro", "20m", "st", "21")
+    assert request.lexicon.spoken_forms("21") == ((("m", "21"), ("aa", "21")),)
+
+
+def test_unknown_languages_are_refused():
+    with pytest.raises(InputError, match="language is 'xx', required one of: en, es, fr, "):
+        as_request(SILENCE, language="xx")
+    with pytest.raises(InputError, match="the language of the transcript is not known; give it, one of: en, es"):
+        resolve_language(Request(SILENCE, "mandrusa kolpeti vastrini", language="auto"))
+
+
+def test_auto_says_what_it_takes_the_speech_for(caplog):
+    for transcript in ("bin blue at f two now", None):
+        assert resolve_language(Request(SILENCE, transcript, language="auto")).language == "en"
+    assert detect_english(SILENCE) is None
+    said = [record.getMessage().partition(";")[0] for record in caplog.records]
+    assert said == [
+        "the transcript is taken for English",
+        "the language of the speech is not known, English is assumed",
+    ]
+
+
+def test_mapped_phones_are_not_called_sure(toy_model, toy_sentence):
+    words = " ".join(toy_sentence.words)
+    lexicon = Lexicon({word: Lexicon().pronunciations(word) for word in toy_sentence.words})
+    request = Request(toy_sentence.audio, words, lexicon=lexicon, recogniser="own", language="es")
+    outlook = lipmotion.animate(request, model=toy_model).outlook
+    assert (outlook.words, outlook.confidence) == ("mapped transcript", MAPPED_CONFIDENCE)
+    assert "mapped to English phones, confidence 0.80" in outlook.text
+    foreign = " ".join(["sisa mapama bisi", *toy_sentence.words[:1]])
+    outlook = lipmotion.animate(Request(toy_sentence.audio, foreign, recogniser="own"), model=toy_model).outlook
+    assert outlook.words == "mapped transcript"
+    assert outlook.confidence == pytest.approx(0.25)
+
+
+def test_the_option_reaches_the_request():
+    assert read_request(Request("a.wav", language="ko")).language == "ko"
+    assert as_request(Request(SILENCE, language="ko"), language="fr").language == "fr"
+    assert as_request(Request(SILENCE, language="ko")).language == "ko"
+
+
+@pytest.mark.long
+def test_the_words_of_english_are_known(caplog):
+    pytest.importorskip("hama.asr")
+    welcome = read_welcome().samples
+    for samples, taken in ((welcome, "taken for English"), (welcome[::-1], "not")):
+        resolve_language(Request(Audio(np.tile(samples, 4), 16_000), language="auto"))
+        assert taken in caplog.messages[-1]
+
+
+@pytest.mark.parametrize(("confidence", "lasts_s", "warns"), [(0.2, 2.0, True), (0.85, 2.0, False), (0.2, 0.5, False)])
+def test_words_that_are_hardly_understood_are_told(confidence, lasts_s, warns, caplog):
+    words = Timeline((Span(0.0, lasts_s, RecognisedWord("hola", confidence)),))
+    warn_of_another_language(Recognition(Timeline(()), words, lasts_s, 0.0, None))
+    assert ("--language" in caplog.text) == warns
+    assert (f"confidence {confidence:.2f}" in caplog.text) == warns
+
+
+WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
+
+
+def words(*timed: tuple[float, float, str]) -> Timeline[RecognisedWord]:
+    return Timeline(tuple(Span(start_s, end_s, RecognisedWord(text, 0.5)) for start_s, end_s, text in timed))
+
+
+def labels(units: Timeline[Unit]) -> list[tuple[str, str]]:
+    return [(span.label.phone, span.label.word) for span in units]
+
+
+@pytest.fixture(scope="module")
+def found() -> Recognition:
+    return recognise_words(WELCOME)
+
+
+def test_long_pauses_end_a_line():
+    assert format_words(words((0.0, 0.3, "oh"), (0.4, 0.6, "no"), (1.2, 1.5, "yes"))) == "oh no\nyes\n"
+    assert format_words(words()) == ""
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".JSON"])
+def test_files_of_words_are_transcripts(found, tmp_path, suffix):
+    path = tmp_path / f"words{suffix}"
+    write_words(found.words, [path], WELCOME)
+    aligned = animate(WELCOME, transcript=path).units
+    assert labels(aligned) == labels(found.units)
+    starts = [(a.start_s, b.start_s) for a, b in zip(aligned, found.units, strict=True)]
+    assert all(abs(a - b) < 0.05 for a, b in starts)
+
+
+def test_json_has_times_and_confidences(found, tmp_path):
+    write_words(found.words, [tmp_path / "words.json"])
+    document = json.loads((tmp_path / "words.json").read_text())
+    assert document["text"].startswith("please speak")
+    first = document["result"][0]
+    assert set(first) == {"word", "start", "end", "conf"}
+    assert 0.4 < first["start"] < first["end"] < 1.0
+    assert all(0 <= word["conf"] <= 1 for word in document["result"])
+
+
+def test_files_that_cannot_be_written(found, tmp_path):
+    for name in ("words.srt", "words", "nowhere/words.txt"):
+        with pytest.raises(ExportError):
+            write_words(found.words, [tmp_path / "first.txt", tmp_path / name])
+    assert not list(tmp_path.iterdir())
+
+
+def test_speech_is_as_reliable_as_its_words(found):
+    request, model = Request(WELCOME), load_model()
+    understood = analyse_speech(model, request)
+    assert understood.recognition.units == found.units
+    assert understood.speech.confidence == pytest.approx(found.reliability)
+    assert understood.speech.units == analyse(model, request).units
+    given = analyse_speech(model, Request(WELCOME, transcript="please speak"))
+    assert given.recognition is None
+    assert analyse(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
+
+
+@pytest.mark.long
+def test_words_do_not_depend_on_the_processes(monkeypatch, found):
+    monkeypatch.setattr("lipmotion.speech.recognition.word_search.SHORT_FRAMES", 0)
+    assert recognise_words(WELCOME, workers=2).words == found.words
+
+
+@dataclass(frozen=True)
+class RecognisingEngine(Engine[Any]):
+    """Recognises the phones that it is given."""
+
+    config: Any = None
+    found: Timeline[Unit] | None = None
+    name: ClassVar[str] = "recognising"
+
+    def inputs(self, motion_s: float = np.inf) -> Inputs:  # noqa: ARG002
+        return Inputs(f0=True)
+
+    def recognise(self, model: object, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
+        assert len(speech.units) == 0
+        return self.found
+
+    def fit(self, examples: object, monitor: object) -> Any: ...
+    def generate(self, model: object, speech: object, constraints: object = None) -> Any: ...
+    def to_arrays(self, model: object) -> Any: ...
+    def from_arrays(self, arrays: object) -> Any: ...
+
+
+RECOGNISED: Timeline[Unit] = Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 2.0, Unit("aa"))))
+RECOGNITION = Recognition(RECOGNISED, Timeline(()), 0.0, 0.0, None)
+
+
+def recognised(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
+    phones, features = recogniser_of(model, kind), features_of(sentence.audio)
+    return recognise_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNITION)
+
+
+def test_phones_that_the_engine_recognises_are_aligned_as_in_training(toy_model, toy_sentence):
+    """Its phones, with the times of forced alignment, and no words."""
+    late = toy_sentence.units.shifted(0.07)
+    speech = recognised(RecognisingEngine(found=late), toy_model, toy_sentence)
+    assert [s.label.phone for s in speech.units] == [s.label.phone for s in toy_sentence.units]
+    assert {s.label.word for s in speech.units} == {""}
+    assert {s.label.confidence for s in speech.units} == {0.0}
+    errors = [abs(a.start_s - b.start_s) for a, b in zip(speech.units, toy_sentence.units, strict=True)]
+    assert np.median(errors) < 0.03
+
+
+def test_the_recogniser_says_what_the_engine_does_not_know(toy_model, toy_sentence):
+    """Or what general models alone are asked for, or what does not fit the sound."""
+    crowd = [span for n in range(30) for span in Timeline(toy_sentence.units.spans[1:-1]).shifted(3.0 * n)]
+    for found, kind in ((None, "own"), (toy_sentence.units, "general"), (Timeline(tuple(crowd)), "own")):
+        speech = recognised(RecognisingEngine(found=found), toy_model, toy_sentence, kind)
+        assert speech.units[1].label.phone == "aa"
+
+
+def test_f0_is_computed_for_engines_that_want_it(toy_sentence):
+    features = features_of(toy_sentence.audio)
+    found = build_speech(RecognisingEngine(), toy_sentence.audio, features, toy_sentence.units).log_f0
+    assert found is not None
+    np.testing.assert_allclose(found, log_f0(toy_sentence.audio), rtol=1e-5)
+
+    @dataclass(frozen=True)
+    class Deaf(RecognisingEngine):
+        def inputs(self, motion_s: float = np.inf) -> Inputs:  # noqa: ARG002
+            return Inputs()
+
+    assert build_speech(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None
+
+
+def test_the_name_of_a_file_is_no_transcript(toy_model, toy_sentence, tmp_path):
+    (tmp_path / "words.txt").write_text("papa", encoding="utf-8")
+    request = Request(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
+    with pytest.raises(InputError, match="is the name of a file; give Path"):
+        analyse(toy_model, request)
+
+
+def group_words(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
+    lines = []
+    for word, spans in groupby(sentence.units, key=lambda span: span.label.word):
+        inside = list(spans)
+        if word:
+            start_s, end_s = inside[0].start_s + late_s, inside[-1].end_s + late_s
+            lines.append(TranscriptLine((TimedWord(word),), start_s, end_s))
+    return TimedTranscript(tuple(lines))
+
+
+def test_subtitles_are_aligned_within_their_times(toy_model, toy_sentence, tmp_path):
+    (tmp_path / "said.srt").write_text(
+        f"00:00:00,300 --> 00:00:02,600\n<i>{' '.join(toy_sentence.words)}</i>\n", encoding="utf-8"
+    )
+    plain = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words), recogniser="own")
+    wanted = analyse(toy_model, plain)
+    text = (tmp_path / "said.srt").read_text(encoding="utf-8")
+    for transcript in (tmp_path / "said.srt", text, group_words(toy_sentence), group_words(toy_sentence, 0.4)):
+        found = analyse(toy_model, replace(plain, transcript=transcript))
+        assert found.units == wanted.units
+        assert found.units_known
+
+
+def test_times_decide_where_words_alone_do_not(toy_model, toy_sentence):
+    """The sentence twice, and a transcript of the second time alone."""
+    twice = Audio(np.tile(toy_sentence.audio.samples, 2), 16_000)
+    second = group_words(toy_sentence, toy_sentence.audio.duration_s)
+    found = analyse(toy_model, Request(twice, transcript=second, recogniser="own")).units
+    starts_s = [span.start_s for span in found if span.label.word]
+    true_s = [span.start_s + toy_sentence.audio.duration_s for span in toy_sentence.units if span.label.word]
+    assert starts_s == pytest.approx(true_s, abs=0.06)
+
+
+def test_words_of_an_installed_recogniser_are_aligned(toy_model, toy_sentence, monkeypatch):
+    said = [group_words(toy_sentence), None]
+    monkeypatch.setattr(pipeline_analysis, "recognise_words", lambda _, kind: said.pop(0) if kind == "vosk" else None)
+    request = Request(toy_sentence.audio, recogniser="vosk")
+    found = analyse(toy_model, request)
+    words = tuple(span.label.word for span in found.units if span.label.word)
+    assert tuple(word for word, _ in groupby(words)) == toy_sentence.words
+    assert found.units_known
+    nothing = analyse(toy_model, request)  # no words: phones are recognised
+    assert not nothing.units_known
+    known = analyse(toy_model, replace(request, transcript=" ".join(toy_sentence.words)))
+    assert known.units == found.units
+    assert not said
+
+
+def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other():
+    assert as_request(Request("a.wav"), "papa").transcript == "papa"
+    assert as_request("a.wav", "papa").transcript == "papa"
+    with pytest.raises(InputError, match="give one"):
+        as_request(Request("a.wav", "mama"), "papa")
+
+
+@pytest.mark.parametrize("kind", ["own", "auto"])
+def test_a_recording_without_speech(toy_model, kind, caplog):
+    request = Request(Audio(np.zeros(16_000, np.float32), 16_000), recogniser=kind)
+    understood = analyse_speech(toy_model, request)
+    (text,) = caplog.messages
+    assert text.startswith("no speech found in the recording: the mouth rests; give a recording in which something")
+    assert understood.is_without_speech
+    outlook = predict_outlook(request, understood)
+    assert (outlook.words, outlook.advice, outlook.text) == ("no speech", (), "no speech found; levels 0 dB apart")
+
+
+def test_a_transcript_beside_units_is_not_used(toy_model, toy_sentence, caplog):
+    request = Request(toy_sentence.audio, transcript="hello", units=toy_sentence.units)
+    assert analyse(toy_model, request).units == toy_sentence.units
+    assert caplog.messages == [
+        "the transcript is not used: the units already say what is spoken; leave one of them out"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("confidence", "word_s", "range_db", "advice"),
+    [
+        (0.6, 3.0, 30.0, (TRANSCRIPT, OWN_MODEL)),  # clear English of a stranger
+        (0.18, 3.0, 15.0, (TRANSCRIPT, LESS_NOISE, OWN_MODEL)),  # another language, or words in noise
+        (0.9, 1.0, 30.0, (TRANSCRIPT, OWN_MODEL)),  # sure words, which are few
+        (0.9, 3.0, 30.0, (OWN_MODEL,)),
+    ],
+)
+def test_unsure_words_are_asked_for_first(toy_model, toy_sentence, confidence, word_s, range_db, advice):
+    request = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
+    words = Timeline((Span(0.0, 1.0, RecognisedWord("papa", confidence)),))
+    recognition = Recognition(RECOGNISED, words, word_s, 3.0 - word_s, -60.0)
+    understood = replace(analyse_speech(toy_model, request), recognition=recognition, range_db=range_db, fit=None)
+    outlook = predict_outlook(request, understood)
+    assert outlook.advice == advice
+    assert outlook.text.endswith(f"would help most: {advice[0]}")
+
+
+def test_the_outlook_says_how_much_of_the_speech_a_transcript_fits(toy_model, toy_sentence):
+    request = Request(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
+    understood = replace(analyse_speech(toy_model, request), range_db=30.0)
+    assert understood.fit is not None
+    whole = predict_outlook(request, understood)
+    assert (whole.confidence, whole.text) == (pytest.approx(1), "words: transcript; levels 30 dB apart")
+    part = predict_outlook(request, replace(understood, fit=TranscriptFit(-2.0, ((0.0, 3.0),), 4.0)))
+    assert (part.confidence, part.advice) == (pytest.approx(0.25), (WHOLE_TRANSCRIPT,))
+    assert part.text.startswith("words: transcript, which fits 25% of the speech; levels 30 dB apart; would help most")
+    wrong = predict_outlook(request, replace(understood, fit=TranscriptFit(-7.0, (), 4.0)))
+    assert wrong.confidence == pytest.approx(0)
