@@ -1,5 +1,6 @@
 import json
 
+from cli.conftest import check_refused
 from lipmotion import compare
 from lipmotion.measures.evaluation_table import comparison_table
 
