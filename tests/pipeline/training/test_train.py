@@ -11,9 +11,8 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.space import resample_track
 from lipmotion.pipeline.training import train as module
-from lipmotion.pipeline.training.other_speakers import VoiceExample
+from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.training.train import describe_training, label_phones
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import Channel, Motion, Track, Utterance
 from lipmotion.units import Lexicon
@@ -164,10 +163,10 @@ def test_camera_frames_become_model_frames():
     assert not valid[103:].any()  # half a camera frame after the last one
 
 
-def others() -> Iterator[VoiceExample]:
+def others() -> Iterator[SpokenSentence]:
     """Two speakers of whom nothing was seen."""
     for number, sentence in enumerate(toy_sentences(4)):
-        yield VoiceExample(analysed(sentence.audio).mfcc(), sentence.units, ("bert", "anna")[number % 2])
+        yield SpokenSentence(sentence.name, ("bert", "anna")[number % 2], sentence.audio, sentence.units)
 
 
 def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus):
