@@ -100,7 +100,7 @@ def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
     chosen = (*few, "--sizes", "3", "--plots", "pictures")
     figures = figures_of(sections.xie_liu_section, "xieliu2007", toy_corpus.path, *chosen)
     assert [row["names"] for row in figures["rows"]] == [3]
-    assert (figures["order"], figures["tuning"]["tried"]) == ("given", {})
+    assert (figures["order"], figures["validation"]) == ("given", 0)
     assert len(list((here / "pictures").iterdir())) == 3
     assert sorted(path.name for path in here.iterdir()) == ["a.json", "order.txt", "pictures"]
 

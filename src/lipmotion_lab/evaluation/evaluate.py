@@ -274,6 +274,20 @@ def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
     return ClipStatistic(sums, lambda total: float(total[0] / total[1]) if total[1] else float("nan"))
 
 
+def best_lag_statistic(generated: Clips, original: Clips, times: Sequence[Array], reach_s: float) -> ClipStatistic:
+    """Return the mean correlation of curves [each shape=(T_i, 1)], each at its best lag (docs/measures.md).
+
+    times   : of the frames, in seconds [each shape=(T_i,)]
+    reach_s : the largest lag to both sides; lags of 10 ms and less are alike
+    """
+    lags = np.arange(-round(reach_s * 100), round(reach_s * 100) + 1) / 100
+    sums = []
+    for g, o, time_s in zip(generated, original, times, strict=True):
+        moved = ([np.interp(time_s + lag, time_s, g[:, 0])[:, None]] for lag in lags)
+        sums.append(np.array([max(correlation_statistic(each, [o]).value for each in moved), 1.0]))
+    return ClipStatistic(sums, lambda total: float(total[0] / total[1]))
+
+
 def closing_score_statistic(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
     """Return the share, in %, of original closings found in generated openings; NaN where there are none."""
     hits, count = clip_closure_counts(generated, original, threshold)

@@ -152,7 +152,7 @@ def run_folds(options: argparse.Namespace) -> None:
 def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = actions.add_parser(
         "xieliu2007",
-        help="which structure of chains predicts lips best, as printed and tuned (Xie & Liu 2007, Table 3)",
+        help="which structure of chains predicts lips best, as printed (Xie & Liu 2007, Table 3), and two stages",
     )
     parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
     order = "names of recordings, one per line (default: train, shuffled)"
@@ -165,14 +165,21 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
     add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
-    add_experiment_arguments(parser, quick="the paper's systems, four of them also tuned; not with --order")
+    more = "also train systems of two stages, on transcribed recordings of others, or their phones, as in train"
+    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=more)
+    parser.add_argument("--voices", action="store_true", help="as --recordings, on synthetic voices")
+    unseen = "compare the opening also on this corpus, of people whom no system knows"
+    add_input(parser, "--strangers", what="corpus", metavar="CORPUS", help=unseen)
+    add_experiment_arguments(parser, quick="the paper's systems; not with --order")
     parser.set_defaults(run=run_xieliu2007)
 
 
 def run_xieliu2007(options: argparse.Namespace) -> None:
     """Call ``xieliu2007`` and print its section."""
     from lipmotion.corpora.source_recordings import read_names
+    from lipmotion.corpora.store import Corpus
     from lipmotion.errors import InputError
+    from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
 
     if options.quick and options.order:
@@ -185,6 +192,8 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
             systems=options.systems or usual.systems,
             visual=options.visual,
             transcripts=options.transcripts,
+            voices=tuple(other_voices(synthetic=options.voices, recordings=options.recordings)),
+            strangers=Corpus.open(options.strangers) if options.strangers else None,
         )
         order = read_names(options.order) if options.order else None
         split, sizes, plots = list_or_all(options.split), options.sizes, options.plots

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -15,12 +14,14 @@ import numpy as np
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
-from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
+from lipmotion.pipeline.training.other_speakers import SpokenSentence
+from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, examples_without_motion, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
@@ -47,46 +48,42 @@ from lipmotion_lab.xie_liu2007.systems import (
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     SPLIT,
-    TUNED,
-    TUNING,
+    TWO_STAGES,
     TrainedSystem,
-    Trial,
-    TuningOptions,
     as_row,
     list_changed_options,
     select_systems,
     system_from_arrays,
     system_to_arrays,
     train_system,
-    tune_options,
     with_inputs_of,
 )
 
-TRIALS = "trials"
+LARGEST_LAG_S = 0.06
+"""Sound and picture of other people's recordings may be apart by so much."""
 
 
 @dataclass(frozen=True)
 class ComparisonOptions:
     """Which systems are compared, and in which conditions.
 
-    tuning      : how the settings of tuned systems are chosen, on the list ``val``
+    mixtures    : most Gaussians a state, where their number is chosen on the list ``val``
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
+    voices      : speech of others, on which systems of two stages are trained as well
+    strangers   : recordings of people whom no system knows, on which all are compared, too (None: there are none)
     """
 
     systems: Sequence[str] | None = None
-    tuning: TuningOptions = TUNING
+    mixtures: int = 8
     visual: str = GEOMETRY
     transcripts: bool = False
+    voices: Sequence[SpokenSentence] = ()
+    strangers: Corpus | None = None
 
 
 DEFAULT_OPTIONS = ComparisonOptions()
-QUICK = ComparisonOptions(
-    systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"],
-    tuning=TuningOptions(
-        clips=runner.QUICK_CLIPS["train"], judges=runner.QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
-    ),
-)
+QUICK = ComparisonOptions(systems=[*PAPER_FIGURES, "mean pose"])
 """A small comparison, for the recordings of ``runner.take_quick_part``; conversion by factorial chains is slow."""
 
 
@@ -105,20 +102,19 @@ def xieliu2007(  # noqa: PLR0913
     """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
 
     order, sizes : train on the first N names of a list, as in ``learning_curve``; by default on all of ``train``
-    The phones in time are computed once for each size and are the same for all systems. The settings of tuned systems
-    are chosen on the list ``val``, with systems trained on the first recordings of the list; then their number of
-    Gaussians, and whether they are better than those printed, with systems of the size itself.
+    The phones in time are computed once for each size and are the same for all systems.
     Raises InputError: no such system, or sizes that the list does not have.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
     Raises MissingDependencyError: a system or the pictures need a package that is not installed.
     Raises ExportError: the pictures cannot be written.
     """
-    names, seed = select_systems(options.systems), settings.seed
+    names, seed = select_systems(options.systems, two_stages=bool(options.voices)), settings.seed
+    if not options.voices and (without := [name for name in names if COMPARED_SYSTEMS[name].second_stage]):
+        raise InputError(f"{without[0]} needs speech of others; give it by --recordings or --voices")
     check_visual(options.visual)
-    tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
     listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), seed)
-    chosen_on_val = tunes or any(COMPARED_SYSTEMS[name].splits for name in names)
-    held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
+    splits = any(COMPARED_SYSTEMS[name].splits for name in names)
+    held_out, validation = corpus.required(split), corpus.required("val") if splits else ()
     check_training_names(corpus, listed, (*held_out, *validation))
     steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
@@ -127,14 +123,11 @@ def xieliu2007(  # noqa: PLR0913
     if plots is not None:
         check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
-    shares = np.cumsum([0.3 * sum(steps), *steps]) / (1.3 * sum(steps))
-    trials = (
-        setup.tune(tunes, listed, sub_monitor(settings.monitor, 0, float(shares[0]), "choosing: ")) if tunes else {}
-    )
+    shares = np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=False):
         part = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
-        trained = setup.train(names, listed[:count], trials, part)
+        trained = setup.train(names, listed[:count], part)
         kept = setup.checkpoint(listed[:count], held_out)
         rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
     recordings = trained.recordings
@@ -143,13 +136,9 @@ def xieliu2007(  # noqa: PLR0913
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "visual": options.visual}
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
-    chosen: dict[str, Any] = {
-        "clips": options.tuning.clips,
-        "judges": options.tuning.judges,
-        "validation": len(validation),
-    }
-    chosen |= {"tried": {name: [as_row(trial) for trial in tried] for name, tried in trials.items()}}
-    return nan_as_null(about | {"tuning": chosen, "rows": rows})
+    about |= {"others": sorted({spoken.speaker for spoken in options.voices})}
+    about |= {"others_minutes": sum(spoken.audio.duration_s for spoken in options.voices) / 60}
+    return nan_as_null(about | {"validation": len(validation), "rows": rows})
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +146,7 @@ class _TrainedSystems:
     used: tuple[str, ...]
     recordings: HeldOutRecordings
     systems: Mapping[str, TrainedSystem]
+    strangers: HeldOutRecordings | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,28 +160,11 @@ class _TrainingSetup:
     settings: runner.ExperimentSettings
     work: Path | None
 
-    def tune(self, systems: Sequence[str], listed: Sequence[str], monitor: Monitor) -> dict[str, list[Trial]]:
-        """Return what was tried for each of some systems of the paper, trained on the first names of a list."""
-        names = listed[: self.options.tuning.clips]
-        examples, recordings = self._prepared(names, (), sub_monitor(monitor, 0, 0.2))
-        trials = {}
-        for number, name in enumerate(systems):
-            part = sub_monitor(monitor, 0.2 + 0.8 * number / len(systems), 0.2 + 0.8 * (number + 1) / len(systems))
-            kept, stage = self.checkpoint(names), f"trials-{name}"
-            found = kept.load(stage)
-            if found is None:
-                tried = tune_options(name, examples, recordings["val"], self.options.tuning, part)
-                found = {TRIALS: np.array(json.dumps([asdict(trial) for trial in tried]))}
-                kept.save(stage, found)
-            trials[name] = [Trial(**trial) for trial in json.loads(str(found[TRIALS]))]
-        return trials
-
-    def train(
-        self, systems: Sequence[str], names: Sequence[str], trials: Mapping[str, Sequence[Trial]], monitor: Monitor
-    ) -> _TrainedSystems:
+    def train(self, systems: Sequence[str], names: Sequence[str], monitor: Monitor) -> _TrainedSystems:
         """Return systems, trained on the same phones of the utterances ``names``."""
         examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
         kept, trained = self.checkpoint(names), dict[str, TrainedSystem]()
+        others = [*examples_without_motion(engine_named("coupled"), self.options.voices)]
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
             part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here
@@ -199,14 +172,15 @@ class _TrainingSetup:
             if found is not None:
                 trained[name] = system_from_arrays(found)
                 continue
-            known = with_inputs_of(name, examples, self.corpus)
-            validation, tuning = recordings.get("val"), self.options.tuning
-            trained[name] = train_system(name, known, validation, trials, trained, tuning, part)
+            known = [*with_inputs_of(name, examples, self.corpus)]
+            known += others if COMPARED_SYSTEMS[name].second_stage else []
+            trained[name] = train_system(name, known, recordings.get("val"), trained, self.options.mixtures, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 found = system_to_arrays(trained[name])
                 kept.save(f"system-{name}", found)
                 trained[name] = system_from_arrays(found)
-        return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
+        used, strangers = tuple(example.name for example in examples), recordings.get("strangers")
+        return _TrainedSystems(used, recordings["held out"], trained, strangers)
 
     def _prepared(
         self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
@@ -229,11 +203,15 @@ class _TrainingSetup:
             reading = sub_monitor(monitor, 0.7 + 0.15 * number, 0.85 + 0.15 * number)
             channels = recordings["held out"].channels if recordings else None
             recordings[name] = read(selection=Selection(names=part), channels=channels, monitor=reading)
+        if (unseen := self.options.strangers) is not None:
+            read = partial(load_held_out, unseen, cached_recogniser(phones), lexicon=lexicon)
+            recordings["strangers"] = read(selection=Selection(), channels=(OPENING,))
         return examples, recordings
 
     def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
-        everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.tuning), *compared))
+        everything = (*names, *self.corpus.names("val"))
+        others = " ".join((str(self.options.mixtures), *(spoken.name for spoken in self.options.voices), *compared))
         key = runner.PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
         return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
@@ -260,6 +238,29 @@ def _size(
         "training": training,
         "conditions": {condition: _system_rows(recordings, clips, seed) for condition, clips in generated.items()},
         "pairs": _paper_pairs(recordings, generated[AUDIO_ONLY], seed),
+        "strangers": _stranger_rows(trained.strangers, systems, seed) if trained.strangers is not None else {},
+    }
+
+
+def _stranger_rows(
+    strangers: HeldOutRecordings, systems: Mapping[str, TrainedSystem], seed: int
+) -> dict[str, dict[str, Any]]:
+    """Return the mean ACC of the opening at the best lag, and for two stages its gain, of people nobody knows."""
+    found: dict[str, dict[str, evaluate.ClipStatistic]] = {}
+    for name, system in systems.items():
+        for condition in strangers.conditions:
+            clips = generate_clips(strangers, condition, system.engine, system.model)
+            curves_of = evaluate.opening_curves(strangers, clips)
+            times = [clip.time_s for clip in clips]
+            found.setdefault(name, {})[condition] = evaluate.best_lag_statistic(*curves_of, times, LARGEST_LAG_S)
+    return {
+        name: {
+            condition: {"acc": own.value, "acc_95": own.interval(seed)}
+            | ({"gain": own.value - one.value, "acc_gain_95": own.gain(one, seed)} if one is not own else {})
+            for condition, own in of_system.items()
+            for one in [found[name.replace(TWO_STAGES, "")][condition]]
+        }
+        for name, of_system in found.items()
     }
 
 
@@ -286,12 +287,13 @@ def _paper_pairs(
     """Return how much better each system of the paper is than each that is worse in print, on the same clips."""
     by_acc = sorted(PAPER_FIGURES, key=lambda name: -PAPER_FIGURES[name][1])
     rows = []
-    for ending in ("", SPLIT, TUNED):
+    for ending in ("", SPLIT):
         compared = [name + ending for name in by_acc if name + ending in made]
         pairs = [*combinations(compared, 2)]
         if not ending:
             pairs += [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
             pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
+            pairs += [(name, name.replace(TWO_STAGES, "")) for name in made if TWO_STAGES in name]
         pairs = [pair for pair in pairs if {*pair} <= made.keys()]
         statistics = {name: _statistics(recordings, made[name]) for pair in pairs for name in pair}
         for better, worse in pairs:

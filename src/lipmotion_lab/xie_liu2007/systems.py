@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Animator, Engine, engine_named
 from lipmotion.engines.coupled.arrays import coupled_arrays
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, SYSTEMS, UNSEEN_LOSS
+from lipmotion.engines.coupled.chains.structures import HMM, SYSTEMS, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import growing_models
@@ -29,34 +29,6 @@ Options = Mapping[str, Any]
 TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
 """Factorial chains that are tied together: rare joint states lose 10 nats, and the chains begin a state apart."""
 TOGETHER = {"moves_together": True}
-CONVERSIONS: tuple[Options, ...] = ({"start": "viterbi", "steps": 3}, {"start": "soft", "steps": 1})
-"""Conversions by EM that are tried: from the best path to where it converges, and one step from all paths."""
-
-
-@dataclass(frozen=True)
-class TuningOptions:
-    """What is tried, one kind of setting after another, each from the best before.
-
-    clips           : number of recordings to train on while settings are tried
-    judges          : number of recordings of the list ``val`` by which they are judged
-    mixtures        : most Gaussians a state, of speech; 1, 2, 4, … are tried
-    visual_mixtures : Gaussians a state of lips, then
-    pair_mixtures   : most Gaussians of factorial chains, whose densities are those of pairs of states
-    split           : most Gaussians a state where their number alone is chosen, of both streams and of speech only
-    states          : a unit
-    """
-
-    clips: int = 50
-    judges: int = 8
-    weights: tuple[float, ...] = (1.0, 0.3, 0.1)
-    mixtures: int = 8
-    visual_mixtures: int = 2
-    pair_mixtures: int = 1
-    split: int = 8
-    states: tuple[int, ...] = (3,)
-
-
-TUNING = TuningOptions()
 
 
 @dataclass(frozen=True)
@@ -79,37 +51,6 @@ class TrainedSystem:
     tried: Sequence[Trial] = field(default_factory=tuple)
 
 
-def list_alternatives(options: Options, tuning: TuningOptions) -> list[list[dict[str, Any]]]:
-    """Return the kinds of settings that are tried for a system, in order, each with its values."""
-    factorial = options["structure"] == FACTORIAL
-    most = tuning.pair_mixtures if factorial else tuning.mixtures
-    kinds: list[list[dict[str, Any]]] = [[{"audio_weight": weight, "mixtures": most} for weight in tuning.weights]]
-    if options["structure"] != HMM and most > 1:
-        kinds.append([{"visual_mixtures": tuning.visual_mixtures}])
-    if factorial:
-        kinds.append([{"unseen_loss": UNSEEN_LOSS}, TIED])
-    if options["structure"] == COUPLED:
-        kinds.append([TOGETHER])
-    return [*kinds, [{"states": states} for states in tuning.states]]
-
-
-def search_settings(
-    options: Options, kinds: Sequence[Sequence[Options]], attempt: Callable[[Options], Sequence[Trial]]
-) -> list[Trial]:
-    """Return all trials of a search from some options that takes one kind of setting after another."""
-    tried: list[Trial] = []
-    for kind in kinds:
-        start = best_trial(tried).options if tried else options
-        for change in kind:
-            tried += attempt({**start, **change})
-    return tried
-
-
-def best_trial(trials: Sequence[Trial]) -> Trial:
-    """Return the trial of the highest ACC; of equals the first."""
-    return max(trials, key=lambda trial: trial.acc)
-
-
 def train_stages(
     options: Options, examples: Sequence[Example], monitor: Monitor = silent_monitor
 ) -> Iterator[TrainedSystem]:
@@ -123,18 +64,15 @@ def train_stages(
 
 
 def judge_systems(
-    systems: Iterable[TrainedSystem], validation: HeldOutRecordings, conversions: Sequence[Options] = ({},)
+    systems: Iterable[TrainedSystem], validation: HeldOutRecordings
 ) -> Iterator[tuple[Trial, TrainedSystem]]:
     """Yield every system with its figures on validation recordings."""
     for system in systems:
-        for conversion in conversions:
-            engine = CoupledEngine(replace(system.engine.config, **conversion))
-            made = generate_clips(validation, AUDIO_ONLY, engine, system.model)
-            generated, original = [clip.generated for clip in made], [clip.original for clip in made]
-            acc = correlation_statistic(generated, original).value
-            amse = distance_statistic(generated, original).value
-            trial = Trial(engine.config.as_mapping(), acc, amse, system.model.chains.parameters)
-            yield trial, replace(system, engine=engine)
+        made = generate_clips(validation, AUDIO_ONLY, system.engine, system.model)
+        generated, original = [clip.generated for clip in made], [clip.original for clip in made]
+        acc = correlation_statistic(generated, original).value
+        amse = distance_statistic(generated, original).value
+        yield Trial(system.engine.config.as_mapping(), acc, amse, system.model.chains.parameters), system
 
 
 def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
@@ -145,13 +83,6 @@ def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator
         if trial.acc <= best:
             return
         best = trial.acc
-
-
-def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
-    """Return the system of which something is highest, as the ACC of its trial; with all trials."""
-    pairs = list(found)
-    _, best = max(pairs, key=lambda pair: of(pair[0]))
-    return replace(best, tried=tuple(trial for trial, _ in pairs))
 
 
 def as_row(trial: Trial) -> dict[str, Any]:
@@ -179,8 +110,8 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
 }
 """AMSE and ACC of the paper's Table 3: eigenlips of another speaker, so only their order compares."""
 BEST_PATH = "ph-vi-CHMM, best path"
-BLSTM = "BLSTM"
-TUNED, SPLIT, ALL_PATHS = ", tuned", ", K on val", ", all paths"
+BLSTM, TRAJECTORY = "BLSTM", "trajectory CHMM"
+SPLIT, ALL_PATHS, TWO_STAGES = ", K on val", ", all paths", ", two stages"
 SOFT = {"start": "soft", "steps": 0}
 ABOUT = "about"
 
@@ -191,16 +122,16 @@ class ComparedSystem:
 
     make          : returns its engine; None: it is the coupled engine with ``options``
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
-    tunes         : the system of the paper whose settings are chosen on validation recordings
-    splits        : only its number of Gaussians is, as in the paper (§7.1)
-    when_named    : it is compared only if it is asked for
+    splits        : its number of Gaussians is chosen on validation recordings, as in the paper (§7.1)
+    second_stage  : it is trained on speech of others without motion as well (§3.4)
+    when_named    : it is compared only if it is asked for, or there is such speech
     """
 
     make: Callable[[], Animator[Any]] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     same_model_as: str = ""
-    tunes: str = ""
     splits: bool = False
+    second_stage: bool = False
     when_named: bool = False
 
     @property
@@ -216,13 +147,19 @@ def _engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
 COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     **{name: ComparedSystem(options=SYSTEMS[name]) for name in PAPER_FIGURES},
     **{name + SPLIT: ComparedSystem(options=SYSTEMS[name], splits=True) for name in PAPER_FIGURES},
-    **{name + TUNED: ComparedSystem(options=SYSTEMS[name], tunes=name) for name in PAPER_FIGURES},
     **{f"{name}, tied": ComparedSystem(options=SYSTEMS[name] | TIED) for name in ("ph-FHMM", "ph-vi-FHMM")},
     **{f"{name}, together": ComparedSystem(options=SYSTEMS[name] | TOGETHER) for name in ("ph-CHMM", "ph-vi-CHMM")},
     **{name + ALL_PATHS: ComparedSystem(options=SOFT, same_model_as=name) for name in PAPER_FIGURES},
     BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
-    "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
-    "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
+    f"{TRAJECTORY}, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
+    REFERENCE_SYSTEM + TWO_STAGES: ComparedSystem(
+        options=SYSTEMS[REFERENCE_SYSTEM], second_stage=True, when_named=True
+    ),
+    REFERENCE_SYSTEM + TWO_STAGES + ALL_PATHS: ComparedSystem(
+        options=SOFT, same_model_as=REFERENCE_SYSTEM + TWO_STAGES, when_named=True
+    ),
+    TRAJECTORY: ComparedSystem(_engine("coupled"), when_named=True),
+    TRAJECTORY + TWO_STAGES: ComparedSystem(_engine("coupled"), second_stage=True, when_named=True),
     "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
     BLSTM: ComparedSystem(BlstmBaseline, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),
@@ -231,15 +168,21 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
 """The systems of the table, in its order.
 
 The paper's six are those of ``train --preset``, of one Gaussian a state; ``K on val``: with the number of Gaussians
-that was best on validation recordings; ``tuned``: with all settings that were best there;
-``tied``, ``together``: chains as ``TIED`` and ``TOGETHER`` have them. ``all paths``: expected means given speech, no
-EM; ``best path``: means along the best path, no EM.
+that was best on validation recordings; ``two stages``: trained on speech of others, too; ``tied``, ``together``:
+chains as ``TIED`` and ``TOGETHER`` have them. ``all paths``: expected means given speech, no EM; ``best path``: means
+along the best path, no EM.
 ``own means``: no regression of the visual means on acoustic features.
 """
 
 
-def select_systems(names: Sequence[str] | None) -> list[str]:
-    """Return the systems to compare, in order. Raises InputError: no such system. Raises MissingDependencyError."""
+def select_systems(names: Sequence[str] | None, *, two_stages: bool = False) -> list[str]:
+    """Return the systems to compare, in order; ``two_stages``: by default those that have two, and the same with one.
+
+    Raises InputError: no such system. Raises MissingDependencyError.
+    """
+    if names is None and two_stages:
+        twice = [name for name in COMPARED_SYSTEMS if TWO_STAGES in name]
+        names = [*twice, *(name.replace(TWO_STAGES, "") for name in twice)]
     if names is None:
         return [name for name, system in COMPARED_SYSTEMS.items() if not system.when_named]
     unknown = [name for name in names if name not in COMPARED_SYSTEMS]
@@ -248,21 +191,8 @@ def select_systems(names: Sequence[str] | None) -> list[str]:
     if BLSTM in names:
         import_torch()
     chosen = [COMPARED_SYSTEMS[name] for name in names]
-    needed = {REFERENCE_SYSTEM} | {name for system in chosen for name in (system.tunes, system.same_model_as)}
+    needed = {REFERENCE_SYSTEM} | {name for system in chosen for name in (system.same_model_as,)}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
-
-
-def tune_options(
-    name: str, examples: Sequence[Example], validation: HeldOutRecordings, tuning: TuningOptions, monitor: Monitor
-) -> list[Trial]:
-    """Return all settings that were tried for a system of the paper, judged by recordings for validation."""
-    judges = validation.first(tuning.judges)
-
-    def attempt(options: Mapping[str, Any]) -> list[Trial]:
-        on_the_way = train_stages(options, examples, monitor)
-        return [trial for trial, _ in judge_systems(on_the_way, judges, CONVERSIONS)]
-
-    return search_settings(SYSTEMS[name], list_alternatives(SYSTEMS[name], tuning), attempt)
 
 
 def with_inputs_of(name: str, examples: Sequence[Example], corpus: Corpus) -> Sequence[Example]:
@@ -279,15 +209,15 @@ def train_system(
     name: str,
     examples: Sequence[Example],
     validation: HeldOutRecordings | None,
-    trials: Mapping[str, Sequence[Trial]],
     trained: Mapping[str, TrainedSystem],
-    tuning: TuningOptions,
+    mixtures: int,
     monitor: Monitor,
 ) -> TrainedSystem:
     """Return one trained system.
 
-    validation : recordings that decide between the settings of a tuned system with 1, 2, 4, … Gaussians, and those of
-                 the system as printed; None: no system is tuned
+    examples   : speech with motion, and for the second stage of training, speech of others without
+    validation : recordings that decide on the number of Gaussians; None: no system has it chosen
+    mixtures   : most Gaussians a state, where their number is chosen: of both streams, and of speech alone
     """
     system = COMPARED_SYSTEMS[name]
     if system.same_model_as:
@@ -296,20 +226,15 @@ def train_system(
     if system.make is not None:
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
-    if system.splits and validation is not None:
-        found: list[tuple[Trial, TrainedSystem]] = []
-        for more in [{"visual_mixtures": tuning.split}, {}][: 1 if system.options["structure"] == HMM else 2]:
-            grown = train_stages({**system.options, "mixtures": tuning.split, **more}, examples, monitor)
-            found += split_while_better(judge_systems(grown, validation))
-        return choose_by(lambda trial: trial.acc, found)
-    if not system.tunes or validation is None:
+    if not system.splits or validation is None:
         *_, last = train_stages(system.options, examples, monitor)
         return last
-    options = best_trial(trials[system.tunes]).options
-    printed = trained[system.tunes]
-    same = CoupledConfig.parsed(options) == printed.engine.config
-    on_the_way = () if same else train_stages(options, examples, monitor)
-    return choose_by(lambda trial: trial.acc, judge_systems([printed, *on_the_way], validation))
+    found: list[tuple[Trial, TrainedSystem]] = []
+    for more in [{"visual_mixtures": mixtures}, {}][: 1 if system.options["structure"] == HMM else 2]:
+        grown = train_stages({**system.options, "mixtures": mixtures, **more}, examples, monitor)
+        found += split_while_better(judge_systems(grown, validation))
+    _, best = max(found, key=lambda pair: pair[0].acc)
+    return replace(best, tried=tuple(trial for trial, _ in found))
 
 
 def system_to_arrays(system: TrainedSystem) -> dict[str, NDArray[Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -152,7 +153,8 @@ GROUP = {
     "tie": ArraySpec(np.intp, "J", 0, 1e9),
 }
 REGRESSION_INPUTS = {
-    **WINDOW,
+    "window": replace(WINDOW["window"], shape="2 W"),
+    "window_basis": replace(WINDOW["window_basis"], shape="W A"),
     "belief": ArraySpec(np.float32, "N B", -1.01, 1.01),
     "mean": ArraySpec(np.float32, "I", -LARGEST_MEAN, LARGEST_MEAN),
     "basis": ArraySpec(np.float32, "I F", -1.01, 1.01),

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
-from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Inference
 from lipmotion.engines.coupled.conversion.em_conversion import convert, path_means
@@ -52,7 +51,7 @@ class CoupledEngine(Engine[CoupledModel]):
     Config: ClassVar[type[Configuration]] = CoupledConfig
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102, ARG002
-        return Inputs(speech_alone=True)
+        return Inputs(speech_alone=True, encoding=self.config.dynamic and self.config.acoustic_regression)
 
     def fit(  # noqa: D102
         self,
@@ -66,13 +65,11 @@ class CoupledEngine(Engine[CoupledModel]):
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: CoupledModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
-        features = np.asarray(speech.features.values)
-        frames = len(features)
+        frames = len(speech.features.values)
         path = np.empty(frames, np.intp)
 
         def statistics(wanted: slice) -> Statistics:
-            lattice = self.lattice(model, speech, wanted)
-            motion_statistics, path[wanted] = self._statistics(model, features[wanted], lattice)
+            motion_statistics, path[wanted] = self._statistics(model, speech, wanted)
             return motion_statistics
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
@@ -102,26 +99,25 @@ class CoupledEngine(Engine[CoupledModel]):
         allowed = allowed_units(chains.structure, speech.units, frames)[wanted]
         return chains.lattice(allowed)
 
-    def _statistics(
-        self, model: CoupledModel, features: Single, lattice: Lattice
-    ) -> tuple[Statistics, NDArray[np.intp]]:
+    def _statistics(self, model: CoupledModel, speech: Speech, frames: slice) -> tuple[Statistics, NDArray[np.intp]]:
         """Return means and precisions [each shape=(T, 3, Q)], and the most probable joint state of every frame."""
-        chains, observations = model.chains, model.speech_observations(features)
+        chains = model.chains
         if self.config.conversion == PATH:
+            observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
             path, _ = chains.best_path(chains.emission_log_densities(observations, lattice), lattice)
             return model.frame_statistics([path_means(chains, path, s + 1) for s in range(len(model.visual))]), path
-        inference = self.inferred(model, features, lattice)
+        inference = self.infer(model, speech, frames)
         if self.config.conversion != TRAJECTORY:
-            streams = convert(chains, observations, lattice, self.config.em, inference).streams[1:]
+            streams = convert(chains, inference.observations, inference.lattice, self.config.em, inference).streams[1:]
             return model.frame_statistics(streams), inference.posteriors.most_probable
         return model.motion_statistics(inference), inference.posteriors.most_probable
 
-    def inferred(self, model: CoupledModel, features: Single, lattice: Lattice) -> Inference:
-        """Return the posteriors of the chains given some frames of speech [shape=(T, 39)].
+    def infer(self, model: CoupledModel, speech: Speech, frames: slice) -> Inference:
+        """Return the posteriors of the chains given some frames of speech.
 
         With ``trajectory`` conversion, each of its steps infers again, with the generated motion as observed motion.
         """
-        observations = model.speech_observations(features)
+        observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
         inference = model.chains.infer(observations, lattice)
         for _ in range(self.config.steps if self.config.conversion == TRAJECTORY else 0):
             values = solve_mlpg(*model.motion_statistics(inference))[0]
@@ -129,21 +125,20 @@ class CoupledEngine(Engine[CoupledModel]):
         return inference
 
     def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
-        result = self.generate(model, speech)
-        features, explanations = np.asarray(speech.features.values), dict[int, Explanation]()
-        for inner, outer in split_into_blocks(len(features)):
+        result, explanations = self.generate(model, speech), dict[int, Explanation]()
+        for inner, outer in split_into_blocks(len(speech.features.values)):
             inside = [frame for frame in frames if inner.start <= frame < inner.stop]
             if inside:
-                inference = self.inferred(model, features[outer], self.lattice(model, speech, outer))
+                inference = self.infer(model, speech, outer)
                 by_trace = [explain_by_trace(result, frame) for frame in inside]
                 rows = [frame - outer.start for frame in inside]
                 explanations.update(zip(inside, explain_frames(by_trace, model, inference, rows), strict=True))
         return tuple(explanations[frame] for frame in frames)
 
     def posteriors(self, model: CoupledModel, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: D102
-        features, blocks = np.asarray(speech.features.values), []
-        for inner, outer in split_into_blocks(len(features)):
-            inference = self.inferred(model, features[outer], self.lattice(model, speech, outer))
+        blocks = []
+        for inner, outer in split_into_blocks(len(speech.features.values)):
+            inference = self.infer(model, speech, outer)
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
             blocks.append(unit_posteriors(model.chains, inference.posteriors, kept))
         return tuple(concatenated(parts) for parts in zip(*blocks, strict=True))

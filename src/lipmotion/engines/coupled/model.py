@@ -30,7 +30,7 @@ from lipmotion.motion.limits import MotionLimits, measure_limits
 from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
-from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, option
+from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, Speech, option
 from lipmotion.units import UnitSet
 
 TRAJECTORY, FRAMES, PATH = "trajectory", "em", "viterbi"
@@ -203,9 +203,10 @@ class CoupledModel:
             low[stream.columns], high[stream.columns] = measure_limits(poses)
         return MotionLimits(low, high)
 
-    def speech_observations(self, features: Single) -> AudioVisualObservations:
-        """Return observations of speech [shape=(T, 39)] in which no visual stream was observed."""
-        return speech_observations(features, self.visual)
+    def speech_observations(self, speech: Speech, frames: slice = slice(None)) -> AudioVisualObservations:
+        """Return observations of some frames of speech in which no visual stream was observed."""
+        encoding = None if speech.encoding is None else np.asarray(speech.encoding[frames])
+        return speech_observations(np.asarray(speech.features.values)[frames], self.visual, encoding)
 
     def with_motion(self, observations: AudioVisualObservations, values: Array) -> AudioVisualObservations:
         """Return the observations with motion in the space [shape=(T, Q)] as the visual streams."""
@@ -254,7 +255,7 @@ class CoupledModel:
         """Return the regression inputs of all frames [shape=(T, F + 1)]; None: there is no regression."""
         if self.regression is None:
             return None
-        return self.regression[0](inference.observations.streams[0], inference.posteriors.chains[0])
+        return self.regression[0](inference.observations, inference.posteriors.chains[0])
 
     def is_away_from_speech(self, posterior: Single) -> NDArray[np.bool_]:
         """Return whether each frame is silence away from speech, by posteriors of the first chain [shapes=(T,), (T,

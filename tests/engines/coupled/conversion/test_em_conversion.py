@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from engines.coupled.tiny import KINDS, TWO, chains, observations, structure
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     PRINTED,
@@ -24,6 +27,7 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import _state_regressions, fit_coupled
+from lipmotion.errors import InputError
 from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
 from oracles import coupled as oracle
@@ -111,12 +115,12 @@ def test_the_printed_update_weighs_by_components_and_partners():
     np.testing.assert_allclose(printed, expected, rtol=1e-3, atol=1e-4)
 
 
-def utterances(count=3, frames=60, states=4, seed=0) -> list[RegressionUtterance]:
-    draw = np.random.default_rng(seed)
+def utterances(width=39, count=3, frames=60, states=4) -> list[RegressionUtterance]:
+    draw = np.random.default_rng(0)
     result = []
     for _ in range(count):
         first = draw.dirichlet(np.full(states, 0.2), frames).astype(np.float32)
-        features = draw.normal(0, 1, (frames, 39)).astype(np.float32)
+        features = draw.normal(0, 1, (frames, width)).astype(np.float32)
         visual = draw.dirichlet(np.full(6, 0.2), frames).astype(np.float32)
         observed = draw.random(frames) < 0.8
         target = (features[:, :2] + visual[:, :2] * 3).astype(np.float32)
@@ -125,21 +129,30 @@ def utterances(count=3, frames=60, states=4, seed=0) -> list[RegressionUtterance
     return result
 
 
-def test_the_regressions_are_ridges_one_towards_the_other():
+@pytest.mark.parametrize("encoded", [False, True])
+def test_the_regressions_are_ridges_one_towards_the_other(encoded):
     """By normal equations over explicitly weighted rows: all, then families, then regressions."""
-    data = utterances()
+    data = utterances(39 + 64 * encoded)
+    heard = [
+        AudioVisualObservations((each.features[:, :39],), (None,), each.features[:, 39:] if encoded else None)
+        for each in data
+    ]
     inputs = fit_regression_inputs(np.eye(4, dtype=np.float32), data)
     regression_of_state, family = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 0, 1])
     found = fit_visual_regression(inputs, data, 0, regression_of_state, family)
-    z = np.concatenate([inputs(one.features, one.reduced_posteriors)[one.observed] for one in data]).astype(float)
+    rows = [inputs(sound, one.reduced_posteriors)[one.observed] for sound, one in zip(heard, data, strict=True)]
+    z = np.concatenate(rows).astype(float)
+    if encoded:
+        with pytest.raises(InputError, match="the speech has no encoding"):
+            inputs(replace(heard[0], encoding=None), data[0].reduced_posteriors)
     target = np.concatenate([one.targets[0][one.observed] for one in data]).astype(float)
     weight = np.concatenate(
         [regression_weights(one.chain_posteriors[0], regression_of_state, 3)[one.observed] for one in data]
     ).astype(float)
 
-    def solved(rows, prior, strength):
-        system = z.T @ (rows[:, None] * z) + strength * np.eye(z.shape[1])
-        return np.linalg.solve(system, z.T @ (rows[:, None] * target) + strength * prior)
+    def solved(share, prior, strength):
+        system = z.T @ (share[:, None] * z) + strength * np.eye(z.shape[1])
+        return np.linalg.solve(system, z.T @ (share[:, None] * target) + strength * prior)
 
     shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), SHARED_RIDGE * len(z))
     for number in range(3):

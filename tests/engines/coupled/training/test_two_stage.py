@@ -202,7 +202,7 @@ def right(engine: CoupledEngine, model: CoupledModel, sentence: Example) -> tupl
     """Return the correlation of the opening with the original's, of unknown words, and of speech frames right."""
     spoken = replace(sentence.speech, units_known=False)
     generated = engine.generate(model, spoken).motion["opening"]
-    observations = model.speech_observations(np.asarray(spoken.features.values))
+    observations = model.speech_observations(spoken)
     chains = model.chains
     found = chains.posteriors(chains.emission_log_densities(observations, chains.full_lattice), chains.full_lattice)
     states = found.chains[0].argmax(axis=1) // chains.structure.states

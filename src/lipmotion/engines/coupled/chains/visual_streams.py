@@ -77,7 +77,10 @@ def fit_visual_streams(
     return tuple(streams)
 
 
-def speech_observations(features: NDArray[np.float32], visual: Sequence[VisualStream]) -> AudioVisualObservations:
-    """Return observations of speech [shape=(T, 39)] in which no visual stream was observed."""
+def speech_observations(
+    features: NDArray[np.float32], visual: Sequence[VisualStream], encoding: NDArray[np.floating] | None = None
+) -> AudioVisualObservations:
+    """Return observations of speech [shape=(T, 39)], and its encoding [shape=(T, 64)], without any visual stream."""
     empty = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in visual)
-    return AudioVisualObservations((features, *empty), (None, *(np.zeros(len(features), bool) for _ in empty)))
+    unseen = (np.zeros(len(features), bool) for _ in empty)
+    return AudioVisualObservations((features, *empty), (None, *unseen), encoding)

@@ -33,6 +33,7 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
     fit_regression_inputs,
     fit_visual_regression,
     posterior_axes,
+    sound_features,
 )
 from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
@@ -203,7 +204,7 @@ def _observations(
 ) -> AudioVisualObservations:
     """Return the speech of an example with its visual streams, from motion in the space [shape=(T, Q)]."""
     streams = (_features(example), *(stream.standardised(values) for stream in visual))
-    return AudioVisualObservations(streams, (None, *(valid for _ in visual)))
+    return AudioVisualObservations(streams, (None, *(valid for _ in visual)), example.speech.encoding)
 
 
 def _features(example: Example) -> NDArray[np.float32]:
@@ -252,9 +253,10 @@ def _fitted_regression(
         _threaded(lambda utterance: _chain_posteriors(model.chains, utterance, (0, *visual_chains)), data)
     )
     axes = posterior_axes(first for first, *_ in posteriors)
+    encoded = all(utterance.observations.encoding is not None for utterance in data)
     utterances = [
         RegressionUtterance(
-            utterance.observations.streams[0],
+            sound_features(utterance.observations, encoded=encoded),
             first @ axes,
             visual,
             utterance.observations.streams[1:],
