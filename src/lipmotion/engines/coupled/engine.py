@@ -20,6 +20,7 @@ from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, Cou
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
+from lipmotion.motion.articulation import slice_dynamics, unseen_share
 from lipmotion.motion.generation import Statistics, split_into_blocks
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -36,6 +37,9 @@ from lipmotion.types import (
     Unit,
 )
 
+ENCODING_SHARE = 0.8
+"""Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none."""
+
 
 @final
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class CoupledEngine(Engine[CoupledModel]):
     Config: ClassVar[type[Configuration]] = CoupledConfig
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102, ARG002
-        return Inputs(speech_alone=True, encoding=self.config.dynamic and self.config.acoustic_regression)
+        return Inputs(speech_alone=True, encoding=self.config.uses_encoding)
 
     def fit(  # noqa: D102
         self,
@@ -110,7 +114,12 @@ class CoupledEngine(Engine[CoupledModel]):
         if self.config.conversion != TRAJECTORY:
             streams = convert(chains, inference.observations, inference.lattice, self.config.em, inference).streams[1:]
             return model.frame_statistics(streams), inference.posteriors.most_probable
-        return model.motion_statistics(inference), inference.posteriors.most_probable
+        means, precisions = model.motion_statistics(inference)
+        share = ENCODING_SHARE * min(2 * unseen_share(speech.voice), 1.0)
+        if share and model.encoding is not None and speech.encoding is not None:
+            means += share * (slice_dynamics(model.encoding.predict(speech)[0], frames) - means)
+            precisions += share * (1 / model.encoding.variances - precisions)
+        return (means, precisions), inference.posteriors.most_probable
 
     def infer(self, model: CoupledModel, speech: Speech, frames: slice) -> Inference:
         """Return the posteriors of the chains given some frames of speech.

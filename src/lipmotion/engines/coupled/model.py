@@ -28,6 +28,7 @@ from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, measure_limits
 from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
+from lipmotion.motion.prior_regression import EncodingRegression
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, Speech, option
@@ -133,6 +134,11 @@ class CoupledConfig(Configuration):
         return self.dynamic and self.modulation_filter > 0
 
     @property
+    def uses_encoding(self) -> bool:
+        """Whether voices that training does not know follow their encoding."""
+        return self.dynamic and self.acoustic_regression and self.conversion == TRAJECTORY
+
+    @property
     def em(self) -> ConversionSettings:
         """The conversion by EM."""
         return ConversionSettings(self.start, self.update, self.steps)
@@ -160,6 +166,7 @@ class CoupledModel:
     closure    : how the lips close; None: the motion has no opening
     prior      : the table of articulation in the speaker's range (None: there is none)
     modulation : restores fast movement (None: the motion stays as it is)
+    encoding   : of voices that training does not know, the motion by their encoding (None: there was none)
     """
 
     chains: Chains
@@ -171,6 +178,7 @@ class CoupledModel:
     closure: Closure | None
     prior: ArticulationPrior | None = None
     modulation: ModulationFilter | None = None
+    encoding: EncodingRegression | None = None
 
     def __repr__(self) -> str:
         size = f"{self.chains.parameters} parameters, {self.space.dimensions} dimensions"
@@ -205,8 +213,7 @@ class CoupledModel:
 
     def speech_observations(self, speech: Speech, frames: slice = slice(None)) -> AudioVisualObservations:
         """Return observations of some frames of speech in which no visual stream was observed."""
-        encoding = None if speech.encoding is None else np.asarray(speech.encoding[frames])
-        return speech_observations(np.asarray(speech.features.values)[frames], self.visual, encoding)
+        return speech_observations(speech, self.visual, frames)
 
     def with_motion(self, observations: AudioVisualObservations, values: Array) -> AudioVisualObservations:
         """Return the observations with motion in the space [shape=(T, Q)] as the visual streams."""
@@ -255,7 +262,7 @@ class CoupledModel:
         """Return the regression inputs of all frames [shape=(T, F + 1)]; None: there is no regression."""
         if self.regression is None:
             return None
-        return self.regression[0](inference.observations, inference.posteriors.chains[0])
+        return self.regression[0](inference.observations.streams[0], inference.posteriors.chains[0])
 
     def is_away_from_speech(self, posterior: Single) -> NDArray[np.bool_]:
         """Return whether each frame is silence away from speech, by posteriors of the first chain [shapes=(T,), (T,

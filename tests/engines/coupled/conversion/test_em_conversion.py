@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import KINDS, TWO, chains, observations, structure
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     PRINTED,
@@ -27,7 +26,7 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import _state_regressions, fit_coupled
-from lipmotion.errors import InputError
+from lipmotion.stats.curves import with_dynamics
 from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
 from oracles import coupled as oracle
@@ -115,12 +114,12 @@ def test_the_printed_update_weighs_by_components_and_partners():
     np.testing.assert_allclose(printed, expected, rtol=1e-3, atol=1e-4)
 
 
-def utterances(width=39, count=3, frames=60, states=4) -> list[RegressionUtterance]:
-    draw = np.random.default_rng(0)
+def utterances(count=3, frames=60, states=4, seed=0) -> list[RegressionUtterance]:
+    draw = np.random.default_rng(seed)
     result = []
     for _ in range(count):
         first = draw.dirichlet(np.full(states, 0.2), frames).astype(np.float32)
-        features = draw.normal(0, 1, (frames, width)).astype(np.float32)
+        features = draw.normal(0, 1, (frames, 39)).astype(np.float32)
         visual = draw.dirichlet(np.full(6, 0.2), frames).astype(np.float32)
         observed = draw.random(frames) < 0.8
         target = (features[:, :2] + visual[:, :2] * 3).astype(np.float32)
@@ -129,30 +128,21 @@ def utterances(width=39, count=3, frames=60, states=4) -> list[RegressionUtteran
     return result
 
 
-@pytest.mark.parametrize("encoded", [False, True])
-def test_the_regressions_are_ridges_one_towards_the_other(encoded):
+def test_the_regressions_are_ridges_one_towards_the_other():
     """By normal equations over explicitly weighted rows: all, then families, then regressions."""
-    data = utterances(39 + 64 * encoded)
-    heard = [
-        AudioVisualObservations((each.features[:, :39],), (None,), each.features[:, 39:] if encoded else None)
-        for each in data
-    ]
+    data = utterances()
     inputs = fit_regression_inputs(np.eye(4, dtype=np.float32), data)
     regression_of_state, family = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 0, 1])
     found = fit_visual_regression(inputs, data, 0, regression_of_state, family)
-    rows = [inputs(sound, one.reduced_posteriors)[one.observed] for sound, one in zip(heard, data, strict=True)]
-    z = np.concatenate(rows).astype(float)
-    if encoded:
-        with pytest.raises(InputError, match="the speech has no encoding"):
-            inputs(replace(heard[0], encoding=None), data[0].reduced_posteriors)
+    z = np.concatenate([inputs(one.features, one.reduced_posteriors)[one.observed] for one in data]).astype(float)
     target = np.concatenate([one.targets[0][one.observed] for one in data]).astype(float)
     weight = np.concatenate(
         [regression_weights(one.chain_posteriors[0], regression_of_state, 3)[one.observed] for one in data]
     ).astype(float)
 
-    def solved(share, prior, strength):
-        system = z.T @ (share[:, None] * z) + strength * np.eye(z.shape[1])
-        return np.linalg.solve(system, z.T @ (share[:, None] * target) + strength * prior)
+    def solved(rows, prior, strength):
+        system = z.T @ (rows[:, None] * z) + strength * np.eye(z.shape[1])
+        return np.linalg.solve(system, z.T @ (rows[:, None] * target) + strength * prior)
 
     shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), SHARED_RIDGE * len(z))
     for number in range(3):
@@ -205,3 +195,25 @@ def test_the_mouth_rests_in_long_silence():
     opening = model.rest_pose[model.space.direct_names.index("opening")]
     assert np.abs(generated[:30] - opening).max() < 2e-3
     assert generated[30:].max() > 0.15
+
+
+def test_unknown_voices_follow_their_encoding():
+    draw, config = np.random.default_rng(0), CoupledConfig(mixtures=1, closures=False, articulation=False)
+    heard = [
+        replace(each, speech=replace(each.speech, encoding=draw.normal(size=(len(each.valid), 64)).astype(np.float16)))
+        for each in examples(4)
+    ]
+    engine = CoupledEngine(config)
+    model = engine.from_arrays(engine.to_arrays(engine.fit(heard, silent_monitor).model))
+    known, unknown = (replace(heard[0].speech, voice=voice) for voice in (1.0, 0.5))
+    assert np.array_equal(
+        engine.generate(model, known).motion.values,
+        engine.generate(model, replace(known, encoding=None)).motion.values,
+    )
+    whole = slice(0, len(heard[0].valid))
+    means, precisions = model.motion_statistics(engine.infer(model, unknown, whole))
+    (found, sharp), _ = engine._statistics(model, unknown, whole)
+    predicted = with_dynamics(model.encoding.predict(unknown)[0])
+    np.testing.assert_allclose(found, 0.2 * means + 0.8 * predicted)
+    np.testing.assert_allclose(sharp, 0.2 * precisions + 0.8 / model.encoding.variances)
+    assert engine.fit(examples(4), silent_monitor).model.encoding is None

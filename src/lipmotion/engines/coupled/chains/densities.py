@@ -20,13 +20,10 @@ LEAST_COMPONENT_FRAMES = 0.1
 class AudioVisualObservations:
     """Streams of T frames [each shape=(T, D_s)], speech first, and where each was observed [each shape=(T,)] (None:
     all).
-
-    encoding : of the speech encoder [shape=(T, 64)], which the chains do not emit, but visual means follow (None: none)
     """
 
     streams: tuple[Single, ...]
     observed: tuple[NDArray[np.bool_] | None, ...]
-    encoding: NDArray[np.floating] | None = None
 
     @property
     def frames(self) -> int:
@@ -45,7 +42,7 @@ class AudioVisualObservations:
         """
         streams, masks = list(self.streams), list(self.observed)
         streams[stream], masks[stream] = values, observed
-        return replace(self, streams=tuple(streams), observed=tuple(masks))
+        return AudioVisualObservations(tuple(streams), tuple(masks))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
-from lipmotion.errors import CorpusError, InputError
-from lipmotion.motion.context_window import FEATURES, AcousticContext, fit_acoustic_context
-from lipmotion.motion.context_window import OFFSETS as ACOUSTIC_OFFSETS
+from lipmotion.errors import CorpusError
+from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
 from lipmotion.stats.trees import ridge, zero_statistics
 
 Array = NDArray[np.float64]
@@ -56,12 +54,10 @@ class RegressionInputs:
     mean: Single
     basis: Single
 
-    def __call__(self, observations: AudioVisualObservations, posterior: Single) -> Single:
-        """Return the regression inputs [shape=(T, F + 1)], constant last, of speech and posteriors [shape=(T, N)].
-
-        Raises InputError: the regression uses the encoding of speech, and there is none.
+    def __call__(self, features: Single, posterior: Single) -> Single:
+        """Return the regression inputs [shape=(T, F + 1)], constant last, of features [shape=(T, 39)] and posteriors
+        [shape=(T, N)].
         """
-        features = sound_features(observations, encoded=len(self.acoustic.mean) > FEATURES * len(ACOUSTIC_OFFSETS))
         return self._projected(_context(self.acoustic, features, posterior @ self.posterior_basis))
 
     def observed_frames(self, utterance: RegressionUtterance) -> Single:
@@ -72,15 +68,6 @@ class RegressionInputs:
     def _projected(self, context: Single) -> Single:
         projected = (context - self.mean) @ self.basis
         return np.concatenate([projected, np.full((len(projected), 1), CONSTANT, np.float32)], axis=1)
-
-
-def sound_features(observations: AudioVisualObservations, *, encoded: bool) -> Single:
-    """Return the features of speech, beside its encoding if ``encoded`` [shape=(T, 39) or (T, 39 + 64)]."""
-    if not encoded:
-        return observations.streams[0]
-    if observations.encoding is None:
-        raise InputError("the speech has no encoding, from which this model's means are regressed")
-    return np.concatenate([observations.streams[0], observations.encoding], axis=1, dtype=np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +112,7 @@ def regression_weights(posterior: Single, regression_of_state: NDArray[np.intp],
 class RegressionUtterance:
     """What the regressions are learned from, for one utterance.
 
-    features           : of ``sound_features`` [shape=(T, D)]
+    features           : acoustic features [shape=(T, 39)]
     reduced_posteriors : posteriors of the first chain along their principal axes [shape=(T, R)]
     chain_posteriors   : for each visual stream, the posteriors of the states of its chain [each shape=(T, N_v)]
     targets            : the visual streams [each shape=(T, D)]
