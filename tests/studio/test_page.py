@@ -178,6 +178,35 @@ def page(opened: Page) -> Page:
     return opened
 
 
+PIN = """const tracks = studio.timeline.tracks.at(-1), row = tracks.rows.get("opening");
+  const step = studio.store.recording.steps.findLast((step) => step.startsWith("pin opening"));
+  const [, value, time_s] = /^pin opening (\\S+) at ([^ ]+)/.exec(step);
+  const pin = { channel: "opening", value: +value, time_s: +time_s, slope: null };
+  const { left, top } = row.element.getBoundingClientRect();
+  return [studio.timeline.x(pin.time_s), tracks.y(row, pin.value), ...tracks.ends(row, pin)[1]]
+    .map((place, n) => place + (n % 2 ? top : left))"""
+"""Where the last pin of the opening is, and its right handle [pixels]."""
+
+
+def move_and_turn_a_pin(page: Page) -> None:
+    """Drag the last pin of the opening, turn the curve there by a handle, and take the pin out."""
+    x, y, *_ = page.window.run(PIN)
+    for act, ended in (
+        (lambda: page.window.drag((x, y), (x + 5, y - 3), (x + 10, y - 6)), r"pin opening \S+ at \S+"),
+        (
+            lambda: page.window.drag(tuple(page.window.run(PIN)[2:]), (x + 40, y - 30)),
+            r"pin opening \S+ at \S+ slope \S+",
+        ),
+    ):
+        count = len(page.steps)
+        act()
+        page.wait_for_steps(count + 2)
+        unpin, pin = page.steps[-2:]
+        assert re.fullmatch(r"unpin opening at \S+", unpin)
+        assert re.fullmatch(ended, pin), pin
+    page.edit(lambda: page.window.press(DELETE), r"unpin opening at \S+")
+
+
 def test_each_edit_by_pointer_and_keys(page):
     window = page.window
 
@@ -217,6 +246,7 @@ def test_each_edit_by_pointer_and_keys(page):
     page.edit(lambda: window.drag((x, y), *way), r"draw opening (\S+ ){3,}from \S+ to \S+")
     page.edit(lambda: window.drag((x - 90, y)), r"pin opening \S+ at \S+")
     window.press("d")
+    move_and_turn_a_pin(page)
     window.click("#tab-delivery")
     page.edit(lambda: window.click("#set-stepped"), "set stepped true")
     made = page.steps

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any, get_type_hints
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, CurveEdit, DrawnCurve, Gain, Hold, Pin, SlopedPin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery, MoodKey, Staging, format_moods, parse_moods, sort_moods
 from lipmotion.types.values import describe_value, parse_number, parse_whole
 from lipmotion.units import PHONES, describe_unknown_phone, is_silent
@@ -283,6 +283,39 @@ class CurveStep(Step):
     def stated(self) -> CurveEdit | Hold:  # noqa: D102
         return self.edit
 
+    @property
+    def parts(self) -> tuple[CurveEdit | Hold, ...]:
+        """The edit, or the pins that make up one with a slope."""
+        return self.edit.pins if isinstance(self.edit, SlopedPin) else (self.edit,)
+
+
+@dataclass(frozen=True)
+class PinRemoved(Step):
+    """The pins of a curve at a time hold no longer."""
+
+    channel: str
+    time_s: float
+
+
+def remove_pins(steps: Sequence[Step]) -> tuple[Step, ...]:
+    """Return edits without the pins that were taken out again. Raises InputError: there was none to take out."""
+    left: list[Step] = []
+    for step in steps:
+        if not isinstance(step, PinRemoved):
+            left.append(step)
+            continue
+        there = [
+            each
+            for each in left
+            if isinstance(each, CurveStep) and isinstance(each.edit, Pin) and each.edit.channel == step.channel
+            if abs(each.edit.time_s - step.time_s) < 0.5 / FRAME_RATE_HZ
+        ]
+        if not there:
+            pins = [repr(str(each)) for each in left if str(each).startswith(f"pin {step.channel} ")]
+            raise InputError(f"{str(step)!r}: pinned is {'; '.join(pins) or 'nothing'}")
+        left = [each for each in left if each not in there]
+    return tuple(left)
+
 
 @dataclass(frozen=True)
 class LockStep(Step):
@@ -295,11 +328,12 @@ class LockStep(Step):
         if not self.start_s < self.end_s:
             raise InputError(f"{str(self)!r}: required an end after the start")
 
-    def holds(self, edit: CurveEdit | Hold) -> bool:
-        """Return whether a pin, or all of another edit of values, lies in the locked span."""
-        if isinstance(edit, Pin):
+    def holds(self, step: Step) -> bool:
+        """Return whether a step changes values in the locked span: a pin, or all of another edit of values."""
+        edit = step.stated
+        if isinstance(edit, Pin | PinRemoved):
             return self.covers(edit.time_s, edit.time_s)
-        return self.start_s <= edit.start_s and edit.end_s <= self.end_s
+        return isinstance(step, CurveStep) and self.start_s <= edit.start_s and edit.end_s <= self.end_s
 
     def covers(self, start_s: float, end_s: float) -> bool:
         """Return whether some time lies in the locked span."""
@@ -403,6 +437,8 @@ STEPS: dict[str, Any] = {
     "remove phone {number}": PhoneRemoved,
     "insert {phone} from {start_s} to {end_s}": PhoneInserted,
     "pin {channel} {value} at {time_s}": Pin,
+    "pin {channel} {value} at {time_s} slope {slope}": SlopedPin,
+    "unpin {channel} at {time_s}": PinRemoved,
     "gain {factor} from {start_s} to {end_s}": Gain,
     "gain {channel} {factor} from {start_s} to {end_s}": Gain,
     "draw {channel} {values} from {start_s} to {end_s}": DrawnCurve,

@@ -41,6 +41,7 @@ from lipmotion.pipeline.edits import (
     WordsSaidSo,
     WordStep,
     find_locks,
+    remove_pins,
     with_span,
 )
 from lipmotion.pipeline.excerpts import apply_excerpt, cut_analysis, find_excerpt
@@ -312,10 +313,10 @@ class Session:
         generation = generation.with_motion(said)  # what phones beside a lock ask must not reach into it
         for place, lock in locks.items():
             for later in steps[place + 1 :]:
-                if isinstance(later, CurveStep) and lock.holds(later.edit):
+                if lock.holds(later):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
             generation = apply_stretch(generation, self._locked(steps[:place], lock, generation.motion.names))
-            earlier = [step.edit for step in steps[:place] if isinstance(step, CurveStep)]
+            earlier = [edit for step in steps[:place] if isinstance(step, CurveStep) for edit in step.parts]
             before = tuple(edit for edit in generation.curve_edits if edit in earlier)
             if len(before) < len(generation.curve_edits):
                 kept = Locked(lock.start_s, lock.end_s, before)
@@ -339,7 +340,7 @@ class Session:
 
     def _with_curves(self, steps: tuple[Step, ...]) -> Generation:
         """Return the motion after some edits without locks: the engine's, then gains and what bends single curves."""
-        edits = [step.edit for step in steps if isinstance(step, CurveStep)]
+        edits = [edit for step in remove_pins(steps) if isinstance(step, CurveStep) for edit in step.parts]
         phone_steps = tuple(step for step in steps if isinstance(step, PhoneStep | WordStep))
         if not edits:
             return self._with_pins(phone_steps, ())

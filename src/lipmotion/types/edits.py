@@ -9,6 +9,7 @@ from numbers import Real
 from typing import ClassVar
 
 from lipmotion.errors import InputError, shorten
+from lipmotion.types.audio import FRAME_RATE_HZ
 
 LARGEST_GAIN, MAX_DRAWN = 3.0, 10_000
 """Largest factor of movements, and largest number of values of a drawn curve."""
@@ -38,6 +39,22 @@ class Pin:
                 is_number = False
             if not is_number:
                 raise InputError(f"the {name} of a pin is {shorten(repr(number))}, required a number")
+
+
+@dataclass(frozen=True)
+class SlopedPin(Pin):
+    """A pin through which the curve goes at a slope.
+
+    slope : of the curve, in its unit per second
+    """
+
+    slope: float
+
+    @property
+    def pins(self) -> tuple[Pin, ...]:
+        """The values in the frame itself, and in those beside it."""
+        steps = (step / FRAME_RATE_HZ for step in (0, -1, 1) if self.time_s + step / FRAME_RATE_HZ >= 0)
+        return tuple(Pin(self.time_s + step, self.channel, self.value + step * self.slope) for step in steps)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ export const KEYS = [
   { key: ["Enter"], group: "edit", shown: ["Enter"], help: "type", act: (studio) => studio.type() },
   { key: ["s"], group: "edit", shown: ["S"], help: "splitPhone", act: (studio) => studio.withPhone((index) => studio.split(index)) },
   { key: ["m"], group: "edit", shown: ["M"], help: "mergePhone", act: (studio) => studio.withPhone((index) => studio.merge(index)) },
-  { key: ["Delete", "Backspace"], group: "edit", shown: ["Del"], help: "removePhone", act: (studio) => studio.withPhone((index) => studio.removePhone(index)) },
+  { key: ["Delete", "Backspace"], group: "edit", shown: ["Del"], help: "removePhone", act: (studio) => studio.remove() },
   { key: ["i"], group: "edit", shown: ["I"], help: "insertPhone", act: (studio) => studio.focusOn("insert-phone") },
   { key: ["ArrowLeft", "ArrowRight"], shift: true, group: "edit", shown: ["⇧ ←", "⇧ →"], help: "moveEnd", act: (studio, { key }) => studio.nudge("end", key === "ArrowLeft" ? -1 : 1) },
   { key: ["ArrowLeft", "ArrowRight"], ctrl: true, shift: true, group: "edit", shown: ["⌃⇧ ←", "⌃⇧ →"], help: "moveStart",

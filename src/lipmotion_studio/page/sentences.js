@@ -13,7 +13,8 @@ export const say = {
   split: (number, time_s) => `split phone ${number} at ${seconds(time_s)}`,
   remove: (number) => `remove phone ${number}`,
   insert: (phone, start_s, end_s) => `insert ${phone} from ${seconds(start_s)} to ${seconds(end_s)}`,
-  pin: (channel, value, time_s) => `pin ${channel} ${rounded(value)} at ${seconds(time_s)}`,
+  pin: (channel, value, time_s, slope = null) => `pin ${channel} ${rounded(value)} at ${seconds(time_s)}${slope === null ? "" : ` slope ${rounded(slope)}`}`,
+  unpin: (channel, time_s) => `unpin ${channel} at ${seconds(time_s)}`,
   gain: (channel, factor, start_s, end_s) => `gain ${channel ? `${channel} ` : ""}${rounded(factor)} from ${seconds(start_s)} to ${seconds(end_s)}`,
   draw: (channel, values, start_s, end_s) => `draw ${channel} ${values.map(rounded).join(" ")} from ${seconds(start_s)} to ${seconds(end_s)}`,
   hold: (start_s, end_s) => `hold from ${seconds(start_s)} to ${seconds(end_s)}`,
@@ -25,7 +26,8 @@ export const say = {
 
 const NUMBER = "([-+\\d.e]+)";
 const FORMS = {
-  pin: new RegExp(`^pin (\\S+) ${NUMBER} at ${NUMBER}$`),
+  pin: new RegExp(`^pin (\\S+) ${NUMBER} at ${NUMBER}(?: slope ${NUMBER})?$`),
+  unpin: new RegExp(`^unpin (\\S+) at ${NUMBER}$`),
   gain: new RegExp(`^gain (?:(\\S+) )?${NUMBER} from ${NUMBER} to ${NUMBER}$`),
   draw: new RegExp(`^draw (\\S+) (.+) from ${NUMBER} to ${NUMBER}$`),
   hold: new RegExp(`^hold from ${NUMBER} to ${NUMBER}$`),
@@ -42,7 +44,8 @@ const FORMS = {
 export function placed(steps) {
   const found = { pins: [], gains: [], drawn: [], holds: [], locks: [], moods: [], set: {} };
   const read = {
-    pin: ([, channel, value, time_s]) => found.pins.push({ channel, value: +value, time_s: +time_s }),
+    pin: ([, channel, value, time_s, slope]) => found.pins.push({ channel, value: +value, time_s: +time_s, slope: slope === undefined ? null : +slope }),
+    unpin: ([, channel, time_s]) => { found.pins = found.pins.filter((pin) => pin.channel !== channel || Math.abs(pin.time_s - time_s) >= 0.005); },
     gain: ([, channel, factor, start_s, end_s]) => found.gains.push({ channel: channel ?? "", factor: +factor, start_s: +start_s, end_s: +end_s }),
     draw: ([, channel, , start_s, end_s]) => found.drawn.push({ channel, start_s: +start_s, end_s: +end_s }),
     hold: ([, start_s, end_s]) => found.holds.push({ start_s: +start_s, end_s: +end_s }),

@@ -13,16 +13,19 @@ export class Refused extends Error {
 }
 
 export class Server {
-  constructor(token) { this.token = token; }
+  constructor(token) { [this.token, this.waiting] = [token, 0]; }
 
-  /** Return the reply to a request. Throws `Refused`. */
+  /** Return the reply to a request; the page shows that it waits. Throws `Refused`. */
   async reply(path, request = {}) {
     let reply;
+    document.body.classList.toggle("waiting", ++this.waiting);
     try {
       reply = await fetch(`/api/${path}`, { ...request, headers: { "x-lipmotion-token": this.token, ...request.headers } });
     } catch (error) {
       if (error.name === "AbortError") throw error;
       throw new Refused(0, TEXT.noReply);
+    } finally {
+      document.body.classList.toggle("waiting", --this.waiting);
     }
     if (reply.ok) return reply;
     const content = await reply.json().catch(() => ({}));

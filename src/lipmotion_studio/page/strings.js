@@ -252,7 +252,7 @@ export const HELP = {
   type: "type another phone or word",
   splitPhone: "split the phone at the playhead",
   mergePhone: "join with the next phone",
-  removePhone: "remove the phone",
+  removePhone: "remove the phone or the pin",
   insertPhone: "insert a phone in the selection: choose it, Enter",
   moveEnd: "move the end of the phone by a frame",
   moveStart: "move its beginning by a frame",

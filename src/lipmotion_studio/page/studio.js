@@ -73,7 +73,6 @@ export class Studio {
       this.message.className = store.message.kind;
     });
     store.on(["saving", "unsaved", "recording"], () => {
-      this.state.classList.toggle("busy", Boolean(store.saving));
       this.state.textContent = store.saving ? TEXT.saving : store.unsaved ? TEXT.notSaved : store.recording ? TEXT.saved : "";
     });
     store.on(["project", "recording"], () => {
@@ -223,7 +222,7 @@ export class Studio {
   }
 
   /** Make edits; one after another, each with the revision that the one before left. Returns whether they were made. */
-  edit(steps) { return this.request("edits", { steps }, fill(TEXT.changed, { what: steps[0] ?? "" })); }
+  edit(steps) { return this.request("edits", { steps }, fill(TEXT.changed, { what: steps.join(", ") })); }
 
   /** Where a dragged border is: each edit takes the place of the one before; all others wait for the last one. */
   dragBorder(steps, instead) {
@@ -361,7 +360,14 @@ export class Studio {
     this.store.set({ span: { start_s: Math.min(span.start_s, now.start_s), end_s: Math.max(span.end_s, now.end_s) } });
   }
 
-  chooseCurve(channel) { this.store.set({ selected: { kind: "curve", index: this.store.channels.indexOf(channel), channel }, tab: "edit" }); }
+  chooseCurve(channel, pin_s = null) { this.store.set({ selected: { kind: "curve", index: this.store.channels.indexOf(channel), channel, pin_s }, tab: "edit" }); }
+
+  /** Take out the selected pin, or else the selected phone. */
+  remove() {
+    const { selected } = this.store;
+    if (selected?.kind !== "curve" || selected.pin_s === null) return this.withPhone((index) => this.removePhone(index));
+    return this.edit([say.unpin(selected.channel, selected.pin_s)]);
+  }
 
   /** The next or previous phone or word, by the key of tabulators; past the last one the focus goes on. */
   tab(event) {

@@ -25,6 +25,8 @@ SENTENCES = (
     "remove phone 2",
     "insert m from 0.5 to 0.56",
     "pin jawOpen 1e-05 at 1.2",
+    "pin opening 0.1 at 1.2 slope -0.5",
+    "unpin opening at 1.2",
     "gain 1.3 from 1.0 to 2.0",
     "gain jawOpen 0.8 from 1.0 to 2.0",
     "draw opening 0.1 0.12 0.0 from 1.0 to 1.5",
@@ -48,7 +50,7 @@ def test_every_kind_of_edit_is_a_sentence():
     [
         ("phone twelve is p", "is no edit; required one of: phone NUMBER is PHONE; phone NUMBER begins"),
         ("jump", "is no edit; required one of: word NUMBER is WORD"),
-        ("pin opening 1,2 at 1", "is no edit; required pin CHANNEL VALUE at TIME"),
+        ("pin opening 1,2 at 1", "is no edit; required one of: pin CHANNEL VALUE at TIME; pin"),
         ("pin opening nan at 1", "is no edit"),
         ("gain 9 from 0 to 1", "the gain is 9, required 0 to 3"),
         ("word 1 is tear said t eh R", "unknown phone 'R'"),

@@ -199,11 +199,20 @@ def test_a_locked_span_stays_as_it_was(session):
     assert jump < 2 * np.abs(np.diff(session.generate(edited("gain 2 from 0.2 to 2.0")).motion["opening"])).max()
     assert LOCK_EDGE_S > 0
     number = next(n for n, span in enumerate(session.units(), 1) if span.start_s > 0.6)
-    for refused in (f"phone {number} is p", "pin opening 0.2 at 0.7", "gain 2 from 0.7 to 0.8"):
+    for refused in (f"phone {number} is p", "pin opening 0.2 at 0.7", "gain 2 from 0.7 to 0.8", "unpin opening at 0.8"):
         with pytest.raises(InputError, match=r"locked \('lock from 0.6 to 1.0'\); take the lock out first"):
             session.generate(first.then(refused))
     freed = session.generate(later.then("unlock from 0.6 to 1.0", "pin opening 0.2 at 0.7"))
     assert freed.motion["opening"][70] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("curve", ["opening", "tongue"])
+def test_a_pin_has_a_slope_and_can_be_taken_out(session, curve):
+    pinned = edited(f"pin {curve} 0.2 at 1.0 slope -1.5", f"pin {curve} 0.1 at 1.5")
+    motion = session.generate(pinned).motion[curve]
+    assert motion[[99, 100, 101, 150]] == pytest.approx([0.215, 0.2, 0.185, 0.1])
+    left = session.generate(pinned.then(f"unpin {curve} at 1.0")).motion
+    assert np.array_equal(left.values, session.generate(edited(f"pin {curve} 0.1 at 1.5")).motion.values)
 
 
 def test_a_locked_span_keeps_channels_that_are_added_later(session):
@@ -261,6 +270,7 @@ def test_edits_of_another_recording_are_refused(session, toy_model, request_):
         ("pin jawopen 0.1 at 1", r"'jawopen' \(is it jawOpen\?\)"),
         ("gain 2 from 0 to 99", "required times from 0 to"),
         ("unlock from 1.0 to 2.0", "locked is nothing"),
+        ("unpin opening at 1.0", "pinned is nothing"),
         ("gain lips 2 from 0 to 1", "cannot change 'lips'"),
     ],
 )

@@ -6,6 +6,7 @@ import { cleared, colour } from "./canvas.js";
 
 const SCALE_STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10], SCALE_PX = 22;
 const PAD_PX = 6, STROKE_STEP_S = 0.02, ROOM = 0.2, OF_WEIGHTS = [-0.06, 1.06];
+const HANDLE_PX = 28, NEAR_PX = 8;
 
 export class CurveTracks {
   constructor(timeline) {
@@ -14,6 +15,7 @@ export class CurveTracks {
     this.selectable = true;
     this.rows = new Map();
     this.stroke = null; // what is being drawn: channel and points by time
+    this.grip = null; // the pin that is being moved, and where it is now
     this.element = make("div", { className: "track curves" });
   }
 
@@ -80,7 +82,11 @@ export class CurveTracks {
     if (its) this.trace(pen, row, frames, place, (frame) => its.value(frame, its.column(name)), colour.other, comparing ? 2 : 1);
     this.trace(pen, row, frames, place, (frame) => motion.value(frame, column), isSelected ? colour.main : colour.curve, comparing ? 1 : 1.5);
     pen.fillStyle = colour.main;
-    for (const { time_s, value } of pins) this.dot(pen, timeline.x(time_s), this.y(row, value), 3);
+    for (const pin of pins) {
+      const { time_s, value } = pin.time_s === this.grip?.pin.time_s && name === this.grip.pin.channel ? this.grip : pin;
+      this.dot(pen, timeline.x(time_s), this.y(row, value), isSelected && selected.pin_s === pin.time_s ? 5 : 3);
+    }
+    for (const pin of pins) if (isSelected && selected.pin_s === pin.time_s) this.handles(pen, row, pin);
     if (this.stroke?.channel === name) {
       pen.strokeStyle = pen.fillStyle = colour.pen;
       pen.lineWidth = 2;
@@ -153,7 +159,53 @@ export class CurveTracks {
     pen.fill();
   }
 
-  /** Draw over a curve with the pen: a click pins one value. */
+  /** The handles of a pin, which show the slope of the curve there: its ends [pixels]. */
+  ends(row, pin) {
+    const { slope, time_s, value } = this.grip?.pin.time_s === pin.time_s ? this.grip : pin, { timeline, store } = this;
+    const curve = store.curvesOf(pin.channel), step_s = 1 / curve.rate_hz, [before, after] = [-step_s, step_s].map((step) => curve.at(time_s + step, curve.column(pin.channel)));
+    const rise = slope ?? (after - before) / (2 * step_s);
+    const x = timeline.x(time_s), y = this.y(row, value), across = 1 / timeline.px_s, up = this.y(row, value + rise * across) - y;
+    const length = HANDLE_PX / Math.hypot(1, up);
+    return [-1, 1].map((side) => [x + side * length, y + side * up * length]);
+  }
+
+  handles(pen, row, pin) {
+    const ends = this.ends(row, pin);
+    pen.strokeStyle = colour.main;
+    pen.lineWidth = 1;
+    pen.beginPath();
+    for (const end of ends) pen.lineTo(...end);
+    pen.stroke();
+    for (const end of ends) this.dot(pen, ...end, 2.5);
+  }
+
+  /** Return what of a pin is under the pointer: the pin, or a handle of the selected one. */
+  gripAt(name, event) {
+    const box = this.rows.get(name).element.getBoundingClientRect(), { selected, recording } = this.store, row = this.rows.get(name);
+    const near = ([x, y]) => Math.hypot(event.clientX - box.left - x, event.clientY - box.top - y) <= NEAR_PX;
+    const pins = placed(recording.steps).pins.filter(({ channel }) => channel === name);
+    const turned = pins.find((pin) => selected?.channel === name && pin.time_s === selected.pin_s && this.ends(row, pin).some(near));
+    const pin = turned ?? pins.findLast(({ time_s, value }) => near([this.timeline.x(time_s), this.y(row, value)]));
+    return pin && { ...pin, pin, turns: Boolean(turned), moved: false };
+  }
+
+  /** Move a pin, or turn its handles, to where the pointer is. */
+  pull(time_s, value) {
+    const { grip } = this, rate = this.store.recording.rate_hz;
+    grip.moved = true;
+    if (!grip.turns) return Object.assign(grip, { time_s: Math.max(Math.round(time_s * rate), 0) / rate, value });
+    const off_s = time_s - grip.time_s;
+    return Object.assign(grip, { slope: (value - grip.value) / (Math.sign(off_s) * Math.max(Math.abs(off_s), 1 / rate) || 1 / rate) });
+  }
+
+  async release() {
+    const { pin, moved, time_s, value, slope } = this.grip, { channel } = pin, { studio } = this.timeline;
+    studio.chooseCurve(channel, moved ? time_s : pin.time_s);
+    if (moved) await studio.edit([say.unpin(channel, pin.time_s), say.pin(channel, value, time_s, slope)]);
+    this.leave();
+  }
+
+  /** Draw over a curve with the pen: a click pins one value. Without it, pins and their handles can be moved. */
   drawable(name, element) {
     const value = (event) => {
       const row = this.rows.get(name), box = element.getBoundingClientRect(), [least, most] = row.range;
@@ -162,20 +214,22 @@ export class CurveTracks {
     };
     const down = (event) => {
       if (event.button !== 0) return;
-      this.timeline.studio.chooseCurve(name);
-      if (this.store.tool !== "draw" || !this.store.curvesOf(name)) return;
+      const draws = this.store.tool === "draw", grip = !draws && this.store.curvesOf(name) && this.gripAt(name, event);
+      this.timeline.studio.chooseCurve(name, grip ? grip.pin.time_s : null);
+      if (!(draws && this.store.curvesOf(name)) && !grip) return;
       event.preventDefault();
       event.stopPropagation();
       element.setPointerCapture(event.pointerId);
-      this.stroke = { channel: name, points: new Map() };
+      if (grip) this.grip = grip;
+      else this.stroke = { channel: name, points: new Map() };
       const over = new AbortController();
-      const add = (moved) => { this.point(this.timeline.timeOf(moved), value(moved)); };
-      add(event);
+      const add = (moved) => { this[grip ? "pull" : "point"](this.timeline.timeOf(moved), value(moved)); };
+      if (draws) add(event);
       element.addEventListener("pointermove", (moved) => {
         for (const each of moved.getCoalescedEvents?.() ?? [moved]) add(each);
         this.timeline.draw();
       }, { signal: over.signal });
-      element.addEventListener("pointerup", () => { over.abort(); this.drop(); }, { signal: over.signal });
+      element.addEventListener("pointerup", () => { over.abort(); grip ? this.release() : this.drop(); }, { signal: over.signal });
       element.addEventListener("pointercancel", () => { over.abort(); this.leave(); }, { signal: over.signal });
       addEventListener("keydown", (pressed) => {
         if (pressed.key !== "Escape") return;
@@ -202,7 +256,7 @@ export class CurveTracks {
   }
 
   leave() {
-    this.stroke = null;
+    this.stroke = this.grip = null;
     this.timeline.draw();
   }
 }
