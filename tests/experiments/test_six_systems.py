@@ -195,15 +195,12 @@ def test_two_stages_beside_one(toy_corpus):
     made = xieliu2007(toy_corpus, options, sizes=[4], settings=SMALL)
     (row,) = made["rows"]
     assert list(row["training"]) == [REFERENCE_SYSTEM, REFERENCE_SYSTEM + TWO_STAGES]
-    assert [(pair["better"], pair["worse"]) for pair in row["pairs"]] == [
-        (REFERENCE_SYSTEM + TWO_STAGES, REFERENCE_SYSTEM)
-    ]
+    assert [pair["worse"] for pair in row["pairs"]] == [REFERENCE_SYSTEM]
     one, two = row["training"].values()
     assert two["parameters"] > one["parameters"]
     one, two = (of_system["audio only"] for of_system in row["strangers"].values())
     assert two["gain"] == pytest.approx(two["acc"] - one["acc"])
     assert two["acc_gain_95"][0] <= two["gain"] <= two["acc_gain_95"][1]
-    assert "acc_gain_95" not in one
     assert (made["others"], made["others_minutes"] > 0) == (["anna"], True)
     assert "People whom no system knows, at the best lag, audio only" in dict(xie_liu_section(made).more)
 
