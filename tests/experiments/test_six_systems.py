@@ -189,7 +189,6 @@ def test_eigenlips(visual, toy_corpus):
 
 @LONG
 def test_two_stages_beside_one(toy_corpus):
-    """The strangers are the clips that are compared anyway: their openings are the same, at the best lag."""
     others = tuple(SpokenSentence(s.name, "anna", s.audio, s.units) for s in toy_sentences(3))
     options = ComparisonOptions(systems=[REFERENCE_SYSTEM + TWO_STAGES], voices=others, strangers=toy_corpus)
     made = xieliu2007(toy_corpus, options, sizes=[4], settings=SMALL)

@@ -154,7 +154,6 @@ def test_recordings_are_aligned(folder, own, monkeypatch):
 
 
 def test_librispeech_is_read_as_it_is_distributed(tmp_path, own, monkeypatch):
-    """Words stand in the file of a chapter; the reader is known by the name, whatever folder is given."""
     monkeypatch.setattr(module, "agreement_score", lambda *_: 0.0)
     chapter = tmp_path / "LibriSpeech" / "dev-clean" / "84" / "121123"
     sentences = toy_sentences(3)

@@ -83,5 +83,4 @@ def speech_observations(
     """Return observations of some frames of speech in which no visual stream was observed."""
     features = np.asarray(speech.features.values)[frames]
     empty = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in visual)
-    unseen = (np.zeros(len(features), bool) for _ in empty)
-    return AudioVisualObservations((features, *empty), (None, *unseen))
+    return AudioVisualObservations((features, *empty), (None, *(np.zeros(len(features), bool) for _ in empty)))

@@ -155,9 +155,8 @@ def growing_models(
             most_steps = config.speech_only_steps * doublings
             report = _reporter("more speech", most_steps, second_monitor)
             chains = train_on_speech(chains, data, speech_only, config, report, workers())
-        model = CoupledModel(
-            chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior, None, encoding
-        )
+        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
+        model = replace(model, encoding=encoding)
         if config.dynamic and config.acoustic_regression:
             monitor(Progress("regression of visual means", 1, 1, 0.75))
             model = replace(model, regression=_fitted_regression(model, data))
