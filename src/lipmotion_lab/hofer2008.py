@@ -16,8 +16,8 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream.densities import MOTION, SPEECH
 from lipmotion.kernels.compiler import one_thread
-from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
-from lipmotion.pipeline.workers import worker_pool
+from lipmotion.pipeline.training.train import phones_and_examples
+from lipmotion.pipeline.workers import training_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
@@ -106,14 +106,13 @@ def hofer2008(
     checkpoint = open_parts(
         work, corpus, settings, PartKey(_engine(channels=options.channels), (*names, *validation, *held_out))
     )
-    with worker_pool(min(settings.workers, len(names) // UTTERANCES_PER_WORKER)) as team:
+    with training_pool(settings.workers, len(names)) as each:
         phones, examples, _ = phones_and_examples(
             [corpus.utterance(name) for name in names],
             config,
             lexicon,
             sub_monitor(monitor, 0, 0.1),
-            checkpoint,
-            team.ordered_map,
+            replace(checkpoint, parallel_map=each),
         )
 
     def list_recordings(chosen: Sequence[str], part: Monitor) -> HeldOutRecordings:

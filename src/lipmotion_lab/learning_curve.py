@@ -11,14 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import one_thread
+from lipmotion.motion.space import resample_track
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import sub_monitor
+from lipmotion.types import Example, Speech, Timeline, sub_monitor
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import figures_of
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, generate_clips, load_held_out
+from lipmotion_lab.xie_liu2007.systems import BLSTM, as_row, best_trial, tune_network, with_inputs_of
 
 SIZES = (20, 50, 100, 200)
 """Default numbers of recordings: those of them that are smaller than the list; and the whole list."""
@@ -34,12 +37,14 @@ def learning_curve(
     order: Sequence[str] | None = None,
     sizes: Sequence[int] | None = None,
     split: str | None = "test",
+    rival: bool = False,
     work: Path | None = None,
     settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Train on the first N utterances of a list, for every N of ``sizes``; return figures of each model on ``split``.
 
     sizes    : by default 20, 50, 100, 200, as far as the list goes, and the whole list
+    rival    : train a BLSTM on the same utterances, with the settings that are best on ``val``, and compare
     Phone models and engine are both trained on those N utterances alone; the phone models also align and recognise
     the utterances of the split.
     Raises InputError: sizes under 1 or over the list, or an empty list.
@@ -47,12 +52,13 @@ def learning_curve(
     split; or motion without an opening.
     """
     listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), settings.seed)
-    held_out = corpus.required(split)
+    held_out, validation = corpus.required(split), corpus.required("val") if rival else ()
     steps = choose_sizes(sizes, len(listed))
-    check_training_names(corpus, listed, held_out)
+    check_training_names(corpus, listed, (*held_out, *validation))
     channels = runner.check_opening(corpus, held_out)
     shares = np.cumsum([0, *steps]) / sum(steps)
-    kept = runner.open_parts(work, corpus, settings, runner.PartKey(engine_named("trajectory"), (*listed, *held_out)))
+    key = runner.PartKey(engine_named("trajectory"), (*listed, *held_out, *validation), others=BLSTM * rival)
+    kept = runner.open_parts(work, corpus, settings, key)
     rows = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
         found = kept.load(str(count))
@@ -61,6 +67,8 @@ def learning_curve(
             part = replace(settings, monitor=monitor)
             result = runner.train_and_generate(corpus, listed[:count], held_out, channels, part, work)
             row = {"names": count} | _row(corpus, result, settings.seed)
+            if rival:
+                row[BLSTM] = _compare_network(corpus, result, validation, part)
             for condition, clips in result.clips.items():
                 settings.receive(f"{count} recordings", condition, result.recordings, clips)
             found = {_ROW: np.array(json.dumps([result.recordings.closed_under, row]))}
@@ -111,3 +119,29 @@ def _row(corpus: Corpus, result: runner.HeldOutResult, seed: int) -> dict[str, A
         "seconds": result.seconds,
         "conditions": conditions,
     }
+
+
+def _compare_network(
+    corpus: Corpus, result: runner.HeldOutResult, validation: Sequence[str], settings: runner.ExperimentSettings
+) -> dict[str, Any]:
+    """Return the figures of a BLSTM, and the gains of our model without pins over it, from sound alone."""
+    recordings, examples = result.recordings, list[Example]()
+    for name in result.used:
+        utterance = corpus.utterance(name)
+        motion, valid = resample_track(utterance.track, len(utterance.features.values))
+        examples.append(Example(name, Speech(utterance.features, Timeline(())), motion, valid))
+    judges = load_held_out(
+        corpus, recordings.phones, selection=Selection(names=validation), channels=recordings.channels
+    )
+    system = tune_network(with_inputs_of(BLSTM, examples, corpus), judges, settings.monitor)
+    clips = generate_clips(recordings, AUDIO_ONLY, system.engine, system.model)
+    settings.receive(f"{BLSTM}, {len(examples)} recordings", AUDIO_ONLY, recordings, clips)
+    free = result.model.engine.without_closures()
+    ours = generate_clips(recordings, AUDIO_ONLY, free, result.model.learned)
+    channels: dict[str, Any] = {}
+    for channel in recordings.channels:
+        own, other = (correlation_statistic(*opening_curves(recordings, made, channel)) for made in (ours, clips))
+        channels[channel] = {"ours": own.value, "acc": other.value, "acc_95": other.interval(settings.seed)}
+        channels[channel]["gain_95"] = own.gain(other, settings.seed)
+    best = best_trial(system.tried).options
+    return {"options": best, "tried": [*map(as_row, system.tried)], "channels": channels}

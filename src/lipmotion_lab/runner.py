@@ -75,8 +75,9 @@ DEFAULT_SETTINGS = ExperimentSettings()
 
 @dataclass(frozen=True, eq=False)
 class HeldOutResult:
-    """Motion generated for held-out recordings, by condition; utterances used, and seconds, of the training."""
+    """A model, its motion of held-out recordings by condition; utterances used, and seconds, of the training."""
 
+    model: Model
     recordings: HeldOutRecordings
     clips: Mapping[str, Sequence[ComparedClip]]
     used: tuple[str, ...]
@@ -120,7 +121,7 @@ def train_and_generate(
     generated = {
         condition: generate_clips(recordings, condition, model.engine, model.learned) for condition in conditions
     }
-    return HeldOutResult(recordings, generated, report.used, seconds)
+    return HeldOutResult(model, recordings, generated, report.used, seconds)
 
 
 def check_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from lipmotion_studio.page_replies import ProjectReplies, RecordingReplies
 from lipmotion_studio.recording import OpenRecording
 from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
-from lipmotion_studio.web.files import read_page
+from lipmotion_studio.web.listening import read_page
 from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, failed
 
 FIRST = "studio.html"

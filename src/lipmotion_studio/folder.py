@@ -20,7 +20,7 @@ from typing import Any
 from uuid import uuid4
 
 from lipmotion.errors import ExportError, InputError, LipMotionError
-from lipmotion.pipeline.batch.lines import is_recording, read_lines
+from lipmotion.pipeline.batch.lines import file_key, is_recording, read_lines
 from lipmotion.pipeline.edit_files import EditFile, check_sound, read_edits, write_edits
 from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.storage.files import (
@@ -327,7 +327,7 @@ class ProjectFolder:
         with self.lock:
             folder = self.path / SOUNDS
             make_folder(folder)
-            taken = self._taken_names() | {_key(each.stem) for each in folder.iterdir()}  # also of what was removed
+            taken = self._taken_names() | {file_key(each.stem) for each in folder.iterdir()}  # also of what was removed
             number = self.project.next_number
             recording = ProjectRecording(number, clean_name(Path(name).stem), "", digest, transcript)
             recording = self._choose_name(recording, taken)
@@ -339,13 +339,13 @@ class ProjectFolder:
             return number
 
     def _taken_names(self) -> set[str]:
-        return {_key(recording.name) for recording in self.project.lines.values()}
+        return {file_key(recording.name) for recording in self.project.lines.values()}
 
     def _choose_name(self, recording: ProjectRecording, taken: set[str]) -> ProjectRecording:
         """Return a new recording with a name that is free, and take it; a number is added if needed."""
 
         def is_free(named: ProjectRecording) -> bool:
-            if _key(named.name) in taken:
+            if file_key(named.name) in taken:
                 return False
             files = [path for path in (self.edits(named), self._copy(named)) if path.exists()]
             try:
@@ -357,7 +357,7 @@ class ProjectFolder:
         while not is_free(named):
             number += 1
             named = replace(recording, name=f"{recording.name}-{number}")
-        taken.add(_key(named.name))
+        taken.add(file_key(named.name))
         return named
 
     @property
@@ -453,10 +453,6 @@ def open_folder(source: Path | None, out: Path | None = None) -> Iterator[Projec
         elif not (path / PROJECT).exists():
             folder.save()
         yield folder
-
-
-def _key(name: str) -> str:
-    return unicodedata.normalize("NFD", name).casefold()
 
 
 def copy_file(source: Path, target: Path) -> None:

@@ -195,12 +195,21 @@ class OpenRecording:
         """Return what the page shows of the recording, but for what the project says of it."""
         generation = self.generation
         motion, outlook = generation.motion, generation.outlook
+        rows, first, spans = [], 0, list(generation.units)
+        for word in group_words(generation.units):
+            last = first
+            while last + 1 < len(spans) and spans[last + 1].start_s < word.end_s - 1e-9:
+                last += 1
+            if word.label:
+                times = {"start_s": word.start_s, "end_s": word.end_s}
+                rows.append({"label": word.label, **times, "first": first + 1, "last": last + 1})
+            first = last + 1
         return {
             "settled": self.settled,
             "duration_s": self.audio.duration_s,
             "rate_hz": motion.rate_hz,
             "frames": len(motion.values),
-            "words": word_rows(generation.units),
+            "words": rows,
             "phones": phone_rows(generation.units, self.session.units()),
             "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
             "steps": list(self.file.edits.sentences),
@@ -323,20 +332,6 @@ def phone_rows(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, A
         }
         for span in units
     ]
-
-
-def word_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:
-    """Return the words of phones in time as objects of JSON, with the numbers of their phones, from 1."""
-    rows, first, spans = [], 0, list(units)
-    for word in group_words(units):
-        last = first
-        while last + 1 < len(spans) and spans[last + 1].start_s < word.end_s - 1e-9:
-            last += 1
-        if word.label:
-            times = {"start_s": word.start_s, "end_s": word.end_s}
-            rows.append({"label": word.label, **times, "first": first + 1, "last": last + 1})
-        first = last + 1
-    return rows
 
 
 def frame_confidence(generation: Generation) -> NDArray[np.float64]:

@@ -26,6 +26,7 @@ from lipmotion.storage.files import atomic_file, confine, create_folders, remove
 from lipmotion.storage.locks import unfinished_work
 from lipmotion.types import Item, Monitor, Progress, sub_monitor
 from lipmotion.types.configuration import Configuration, Rule, option
+from lipmotion.types.progress import warnings_to
 from lipmotion.units import Lexicon
 from lipmotion_faces.corpus.long_videos import HELD_OUT_SHARE, LEAST_SPLIT_UTTERANCES
 from lipmotion_faces.corpus.prepare import prepare
@@ -97,10 +98,9 @@ def run_training(order: TrainingOrder, report: Report) -> None:
         elif event.reason:
             report({"skipped" if event.outcome == "skipped" else "noted": event.name, "reason": event.reason})
 
-    handler = _WarningHandler(report)
-    LOG.addHandler(handler)
     try:
-        with confine(order.work.parent):  # the project, in this process
+        # the project is confined in this process
+        with confine(order.work.parent), warnings_to(lambda text: report({"warning": text})):
             begun_s = time.monotonic()
             with create_folders([order.target.parent, order.work]), gather_recordings(order) as recordings:
                 if order.kind == VOICE:
@@ -115,17 +115,6 @@ def run_training(order: TrainingOrder, report: Report) -> None:
         report({"error": str(error)})
     except Exception as error:  # a bug, of which the page is told
         report({"error": f"a bug: {type(error).__name__}: {error}"})
-    finally:
-        LOG.removeHandler(handler)
-
-
-class _WarningHandler(logging.Handler):
-    def __init__(self, report: Report) -> None:
-        super().__init__(logging.WARNING)
-        self._report = report
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._report({"warning": record.getMessage()})
 
 
 @contextmanager

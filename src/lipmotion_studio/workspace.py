@@ -11,9 +11,9 @@ import logging
 import threading
 import time
 from collections import OrderedDict, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from typing import TypeVar
 
 from starlette.exceptions import HTTPException
@@ -22,6 +22,7 @@ from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.types import Item, Progress
+from lipmotion.types.progress import warnings_to
 from lipmotion_studio.folder import NO_EDITS, ProjectFolder
 from lipmotion_studio.project import ProjectRecording
 from lipmotion_studio.recording import OpenRecording, analyse_recording, open_recording
@@ -42,20 +43,6 @@ class NotReadyError(HTTPException):
 
     def __init__(self) -> None:
         super().__init__(503, "the recording is still being analysed; ask again", {"retry-after": "1"})
-
-
-@contextmanager
-def _collect_warnings() -> Iterator[list[str]]:
-    """Give a list of what is warned of in this thread."""
-    texts: list[str] = []
-    handler = logging.Handler(logging.WARNING)
-    handler.addFilter(lambda record: record.thread == threading.get_ident())
-    handler.emit = lambda record: texts.append(record.getMessage())  # type: ignore[method-assign]
-    LOG.addHandler(handler)
-    try:
-        yield texts
-    finally:
-        LOG.removeHandler(handler)
 
 
 class StoppedError(LipMotionError):
@@ -251,7 +238,8 @@ class Workspace:
             if summary is not NO_EDITS:
                 return None
             work.set_status(WORKING)
-            with _collect_warnings() as self.misfits[work.number]:
+            misfits = self.misfits[work.number] = list[str]()
+            with warnings_to(misfits.append, of_thread=True):
                 audio = analyse_recording(self.folder, recording, self.model, work.report)
             if len(self._waiting) % SAVED_EACH == 0:
                 self.folder.save()

@@ -190,7 +190,7 @@ PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
     ("text", "expected"),
     [
         ("av>=14", Requirement("av", ">=14")),
-        ("torch>=2.4; extra == 'network'", Requirement("torch", ">=2.4", "", "network")),
+        ("matplotlib>=3.9; extra == 'plots'", Requirement("matplotlib", ">=3.9", "", "plots")),
         ("opencv-python-headless (<5,>=4.10)", Requirement("opencv-python-headless", "<5,>=4.10")),
         (
             "mediapipe==0.10.14; (python_version < '3.13') and extra == 'video'",

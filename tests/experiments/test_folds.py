@@ -16,8 +16,8 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
-from lipmotion_lab.folds import folds
-from lipmotion_lab.report.sections import folds_section
+from lipmotion_lab.folds import folds, in_blocks
+from lipmotion_lab.report.sections import blocks_section, folds_section
 from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -167,3 +167,39 @@ def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypat
     assert [len(each) for each in left_out] == [2, 2]
     with pytest.raises(InputError, match="5 folds; required: from 2 to 4, which is how many speakers there are"):
         folds(corpus, by_speaker=True, count=5)
+
+
+def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy_corpus, tmp_path):
+    """The figures are those of all clips; what is done is not done again, and clips of ``val`` are not compared."""
+    cut: list[list[tuple[str, ...]]] = []
+
+    def experiment(corpus: Corpus, *, settings: ExperimentSettings) -> dict[str, Any]:
+        cut.append([corpus.names(split) for split in ("train", "val", "test")])
+        for split in ("val", "test"):
+            utterances = [corpus.utterance(name) for name in corpus.names(split)]
+            for system, error in (("true", 0.0), ("noisy", 0.1)):
+                clips = []
+                for one in utterances:
+                    seen = one.track.motion.selected(("opening", "width")).values[one.track.seen]
+                    time_s = np.arange(len(seen)) / RATE_HZ
+                    noise = error * np.random.default_rng(0).normal(size=seen.shape)
+                    clips.append(ComparedClip(seen, seen + noise, time_s, ((0.04, 0.08, "b"),)))
+                recordings = SimpleNamespace(utterances=utterances, channels=("opening", "width"))
+                settings.receive(system, "audio only", recordings, clips)
+        return {}
+
+    figures = in_blocks(experiment, toy_corpus, ["true"], count=4, work=tmp_path)
+    names = list(toy_corpus.names())
+    assert [name for _, _, test in cut for name in test] == names
+    assert all(sorted([*train, *val, *test]) == names for train, val, test in cut)
+    assert [test for _, _, test in cut] == [cut[number - 1][1] for number in range(4)]
+    rows = figures["conditions"]["audio only"]
+    assert rows["true"]["acc"] == pytest.approx(1)
+    assert rows["true"]["score"] == rows["true"]["opening"]["score"] == 100
+    assert rows["noisy"]["acc"] < 1
+    assert rows["noisy"]["acc_gain_95"]["true"][1] < 0 < rows["noisy"]["amse_gain_95"]["true"][0]
+    assert in_blocks(experiment, toy_corpus, ["true"], count=4, work=tmp_path) == figures
+    assert len(cut) == 4
+    assert blocks_section(figures).verdict == "Highest ACC: true, 1.000."
+    with pytest.raises(InputError, match="2 blocks; required: from 3 to 12"):
+        in_blocks(experiment, toy_corpus, [], count=2)

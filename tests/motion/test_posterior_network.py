@@ -61,7 +61,7 @@ def trained(examples: list[Example]) -> PosteriorNetwork:
         patched.setattr(posterior_network, "STEPS", 15.0)
         patched.setattr(posterior_network, "RECURRENT_STEPS", 8.0)
         patched.setattr(posterior_network, "_train_recurrent", TRAINED_RECURRENT)
-        return PosteriorNetwork.train(PredictorTraining(examples, values, 2))
+        return PosteriorNetwork.fit(PredictorTraining(examples, values, 2)).predictor  # type: ignore[return-value]
 
 
 @pytest.fixture(scope="module")

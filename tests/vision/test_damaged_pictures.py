@@ -9,7 +9,8 @@ from functools import partial
 
 import cv2
 
-from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged, find_repeated, spans
+from lipmotion.motion.rest import find_runs
+from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged, find_repeated
 
 FRAMES, RATE_HZ = 75, 25.0
 
@@ -36,15 +37,15 @@ def test_smeared_blurred_and_dark_mouths_are_found_and_a_rare_one_is_not():
     clips[8][50:] //= 4
     damage = find_damaged([partial(np.copy, clip) for clip in clips], [np.ones(FRAMES, bool)] * 13, [RATE_HZ] * 13)
     found = {
-        number: {kind: spans(mask) for kind, mask in each.items() if mask.any()} for number, each in enumerate(damage)
+        n: {k: find_runs(mask).tolist() for k, mask in each.items() if mask.any()} for n, each in enumerate(damage)
     }
     assert {number: set(kinds) for number, kinds in found.items() if kinds} == {
         3: {"smeared"},
         5: {"blurred"},
         8: {"dark"},
     }
-    assert found[3]["smeared"] == [(30, 48)]
-    assert found[8]["dark"] == [(50, 75)]
+    assert found[3]["smeared"] == [[30, 48]]
+    assert found[8]["dark"] == [[50, 75]]
     assert describe_damage(damage[3], np.arange(FRAMES) / RATE_HZ) == ("smeared pictures: 1.20 to 1.88 s",)
 
 
@@ -62,6 +63,6 @@ def test_frozen_pictures_and_doubled_ones_are_told_apart():
     changes[30] = 3.0
     changes[33:39] = [0.05] * 6  # somebody stands still
     repeated, frozen = find_repeated(changes, RATE_HZ)
-    assert spans(frozen) == [(20, 30)]
-    assert spans(repeated) == [(8, 9), (16, 17), (20, 30)]
+    assert find_runs(frozen).tolist() == [[20, 30]]
+    assert find_runs(repeated).tolist() == [[8, 9], [16, 17], [20, 30]]
     assert not find_repeated([np.inf, 0.0], RATE_HZ)[0].any()

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.rest import find_runs
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import mark_closing_phones
@@ -134,9 +135,8 @@ def show_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
     frames = np.clip(np.rint(time_s * rate_hz).astype(int), 0, max(len(contact) - 1, 0))
     shown = contact[frames].copy()
     if len(time_s) > 1:
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], contact, [False]]))).reshape(-1, 2)
         step_s = float(time_s[1] - time_s[0])
-        for first, stop in edges.tolist():
+        for first, stop in find_runs(contact).tolist():
             middle = ((first + stop - 1) / 2 / rate_hz - float(time_s[0])) / step_s
             count = 2 if stop - first >= max(0.95 * step_s * rate_hz, 2) else 1
             start = max(int(np.ceil(middle - count / 2)), 0)

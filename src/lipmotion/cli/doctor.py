@@ -83,7 +83,6 @@ EXTRAS = {
     "plots": "pictures of 'experiment xieliu2007'",
     "whisper": "words recognised by faster-whisper, with a model of yours",
     "vosk": "words recognised by Vosk, with a model of yours",
-    "network": "the recurrent network of 'experiment xieliu2007'",
     "cluster": "'batch --cluster'",
     "study": "the page of 'study serve'",
     "studio": "the page of 'studio'",

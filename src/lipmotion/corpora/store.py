@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import zlib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -295,6 +295,11 @@ class Corpus:
             if name not in self._index:
                 raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)}")
         return Corpus(self.path, {name: self._index[name] for name in names})
+
+    def divided(self, lists: Mapping[str, Collection[str]]) -> Corpus:
+        """Return the utterances of other lists ``train``, ``val`` and ``test`` alone; as of ``part``."""
+        entries = {name: {**self._index[name], "split": split} for split, names in lists.items() for name in names}
+        return Corpus(self.path, entries)
 
     def required(self, split: str | None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
         """Return the same names as ``names``, at least one.

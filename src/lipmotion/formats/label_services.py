@@ -405,7 +405,10 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return lists of items in time: phones, and a tier of each speaker, of words if nearly all are, else of lines."""
     rows = [row for place, item in objects for row in _find_rows(item, place if len(objects) > 1 else "", where)]
     check_count(len(rows), where)
-    _warn_of_missed_words(objects, where)
+    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
+    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
+    if missed and where:
+        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
     timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
     if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
@@ -415,7 +418,10 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     spoken = _drop_first_pass(_last_until_next([row for row in rows if row.role != PHONE_LABELS], silences))
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
-    role = _choose_role(spoken, where)
+    counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in spoken]
+    check_word_count(sum(counts) + sum(len(row.parts) for row in spoken), where)
+    single = sum(row.role == WORDS or count < 2 for row, count in zip(spoken, counts, strict=True))
+    role = WORDS if single >= SINGLE_SHARE * len(spoken) and not any(row.parts for row in spoken) else LINES
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     for row, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
         by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
@@ -423,26 +429,11 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     return tiers + [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
 
 
-def _warn_of_missed_words(objects: Objects, where: str) -> None:
-    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
-    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
-    if missed and where:
-        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
-
-
 def _drop_first_pass(rows: list[Row]) -> list[Row]:
     """Return rows without their first half, where the second repeats it with speakers, as Google's last result does."""
     half = len(rows) // 2
     first, again = ([(row.text, row.start) for row in part] for part in (rows[:half], rows[half:]))
     return rows[half:] if half and first == again and rows[0].speaker != rows[-1].speaker else rows
-
-
-def _choose_role(rows: Sequence[Row], where: str) -> str:
-    """Return whether rows are words, as nearly all single ones are, or lines. Raises InputError: too many words."""
-    counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
-    check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
-    single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
-    return WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
 
 
 def _last_until_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:

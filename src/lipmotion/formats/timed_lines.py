@@ -77,35 +77,46 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
     first = next((line for _, line in _lines(text)), "")
     if RTTM.match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
-    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
-    columns, spoken = _find_columns(header or first), LRS_TEXT.match(text)
-    if columns or spoken:
-        return (
-            _read_lrs(text, spoken[1], where) if spoken and not columns else _read_table(text, columns, where, header)
-        )
-    span, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
-    if SECONDS.fullmatch(first):
-        return [_read_spans(text, SECONDS, where)]
-    if span:  # times, if they are large, or in order and last too long for seconds
-        matches = [WHOLE.fullmatch(line) for _, line in islice(_lines(text), 1000)]
-        spans = [(int(match[1]), int(match[2])) for match in matches if match and len(match[1]) < 15 > len(match[2])]
-        in_order = len(matches) == len(spans) > 2 and all(a <= b for a, b in spans) and spans == sorted(spans)
-        long = in_order and median(end - start for start, end in spans) > LONG_SPAN
-        if long or float(span[2]) >= SHORTEST_TICKS:
-            return [_read_spans(text, WHOLE, where)]
-    lines = [line for _, line in islice(_lines(text), MAX_LABELS + 1)] if starts else []
-    last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None
-    if last and float(last[1]) >= SHORTEST_TICKS:
-        rows = list(_match_lines(text, STARTS, "start label", where))
-        edges_s = [require_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows] + [math.inf]
-        pairs = zip(edges_s, edges_s[1:], rows, strict=False)
-        return [LabelTier("labels", tuple(TimedLabel(a, b, row[1], f"line {number}") for a, b, (number, row) in pairs))]
-    first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")[:1000]
-    for form in (STM, CTM):
-        found = form.fullmatch(first)
-        if found is not None and "." in found[3] + found[4] and not re.match(rf"(?:{NUMBER})(?:\s|$)", found[5]):
-            return _read_nist(text, form, where)
+    for read in (_read_columns, _read_lrs, _read_seconds, _read_wholes, _read_starts, _read_nist):
+        tiers = read(text, first, where)
+        if tiers is not None:
+            return tiers
     return None
+
+
+def _read_columns(text: str, first: str, where: str) -> list[LabelTier] | None:
+    """Return the tiers of a table whose columns are known by their names, or by the form of its first line."""
+    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
+    columns = _find_columns(header or first)
+    return _read_table(text, columns, where, header) if columns else None
+
+
+def _read_seconds(text: str, first: str, where: str) -> list[LabelTier] | None:
+    return [_read_spans(text, SECONDS, where)] if SECONDS.fullmatch(first) else None
+
+
+def _read_wholes(text: str, first: str, where: str) -> list[LabelTier] | None:
+    """Return labels with whole numbers, if these are times: large, or in order and too far apart for seconds."""
+    span = WHOLE.fullmatch(first)
+    if span is None:
+        return None
+    matches = [WHOLE.fullmatch(line) for _, line in islice(_lines(text), 1000)]
+    spans = [(int(match[1]), int(match[2])) for match in matches if match and len(match[1]) < 15 > len(match[2])]
+    in_order = len(matches) == len(spans) > 2 and all(a <= b for a, b in spans) and spans == sorted(spans)
+    long = in_order and median(end - start for start, end in spans) > LONG_SPAN
+    return [_read_spans(text, WHOLE, where)] if long or float(span[2]) >= SHORTEST_TICKS else None
+
+
+def _read_starts(text: str, first: str, where: str) -> list[LabelTier] | None:
+    """Return labels that each last to the next one, in ticks."""
+    lines = [line for _, line in islice(_lines(text), MAX_LABELS + 1)] if STARTS.fullmatch(first) else []
+    last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None
+    if last is None or float(last[1]) < SHORTEST_TICKS:
+        return None
+    rows = list(_match_lines(text, STARTS, "start label", where))
+    edges_s = [require_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows] + [math.inf]
+    pairs = zip(edges_s, edges_s[1:], rows, strict=False)
+    return [LabelTier("labels", tuple(TimedLabel(a, b, row[1], f"line {number}") for a, b, (number, row) in pairs))]
 
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
@@ -146,8 +157,13 @@ def _read_spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
     return parse_seconds([replace(tier, role=role)], where)[0]
 
 
-def _read_nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
+def _read_nist(text: str, _: str, where: str) -> list[LabelTier] | None:
     """Return the words of a CTM or the lines of an STM in order of time, a tier for each channel or speaker."""
+    first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")[:1000]
+    matches = ((form, form.fullmatch(first)) for form in (STM, CTM))
+    form = next((form for form, match in matches if match and _has_decimals(match)), None)
+    if form is None:
+        return None
     wanted = "recording channel start duration word" if form is CTM else "recording channel speaker start end words"
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     recording = ""
@@ -169,11 +185,18 @@ def _read_nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
     ]
 
 
-def _read_lrs(text: str, spoken: str, where: str) -> list[LabelTier]:
+def _has_decimals(match: re.Match[str]) -> bool:
+    """Return whether the times of a line of NIST have decimals, and what is said does not begin with a number."""
+    return "." in match[3] + match[4] and not re.match(rf"(?:{NUMBER})(?:\s|$)", match[5])
+
+
+def _read_lrs(text: str, _: str, where: str) -> list[LabelTier] | None:
     """Return the words of a text of LRS: with times where it has a table ``WORD START END`` of seconds."""
-    heading = LRS_WORDS.search(text)
+    spoken, heading = LRS_TEXT.match(text), LRS_WORDS.search(text)
+    if spoken is None:
+        return None
     if heading is None:
-        return [LabelTier("Text", (TimedLabel(math.nan, math.nan, spoken, "line 1"),), LINES)]
+        return [LabelTier("Text", (TimedLabel(math.nan, math.nan, spoken[1], "line 1"),), LINES)]
     rows = re.split(r"\n\s*\n", text[heading.start() :], maxsplit=1)[0]
     padded = "\n" * text.count("\n", 0, heading.start()) + re.sub(r"[ \t]+", "\t", rows)
     return _read_table(padded, _find_columns("WORD\tSTART\tEND"), where)

@@ -22,7 +22,7 @@ from lipmotion.motion.network_steps import (
     measure_poses,
     stack_spectrum,
 )
-from lipmotion.motion.posterior_network import PosteriorNetwork, have_posteriors
+from lipmotion.motion.posterior_network import PosteriorNetwork, list_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.motion.prior_regression import EncodingRegression
 from lipmotion.motion.rest import rate_clearness
@@ -74,6 +74,7 @@ class AcousticNetwork(Predictor):
     posterior_network: PosteriorNetwork | None = None
     encoding: EncodingRegression | None = None
     name: ClassVar[str] = "network"
+    needs: ClassVar[str] = "spectrum"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS
     CONTAINS: ClassVar[frozenset[str]] = frozenset({PosteriorNetwork.name, EncodingRegression.name})
 
@@ -101,14 +102,10 @@ class AcousticNetwork(Predictor):
         predicted = (trained._predict(example.condition_spectra[0].values)[0] for example in examples)
         variances = measure_error_variances(training, predicted, scale)
         last = replace(training, monitor=sub_monitor(training.monitor, 0.8, 1))
-        posterior_network = PosteriorNetwork.train(last) if have_posteriors(examples) else None
+        posterior_network: Any = PosteriorNetwork.fit(last).predictor if list_posteriors(examples) else None
         encoded = all(example.speech.encoding is not None for example in examples)
         encoding: Any = EncodingRegression.fit(training).predictor if encoded else None
         return PredictorFit(cls(network, mean, scale, variances, posterior_network, encoding))
-
-    def can_predict(self, speech: Speech) -> bool:
-        """Return whether speech has a spectrum."""
-        return speech.spectrum is not None
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
         """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].

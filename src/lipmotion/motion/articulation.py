@@ -80,14 +80,6 @@ class ArticulationPrior:
     weight: float = TABLE_WEIGHT
     known_voice_share: float = 1.0
 
-    def trajectory(self, units: Timeline[Unit], frames: int, reliability: Array | float = 1.0) -> Array:
-        """Return the motion of phones in time, in the motion space [shape=(frames, Q)].
-
-        reliability : of the phones, 0 to 1 [shape=(frames,)]
-        Raises InputError: an unknown phone.
-        """
-        return self.centre + GAIN * trace_articulators(units, frames, reliability) @ self.matrix
-
     def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
         """Return how well training knows each phone between its neighbours, 0 to 1 [shape=(frames,)].
 
@@ -118,7 +110,7 @@ class ArticulationPrior:
         voice       : how well training knows the voice, 0 to 1
         Precisions stay those of the model.
         """
-        values = self.trajectory(units, frames)
+        values = self.centre + GAIN * trace_articulators(units, frames) @ self.matrix
         unknown = 1 - self.familiarity(units, frames)
         of_voice = self.known_voice_share + unseen_share(voice) * (1 - self.known_voice_share)
         weight = of_voice * self.weight * (np.asarray(reliability) * unknown) ** POWER
@@ -141,17 +133,14 @@ def slice_dynamics(values: Array, frames: slice) -> Array:
     return with_dynamics(values[first : stop + 1])[start - first :][: stop - start]
 
 
-def trace_articulators(units: Timeline[Unit], frames: int, reliability: Array | float = 1.0) -> Array:
+def trace_articulators(units: Timeline[Unit], frames: int) -> Array:
     """Return the articulators of phones in time, in standard deviations of a speaker [shape=(frames, 8)].
 
-    reliability : of the phones, 0 to 1 [shape=(frames,)]
     Every third of a phone has the means of the table; a Gaussian joins them. A phone without a row of its own has that
-    of the most similar phone with one. What cannot be relied on has the mean of what it may be: of all vowels, or of
-    all consonants.
+    of the most similar phone with one.
     Raises InputError: an unknown phone.
     """
-    table, means, steps = read_articulation_table(), average_classes(), np.zeros((frames, len(ARTICULATORS)))
-    relied = np.broadcast_to(np.asarray(reliability, float), frames)[:, None]
+    table, steps = read_articulation_table(), np.zeros((frames, len(ARTICULATORS)))
     for span in units:
         phone, (first, stop) = span.label.phone, frames_of(span, frames)
         if phone and phone not in PHONES:
@@ -160,9 +149,7 @@ def trace_articulators(units: Timeline[Unit], frames: int, reliability: Array | 
             row = table[phone if phone in table else find_similar_phone(phone, list(table))]
             time_s = np.arange(first, stop) / FRAME_RATE_HZ
             third = (time_s - span.start_s) / max(span.duration_s, 1e-9) * len(THIRDS)
-            thirds, sure = np.minimum(np.maximum(third.astype(int), 0), len(THIRDS) - 1), relied[first:stop]
-            mean = row if is_silent(phone) else means[phone in VOWELS]
-            steps[first:stop] = sure * row[thirds] + (1 - sure) * mean[thirds]
+            steps[first:stop] = row[np.clip(third.astype(int), 0, len(THIRDS) - 1)]
     return smooth_steps(steps)
 
 

@@ -102,6 +102,7 @@ class PosteriorNetwork(Predictor):
     source: str
     recurrent: RecurrentNetwork | None = None
     name: ClassVar[str] = "posteriors"
+    needs: ClassVar[str] = "posteriors"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS | RECURRENT.specs
 
     @classmethod
@@ -111,24 +112,19 @@ class PosteriorNetwork(Predictor):
 
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
-        """Return the network of ``train``. Raises CorpusError."""
-        return PredictorFit(cls.train(training))
-
-    @classmethod
-    def train(cls, training: PredictorTraining) -> PosteriorNetwork:
         """Return a network that is trained on examples as recorded; without spectra where one of them has none.
 
         Raises CorpusError: an example without posteriors.
         """
         examples = training.examples
-        posteriors = _list_posteriors(examples)
+        posteriors = list_posteriors(examples)
         if posteriors is None:
             raise CorpusError(
                 "examples without posteriors, which the predictor posteriors needs; train with the recogniser auto"
             )
         centre, scale = measure_poses(training)
-        rows = [_limit(each) for each in posteriors]
-        mean, basis = _fit_components(rows)
+        rows = [limit_logarithms(each) for each in posteriors]
+        mean, basis = fit_components(rows)
         heard = all(example.condition_spectra for example in examples)
         spectra = [example.condition_spectra[0].values if heard else None for example in examples]
         inputs = [_stack_inputs((row - mean) @ basis, x) for row, x in zip(rows, spectra, strict=True)]
@@ -144,11 +140,7 @@ class PosteriorNetwork(Predictor):
             for shifted, values in zip(inputs, training.values, strict=True)
         )
         variances = measure_error_variances(training, predicted, scale)
-        return cls(network, mean, basis, centre, scale, variances, posteriors[0].source, recurrent)
-
-    def can_predict(self, speech: Speech) -> bool:
-        """Return whether speech has posteriors."""
-        return speech.posteriors is not None
+        return PredictorFit(cls(network, mean, basis, centre, scale, variances, posteriors[0].source, recurrent))
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
         """Return motion in the motion space [shape=(T, Q)], and no distortion: 0 [shape=(T,)].
@@ -183,7 +175,7 @@ class PosteriorNetwork(Predictor):
 
     def _components(self, posteriors: TokenPosteriors) -> NDArray[np.floating]:
         """Return the principal components of the logarithms of posteriors [shape=(N, 120)]."""
-        return (_limit(posteriors) - self.mean) @ self.basis
+        return (limit_logarithms(posteriors) - self.mean) @ self.basis
 
     def _check(self, posteriors: TokenPosteriors | None) -> TokenPosteriors:
         """Return the posteriors; raise InputError where there are none, or those of another phone recogniser."""
@@ -227,12 +219,7 @@ class PosteriorNetwork(Predictor):
         )
 
 
-def have_posteriors(examples: Sequence[Example]) -> bool:
-    """Return whether a posterior network can be trained on examples: whether all of them have posteriors."""
-    return _list_posteriors(examples) is not None
-
-
-def _list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None:
+def list_posteriors(examples: Sequence[Example]) -> list[TokenPosteriors] | None:
     """Return the posteriors of examples; None where one of them has none."""
     known = [example.speech.posteriors for example in examples if example.speech.posteriors is not None]
     return known if known and len(known) == len(examples) else None
@@ -282,7 +269,7 @@ def _run(network: SequenceNetwork, shifted: Sequence[NDArray[np.float32]], frame
     return mean
 
 
-def _fit_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def fit_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the mean of posteriors [shape=(K,)] and a basis, scaled as inputs of the network [shape=(K, 120)]."""
     everything = np.concatenate(rows).astype(float)
     mean = everything.mean(axis=0)
@@ -293,7 +280,7 @@ def _fit_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.flo
     return mean.astype(np.float32), basis.astype(np.float32)
 
 
-def _limit(posteriors: TokenPosteriors) -> NDArray[np.float32]:
+def limit_logarithms(posteriors: TokenPosteriors) -> NDArray[np.float32]:
     """Return the logarithms of posteriors within the limit [shape=(N, K)]."""
     limited: NDArray[np.float32] = np.maximum(posteriors.values, MIN_LOG_POSTERIOR).astype(np.float32)
     return limited

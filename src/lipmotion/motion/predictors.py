@@ -77,6 +77,7 @@ class Predictor(ABC):
     name: ClassVar[str]
     ARRAYS: ClassVar[Mapping[str, ArraySpec]]
     CONTAINS: ClassVar[frozenset[str]] = frozenset()
+    needs: ClassVar[str] = ""
     uses_prior: ClassVar[bool] = False
     uses_articulation: ClassVar[bool] = False
     variances: Array
@@ -102,9 +103,9 @@ class Predictor(ABC):
         Raises InputError: an unknown phone, or speech without what ``can_predict`` asks for.
         """
 
-    def can_predict(self, speech: Speech) -> bool:  # noqa: ARG002
-        """Return whether speech has what ``predict`` needs of it: a spectrum, for instance."""
-        return True
+    def can_predict(self, speech: Speech) -> bool:
+        """Return whether speech has what ``predict`` needs of it."""
+        return not self.needs or getattr(speech, self.needs) is not None
 
     def hidden(self, speech: Speech) -> tuple[NDArray[np.float32], Array] | None:  # noqa: ARG002
         """Return features on which models of other people can stand, and the distortion; None: there are none.

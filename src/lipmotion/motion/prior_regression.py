@@ -37,6 +37,7 @@ class EncodingRegression(Predictor):
     centre: Array
     variances: Array
     name: ClassVar[str] = "encoding"
+    needs: ClassVar[str] = "encoding"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = {
         "encoding_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
         "encoding_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
@@ -72,10 +73,6 @@ class EncodingRegression(Predictor):
         scale = np.sqrt(sum(np.square(y - centre).sum(axis=0) for _, y in rows) / count)
         variances = measure_error_variances(training, predicted, scale)
         return PredictorFit(cls(fitted.coefficients, fitted.centre, variances))
-
-    def can_predict(self, speech: Speech) -> bool:
-        """Return whether speech has an encoding."""
-        return speech.encoding is not None
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
         """Return motion in the motion space [shape=(T, Q)], and no distortion: 0 [shape=(T,)].

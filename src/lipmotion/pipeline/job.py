@@ -218,21 +218,15 @@ def write_outputs(
     speech, model, temporary : as of ``write``
     """
     from lipmotion.pipeline.outputs.motion_files import with_articulation
-    from lipmotion.pipeline.outputs.output import create_outputs, write_planned
+    from lipmotion.pipeline.outputs.output import Performance, create_outputs, write_planned
     from lipmotion.types import Audio
 
     if job.outputs.articulation:
         generation = with_articulation(generation)
     settings = replace(output_settings(job, face, speech), sounded=isinstance(speech, Audio))
-    write_planned(
-        generation,
-        create_outputs(job.outputs.files, settings),
-        settings,
-        sound=speech if isinstance(speech, Audio) else None,
-        model=model,
-        temporary=temporary,
-        monitor=monitor,
-    )
+    sound = speech if isinstance(speech, Audio) else None
+    performance = Performance(generation, settings, sound, settings.recording, model, monitor)
+    write_planned(performance, create_outputs(job.outputs.files, settings), temporary=temporary)
 
 
 NAME = "{name}"

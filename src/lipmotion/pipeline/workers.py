@@ -26,6 +26,10 @@ ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 
 
+class WorkerDiedError(CorpusError):
+    """A worker process ended while it had work."""
+
+
 def process_count(count: int | None) -> int:
     """Return how many processes share the work; None: one a core. Raises InputError: fewer than one."""
     if count is not None and count < 1:
@@ -46,7 +50,7 @@ class Workers:
     def ordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         """Yield the results in the order of the items. The first items are sent at once.
 
-        Raises CorpusError: a process died.
+        Raises WorkerDiedError: a process died.
         """
         numbered = self._numbered(function, items)
 
@@ -62,7 +66,7 @@ class Workers:
         return in_order()
 
     def unordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[ResultT]:
-        """Yield the results in the order in which they are ready. Raises CorpusError: a process died."""
+        """Yield the results in the order in which they are ready. Raises WorkerDiedError: a process died."""
         return (result for _, result in self._numbered(function, items))
 
     def _numbered(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[tuple[int, ResultT]]:
@@ -75,7 +79,7 @@ class Workers:
                 try:
                     end.send((function, item))
                 except OSError as error:
-                    raise CorpusError(DIED) from error
+                    raise WorkerDiedError(DIED) from error
                 busy[end] = number
 
         def results() -> Iterator[tuple[int, ResultT]]:
@@ -86,7 +90,7 @@ class Workers:
                     try:
                         succeeded, result = end.recv()
                     except (EOFError, OSError) as error:
-                        raise CorpusError(DIED) from error
+                        raise WorkerDiedError(DIED) from error
                     send_next(end)
                     if not succeeded:
                         raise result

@@ -7,6 +7,7 @@ mark, blank lines, comments (``#``) and Excel's ``sep=;`` may stand above the na
 from __future__ import annotations
 
 import csv
+import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,8 +16,10 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_formula
 from lipmotion.storage.files import as_text
+from lipmotion.storage.sources import read_text_file
 
 LONGEST_LINE = 1 << 20
 """Most characters of a line."""
@@ -26,6 +29,8 @@ MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(i
 
 
 QUOTE = "'"
+Rows = list[tuple[int, list[str]]]
+"""Rows of a table: the number of the last line of each, and its fields."""
 
 
 def as_field(text: str) -> str:
@@ -107,3 +112,17 @@ def numbers_in(fields: Sequence[str], line: int) -> list[float]:
         ]
     except ValueError as error:
         raise ValueError(f"line {line}: {error}") from error
+
+
+def read_whole_table(path: Path, kind: str, largest: int, required: Sequence[str]) -> tuple[list[str], Rows]:
+    """Return the names of the columns of a table that people write, and its rows.
+
+    required : the columns, for messages
+    Raises InputError: as ``read_text_file``, or it is no table.
+    """
+    text = read_text_file(path, kind, largest)
+    try:
+        table = read_table(io.StringIO(text, newline=""))
+        return table.plain_names, list(table.rows)
+    except ValueError as error:
+        raise InputError(f"{path}: no readable table ({shorten(str(error))}); required {','.join(required)}") from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
@@ -173,23 +173,24 @@ class Configuration:
         return cls.parsed({**cls.default_if_missing, **values})
 
 
+_FITS: dict[type[Any], Callable[[Any], bool]] = {
+    float: lambda value: type(value) is int or isinstance(value, float),
+    tuple: lambda value: type(value) is tuple and all(isinstance(each, str) for each in value),
+    Path: lambda value: isinstance(value, Path) and is_path(str(value)),
+}
+"""Which values options take of the types of which it is not every value of exactly that type."""
+
+
 def check_value(option_field: Field[Any], value: Any) -> None:
     """Raise InputError unless a value has the type of an option and satisfies its rule."""
     kind, rule = kind_of(option_field), option_field.metadata.get("rule", ANY)
-    if value is None and option_field.default is None:
-        return
     values = option_field.metadata.get("values", {})
-    if any(each.__name__ in values for each in type(value).__mro__):
+    if any(each.__name__ in values for each in type(value).__mro__) or (value is None and option_field.default is None):
         return
     if values and not isinstance(value, str | Path):
         required = " or ".join(words for words in values.values() if words)
         raise InputError(f"{option_field.name}: found a {type(value).__name__}, required {_WORDS[kind]}, or {required}")
-    fits = type(value) is kind or (kind in (float, Path) and isinstance(value, kind))
-    fits = fits or (kind is float and type(value) is int)
-    if kind is tuple:
-        fits = fits and all(isinstance(each, str) for each in value)
-    if kind is Path:
-        fits = fits and is_path(str(value))
+    fits = _FITS.get(kind, lambda each: type(each) is kind)(value)
     in_range = not fits or kind not in (int, float) or -LARGEST_NUMBER <= value <= LARGEST_NUMBER
     if fits and rule.most is not None and not (in_range and rule.allows(value)):
         what = option_field.metadata.get("what", option_field.name)

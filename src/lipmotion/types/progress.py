@@ -1,8 +1,11 @@
-"""Long work: reports of its progress, monitors, which receive them, and maps over several processes."""
+"""Long work: reports of its progress, monitors, which receive them, warnings, and maps over several processes."""
 
 from __future__ import annotations
 
+import logging
+import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
@@ -83,6 +86,24 @@ def with_progress(items: Sequence[ItemT], stage: str, monitor: Monitor) -> Itera
         monitor(Progress(stage, number, len(items), number / len(items)))
         yield item
     monitor(Progress(stage, len(items), len(items), 1.0))
+
+
+@contextmanager
+def warnings_to(receive: Callable[[str], object], *, of_thread: bool = False, propagate: bool = True) -> Iterator[None]:
+    """Give the package's warnings to a function while the block lasts; ``of_thread``: those of this thread alone.
+
+    propagate : whether they go on to where they are written otherwise
+    """
+    logger, handler, thread = logging.getLogger("lipmotion"), logging.Handler(logging.WARNING), threading.get_ident()
+    handler.emit = lambda record: receive(record.getMessage())  # type: ignore[assignment,method-assign]
+    handler.addFilter(lambda record: not of_thread or record.thread == thread)
+    logger.addHandler(handler)
+    before, logger.propagate = logger.propagate, propagate
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.propagate = before
 
 
 class ParallelMap(Protocol):

@@ -274,7 +274,17 @@ class _Plan:
             change[first + 1 : last] = np.maximum(change[first + 1 : last], steps)
         ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
         self.busy = binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
-        self.restless = _measure_restlessness(descriptors, self.scenes) + BUSY_COST * self.busy
+        from scipy.ndimage import gaussian_filter1d
+
+        rows = descriptors.standardise(self.scenes)
+        speed = np.zeros(len(rows))
+        for start, stop in self.scenes:
+            if stop - start > 1:
+                smooth = gaussian_filter1d(rows[start:stop], 1.0, axis=0, mode="nearest")
+                speed[start:stop] = np.linalg.norm(np.gradient(smooth, axis=0), axis=1)
+        self.restless = (
+            speed / (float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0)
+        ) + BUSY_COST * self.busy
         self._least = max(1, round(LEAST_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
         self._repeat = REPEAT_S * rate_hz
@@ -371,19 +381,6 @@ def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int
     change = np.flatnonzero(np.diff(allowed.astype(int))) + 1
     ends = sorted({0, len(allowed), *change.tolist(), *(cut for cut in cuts if 0 < cut < len(allowed))})
     return [(start, stop) for start, stop in pairwise(ends) if allowed[start]]
-
-
-def _measure_restlessness(descriptors: FrameDescriptors, scenes: Sequence[tuple[int, int]]) -> Array:
-    """Return the speed of the background at each frame, relative to the median [shape=(T,)]."""
-    from scipy.ndimage import gaussian_filter1d
-
-    rows = descriptors.standardise(scenes)
-    speed = np.zeros(len(rows))
-    for start, stop in scenes:
-        if stop - start > 1:
-            smooth = gaussian_filter1d(rows[start:stop], 1.0, axis=0, mode="nearest")
-            speed[start:stop] = np.linalg.norm(np.gradient(smooth, axis=0), axis=1)
-    return speed / (float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0)
 
 
 def _make_order(runs: Sequence[tuple[int, int, int]], joins: tuple[Join, ...], count: int, fade: int) -> LoopOrder:

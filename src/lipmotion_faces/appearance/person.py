@@ -24,6 +24,7 @@ from lipmotion.motion.eigenlips import (
 )
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
+from lipmotion.motion.rest import find_runs
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
@@ -184,8 +185,7 @@ class Appearance:
         mouths = candidates.draw_to_recorded(sought, recorded)[:, : predicted.shape[1]]
         if contact is None:
             return mouths
-        ends = np.flatnonzero(np.diff(np.concatenate([[False], contact >= 1, [False]]))).reshape(-1, 2)
-        for first, stop in ends.tolist():
+        for first, stop in find_runs(contact >= 1).tolist():
             if stop - first > max(1, LONGEST_CLOSURE_S * motion.rate_hz):
                 continue
             closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())

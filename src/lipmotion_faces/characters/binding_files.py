@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,8 +15,8 @@ from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors
-from lipmotion.storage.sources import check_source, read_text_file
-from lipmotion.storage.text_table import read_table
+from lipmotion.storage.sources import check_source
+from lipmotion.storage.text_table import read_whole_table
 from lipmotion.types.values import parse_whole
 from lipmotion_faces.characters.file_limits import MOST_VERTICES
 
@@ -140,16 +139,9 @@ def read_points(path: Path) -> dict[int, int]:
 
 def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:
     """Yield the rows of a table with their line numbers; empty lines and lines that begin with # are left out."""
-    try:
-        table = read_table(io.StringIO(read_text_file(path, kind, LARGEST_TABLE_BYTES), newline=""))
-        rows = list(table.rows)
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: no table ({shorten(str(error))}); required {','.join(columns)}") from error
-    if table.plain_names != list(columns):
-        names = shorten(",".join(table.plain_names))
-        raise InputError(f"{path}: the columns are {names!r}, required {','.join(columns)}")
+    names, rows = read_whole_table(path, kind, LARGEST_TABLE_BYTES, columns)
+    if names != list(columns):
+        raise InputError(f"{path}: the columns are {shorten(','.join(names))!r}, required {','.join(columns)}")
     for line, row in rows:
         if not row[0].startswith("#"):
             if len(row) != len(columns):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from lipmotion.articulation.contact import LEAST_GAP
+from lipmotion.articulation.contact import LEAST_GAP, smooth_step
 from lipmotion_faces.head.part import MOUTH_Y
 from lipmotion_faces.head.pose import CharacterPose
 
@@ -149,8 +149,7 @@ def _meeting(pose: CharacterPose, base_z: Real, inwards: Any) -> Real:
 
 def closed_share(pose: CharacterPose, apart: float = SEAM_GAP) -> Any:
     """Return how nearly the lips are closed: 1 where they touch, 0 from a gap of ``apart`` on [shape of the gap]."""
-    share = np.minimum(np.maximum(1 - pose.gap / apart, 0.0), 1.0)
-    return share * share * (3 - 2 * share)
+    return smooth_step(np.asarray(1 - pose.gap / apart))
 
 
 def _between(pose: CharacterPose) -> Real:

@@ -157,9 +157,10 @@ _WEIGHTS = np.array([6.0, 1.6, 0.5, 0.9, 0.7, 0.6, 0.5])
 class LayeredFace(Face):
     """A drawing in layers (docs/faces.md)."""
 
-    def __init__(self, path: Path, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
+    def __init__(self, path: Path) -> None:
         """Raise InputError: the file is no drawing, or has no layer ``mouth-rest``."""
-        self.path, self.staging, self.prosody = path, staging or Staging(), prosody
+        self.path, self.staging = path, Staging()
+        self.prosody: Prosody | None = None
         self.layers = read_drawing(path)
         names = {name for layers, _ in self.layers.shapes for name in layers}
         self.mouths = tuple(name for name in MOUTHS if MOUTH + name in names)

@@ -50,15 +50,6 @@ class LidPose(NamedTuple):
     sneer: int = 0
 
 
-def lid_pose(shut: float, mood: UpperFace) -> LidPose:
-    """Return the nearest pose of lids that are closed so far, 0..1, in a mood."""
-    slant = mood.lowered * (1 - mood.inner) - 0.8 * mood.inner * (1 - mood.outer) * (1 - mood.wide)
-    furrow = mood.lowered * (1 - 0.5 * mood.inner)
-    squint = max(mood.squint, CHEEK_SQUINT * mood.cheek)
-    steps = (round(share * MOOD_LIDS) for share in (mood.wide, squint, slant, furrow, mood.sneer))
-    return LidPose(round(shut * LID_POSITIONS), *steps)
-
-
 class EyePainter:
     """Paints both eyes of a character, with the lids.
 
@@ -88,7 +79,11 @@ class EyePainter:
     def paint(self, shut: float, gaze_x: float, gaze_y: float, mood: UpperFace = CALM) -> Pixels:
         """Return the eyes, premultiplied [shape=(h, w, 4)], not to be changed; gaze right and down, eye distances."""
         step = self._window.view.scale * GAZE_STEPS
-        return self._cached(lid_pose(shut, mood), round(gaze_x * step), round(gaze_y * step))
+        slant = mood.lowered * (1 - mood.inner) - 0.8 * mood.inner * (1 - mood.outer) * (1 - mood.wide)
+        furrow = mood.lowered * (1 - 0.5 * mood.inner)
+        squint = max(mood.squint, CHEEK_SQUINT * mood.cheek)
+        steps = (round(share * MOOD_LIDS) for share in (mood.wide, squint, slant, furrow, mood.sneer))
+        return self._cached(LidPose(round(shut * LID_POSITIONS), *steps), round(gaze_x * step), round(gaze_y * step))
 
     def _paint(self, lids: LidPose, gaze_x: int, gaze_y: int) -> Pixels:
         under, almond, over = self.lids(lids)

@@ -111,25 +111,20 @@ BIAS_DISTANCE, FADE_DISTANCE = 0.05, 0.10
 """A vertex this far behind another one begins to be hidden, and is hidden this much further behind."""
 
 
-def reaches(
-    places: Real,
-    normals: Real,
-    triangles: NDArray[np.int32],
-    hiding: NDArray[np.bool_],
-    *,
-    directions: int = 72,
-    lamps: int = 20,
-) -> Real:
+DIRECTIONS, LAMPS = 72, 20
+"""Directions of the sky from which light comes, and places on the key light, which is large and soft."""
+
+
+def reaches(places: Real, normals: Real, triangles: NDArray[np.int32], hiding: NDArray[np.bool_]) -> Real:
     """Return the parts of the sky and of the key light that reach the vertices, 0 to 1 [shape=(V, 2)].
 
     places, normals : of the vertices, which must be dense: no further apart than ``CELL`` [shape=(V, 3)]
     triangles  : along which the result is smoothed [shape=(F, 3)]
     hiding     : which of them hide others [shape=(V,)]
-    directions : number of directions of the sky;  lamps : number of places on the key light, which is large and soft
-    Cost: O(V · directions).
+    Cost: O(V · ``DIRECTIONS``).
     """
-    y = 1 - (2 * np.arange(directions) + 1) / directions  # directions that are spread evenly over the sphere
-    angle, flat = 2.39996 * np.arange(directions), np.sqrt(1 - y * y)
+    y = 1 - (2 * np.arange(DIRECTIONS) + 1) / DIRECTIONS  # directions that are spread evenly over the sphere
+    angle, flat = 2.39996 * np.arange(DIRECTIONS), np.sqrt(1 - y * y)
     towards = np.stack([flat * np.cos(angle), y, flat * np.sin(angle)], axis=1)
     total, seen = np.zeros(len(places)), np.zeros(len(places))
     for way in towards:
@@ -141,10 +136,10 @@ def reaches(
     around = np.cross(key, [0.0, 1.0, 0.0])
     above = np.cross(around, key)
     direct = np.zeros(len(places))
-    for n in range(lamps):
-        radius, turn = 0.22 * np.sqrt((n + 0.5) / lamps), 2.39996 * n
+    for n in range(LAMPS):
+        radius, turn = 0.22 * np.sqrt((n + 0.5) / LAMPS), 2.39996 * n
         direct += _visible(places, hiding, unit(key + radius * (np.cos(turn) * around + np.sin(turn) * above)))
-    return _smooth(np.stack([sky, direct / lamps], axis=1), triangles)
+    return _smooth(np.stack([sky, direct / LAMPS], axis=1), triangles)
 
 
 def _smooth(values: Real, triangles: NDArray[np.int32], times: int = 4) -> Real:

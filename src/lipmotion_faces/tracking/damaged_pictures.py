@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.rest import find_runs
 from lipmotion.stats.pca import choose_evenly
 from lipmotion_faces.tracking.packages import import_opencv
 
@@ -64,25 +65,19 @@ def find_repeated(changes: Sequence[float], rate_hz: float) -> tuple[Mask, Mask]
     repeated = np.array(changes) < REPEATED_SHARE * np.percentile(known, 75)
     repeated &= repeated.mean() < LARGEST_SHARE
     frozen = np.zeros(len(repeated), bool)
-    for start, stop in spans(repeated):
+    for start, stop in find_runs(repeated).tolist():
         jumps = stop < len(repeated) and changes[stop] >= JUMP * np.percentile(known, 75)
         frozen[start:stop] = jumps and stop - start >= FROZEN_S * rate_hz
         repeated[start:stop] = frozen[start:stop] | (stop - start == 1)
     return repeated, frozen
 
 
-def spans(mask: Mask) -> list[tuple[int, int]]:
-    """Return the parts in which a mask holds: first index, and the one after the last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def describe_damage(damage: Damage, times_s: NDArray[np.float64]) -> tuple[str, ...]:
     """Return notes on damaged pictures at some times: what is damaged, from when to when."""
-    parts = {
-        kind: [(times_s[start], times_s[stop - 1]) for start, stop in spans(mask)] for kind, mask in damage.items()
+    texts = {
+        kind: ", ".join(f"{times_s[start]:.2f} to {times_s[stop - 1]:.2f} s" for start, stop in find_runs(mask))
+        for kind, mask in damage.items()
     }
-    texts = {kind: ", ".join(f"{start:.2f} to {stop:.2f} s" for start, stop in spans) for kind, spans in parts.items()}
     return tuple(f"{kind} pictures: {text}" for kind, text in texts.items() if text)
 
 
@@ -132,7 +127,7 @@ def _median(values: Sequence[Floats], masks: Sequence[Mask]) -> float:
 def _find_smeared(unlike: Floats) -> Mask:
     """Return which mouths are unlike all others until they are repaired at once."""
     result = np.zeros(len(unlike), bool)
-    for start, stop in spans(unlike > UNLIKE):
+    for start, stop in find_runs(unlike > UNLIKE).tolist():
         if stop < len(unlike) and stop - start >= LEAST_SMEARED and unlike[stop - 1] - unlike[stop] >= REPAIR:
             result[start:stop] = True
     return result

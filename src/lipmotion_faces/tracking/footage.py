@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
@@ -57,24 +57,33 @@ class Footage:
         return len(self.pictures_s)
 
 
-def track_footage(path: Path, span: VideoSpan = WHOLE, *, person: Sequence[Array] = (), crops: bool = False) -> Footage:
+def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -> Footage:
     """Return a tracked video, and where the face is in every frame of it.
 
-    path, span, person : as of ``track.track``
-    crops              : whether mouth pictures are wanted, for which the video is decoded once more
+    path, span : as of ``track.track``
+    crops      : whether mouth pictures are wanted, for which the video is decoded once more
     Raises InputError and MissingDependencyError: as ``track.track``; InputError also if the pictures of the
     video have several sizes.
     """
-    frames = track_frames(path, span, person)
+    frames = track_frames(path, span, ())
     if len(frames.sizes) > 1:
         several = " and ".join(f"{width} × {height}" for height, width in sorted(frames.sizes)[:3])
         raise InputError(f"{path}: pictures of {several} pixels in one video; export the video in one size")
     wanted_s = np.arange(frames.count) / frames.rate_hz
+    times_s, rate_hz, count = frames.seen_s, frames.rate_hz, frames.count
+    maps = face_to_image(frames.points).reshape(-1, 6)
+    result = maps[nearest_indices(times_s, np.arange(count) / rate_hz)]  # in scenes in which the person is not seen
+    ends = [0, *_frames_of_cuts(frames), count]
+    for start, stop in pairwise(ends):
+        inside = (times_s * rate_hz >= start - 0.5) & (times_s * rate_hz < stop - 0.5)
+        if inside.any():
+            scene_s = times_s[inside] - start / rate_hz
+            result[start:stop] = resample_to_constant_rate(scene_s, maps[inside], rate_hz, stop - start)
     return Footage(
         path,
         span,
         make_track(path, span, frames, crops=crops),
-        _maps(frames),
+        result.reshape(-1, 2, 3),
         frames.times_s[nearest_indices(frames.times_s, wanted_s)],
         tuple(_frames_of_cuts(frames)),
         next(iter(frames.sizes)),
@@ -153,20 +162,6 @@ def _frames_of_cuts(frames: TrackedFrames) -> list[int]:
     """Return the frames at the constant rate before which there is a cut, rising, without repetition."""
     at = {int(np.ceil(frames.times_s[cut] * frames.rate_hz - 0.5)) for cut in frames.cuts}
     return sorted(n for n in at if 0 < n < frames.count)
-
-
-def _maps(frames: TrackedFrames) -> Array:
-    """Return the maps of ``face_to_image`` at the constant rate [shape=(T, 2, 3)]; no scene looks at another one."""
-    times_s, rate_hz, count = frames.seen_s, frames.rate_hz, frames.count
-    maps = face_to_image(frames.points).reshape(-1, 6)
-    result = maps[nearest_indices(times_s, np.arange(count) / rate_hz)]  # in scenes in which the person is not seen
-    ends = [0, *_frames_of_cuts(frames), count]
-    for start, stop in pairwise(ends):
-        inside = (times_s * rate_hz >= start - 0.5) & (times_s * rate_hz < stop - 0.5)
-        if inside.any():
-            scene_s = times_s[inside] - start / rate_hz
-            result[start:stop] = resample_to_constant_rate(scene_s, maps[inside], rate_hz, stop - start)
-    return result.reshape(-1, 2, 3)
 
 
 def read_video_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:

@@ -149,12 +149,13 @@ def evaluate(
     selection  : the utterances to compare; by default those of the list ``test``
     recogniser : ``own``, ``general`` or ``auto``, as in ``Request``
 
-    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; in addition
-    or instead, the eigenlips of the model. Figures of closures and of silence need the channel ``opening``. Figures
-    that cannot be computed are None. A model of several people generates the motion of each utterance's speaker; of
-    speakers whom it does not know, named under ``strangers``, that of the mean person. ``without_words`` is the number
-    of utterances without words or labelled phones, if there is one; ``seen_in_training`` is there, and True, if the
-    model's header says that it was trained on some of the utterances.
+    Compared are the lip distances or, in a corpus without them, every channel that moves in the recordings; of an
+    engine with the option ``channels`` those alone; in addition or instead, the eigenlips of the model.
+    Figures of closures and of silence need the channel ``opening``. Figures that cannot be computed are None. A model
+    of several people generates the motion of each utterance's speaker; of speakers whom it does not know, named under
+    ``strangers``, that of the mean person. ``without_words`` is the number of utterances without words or labelled
+    phones, if there is one; ``seen_in_training`` is there, and True, if the model's header says that it was trained on
+    some of the utterances.
     If the engine makes the lips meet in p, b and m, ``unpinned`` holds the figures of its motion without that.
     The reference for speech and for p, b and m are the labelled phones, or the forced alignment, or the recognised
     phones of utterances without transcript. The threshold of a closed mouth is computed from the corpus's training
@@ -170,10 +171,12 @@ def evaluate(
     ['audio only', 'with transcript']
     """
     phones = cached_recogniser(model.phones, recogniser, model.adaptation)
+    modelled = getattr(model.engine.config, "channels", "").split()  # some alone: what else moves is not compared
     recordings = held_out.load_held_out(
         corpus,
         phones,
         selection=selection,
+        channels=modelled or None,
         lexicon=lexicon,
         monitor=monitor,
         visual=model.visual,
@@ -274,20 +277,6 @@ def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
     return ClipStatistic(sums, lambda total: float(total[0] / total[1]) if total[1] else float("nan"))
 
 
-def best_lag_statistic(generated: Clips, original: Clips, times: Sequence[Array], reach_s: float) -> ClipStatistic:
-    """Return the mean correlation of curves [each shape=(T_i, 1)], each at its best lag (docs/measures.md).
-
-    times   : of the frames, in seconds [each shape=(T_i,)]
-    reach_s : the largest lag to both sides; lags of 10 ms and less are alike
-    """
-    lags = np.arange(-round(reach_s * 100), round(reach_s * 100) + 1) / 100
-    sums = []
-    for g, o, time_s in zip(generated, original, times, strict=True):
-        moved = ([np.interp(time_s + lag, time_s, g[:, 0])[:, None]] for lag in lags)
-        sums.append(np.array([max(correlation_statistic(each, [o]).value for each in moved), 1.0]))
-    return ClipStatistic(sums, lambda total: float(total[0] / total[1]))
-
-
 def closing_score_statistic(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
     """Return the share, in %, of original closings found in generated openings; NaN where there are none."""
     hits, count = clip_closure_counts(generated, original, threshold)
@@ -296,11 +285,30 @@ def closing_score_statistic(generated: Clips, original: Clips, threshold: float)
 
 
 def opening_curves(
-    recordings: held_out.HeldOutRecordings, made: Sequence[held_out.ComparedClip]
+    recordings: Compared, made: Sequence[held_out.ComparedClip], channel: str = held_out.OPENING
 ) -> tuple[list[Array], list[Array]]:
-    """Return the generated and the original opening of every clip [each shape=(T, 1)]."""
-    column = slice(recordings.channels.index(held_out.OPENING), recordings.channels.index(held_out.OPENING) + 1)
+    """Return the generated and the original opening, or another channel, of every clip [each shape=(T, 1)]."""
+    column = slice(recordings.channels.index(channel), recordings.channels.index(channel) + 1)
     return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
+
+
+def clip_statistics(recordings: Compared, made: Sequence[held_out.ComparedClip]) -> dict[str, ClipStatistic]:
+    """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; ACC and score of the opening."""
+    pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
+    parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
+    statistics = {}
+    for part, columns in parts.items():
+        if columns.any():
+            both = [clip.generated[:, columns] for clip in made], [clip.original[:, columns] for clip in made]
+            statistics[f"{part}amse"], statistics[f"{part}acc"] = (
+                distance_statistic(*both),
+                correlation_statistic(*both),
+            )
+    if recordings.closed_under is not None:
+        opening = opening_curves(recordings, made)
+        statistics["opening_acc"] = correlation_statistic(*opening)
+        statistics["score"] = closing_score_statistic(*opening, recordings.closed_under)
+    return statistics
 
 
 def sign_of_difference(interval: Sequence[float | None]) -> int:

@@ -79,7 +79,7 @@ def can_draw() -> bool:
 def _run_xie_liu(run: PartRun) -> dict[str, Any]:
     options = six_systems.QUICK if run.quick else six_systems.DEFAULT_OPTIONS
     if not run.corpus.names("val"):  # nothing to choose settings with
-        printed = [name for name in select_systems(options.systems) if not COMPARED_SYSTEMS[name].tunes]
+        printed = [name for name in select_systems(options.systems) if not COMPARED_SYSTEMS[name].splits]
         options = replace(options, systems=printed)
     return six_systems.xieliu2007(run.corpus, options, plots=run.plots, work=run.work, settings=run.settings)
 

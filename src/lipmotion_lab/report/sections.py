@@ -31,7 +31,7 @@ from lipmotion_lab.report.section import (
     difference,
     warn_of_few,
 )
-from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
+from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
 
 TIMING = Column("timing_ms", "timing", "+.0f", "by how much closings are late, in ms")
 AS_PRINTED, SETS = next(iter(PINS)), "Unit sets, "
@@ -231,23 +231,22 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     for each in smaller:
         cases += [(f"{name}, {each['names']} recordings", rows, each) for name, rows in each["conditions"].items()]
     (_, main), *more = ((caption, _systems_table(caption, *case)) for caption, *case in cases)
-    words, verdict = warn_of_few(figures["clips"]), ""
-    pairs = [pair for pair in size["pairs"] if {pair["better"], pair["worse"]} <= PAPER_FIGURES.keys()]
-    if pairs:
-        by_acc, by_error = (_order_of_systems(main.rows, pairs, *measure) for measure in MEASURES)
-        words["Systems as printed, by ACC"], verdict = by_acc.sentences(), by_acc.verdict()
-        words["By AMSE"] = [f"Systems as printed: {by_error.verdict()}"]
+    words, verdict, by_amse = warn_of_few(figures["clips"]), "", []
+    for ending, called in (("", "as printed"), (SPLIT, "with Gaussians chosen on val")):
+        names = {name + ending for name in PAPER_FIGURES}
+        pairs = [pair for pair in size["pairs"] if {pair["better"], pair["worse"]} <= names]
+        if pairs:
+            by_acc, by_error = (_order_of_systems(main.rows, pairs, ending, *measure) for measure in MEASURES)
+            words[f"Systems {called}, by ACC"] = [*([by_acc.verdict()] if verdict else []), *by_acc.sentences()]
+            by_amse.append(f"Systems {called}: {by_error.verdict()}")
+            verdict = verdict or by_acc.verdict()
+    words["By AMSE"] = by_amse
     if changed := [_chosen(name, row["options"]) for name, row in size["training"].items() if row["tried"]]:
         words["Settings, the best on val"] = changed
     if size["pairs"]:
         rows = {f"{pair['better']} over {pair['worse']}": pair for pair in size["pairs"]}
         columns = [Column(key, f"difference of {title}", form) for key, title, form in MEASURES]
         more.append(("Pairs of the paper", Table("xieliu2007-pairs", "Pairs of the paper", columns, rows, head="pair")))
-    for condition in (rows := size.get("strangers", {})) and next(iter(rows.values())):
-        of_condition = {name: row[condition] for name, row in rows.items()}
-        caption = f"People whom no system knows, at the best lag, {condition}"
-        name = f"xieliu2007-strangers-{condition}".replace(" ", "-")
-        more.append((caption, Table(name, caption, [ACC], of_condition)))
     channels = figures["channels"]
     about = (
         f"Which structure of chains predicts lips best: {len(main.rows)} systems trained on {size['used']} recordings, "
@@ -255,6 +254,8 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
         f"({', '.join(channels[:3])}{', …' if len(channels) > 3 else ''})."
         f"{_closings(figures, next(iter(main.rows.values())))}"
     )
+    if changed:
+        about += " K on val: with the number of Gaussians that was best there; nothing was chosen on test."
     shown = [Dot(name, row["acc"], row["acc_95"], row["paper_acc"]) for name, row in main.rows.items()]
     charts = [draw_dots("ACC of every system", "ACC", shown)]
     title = "Xie & Liu 2007, Table 3: structures of chains"
@@ -267,7 +268,7 @@ def _systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) 
     """Return the table of all systems in one case, with the paper's figures, the opening and the training."""
     full_rows = {}
     for name, row in rows.items():
-        amse, acc = PAPER_FIGURES.get(name, (None, None))
+        amse, acc = PAPER_FIGURES.get(name.removesuffix(SPLIT), (None, None))
         training = {key: size["training"][name][key] for key in ("parameters", "seconds")}
         full_rows[name] = {**(row["opening"] or {}), **row, **training, "paper_amse": amse, "paper_acc": acc}
     columns = [*XIELIU_COLUMNS]
@@ -285,9 +286,9 @@ def _chosen(name: str, options: Mapping[str, Any]) -> str:
 
 
 def _order_of_systems(
-    rows: Mapping[str, Row], pairs: Sequence[Mapping[str, Any]], key: str, title: str, form: str
+    rows: Mapping[str, Row], pairs: Sequence[Mapping[str, Any]], ending: str, key: str, title: str, form: str
 ) -> PaperOrder:
-    """Return the paper's order of systems by one measure."""
+    """Return the paper's order of systems by one measure; ``ending``: of their names here."""
     is_error = key == "amse"
     compared = []
     for pair in pairs:
@@ -295,9 +296,10 @@ def _order_of_systems(
         if is_error:  # turned such that positive differences are better
             gain = None if gain is None else -gain
             interval = [None if end is None else -end for end in reversed(interval)]
-        compared.append(PaperPair(pair["better"], pair["worse"], gain, interval))
-    paper = {name: printed[0 if is_error else 1] for name, printed in PAPER_FIGURES.items() if name in rows}
-    here = {name: rows[name][key] for name in paper}
+        better, worse = (pair[which].removesuffix(ending) for which in ("better", "worse"))
+        compared.append(PaperPair(better, worse, gain, interval))
+    paper = {name: PAPER_FIGURES[name][0 if is_error else 1] for name in PAPER_FIGURES if name + ending in rows}
+    here = {name: rows[name + ending][key] for name in paper}
     return PaperOrder(title, paper, here, compared, form, is_error)
 
 
@@ -422,3 +424,17 @@ def folds_section(figures: Mapping[str, Any]) -> Section:
             "{} speakers: mean ACC {:.3f}, {:.3f} ({}) to {:.3f} ({}).".format(len(speakers), mean, *lowest, *highest)
         ]
     return Section("Cross-validation", about, verdict, words, [], table)
+
+
+def blocks_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``folds.in_blocks`` say: of sound alone, systems by their mean correlation."""
+    rows = {name: {**(row.get("opening") or {}), **row} for name, row in figures["conditions"][AUDIO_ONLY].items()}
+    columns = (Column("acc", "ACC, mean", ".3f", "correlation, mean over channels"), SCORE, PRECISION, RECALL, VARIANCE)
+    best = max(rows, key=lambda name: rows[name]["acc"])
+    about = (
+        f"{figures['clips']} recordings, {figures['minutes']:.1f} minutes, in {figures['blocks']} blocks: each is "
+        f"generated by systems trained on the others but one, on which they choose."
+    )
+    verdict = f"Highest ACC: {best}, {rows[best]['acc']:.3f}."
+    table = Table("blocks", "Small corpus, sound alone", columns, rows, head="system")
+    return Section("Small corpus in blocks", about, verdict, warn_of_few(figures["clips"]), [], table)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -56,23 +56,38 @@ def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = ""
     add_figures_arguments(parser)
 
 
+def add_blocks(parser: argparse.ArgumentParser) -> None:
+    """Add ``--blocks``, for corpora too small for a list ``test``."""
+    help_text = "for a small corpus: divide it into K blocks of time; each is test once, the next val, the rest train"
+    parser.add_argument("--blocks", type=int, metavar="K", help=help_text)
+
+
 def run_experiment(
     options: argparse.Namespace,
     experiment: Callable[..., dict[str, Any]],
     name: str,
     *,
     has_parts: bool = True,
+    references: Sequence[str] = (),
 ) -> None:
     """Call ``experiment(corpus, work=…, settings=…)``, print what a report says of it, and give its figures.
 
     name : of the part of a report
+    references : the systems that the others are compared with in ``--blocks``
     ``work`` is a folder of finished parts, from which a second run goes on; None without an output, and not
     ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
     from lipmotion.storage.locks import unfinished_work
+    from lipmotion_lab.folds import in_blocks
     from lipmotion_lab.report.report import PARTS
+    from lipmotion_lab.report.sections import blocks_section
     from lipmotion_lab.runner import ExperimentSettings, Stamp, take_quick_part
+
+    blocks = getattr(options, "blocks", None)
+    if blocks is not None:
+        words = " ".join(map(str, options.words))
+        experiment = partial(in_blocks, experiment, references=references, count=blocks, key=words)
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
         stamp = Stamp()
@@ -84,7 +99,8 @@ def run_experiment(
             figures = experiment(corpus, work=work, settings=settings)
         return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
 
-    report_figures(options, compute, lambda figures: PARTS[name].section(figures).as_text())
+    section = PARTS[name].section if blocks is None else blocks_section
+    report_figures(options, compute, lambda figures: section(figures).as_text())
 
 
 def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -96,16 +112,19 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
     parser.add_argument("--channels", default="", metavar="NAME,NAME", help=channels)
     parser.add_argument("--states", type=numbers, metavar="N,N", help="states of a unit (default: 3,5; quick: 5)")
     add_experiment_arguments(parser, quick="one or two Gaussians")
+    add_blocks(parser)
     parser.set_defaults(run=run_hofer2008)
 
 
 def run_hofer2008(options: argparse.Namespace) -> None:
     """Call ``hofer2008`` and print its section."""
-    from lipmotion_lab.hofer2008 import FULL, QUICK, hofer2008
+    from lipmotion_lab.hofer2008 import FULL, QUICK, REFERENCE_SET, hofer2008
 
     usual = QUICK if options.quick else FULL
     chosen = replace(usual, channels=options.channels.replace(",", " "), states=options.states or usual.states)
-    run_experiment(options, partial(hofer2008, options=chosen, split=list_or_all(options.split)), "hofer2008")
+    references = [f"{REFERENCE_SET}, {states} states" for states in chosen.states]
+    experiment = partial(hofer2008, options=chosen, split=list_or_all(options.split))
+    run_experiment(options, experiment, "hofer2008", references=references)
 
 
 def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -115,6 +134,8 @@ def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentPar
     sizes = "numbers of recordings to train on (default: 20,50,100,200 and all)"
     parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help=sizes)
     parser.add_argument("--split", default="test", help="compare on val or test (default: test)")
+    rival = "train also a BLSTM on the same recordings, its settings chosen on val, and compare"
+    parser.add_argument("--rival", action="store_true", help=rival)
     add_experiment_arguments(parser)
     parser.set_defaults(run=run_learning_curve)
 
@@ -126,7 +147,8 @@ def run_learning_curve(options: argparse.Namespace) -> None:
 
     def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
         order = read_names(options.order) if options.order else None
-        return learning_curve(corpus, order=order, sizes=options.sizes, split=list_or_all(options.split), **others)
+        split, rival = list_or_all(options.split), options.rival
+        return learning_curve(corpus, order=order, sizes=options.sizes, split=split, rival=rival, **others)
 
     run_experiment(options, experiment, "learning-curve")
 
@@ -152,7 +174,7 @@ def run_folds(options: argparse.Namespace) -> None:
 def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = actions.add_parser(
         "xieliu2007",
-        help="which structure of chains predicts lips best, as printed (Xie & Liu 2007, Table 3), and two stages",
+        help="which structure of chains predicts lips best, as printed and chosen on val (Xie & Liu 2007, Table 3)",
     )
     parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
     order = "names of recordings, one per line (default: train, shuffled)"
@@ -165,25 +187,24 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
     add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
-    more = "also train systems of two stages, on transcribed recordings of others, or their phones, as in train"
-    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=more)
-    parser.add_argument("--voices", action="store_true", help="as --recordings, on synthetic voices")
-    unseen = "compare the opening also on this corpus, of people whom no system knows"
-    add_input(parser, "--strangers", what="corpus", metavar="CORPUS", help=unseen)
-    add_experiment_arguments(parser, quick="the paper's systems; not with --order")
+    add_experiment_arguments(
+        parser, quick="the paper's systems, four also with Gaussians chosen on val; not with --order"
+    )
+    add_blocks(parser)
     parser.set_defaults(run=run_xieliu2007)
 
 
 def run_xieliu2007(options: argparse.Namespace) -> None:
     """Call ``xieliu2007`` and print its section."""
     from lipmotion.corpora.source_recordings import read_names
-    from lipmotion.corpora.store import Corpus
     from lipmotion.errors import InputError
-    from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
+    from lipmotion_lab.xie_liu2007.systems import BLSTM, REFERENCE_SYSTEM
 
     if options.quick and options.order:
         raise InputError("--quick takes recordings of its own, and --order is a list of others; leave out one of them")
+    if options.blocks and (options.order or options.sizes or options.plots or options.visual != "geometry"):
+        raise InputError("--blocks trains on all other blocks, by channels that all have; leave out other options")
 
     def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
         usual = QUICK if options.quick else DEFAULT_OPTIONS
@@ -192,14 +213,12 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
             systems=options.systems or usual.systems,
             visual=options.visual,
             transcripts=options.transcripts,
-            voices=tuple(other_voices(synthetic=options.voices, recordings=options.recordings)),
-            strangers=Corpus.open(options.strangers) if options.strangers else None,
         )
         order = read_names(options.order) if options.order else None
         split, sizes, plots = list_or_all(options.split), options.sizes, options.plots
         return xieliu2007(corpus, compared, split=split, order=order, sizes=sizes, plots=plots, **others)
 
-    run_experiment(options, experiment, "xieliu2007")
+    run_experiment(options, experiment, "xieliu2007", references=(REFERENCE_SYSTEM, "ph-HMM", BLSTM))
 
 
 def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -211,15 +230,16 @@ def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]
     )
     parser.add_argument("--no-guide", dest="guided", action="store_false", help=unguided)
     add_experiment_arguments(parser, quick="few epochs; the model is not kept")
+    add_blocks(parser)
     parser.set_defaults(run=run_minnis2000)
 
 
 def run_minnis2000(options: argparse.Namespace) -> None:
     """Call ``minnis2000`` and print its section."""
-    from lipmotion_lab.minnis2000 import minnis2000
+    from lipmotion_lab.minnis2000 import PRINTED, minnis2000
 
     chosen = {"models": options.models, "quick": options.quick, "guided": options.guided}
-    run_experiment(options, partial(minnis2000, **chosen), "minnis2000")
+    run_experiment(options, partial(minnis2000, **chosen), "minnis2000", references=(PRINTED,))
 
 
 def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -14,15 +14,13 @@ import numpy as np
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel
-from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
-from lipmotion.pipeline.training.other_speakers import SpokenSentence
-from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, examples_without_motion, phones_and_examples
-from lipmotion.pipeline.workers import worker_pool
+from lipmotion.pipeline.training.train import phones_and_examples
+from lipmotion.pipeline.workers import training_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
 from lipmotion.storage.archive import Checkpoint
@@ -44,13 +42,14 @@ from lipmotion_lab.learning_curve import check_training_names, choose_sizes
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
     ALL_PATHS,
+    BLSTM,
     COMPARED_SYSTEMS,
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     SPLIT,
-    TWO_STAGES,
     TrainedSystem,
     as_row,
+    best_trial,
     list_changed_options,
     select_systems,
     system_from_arrays,
@@ -59,31 +58,26 @@ from lipmotion_lab.xie_liu2007.systems import (
     with_inputs_of,
 )
 
-LARGEST_LAG_S = 0.06
-"""Sound and picture of other people's recordings may be apart by so much."""
-
 
 @dataclass(frozen=True)
 class ComparisonOptions:
     """Which systems are compared, and in which conditions.
 
-    mixtures    : most Gaussians a state, where their number is chosen on the list ``val``
+    mixtures    : most Gaussians a state where their number is chosen, on the list ``val``
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
-    voices      : speech of others, on which systems of two stages are trained as well
-    strangers   : recordings of people whom no system knows, on which all are compared, too (None: there are none)
     """
 
     systems: Sequence[str] | None = None
     mixtures: int = 8
     visual: str = GEOMETRY
     transcripts: bool = False
-    voices: Sequence[SpokenSentence] = ()
-    strangers: Corpus | None = None
 
 
 DEFAULT_OPTIONS = ComparisonOptions()
-QUICK = ComparisonOptions(systems=[*PAPER_FIGURES, "mean pose"])
+QUICK = ComparisonOptions(
+    systems=[*PAPER_FIGURES, *(name + SPLIT for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"], mixtures=2
+)
 """A small comparison, for the recordings of ``runner.take_quick_part``; conversion by factorial chains is slow."""
 
 
@@ -105,16 +99,14 @@ def xieliu2007(  # noqa: PLR0913
     The phones in time are computed once for each size and are the same for all systems.
     Raises InputError: no such system, or sizes that the list does not have.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
-    Raises MissingDependencyError: a system or the pictures need a package that is not installed.
+    Raises MissingDependencyError: the pictures need a package that is not installed.
     Raises ExportError: the pictures cannot be written.
     """
-    names, seed = select_systems(options.systems, two_stages=bool(options.voices)), settings.seed
-    if not options.voices and (without := [name for name in names if COMPARED_SYSTEMS[name].second_stage]):
-        raise InputError(f"{without[0]} needs speech of others; give it by --recordings or --voices")
+    names, seed = select_systems(options.systems), settings.seed
     check_visual(options.visual)
     listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), seed)
-    splits = any(COMPARED_SYSTEMS[name].splits for name in names)
-    held_out, validation = corpus.required(split), corpus.required("val") if splits else ()
+    chosen_on_val = any(COMPARED_SYSTEMS[name].splits for name in names)
+    held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
     check_training_names(corpus, listed, (*held_out, *validation))
     steps = choose_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
@@ -125,7 +117,7 @@ def xieliu2007(  # noqa: PLR0913
         check_apart([plots], [Source(corpus.path, "corpus")])
     shares = np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
-    for count, (start, stop) in zip(steps, pairwise(shares), strict=False):
+    for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
         part = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
         trained = setup.train(names, listed[:count], part)
         kept = setup.checkpoint(listed[:count], held_out)
@@ -136,8 +128,6 @@ def xieliu2007(  # noqa: PLR0913
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "visual": options.visual}
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
-    about |= {"others": sorted({spoken.speaker for spoken in options.voices})}
-    about |= {"others_minutes": sum(spoken.audio.duration_s for spoken in options.voices) / 60}
     return nan_as_null(about | {"validation": len(validation), "rows": rows})
 
 
@@ -146,7 +136,6 @@ class _TrainedSystems:
     used: tuple[str, ...]
     recordings: HeldOutRecordings
     systems: Mapping[str, TrainedSystem]
-    strangers: HeldOutRecordings | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +153,6 @@ class _TrainingSetup:
         """Return systems, trained on the same phones of the utterances ``names``."""
         examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
         kept, trained = self.checkpoint(names), dict[str, TrainedSystem]()
-        others = [*examples_without_motion(engine_named("coupled"), self.options.voices)]
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
             part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here
@@ -172,15 +160,13 @@ class _TrainingSetup:
             if found is not None:
                 trained[name] = system_from_arrays(found)
                 continue
-            known = [*with_inputs_of(name, examples, self.corpus)]
-            known += others if COMPARED_SYSTEMS[name].second_stage else []
+            known = with_inputs_of(name, examples, self.corpus)
             trained[name] = train_system(name, known, recordings.get("val"), trained, self.options.mixtures, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 found = system_to_arrays(trained[name])
                 kept.save(f"system-{name}", found)
                 trained[name] = system_from_arrays(found)
-        used, strangers = tuple(example.name for example in examples), recordings.get("strangers")
-        return _TrainedSystems(used, recordings["held out"], trained, strangers)
+        return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
 
     def _prepared(
         self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
@@ -191,10 +177,10 @@ class _TrainingSetup:
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
         eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
-        with worker_pool(min(self.settings.workers, len(utterances) // UTTERANCES_PER_WORKER)) as team:
-            phones, examples, _ = phones_and_examples(
-                utterances, config, lexicon, sub_monitor(monitor, 0, 0.7), self.checkpoint(names), team.ordered_map
-            )
+        with training_pool(self.settings.workers, len(utterances)) as each:
+            checkpoint = replace(self.checkpoint(names), parallel_map=each)
+            learning = sub_monitor(monitor, 0, 0.7)
+            phones, examples, _ = phones_and_examples(utterances, config, lexicon, learning, checkpoint)
         read = partial(load_held_out, self.corpus, cached_recogniser(phones), lexicon=lexicon)
         read = partial(read, visual=visual, eigenlips=eigenlips)
         parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
@@ -203,15 +189,11 @@ class _TrainingSetup:
             reading = sub_monitor(monitor, 0.7 + 0.15 * number, 0.85 + 0.15 * number)
             channels = recordings["held out"].channels if recordings else None
             recordings[name] = read(selection=Selection(names=part), channels=channels, monitor=reading)
-        if (unseen := self.options.strangers) is not None:
-            read = partial(load_held_out, unseen, cached_recogniser(phones), lexicon=lexicon)
-            recordings["strangers"] = read(selection=Selection(), channels=(OPENING,))
         return examples, recordings
 
     def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
-        everything = (*names, *self.corpus.names("val"))
-        others = " ".join((str(self.options.mixtures), *(spoken.name for spoken in self.options.voices), *compared))
+        everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.mixtures), *compared))
         key = runner.PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
         return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
@@ -230,6 +212,8 @@ def _size(
     for name, system in systems.items():
         row: dict[str, Any] = {"seconds": system.seconds, "parameters": None, "options": None}
         row["tried"] = [*map(as_row, system.tried)]
+        if name == BLSTM and system.tried:
+            row |= {key: getattr(best_trial(system.tried), key) for key in ("parameters", "options")}
         if isinstance(system.model, CoupledModel):
             row |= {"parameters": system.model.chains.parameters, "options": list_changed_options(system.engine.config)}
         training[name] = row
@@ -238,29 +222,6 @@ def _size(
         "training": training,
         "conditions": {condition: _system_rows(recordings, clips, seed) for condition, clips in generated.items()},
         "pairs": _paper_pairs(recordings, generated[AUDIO_ONLY], seed),
-        "strangers": _stranger_rows(trained.strangers, systems, seed) if trained.strangers is not None else {},
-    }
-
-
-def _stranger_rows(
-    strangers: HeldOutRecordings, systems: Mapping[str, TrainedSystem], seed: int
-) -> dict[str, dict[str, Any]]:
-    """Return the mean ACC of the opening at the best lag, and for two stages its gain, of people nobody knows."""
-    found: dict[str, dict[str, evaluate.ClipStatistic]] = {}
-    for name, system in systems.items():
-        for condition in strangers.conditions:
-            clips = generate_clips(strangers, condition, system.engine, system.model)
-            curves_of = evaluate.opening_curves(strangers, clips)
-            times = [clip.time_s for clip in clips]
-            found.setdefault(name, {})[condition] = evaluate.best_lag_statistic(*curves_of, times, LARGEST_LAG_S)
-    return {
-        name: {
-            condition: {"acc": own.value, "acc_95": own.interval(seed)}
-            | ({"gain": own.value - one.value, "acc_gain_95": own.gain(one, seed)} if one is not own else {})
-            for condition, own in of_system.items()
-            for one in [found[name.replace(TWO_STAGES, "")][condition]]
-        }
-        for name, of_system in found.items()
     }
 
 
@@ -293,9 +254,8 @@ def _paper_pairs(
         if not ending:
             pairs += [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
             pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
-            pairs += [(name, name.replace(TWO_STAGES, "")) for name in made if TWO_STAGES in name]
         pairs = [pair for pair in pairs if {*pair} <= made.keys()]
-        statistics = {name: _statistics(recordings, made[name]) for pair in pairs for name in pair}
+        statistics = {name: evaluate.clip_statistics(recordings, made[name]) for pair in pairs for name in pair}
         for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
@@ -307,11 +267,11 @@ def _paper_pairs(
 
 def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
-    reference, rows = _statistics(recordings, made[REFERENCE_SYSTEM]), {}
+    reference, rows = evaluate.clip_statistics(recordings, made[REFERENCE_SYSTEM]), {}
     for system, clips in made.items():
         figures = evaluate.figures_of(clips, recordings, seed)
         row: dict[str, Any] = {}
-        for name, statistic in _statistics(recordings, clips).items():
+        for name, statistic in evaluate.clip_statistics(recordings, clips).items():
             row[name], row[f"{name}_95"] = statistic.value, statistic.interval(seed)
             row[f"{name}_gain_95"] = statistic.gain(reference[name], seed)
         still = not varies(np.concatenate([clip.generated for clip in clips])).any()
@@ -321,19 +281,3 @@ def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[Compared
             row["opening"] = runner.opening_row_with_rates(figures) | {"rmse": rmse}
         rows[system] = row
     return rows
-
-
-def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, evaluate.ClipStatistic]:
-    """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; and the ACC of the opening."""
-    pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
-    parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
-    statistics = {}
-    for part, columns in parts.items():
-        if columns.any():
-            generated = [clip.generated[:, columns] for clip in made]
-            original = [clip.original[:, columns] for clip in made]
-            statistics[f"{part}amse"] = evaluate.distance_statistic(generated, original)
-            statistics[f"{part}acc"] = evaluate.correlation_statistic(generated, original)
-    if OPENING in recordings.channels:
-        statistics["opening_acc"] = evaluate.correlation_statistic(*evaluate.opening_curves(recordings, made))
-    return statistics

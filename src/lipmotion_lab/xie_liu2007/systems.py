@@ -1,4 +1,4 @@
-"""The systems of Xie & Liu 2007, Table 3, with their tuning, the engines of this project beside them, and baselines."""
+"""The systems of Xie & Liu 2007, Table 3, the engines of this project beside them, and baselines."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.engines import Animator, Engine, engine_named
+from lipmotion.engines import Animator, engine_named
 from lipmotion.engines.coupled.arrays import coupled_arrays
 from lipmotion.engines.coupled.chains.structures import HMM, SYSTEMS, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
@@ -21,14 +21,27 @@ from lipmotion.engines.coupled.training.coupled_training import growing_models
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
-from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose, import_torch
+from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
-from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
+from lipmotion_lab.evaluation.held_out import (
+    AUDIO_ONLY,
+    ComparedClip,
+    HeldOutRecordings,
+    generate_clips,
+    generate_compared,
+    make_speech,
+)
 
 Options = Mapping[str, Any]
 TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
 """Factorial chains that are tied together: rare joint states lose 10 nats, and the chains begin a state apart."""
 TOGETHER = {"moves_together": True}
+NETWORK_SETTINGS: tuple[Sequence[Options], ...] = (
+    [{"rate": rate} for rate in (4e-3, 2e-3, 8e-3)],
+    [{"cells": 192}],
+    [{"steps": 100.0}],
+)
+"""Settings of the BLSTM that are tried, one kind after another."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +64,23 @@ class TrainedSystem:
     tried: Sequence[Trial] = field(default_factory=tuple)
 
 
+def search_settings(
+    options: Options, kinds: Sequence[Sequence[Options]], attempt: Callable[[Options], Sequence[Trial]]
+) -> list[Trial]:
+    """Return all trials of a search from some options that takes one kind of setting after another."""
+    tried: list[Trial] = []
+    for kind in kinds:
+        start = best_trial(tried).options if tried else options
+        for change in kind:
+            tried += attempt({**start, **change})
+    return tried
+
+
+def best_trial(trials: Sequence[Trial]) -> Trial:
+    """Return the trial of the highest ACC; of equals the first."""
+    return max(trials, key=lambda trial: trial.acc)
+
+
 def train_stages(
     options: Options, examples: Sequence[Example], monitor: Monitor = silent_monitor
 ) -> Iterator[TrainedSystem]:
@@ -69,10 +99,31 @@ def judge_systems(
     """Yield every system with its figures on validation recordings."""
     for system in systems:
         made = generate_clips(validation, AUDIO_ONLY, system.engine, system.model)
-        generated, original = [clip.generated for clip in made], [clip.original for clip in made]
-        acc = correlation_statistic(generated, original).value
-        amse = distance_statistic(generated, original).value
-        yield Trial(system.engine.config.as_mapping(), acc, amse, system.model.chains.parameters), system
+        options, parameters = system.engine.config.as_mapping(), system.model.chains.parameters
+        yield Trial(options, *measure_clips(made), parameters), system
+
+
+def measure_clips(made: Sequence[ComparedClip]) -> tuple[float, float]:
+    """Return ACC and AMSE of what a system makes of recordings."""
+    both = [clip.generated for clip in made], [clip.original for clip in made]
+    return correlation_statistic(*both).value, distance_statistic(*both).value
+
+
+def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, monitor: Monitor) -> TrainedSystem:
+    """Return the BLSTM whose learning rate, then cells, then steps are the best on validation recordings."""
+    hearing: Animator[Any] = BlstmBaseline()
+    speech, found = make_speech(validation, AUDIO_ONLY, hearing, None), list[tuple[Trial, TrainedSystem]]()
+
+    def attempt(options: Options) -> list[Trial]:
+        start_s, engine = process_time(), BlstmBaseline(**options)
+        model = engine.fit(examples, monitor).model
+        size = sum(array.size for array in model.learned.network.parameters)
+        trial = Trial(options, *measure_clips(generate_compared(validation, speech, engine, model)), size)
+        found.append((trial, TrainedSystem(engine, model, process_time() - start_s)))
+        return [trial]
+
+    search_settings({}, NETWORK_SETTINGS, attempt)
+    return choose_by(lambda trial: trial.acc, found)
 
 
 def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
@@ -85,9 +136,18 @@ def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator
         best = trial.acc
 
 
+def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
+    """Return the system of which something is highest, as the ACC of its trial; with all trials."""
+    pairs = list(found)
+    _, best = max(pairs, key=lambda pair: of(pair[0]))
+    return replace(best, tried=tuple(trial for trial, _ in pairs))
+
+
 def as_row(trial: Trial) -> dict[str, Any]:
-    """Return a trial as figures; its options are those that ``list_changed_options`` returns."""
-    return asdict(trial) | {"options": list_changed_options(CoupledConfig.parsed(trial.options))}
+    """Return a trial as figures; the options of chains are those that ``list_changed_options`` returns."""
+    options = trial.options
+    chains = "structure" in options
+    return asdict(trial) | {"options": list_changed_options(CoupledConfig.parsed(options)) if chains else options}
 
 
 def list_changed_options(config: CoupledConfig) -> dict[str, Any]:
@@ -110,8 +170,8 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
 }
 """AMSE and ACC of the paper's Table 3: eigenlips of another speaker, so only their order compares."""
 BEST_PATH = "ph-vi-CHMM, best path"
-BLSTM, TRAJECTORY = "BLSTM", "trajectory CHMM"
-SPLIT, ALL_PATHS, TWO_STAGES = ", K on val", ", all paths", ", two stages"
+BLSTM = "BLSTM"
+SPLIT, ALL_PATHS = ", K on val", ", all paths"
 SOFT = {"start": "soft", "steps": 0}
 ABOUT = "about"
 
@@ -122,16 +182,15 @@ class ComparedSystem:
 
     make          : returns its engine; None: it is the coupled engine with ``options``
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
-    splits        : its number of Gaussians is chosen on validation recordings, as in the paper (§7.1)
-    second_stage  : it is trained on speech of others without motion as well (§3.4)
-    when_named    : it is compared only if it is asked for, or there is such speech
+    splits        : its number of Gaussians is chosen on validation recordings, as in the paper (§7.1), or settings of a
+                    network, ``NETWORK_SETTINGS``
+    when_named    : it is compared only if it is asked for
     """
 
     make: Callable[[], Animator[Any]] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     same_model_as: str = ""
     splits: bool = False
-    second_stage: bool = False
     when_named: bool = False
 
     @property
@@ -151,58 +210,42 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     **{f"{name}, together": ComparedSystem(options=SYSTEMS[name] | TOGETHER) for name in ("ph-CHMM", "ph-vi-CHMM")},
     **{name + ALL_PATHS: ComparedSystem(options=SOFT, same_model_as=name) for name in PAPER_FIGURES},
     BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
-    f"{TRAJECTORY}, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
-    REFERENCE_SYSTEM + TWO_STAGES: ComparedSystem(
-        options=SYSTEMS[REFERENCE_SYSTEM], second_stage=True, when_named=True
-    ),
-    REFERENCE_SYSTEM + TWO_STAGES + ALL_PATHS: ComparedSystem(
-        options=SOFT, same_model_as=REFERENCE_SYSTEM + TWO_STAGES, when_named=True
-    ),
-    TRAJECTORY: ComparedSystem(_engine("coupled"), when_named=True),
-    TRAJECTORY + TWO_STAGES: ComparedSystem(_engine("coupled"), second_stage=True, when_named=True),
+    "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
+    "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
     "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
-    BLSTM: ComparedSystem(BlstmBaseline, when_named=True),
+    BLSTM: ComparedSystem(BlstmBaseline, splits=True, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),
     "mean pose": ComparedSystem(MeanPose),
 }
 """The systems of the table, in its order.
 
 The paper's six are those of ``train --preset``, of one Gaussian a state; ``K on val``: with the number of Gaussians
-that was best on validation recordings; ``two stages``: trained on speech of others, too; ``tied``, ``together``:
-chains as ``TIED`` and ``TOGETHER`` have them. ``all paths``: expected means given speech, no EM; ``best path``: means
-along the best path, no EM.
+that was best on validation recordings;
+``tied``, ``together``: chains as ``TIED`` and ``TOGETHER`` have them. ``all paths``: expected means given speech, no
+EM; ``best path``: means along the best path, no EM.
 ``own means``: no regression of the visual means on acoustic features.
 """
 
 
-def select_systems(names: Sequence[str] | None, *, two_stages: bool = False) -> list[str]:
-    """Return the systems to compare, in order; ``two_stages``: by default those that have two, and the same with one.
-
-    Raises InputError: no such system. Raises MissingDependencyError.
-    """
-    if names is None and two_stages:
-        twice = [name for name in COMPARED_SYSTEMS if TWO_STAGES in name]
-        names = [*twice, *(name.replace(TWO_STAGES, "") for name in twice)]
+def select_systems(names: Sequence[str] | None) -> list[str]:
+    """Return the systems to compare, in order. Raises InputError: no such system."""
     if names is None:
         return [name for name, system in COMPARED_SYSTEMS.items() if not system.when_named]
     unknown = [name for name in names if name not in COMPARED_SYSTEMS]
     if unknown:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
-    if BLSTM in names:
-        import_torch()
     chosen = [COMPARED_SYSTEMS[name] for name in names]
-    needed = {REFERENCE_SYSTEM} | {name for system in chosen for name in (system.same_model_as,)}
+    needed = {REFERENCE_SYSTEM} | {system.same_model_as for system in chosen}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
 
 
 def with_inputs_of(name: str, examples: Sequence[Example], corpus: Corpus) -> Sequence[Example]:
     """Return examples with what a system takes from their sound, as ``lipmotion train`` gives it to an engine."""
     make = COMPARED_SYSTEMS[name].make
-    engine = make() if make is not None else None
-    if not isinstance(engine, Engine):
+    if make is None:
         return examples
     sound = {example.name: corpus.utterance(example.name).audio for example in examples}
-    return with_sound_inputs(engine, examples, sound, silent_monitor, map)
+    return with_sound_inputs(make(), examples, sound, silent_monitor, map)
 
 
 def train_system(
@@ -215,26 +258,26 @@ def train_system(
 ) -> TrainedSystem:
     """Return one trained system.
 
-    examples   : speech with motion, and for the second stage of training, speech of others without
-    validation : recordings that decide on the number of Gaussians; None: no system has it chosen
-    mixtures   : most Gaussians a state, where their number is chosen: of both streams, and of speech alone
+    validation : recordings that decide between 1, 2, 4, … Gaussians, or settings of a network; None: nothing does
+    mixtures   : most Gaussians a state, of both streams and of speech only
     """
     system = COMPARED_SYSTEMS[name]
     if system.same_model_as:
         twin = trained[system.same_model_as]
         return replace(twin, engine=CoupledEngine(replace(twin.engine.config, **system.options)))
+    if system.make is BlstmBaseline and validation is not None:
+        return tune_network(examples, validation, monitor)
     if system.make is not None:
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
-    if not system.splits or validation is None:
-        *_, last = train_stages(system.options, examples, monitor)
-        return last
-    found: list[tuple[Trial, TrainedSystem]] = []
-    for more in [{"visual_mixtures": mixtures}, {}][: 1 if system.options["structure"] == HMM else 2]:
-        grown = train_stages({**system.options, "mixtures": mixtures, **more}, examples, monitor)
-        found += split_while_better(judge_systems(grown, validation))
-    _, best = max(found, key=lambda pair: pair[0].acc)
-    return replace(best, tried=tuple(trial for trial, _ in found))
+    if system.splits and validation is not None:
+        found: list[tuple[Trial, TrainedSystem]] = []
+        for more in [{"visual_mixtures": mixtures}, {}][: 1 if system.options["structure"] == HMM else 2]:
+            grown = train_stages({**system.options, "mixtures": mixtures, **more}, examples, monitor)
+            found += split_while_better(judge_systems(grown, validation))
+        return choose_by(lambda trial: trial.acc, found)
+    *_, last = train_stages(system.options, examples, monitor)
+    return last
 
 
 def system_to_arrays(system: TrainedSystem) -> dict[str, NDArray[Any]]:

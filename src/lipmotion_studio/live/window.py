@@ -27,7 +27,7 @@ from lipmotion.live.consumers import Consumer, LiveSound, json_line
 from lipmotion.live.face import LiveFrame
 from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
 from lipmotion_studio.live.servers import Server, open_server, pcm_16
-from lipmotion_studio.web.files import read_page
+from lipmotion_studio.web.listening import read_page
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection

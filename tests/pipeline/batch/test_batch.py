@@ -23,11 +23,9 @@ from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finish_line
-from lipmotion.pipeline.batch.run import WorkerDied
+from lipmotion.pipeline.workers import WorkerDiedError
 from lipmotion.types import Item
 from lipmotion_faces.outputs.shown_faces import shown_face
-
-pytest.importorskip("joblib")
 
 
 @pytest.fixture
@@ -190,7 +188,7 @@ class DyingPool:
             if item.line.name == self.deadly and self.times:
                 self.times -= 1
                 item.place.work(item.line.name).mkdir(parents=True, exist_ok=True)
-                raise WorkerDied("killed")
+                raise WorkerDiedError("killed")
             yield function(item)
 
 
@@ -214,7 +212,7 @@ def test_a_worker_dies(sounds, settings, tmp_path, times, outcome):
 
 def test_workers_that_never_begin_end_the_batch(sounds, settings, tmp_path):
     def dead(*_):
-        raise WorkerDied("no memory")
+        raise WorkerDiedError("no memory")
         yield
 
     with pytest.raises(CorpusError, match="die before they begin"):

@@ -17,7 +17,6 @@ from lipmotion.pipeline.batch.check import (
     expected_s,
 )
 
-pytest.importorskip("joblib")
 RATE_HZ = 16_000
 
 

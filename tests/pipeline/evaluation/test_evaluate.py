@@ -266,6 +266,16 @@ def test_other_channels_than_lip_distances(toy_model, toy_corpus, known, tmp_pat
     assert "left out, for they do not move: brow, noise" in figures_table(figures)
 
 
+def test_a_model_of_two_features_is_compared_by_these(toy_model, toy_corpus, known):
+    two = {name: motion.selected(("opening", "width")) for name, motion in known.items()}
+    figures = evaluate(
+        replace(toy_model, engine=Medium(SimpleNamespace(channels="opening width")), learned=two), toy_corpus
+    )
+    for condition in figures["conditions"].values():
+        assert list(condition["channels"]) == ["opening", "width"]
+        assert condition["closures"]["score"] == 1
+
+
 def test_a_model_of_other_motion_is_refused(toy_model, toy_corpus, known, tmp_path):
     first, second = held_out(toy_corpus)
     faces = corpus_of([renamed_utterance(first)], tmp_path)

@@ -7,10 +7,11 @@ import errno
 import logging
 import os
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from lipmotion.cli.terminal.events import Events, JsonLines, RhubarbStatus, Stopper
 from lipmotion.cli.terminal.printing import print_error, print_lines, with_program_name
@@ -18,57 +19,42 @@ from lipmotion.errors import ExportError, InputError, LipMotionError
 from lipmotion.extensions import describe_failed_extension
 from lipmotion.printable import printable
 from lipmotion.storage.files import as_text
-from lipmotion.types.progress import Item, Progress
+from lipmotion.types.progress import Item, Progress, warnings_to
 
 
-class Report(Protocol):
+class Report(ABC):
     """Receives the events of long work."""
 
+    @abstractmethod
     def receive(self, event: Progress | Item) -> None:
         """Show or write one event."""
 
+    @abstractmethod
     def warn(self, text: str) -> None:
         """Show or write a warning."""
 
+    @abstractmethod
     def finish(self, text: str, **figures: Any) -> None:
         """Give the result: ``text`` for a person, ``figures`` for a program."""
+
+    def close(self) -> None:
+        """Remove what is shown while the work lasts."""
+        return
 
 
 @contextmanager
 def report_progress(options: argparse.Namespace) -> Iterator[Report]:
     """Yield the report of a command; meanwhile the package's warnings go to it, too."""
-    chosen = (
-        _MachineReport(options.stopper, options.events)
-        if options.machine_readable
-        else _TerminalReport(options.stopper)
-    )
-    report: Report = chosen
-    logger = logging.getLogger("lipmotion")
-    handler = _ReportHandler(report)
-    logger.addHandler(handler)
-    logger.propagate = False
-    try:
+    report = _MachineReport(options) if options.machine_readable else _TerminalReport(options)
+    with warnings_to(report.warn, propagate=False), closing(report):
         yield report
-    finally:
-        chosen.close()
-        logger.removeHandler(handler)
-        logger.propagate = True
 
 
-class _ReportHandler(logging.Handler):
-    def __init__(self, report: Report) -> None:
-        super().__init__(logging.WARNING)
-        self._report = report
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._report.warn(record.getMessage())
-
-
-class _TerminalReport:
+class _TerminalReport(Report):
     """A progress bar and warnings on standard error, the bar only on a terminal; the result on standard output."""
 
-    def __init__(self, stopper: Stopper) -> None:
-        self._stopper = stopper
+    def __init__(self, options: argparse.Namespace) -> None:
+        self._stopper: Stopper = options.stopper
         self._shown = sys.stderr is not None and sys.stderr.isatty()
         self._bar: Any = None
 
@@ -111,11 +97,12 @@ class _TerminalReport:
         self._bar.refresh()
 
 
-class _MachineReport:
+class _MachineReport(Report):
     """JSON events for the calling program."""
 
-    def __init__(self, stopper: Stopper, events: JsonLines) -> None:
-        self._stopper, self._events = stopper, events
+    def __init__(self, options: argparse.Namespace) -> None:
+        self._stopper: Stopper = options.stopper
+        self._events: JsonLines = options.events
 
     def receive(self, event: Progress | Item) -> None:
         self._stopper.check()
@@ -132,9 +119,6 @@ class _MachineReport:
     def finish(self, text: str, **figures: Any) -> None:  # noqa: ARG002
         self._stopper.settle()
         self._events.succeed(**figures)
-
-    def close(self) -> None:
-        """Do nothing: there is no progress bar to remove."""
 
 
 GONE = "the current folder has been deleted; go to one that exists"

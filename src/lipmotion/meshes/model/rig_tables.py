@@ -6,7 +6,6 @@ The table beside a character is the same: its controls are the blendshapes, one 
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -19,8 +18,8 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_52, CLOSED, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.storage.files import atomic_file
-from lipmotion.storage.sources import is_file, read_text_file
-from lipmotion.storage.text_table import as_field, from_field, read_table
+from lipmotion.storage.sources import is_file
+from lipmotion.storage.text_table import as_field, from_field, read_whole_table
 from lipmotion.types import Channel, Motion
 from lipmotion.types.values import parse_number
 
@@ -55,14 +54,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
 
     Raises InputError: no such file, other columns, no rows, or a row that is damaged.
     """
-    try:
-        table = read_table(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE_BYTES), newline=""))
-        lines = list(table.rows)
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: no table ({shorten(str(error))}); required {','.join(COLUMNS)}") from error
-    names = table.plain_names
+    names, lines = read_whole_table(path, "rig table", LARGEST_TABLE_BYTES, COLUMNS)
     if names[:2] != list(COLUMNS[:2]) or not set(names) <= set(COLUMNS):
         raise InputError(f"{path}: the columns are {shorten(','.join(names))!r}, required {','.join(COLUMNS)}")
     rows = []

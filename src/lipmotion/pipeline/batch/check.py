@@ -11,14 +11,15 @@ from functools import partial
 from pathlib import Path
 from statistics import median
 
-from lipmotion.errors import CorpusError, InputError, LipMotionError
+from lipmotion.errors import CorpusError, LipMotionError
 from lipmotion.pipeline.analysis.language import detect_english
 from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
-from lipmotion.pipeline.batch.run import WorkerDied, local_pool
+from lipmotion.pipeline.batch.run import local_pool
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Request
+from lipmotion.pipeline.workers import WorkerDiedError, process_count
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
 from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
@@ -171,16 +172,15 @@ def check(
     Raises InputError: there are no lines, or too many. ExportError: two lines have the same output.
     """
     job = (job or Job()).at(Path.cwd())
-    if jobs is not None and jobs < 1:
-        raise InputError(f"{jobs} processes, required 1 or more; leave the number out for one a core")
+    processes = process_count(jobs)
     lines = read_lines(Path(source), job.outputs.kinds)
     checked: dict[str, CheckedLine] = {}
     try:
-        with local_pool(jobs or os.cpu_count() or 1) as pool:
+        with local_pool(processes) as pool:
             for each in pool(partial(check_line, request=job.request), lines):
                 checked[each.name] = each
                 monitor(Progress(STAGE, len(checked), len(lines), len(checked) / len(lines)))
-    except WorkerDied as error:
+    except WorkerDiedError as error:
         raise CorpusError(f"a process that listened to recordings died ({error}); run it with --jobs 1") from error
     in_order = [checked[line.name] for line in lines]
     return CheckSummary(len(lines), tuple(_find_problems(in_order, _find_orphans(Path(source), lines))))

@@ -109,7 +109,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
                 "with a dot or a blank; rename the recording, or give another name in a column 'output' of the list"
             )
         for folder in path.parents[:-1]:
-            folders[_key(str(folder))] = line.recording
+            folders[file_key(str(folder))] = line.recording
         for kind in kinds:
             file = f"{line.name}.{kind}"
             if any(len(os.fsencode(part)) > LONGEST_PART_BYTES for part in file.split("/")):
@@ -123,7 +123,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
                     f"{line.recording}: the output {file!r} would be called as {other} and hold {kind}; give "
                     f"{other[1:]} as the kind, or another name in a column 'output' of the list"
                 )
-            key = _key(file)
+            key = file_key(file)
             if key in taken:
                 raise ExportError(
                     f"{line.name}.{kind}: would be written for {taken[key]} and for {line.recording}; rename one of "
@@ -137,7 +137,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
         )
 
 
-def _key(name: str) -> str:
+def file_key(name: str) -> str:
     """Return what two names share where neither case nor the form of accents counts."""
     return unicodedata.normalize("NFD", unicodedata.normalize("NFD", name).casefold())
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import io
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -23,8 +22,7 @@ from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.storage.files import as_text, atomic_file
 from lipmotion.storage.json_text import as_json
-from lipmotion.storage.sources import read_text_file
-from lipmotion.storage.text_table import as_field, from_field, read_table
+from lipmotion.storage.text_table import as_field, from_field, read_whole_table
 from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
 
 APPROVE, REDO, NO_MARK = "approve", "redo", ""
@@ -53,26 +51,19 @@ def read_marks(path: Path) -> dict[str, Mark]:
     Raises InputError: the file cannot be read, lacks a column, or has an unknown mark, or two marks of one line.
     """
     marks: dict[str, Mark] = {}
-    try:
-        table = read_table(io.StringIO(read_text_file(path, "file of marks", LARGEST_LIST_BYTES), newline=""))
-        missing = [name for name in MARK_COLUMNS[:2] if name not in table.plain_names]
-        if missing:
-            raise InputError(
-                f"{path}: no column {missing[0]!r}; required a first row name,mark (and when, if you like)"
-            )
-        for number, fields in table.rows:
-            row = dict(zip(table.plain_names, fields, strict=False))
-            name, kind, when = (from_field(row.get(column, "")) for column in MARK_COLUMNS)
-            kind = kind.strip().lower()
-            if kind not in KINDS:
-                raise InputError(f"{path}, row {number}: the mark is {shorten(kind)!r}, required approve or redo")
-            if name in marks:
-                raise InputError(f"{path}, row {number}: {shorten(name)!r} is marked twice; remove one of the rows")
-            marks[name] = Mark(kind, when)
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not a readable table ({error}); export it again as CSV") from error
+    names, rows = read_whole_table(path, "file of marks", LARGEST_LIST_BYTES, MARK_COLUMNS)
+    missing = [name for name in MARK_COLUMNS[:2] if name not in names]
+    if missing:
+        raise InputError(f"{path}: no column {missing[0]!r}; required a first row name,mark (and when, if you like)")
+    for number, fields in rows:
+        row = dict(zip(names, fields, strict=False))
+        name, kind, when = (from_field(row.get(column, "")) for column in MARK_COLUMNS)
+        kind = kind.strip().lower()
+        if kind not in KINDS:
+            raise InputError(f"{path}, row {number}: the mark is {shorten(kind)!r}, required approve or redo")
+        if name in marks:
+            raise InputError(f"{path}, row {number}: {shorten(name)!r} is marked twice; remove one of the rows")
+        marks[name] = Mark(kind, when)
     return marks
 
 

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
-import sys
-import threading
-import time
 import uuid
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError, shorten
 from lipmotion.extensions import install_command, installed_version
-from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     FAILED,
@@ -45,27 +41,21 @@ from lipmotion.pipeline.batch.report import (
     write_reports,
 )
 from lipmotion.pipeline.job import Job
-from lipmotion.pipeline.workers import process_count
+from lipmotion.pipeline.workers import WorkerDiedError, process_count, worker_pool
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
-PARENT_CHECK_S = 0.2
 CONNECT_S = 20
-GRACE_S = 5.0
 ITEMS_AHEAD = 4
-"""Items a worker that are sent ahead: with ``Parallel``'s own bundles of short items none waits, and memory is flat."""
-
-
-class WorkerDied(Exception):  # noqa: N818 # an event that the batch survives
-    """A worker process ended while it had work."""
+"""Items a worker of a cluster that are sent ahead, so that none waits, and memory is flat."""
 
 
 class Pool(Protocol):
     """Applies a function to items in other processes; yields results as they are ready.
 
-    Raises WorkerDied: a worker ended; which items are done is not known.
+    Raises WorkerDiedError: a worker ended; which items are done is not known.
     """
 
     def __call__(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
@@ -75,48 +65,12 @@ class Pool(Protocol):
 @contextmanager
 def local_pool(jobs: int) -> Iterator[Pool]:
     """Give a pool of processes on this machine; with one job, this process itself."""
-    from joblib.externals.loky import get_reusable_executor
-    from joblib.externals.loky.backend.resource_tracker import ensure_running
 
-    if jobs == 1:
-        with one_thread():
-            yield _pool({"backend": "sequential"})
-        return
-    before = os.environ.get("PYTHONWARNINGS")
-    os.environ["PYTHONWARNINGS"] = "ignore"
-    try:
-        ensure_running()  # loky's process, which deletes what killed processes leave, without a word
-    finally:
-        del os.environ["PYTHONWARNINGS"]
-        if before is not None:
-            os.environ["PYTHONWARNINGS"] = before
-    report, ended = threading.excepthook, threading.Event()
+    def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        with worker_pool(jobs) as workers:
+            yield from workers.unordered_map(function, items)
 
-    def report_late(error: Any) -> None:
-        """Report an error of a thread unless the pool ends soon: a signal withdraws work that loky's threads meet."""
-        if not ended.wait(GRACE_S):
-            report(error)
-
-    threading.excepthook = lambda error: threading.Thread(target=report_late, args=(error,), daemon=True).start()
-    try:
-        yield _pool({"backend": "loky", "n_jobs": jobs, "initializer": begin_worker, "initargs": (os.getpid(),)})
-    finally:
-        get_reusable_executor(max_workers=jobs).shutdown(wait=True, kill_workers=True)
-        ended.set()
-        threading.excepthook = report
-
-
-def begin_worker(parent: int) -> None:
-    """Prepare a worker process: Ctrl-C is for the first process, and no worker outlives it."""
-
-    def end_with_parent() -> None:
-        while os.getppid() == parent:
-            time.sleep(PARENT_CHECK_S)
-        os._exit(1)
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform != "win32":
-        threading.Thread(target=end_with_parent, daemon=True).start()
+    yield each
 
 
 @contextmanager
@@ -129,7 +83,7 @@ def cluster_pool(address: str, out: Path) -> Iterator[Pool]:
     Raises InputError: no cluster answers, it has no workers, or they lack lipmotion, its version or the folder.
     """
     try:
-        from distributed import Client
+        from distributed import Client, KilledWorker, as_completed
     except ImportError as error:
         raise MissingDependencyError(
             f"a cluster needs the package distributed: {install_command('cluster')}, here and on all workers"
@@ -155,35 +109,26 @@ def cluster_pool(address: str, out: Path) -> Iterator[Pool]:
                 raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
             if not sees_folder:
                 raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
-        yield _pool({"backend": "dask", "client": client, "pure": False})
+
+        def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+            remaining = iter(items)
+            first = list(islice(remaining, ITEMS_AHEAD * sum(client.ncores().values())))
+            running = as_completed(client.map(function, first, pure=False), loop=client.loop)
+            try:
+                for future in running:
+                    yield future.result()
+                    running.update(client.submit(function, item, pure=False) for item in islice(remaining, 1))
+            except KilledWorker as error:
+                raise WorkerDiedError(str(error)) from error
+            finally:
+                client.cancel(list(running.futures))
+
+        yield each
 
 
 def describe_worker(out: str) -> tuple[str, bool]:
     """Return a worker's version of lipmotion, and whether it sees a folder."""
     return installed_version(), os.path.isdir(out)  # noqa: PTH112
-
-
-def _pool(chosen: dict[str, Any]) -> Pool:
-    from joblib import Parallel, delayed, parallel_config
-    from joblib.externals.loky.process_executor import BrokenProcessPool
-
-    def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-        with parallel_config(**chosen):
-            results = Parallel(return_as="generator_unordered", pre_dispatch=f"{ITEMS_AHEAD}*n_jobs")(
-                delayed(function)(item) for item in items
-            )
-            try:
-                yield from results
-            except BrokenProcessPool as error:
-                raise WorkerDied(str(error)) from error
-            except Exception as error:
-                if type(error).__name__ == "KilledWorker":
-                    raise WorkerDied(str(error)) from error
-                raise
-            finally:
-                results.close()
-
-    return each
 
 
 LOG = logging.getLogger("lipmotion")
@@ -344,7 +289,7 @@ def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, 
                 del left[record["name"]]
                 deaths = 0
                 yield record
-        except WorkerDied as error:
+        except WorkerDiedError as error:
             deaths += 1
             suspects = [work for work in left.values() if work.place.work(work.line.name).is_dir()]
             if not suspects and deaths >= MAX_DEATHS:
@@ -356,7 +301,7 @@ def _finish_lines(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, 
                 del left[work.line.name]
                 try:
                     yield next(iter(each(finish_line, [work])))  # while nothing else is done
-                except WorkerDied:
+                except WorkerDiedError:
                     yield {
                         "name": work.line.name,
                         "recording": work.line.recording,

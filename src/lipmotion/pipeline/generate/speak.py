@@ -16,6 +16,7 @@ from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
 from lipmotion.formats.subtitles import is_subtitles, subtitle_words
 from lipmotion.kernels.compiler import one_thread
+from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generation import speaker_map
 from lipmotion.pipeline.model import Model, load_model
@@ -39,23 +40,15 @@ FEATURES = 13
 
 
 @one_thread()
-def speak_from_corpus(  # noqa: PLR0913
-    text: str,
-    corpus: Corpus,
-    model: Model,
-    *,
-    constraints: Constraints | None = None,
-    lexicon: Lexicon | None = None,
-    speaker: str = "",
-    pauses: Pauses = "rest",
-    asymmetry: float = 0.0,
+def speak_from_corpus(
+    text: str, corpus: Corpus, model: Model, request: Request | None = None, constraints: Constraints | None = None
 ) -> SpokenText:
     """Return a text as the joined sound of recordings, and the motion that was recorded with it.
 
-    text    : one sentence or several, in English words that the dictionary or ``lexicon`` pronounces
+    text    : one sentence or several, in English words that the dictionary or the request's lexicon pronounces
     corpus  : the corpus that the model was trained on
     model   : of an engine that ``SelectsRecordings`` (``selection``)
-    constraints, speaker, pauses, asymmetry : as of ``speak``
+    request : the lexicon, and how the motion is made of the sound: speaker, pauses, asymmetry
     The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
     fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
     ones, with a warning.
@@ -63,7 +56,7 @@ def speak_from_corpus(  # noqa: PLR0913
     that nobody can pronounce.
     Source: Minnis & Breen 2000, §2 and §3.
     """
-    engine = model.engine
+    engine, request = model.engine, request or Request()
     if not isinstance(engine, SelectsRecordings):
         raise InputError(
             f"a model of the engine {engine.name!r} has no recordings to speak with; train one: --engine selection"
@@ -76,7 +69,7 @@ def speak_from_corpus(  # noqa: PLR0913
             f"the corpus {corpus.path} lacks {len(missing)} of {len(names)} recordings of the model, {missing[0]} "
             "among them; give the corpus that it was trained on"
         )
-    target = _plan_phones(text, lexicon or Lexicon(), engine, model)
+    target = _plan_phones(text, read_lexicon(request), engine, model)
     utterances = {name: corpus.utterance(name) for name in names}
     people = sorted({utterance.speaker for utterance in utterances.values()})
     if len(people) > 1:
@@ -103,7 +96,7 @@ def speak_from_corpus(  # noqa: PLR0913
     audio = Audio(joined.samples[first:last], rate_hz)
     edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
     spoken = Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges_s, edges_s[1:], units, strict=False)))
-    request = Request(audio, units=spoken, speaker=speaker, pauses=pauses, asymmetry=asymmetry, spoken_so=True)
+    request = replace(request, recording=audio, units=spoken, lexicon=None, spoken_so=True)
     return SpokenText(audio, animate(request, model=model, constraints=constraints))
 
 
@@ -201,22 +194,16 @@ def speak(  # noqa: PLR0913
         LOG.warning("the text is that of subtitles: times, and sounds in brackets, are left out")
         text = subtitle_words(text)
     text, tags = parse_tagged_text(text)
+    request = Request(
+        lexicon=lexicon, speaker=speaker, onto=onto, onto_speaker=onto_speaker, pauses=pauses, asymmetry=asymmetry
+    )
     if voice == CORPUS_VOICE or corpus is not None:
         if voice != CORPUS_VOICE or corpus is None:
             raise InputError("a corpus that speaks needs both: the voice 'corpus', and the corpus (--corpus FOLDER)")
         if onto is not None:
             raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
         loaded = model if isinstance(model, Model) else load_model(model)
-        spoken = speak_from_corpus(
-            text,
-            corpus,
-            loaded,
-            constraints=constraints,
-            lexicon=lexicon,
-            speaker=speaker,
-            pauses=pauses,
-            asymmetry=asymmetry,
-        )
+        spoken = speak_from_corpus(text, corpus, loaded, replace(request, onto_speaker=""), constraints)
         return spoken._replace(generation=_with_moods(spoken.generation, tags))
     sentences = split_sentences(text)
     chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
@@ -224,17 +211,8 @@ def speak(  # noqa: PLR0913
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
     sound, units = _speak_sentences(sentences, chosen, lexicon)
     sound = quantise(sound)
-    request = Request(
-        at_speech_rate(sound),
-        units=units,
-        speaker=speaker,
-        onto=onto,
-        onto_speaker=onto_speaker,
-        pauses=pauses,
-        asymmetry=asymmetry,
-        manner=ASKED,
-        spoken_so=True,
-    )
+    spoken_so = {"recording": at_speech_rate(sound), "units": units, "manner": ASKED, "spoken_so": True}
+    request = replace(request, lexicon=None, **spoken_so)
     return SpokenText(sound, _with_moods(animate(request, model=loaded, constraints=constraints), tags))
 
 

@@ -354,25 +354,14 @@ def write(  # noqa: PLR0913
         delivery or Delivery(),
     )
     planned = create_outputs([outputs] if isinstance(outputs, str | Path) else outputs, settings)
-    write_planned(generation, planned, settings, sound=sound, model=model, temporary=temporary, monitor=monitor)
+    performance = Performance(generation, settings, sound, settings.recording, model, monitor)
+    write_planned(performance, planned, temporary=temporary)
 
 
-def write_planned(
-    generation: Generation,
-    planned: Sequence[Output],
-    settings: OutputSettings,
-    *,
-    sound: Audio | None = None,
-    model: Model | None = None,
-    temporary: bool = False,
-    monitor: Monitor = silent_monitor,
-) -> None:
-    """Write generated motion to the outputs of ``create_outputs``.
-
-    model, temporary, monitor : as of ``write``. Raises as ``write``.
-    """
-    sounds = (output.path for output in planned if isinstance(output, SoundOutput))
-    sound_file = next(sounds, None) if settings.recording is None or temporary else settings.recording
-    performance = Performance(generation, settings, sound, sound_file, model, monitor)
+def write_planned(performance: Performance, planned: Sequence[Output], *, temporary: bool = False) -> None:
+    """Write what is performed to the outputs of ``create_outputs``; ``temporary``: as of ``write``. Raises as that."""
+    if performance.sound_file is None or temporary:
+        written = (output.path for output in planned if isinstance(output, SoundOutput))
+        performance = replace(performance, sound_file=next(written, None))
     for write_file in [output.prepare(performance) for output in planned]:  # nothing, if the motion does not suit one
         write_file()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines import Engine
+from lipmotion.engines import Animator
 from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import BOTH, GEOMETRY, VISUALS
@@ -141,7 +141,7 @@ LONGEST_VOICE_S = 10.0
 
 
 def with_sound_inputs(
-    engine: Engine[Any], examples: Sequence[Example], sound: Mapping[str, Audio], monitor: Monitor, each: ParallelMap
+    engine: Animator[Any], examples: Sequence[Example], sound: Mapping[str, Audio], monitor: Monitor, each: ParallelMap
 ) -> list[Example]:
     """Return examples with what the engine's training takes from their sound (``Inputs``).
 
