@@ -232,3 +232,27 @@ def test_described_numbers_that_cannot_be(corpus: Corpus) -> None:
         entry.write_text(json.dumps(described | {key: 10**400}))
         with pytest.raises(CorpusError, match="delete this folder and prepare again"):
             corpus.summary()
+
+
+def test_a_corpus_by_url_is_that_of_its_folder(toy_corpus):
+    """A URL's utterances are copied when they are read; nothing is added to it."""
+    fsspec = pytest.importorskip("fsspec")
+    system = fsspec.filesystem("memory")
+    system.put(str(toy_corpus.path), "/away/toy", recursive=True)
+    for url in ("memory://away/toy", "memory://away/toy/", toy_corpus.path.absolute().as_uri()):
+        corpus = Corpus.open(url)
+        name = corpus.names()[1]
+        assert len(corpus) == len(toy_corpus)
+        assert not (corpus.path / "utterances").exists()
+        found, wanted = corpus.part([name]).utterance(name), toy_corpus.utterance(name)
+        assert np.array_equal(found.features.values, wanted.features.values)
+        assert found.words == wanted.words
+        with pytest.raises(CorpusError, match="only read"):
+            corpus.add(wanted)
+    gone = sorted(corpus.names())[2]
+    system.rm(f"/away/toy/utterances/{gone}", recursive=True)
+    with pytest.raises(CorpusError, match="cannot be read"):
+        Corpus.open("memory://away/toy").utterance(gone)
+    for url, words in (("memory://nothing", "cannot be read"), ("never://here", "cannot be opened")):
+        with pytest.raises(CorpusError, match=words):
+            Corpus.open(url)

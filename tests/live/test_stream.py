@@ -181,7 +181,9 @@ def test_hours_need_no_more_memory_than_minutes(sound: np.ndarray) -> None:
 def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarray) -> None:
     stream = Stream()
     for wrong, message in (
-        (np.array([0.1, np.nan]), "not finite"),
+        *((np.array([0.1, value]), "not finite, or beyond 1e") for value in (np.nan, np.inf, 1e300, 2e6)),
+        (np.zeros((3, 0)), r"shape \(3, 0\)"),
+        ([[1.0, 2.0], [3.0]], "no samples"),
         (np.zeros((2, 2, 2)), r"shape \(2, 2, 2\)"),
         (np.zeros(3, np.int32), "int32"),
         (b"123", "3 bytes"),
@@ -243,6 +245,12 @@ def test_what_is_told_wrongly_is_refused_and_forgotten_at_an_interruption(sound:
     for wrong in ([("a", 0.8, 1.0)], [("a", 1.5, 1.2)], [("a", 1000, 1400)], [("a", 1.0, np.nan)]):
         with pytest.raises(InputError, match="required seconds"):
             stream.add_words(wrong)
+    for wrong in ([("a", "b", 0.3)], [("a", None, 0.3)], [("a", 0.3)], [("a", 1, 10**400)], [("b", 1.0, 2.0), 5]):
+        with pytest.raises(InputError, match="a text with its start and end"):
+            stream.add_words(wrong)
+    for time_s in (np.nan, np.inf):
+        with pytest.raises(InputError, match="a time of the stream"):
+            stream.interrupt(time_s)
     with pytest.raises(InputError, match="unknown phone"):
         stream.add_phones([("qq", 1.0, 1.2)])
     stream.add_words([("boom", 0.9, 1.3)])

@@ -85,14 +85,6 @@ def chain_posteriors(log_emission, log_stay, log_move):
     return posterior, stay, log_likelihood
 
 
-def path_posterior(log_emission, emission, arcs, log_initial, log_final):
-    """Return the posterior of every possible path, and the log likelihood."""
-    paths = list(product(range(len(emission)), repeat=len(log_emission)))
-    scores = np.array([path_score(p, log_emission, emission, arcs, log_initial, log_final) for p in paths])
-    total = np.logaddexp.reduce(scores)
-    return {p: float(np.exp(s - total)) for p, s in zip(paths, scores, strict=True) if np.isfinite(s)}, float(total)
-
-
 def path_cost(path, start, steps) -> float:
     """Return the cost of a path, which begins in a state before the first step."""
     return float(start[path[0]] + sum(steps[i, j, frame] for frame, (i, j) in enumerate(pairwise(path))))

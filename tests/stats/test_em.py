@@ -3,7 +3,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from lipmotion.stats.em import run_em
+from lipmotion.stats import em
+from lipmotion.stats.em import run_em, sum_statistics
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 
 
 @dataclass(frozen=True)
@@ -46,3 +48,37 @@ def test_it_stops_at_the_first_step_that_gains_too_little(converged, model, repo
 
 def test_the_first_step_never_counts_as_converged():
     assert run_em(1.0, Half, maximise, 5, least_gain=np.inf).log_likelihoods == (0, 0)
+
+
+SHARDS = list(np.random.default_rng(0).normal(0, 1e3, (9, 50)))
+
+
+def expect(job: tuple[float, np.ndarray]) -> dict[str, np.ndarray]:
+    model, shard = job
+    return {"sum": np.array((model * shard).sum()), "squares": np.square(shard)}
+
+
+def test_statistics_are_summed_over_shards_and_found_again_after_a_stop(tmp_path, monkeypatch):
+    """Those of another model or of other data are not."""
+    monkeypatch.setattr(em, "SAVE_S", 0.0)
+    computed = []
+
+    def count(function, jobs):
+        for job in jobs:
+            computed.append(job)
+            if len(computed) == 5:
+                raise KeyboardInterrupt
+            yield function(job)
+
+    work = Checkpoint(tmp_path, "job", count)
+    with pytest.raises(KeyboardInterrupt):
+        sum_statistics(expect, 2.0, SHARDS, work)
+    whole = sum_statistics(expect, 2.0, SHARDS, NO_CHECKPOINT)
+    assert whole["sum"] == pytest.approx(2 * np.sum(SHARDS))
+    assert whole["squares"] == pytest.approx(np.square(SHARDS).sum(axis=0))
+    for model, shards, more in ((2.0, SHARDS, 5), (2.0, SHARDS, 0), (3.0, SHARDS, 9), (2.0, SHARDS[::-1], 9)):
+        before = len(computed)
+        found = sum_statistics(expect, model, shards, work)
+        assert len(computed) - before == more
+        assert np.array_equal(found["squares"], sum_statistics(expect, model, shards, NO_CHECKPOINT)["squares"])
+    assert sum_statistics(expect, 2.0, [], NO_CHECKPOINT) == {}

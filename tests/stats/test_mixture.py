@@ -29,6 +29,11 @@ def random_data(seed: int, frames: int = 200) -> tuple[np.ndarray, np.ndarray]:
     return (centres + draw.normal(0, 0.7, (frames, 3))).astype(np.float32), draw.random(frames).astype(np.float32)
 
 
+def em_update(mixtures: Mixtures, density: int, x: np.ndarray, share: np.ndarray, floor: np.ndarray) -> None:
+    sums = mixtures.component_sums(density, x, share)
+    mixtures.set_from_statistics(np.array([density]), sums[None], floor)
+
+
 def component_logs(mixtures: Mixtures, density: int, x: np.ndarray) -> np.ndarray:
     """Return ``log_components`` computed by SciPy [shape=(T, M)]."""
     rows = zip(mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density], strict=True)
@@ -59,7 +64,7 @@ def test_no_step_of_improvement_lowers_the_likelihood(seed):
     mixtures, (x, share) = random_mixtures(seed), random_data(seed)
     before = -np.inf
     for _ in range(8):
-        mixtures.em_update(1, x, share, FLOOR)
+        em_update(mixtures, 1, x, share, FLOOR)
         used = np.isfinite(mixtures.log_weights[1])
         after = share @ logsumexp(component_logs(mixtures, 1, x), axis=1)
         if used.all():  # switching a component off is no step of EM
@@ -70,24 +75,24 @@ def test_no_step_of_improvement_lowers_the_likelihood(seed):
 def test_one_gaussian_takes_the_weighted_mean_and_variance_above_the_floor():
     mixtures, (x, share) = random_mixtures(2, components=1), random_data(2)
     untouched = mixtures.copy()
-    mixtures.em_update(1, x, share, FLOOR)
+    em_update(mixtures, 1, x, share, FLOOR)
     mean = np.average(x, axis=0, weights=share)
     assert mixtures.means[1, 0] == pytest.approx(mean, abs=1e-4)
     assert mixtures.variances[1, 0] == pytest.approx(np.average((x - mean) ** 2, axis=0, weights=share), abs=1e-3)
     assert mixtures.log_weights[1] == pytest.approx(0, abs=1e-6)
     assert np.array_equal(mixtures.means[[0, 2]], untouched.means[[0, 2]])
     floor = np.array([0.1, 0.2, 0.3], np.float32)
-    mixtures.em_update(0, np.ones((50, 3), np.float32), np.ones(50, np.float32), floor)
+    em_update(mixtures, 0, np.ones((50, 3), np.float32), np.ones(50, np.float32), floor)
     assert mixtures.variances[0, 0] == pytest.approx(floor)
 
 
 def test_a_component_without_data_is_switched_off():
     mixtures, (x, share) = random_mixtures(3), random_data(3)
     mixtures.means[0, 1] = 1000
-    mixtures.em_update(0, x, share, FLOOR)
+    em_update(mixtures, 0, x, share, FLOOR)
     assert mixtures.log_weights[0].tolist() == pytest.approx([0, -np.inf])
     assert np.isfinite(mixtures.log_likelihood(x)).all()
-    mixtures.em_update(0, x, share, FLOOR)
+    em_update(mixtures, 0, x, share, FLOOR)
     assert np.isfinite(mixtures.split().log_likelihood(x)).all()
 
 
@@ -98,7 +103,7 @@ def test_huge_relevance_keeps_the_prior(seed):
     parts = mixtures.means, mixtures.variances, mixtures.log_weights
     for part in parts:
         part[0] = part[2]
-    mixtures.map_update(0, x, share, prior=2, relevance=1e8)
+    mixtures.map_update(0, mixtures.component_sums(0, x, share), prior=2, relevance=1e8)
     for part in parts:
         assert part[0] == pytest.approx(part[2], rel=1e-3, abs=1e-3)
 
@@ -106,13 +111,14 @@ def test_huge_relevance_keeps_the_prior(seed):
 def test_tiny_relevance_follows_the_data_and_relevance_counts_as_frames():
     mixtures, (x, share) = random_mixtures(4, components=1), random_data(4)
     mixtures.variances[2] = 1  # the prior's variance bounds what adaptation may reach from below
-    mixtures.map_update(0, x, share, prior=2, relevance=1e-6)
+    mixtures.map_update(0, mixtures.component_sums(0, x, share), prior=2, relevance=1e-6)
     mean = np.average(x, axis=0, weights=share)
     variance = np.average((x - mean) ** 2, axis=0, weights=share)
     assert mixtures.means[0, 0] == pytest.approx(mean, abs=1e-3)
     assert mixtures.variances[0, 0] == pytest.approx(np.maximum(variance, 0.25), rel=1e-2)
     prior = mixtures.means[1, 0].astype(float)
-    mixtures.map_update(0, np.full((30, 3), 2.0, np.float32), np.ones(30, np.float32), prior=1, relevance=10.0)
+    sums = mixtures.component_sums(0, np.full((30, 3), 2.0, np.float32), np.ones(30, np.float32))
+    mixtures.map_update(0, sums, prior=1, relevance=10.0)
     assert mixtures.means[0, 0] == pytest.approx((10 * prior + 30 * 2) / 40, abs=1e-5)
 
 
@@ -135,8 +141,8 @@ def test_splitting_keeps_the_density_nearly_the_same(seed, components):
 def test_a_component_with_less_than_two_frames_of_data_is_switched_off():
     mixtures = random_mixtures(3)
     size = mixtures.means.shape[2]
-    first, second = np.ones((1, 2, size)), np.full((1, 2, size), 4.0)
     for frames, is_off in ((1.0, True), (1.9, True), (2.1, False)):
-        mixtures.set_from_statistics(np.array([0]), np.array([[50.0, frames]]), first, second, FLOOR)
+        rows = [[1.0] * size + [4.0] * size + [count] for count in (50.0, frames)]
+        mixtures.set_from_statistics(np.array([0]), np.array([rows]), FLOOR)
         assert (mixtures.log_weights[0, 1] == -np.inf) == is_off
         assert (mixtures.variances[0, 1] == 1).all() == is_off

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import shutil
 import zlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.source_recordings import SPLITS
-from lipmotion.errors import CorpusError, InputError
+from lipmotion.errors import CorpusError, InputError, MissingDependencyError
+from lipmotion.extensions import install_command
 from lipmotion.storage.files import TEMPORARY, atomic_file, atomic_folder, confine, make_folder, portable_name
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.storage.locks import remove_unfinished
+from lipmotion.storage.locks import remove_unfinished, temporary_folder
 from lipmotion.storage.schema import ArraySpec, check_sizes
 from lipmotion.storage.sources import check_regular, read_text_file
 from lipmotion.types import (
@@ -204,13 +207,25 @@ class Corpus:
     39
     """
 
-    def __init__(self, path: Path, index: dict[str, dict[str, Any]]) -> None:
+    def __init__(
+        self, path: Path, index: dict[str, dict[str, Any]], fetch: Callable[[str], None] | None = None
+    ) -> None:
         self.path = path
-        self._index = index
+        self._index, self._fetch = index, fetch
 
     @classmethod
     def open(cls, path: str | Path) -> Corpus:
-        """Return an existing corpus. Raises CorpusError: missing, not a corpus, or of a newer version."""
+        """Return an existing corpus.
+
+        path : its folder, or a URL of one that fsspec reads, as ``s3://BUCKET/NAME``; its utterances are copied when
+               they are first read, into a temporary folder that lasts as long as this process. Nothing is added to it
+        Raises CorpusError: missing, not a corpus, or of a newer version. MissingDependencyError: a URL needs fsspec, or
+        a package of its kind.
+        """
+        if "://" in str(path):
+            folder, fetch = _open_remote(str(path))
+            fetch(MANIFEST)
+            return cls(folder, cls.open(folder)._index, fetch)
         path = Path(path)
         try:
             is_there = path.is_dir()
@@ -294,12 +309,12 @@ class Corpus:
         for name in names:
             if name not in self._index:
                 raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)}")
-        return Corpus(self.path, {name: self._index[name] for name in names})
+        return Corpus(self.path, {name: self._index[name] for name in names}, self._fetch)
 
     def divided(self, lists: Mapping[str, Collection[str]]) -> Corpus:
         """Return the utterances of other lists ``train``, ``val`` and ``test`` alone; as of ``part``."""
         entries = {name: {**self._index[name], "split": split} for split, names in lists.items() for name in names}
-        return Corpus(self.path, entries)
+        return Corpus(self.path, entries, self._fetch)
 
     def required(self, split: str | None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
         """Return the same names as ``names``, at least one.
@@ -358,6 +373,8 @@ class Corpus:
 
     def folder(self, name: str) -> Path:
         """Return the folder of an utterance of this name, whether or not it exists."""
+        if self._fetch is not None and name in self._index:
+            self._fetch(f"{UTTERANCES}/{name}")
         return self.path / UTTERANCES / name
 
     def utterance(self, name: str) -> Utterance:
@@ -406,6 +423,8 @@ class Corpus:
         settings : as of ``write_utterance``
         Raises InputError: its name cannot be a folder's. Raises ExportError: it cannot be written.
         """
+        if self._fetch is not None:
+            raise CorpusError(f"{self.path.name}: a corpus by URL is only read; copy it to add {utterance.name!r}")
         folder = self.folder(utterance.name)
         with confine(self.path):
             write_utterance(folder, utterance, settings or {})
@@ -423,6 +442,41 @@ class Corpus:
         with confine(self.path), atomic_file(self.path / MANIFEST) as unfinished:
             text = as_json(content, indent=1, sort_keys=True, ensure_ascii=False)
             unfinished.write_text(text + "\n", encoding="utf-8")
+
+
+def _open_remote(url: str) -> tuple[Path, Callable[[str], None]]:
+    """Return a temporary folder, and what copies a file or a folder of files there, by its path in a corpus by URL."""
+    try:
+        from fsspec.core import url_to_fs
+
+        system, root = url_to_fs(url)
+    except ImportError as error:
+        raise MissingDependencyError(f"{url}: {error}; {install_command('cluster')}") from error
+    except Exception as error:  # every kind of file system has errors of its own
+        raise CorpusError(f"{url}: cannot be opened ({error}); give a folder by URL, as s3://BUCKET/NAME") from error
+    kept = ExitStack()
+    folder = kept.enter_context(temporary_folder()) / (Path(root).name or "corpus")
+    atexit.register(kept.close)
+
+    def fetch(part: str) -> None:
+        place, source = folder / part, f"{root.rstrip('/')}/{part}"
+        if place.exists():
+            return
+        make_folder(place.parent)
+        try:
+            if not system.isdir(source):
+                with atomic_file(place) as file:
+                    file.write_bytes(system.cat_file(source))
+                return
+            with atomic_folder(place) as unfinished:
+                for name in system.ls(source, detail=False):
+                    (unfinished / Path(name).name).write_bytes(system.cat_file(name))
+        except Exception as error:
+            raise CorpusError(
+                f"{url.rstrip('/')}/{part}: cannot be read ({error!r}); is it a prepared corpus?"
+            ) from error
+
+    return folder, fetch
 
 
 def _summary(entry: dict[str, Any]) -> dict[str, Any]:

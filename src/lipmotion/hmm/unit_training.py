@@ -17,11 +17,12 @@ from lipmotion.hmm.baum_welch import (
     Maximise,
     UnitStatistics,
     adapt_contexts,
+    add_up,
     baum_welch,
-    collect_statistics,
     max_mean_durations,
     reestimate_mixtures,
     reestimate_states,
+    unit_statistics,
 )
 from lipmotion.hmm.loudness import smooth_level
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays, make_plain_states
@@ -29,7 +30,7 @@ from lipmotion.hmm.network import compute_log_likelihoods
 from lipmotion.stats.bigram import estimate_bigram
 from lipmotion.stats.mixture import make_equal_gaussians
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import Monitor, ParallelMap, Progress
+from lipmotion.types import Monitor, Progress
 
 _CHECKPOINT = "phones"
 UTTERANCES_PER_BLOCK = 32
@@ -67,14 +68,12 @@ def train_hmm(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint = NO_CHECKPOINT,
-    parallel_map: ParallelMap = map,
 ) -> UnitHmm:
     """Return models of all units in the transcripts.
 
     Stages: flat start with the first pronunciations; choice of pronunciations and pauses; mixtures by
     splitting; the choice again; states in context. Each stage is embedded Baum–Welch over whole utterances.
-    checkpoint : after every step, all that the next one needs is stored there
-    parallel_map : distributes the work; the result is the same to the bit
+    checkpoint : after every step, all that the next one needs is stored there; it distributes the work
     Raises CorpusError: no utterance, or none long enough for its transcript.
     """
     usable, sequences = [], []
@@ -89,7 +88,7 @@ def train_hmm(
             f"none of {len(utterances)} utterances has a transcript that fits into its recording; "
             "check that transcripts and recordings belong together"
         )
-    return _Training(usable, sequences, inventory, config, monitor, checkpoint, parallel_map).run()
+    return _Training(usable, sequences, inventory, config, monitor, checkpoint).run()
 
 
 class _Stage(NamedTuple):
@@ -121,10 +120,9 @@ class _Training:
         config: HmmConfig,
         monitor: Monitor,
         checkpoint: Checkpoint,
-        parallel_map: ParallelMap,
     ) -> None:
-        self._utterances, self._inventory, self._monitor = utterances, inventory, monitor
-        self._checkpoint, self._map = checkpoint, parallel_map
+        self._utterances, self._inventory = utterances, inventory
+        self._monitor, self._checkpoint = monitor, checkpoint
         self._data = [utterance.features for utterance in utterances]
         arrays = checkpoint.load(_CHECKPOINT)
         if arrays is None:
@@ -174,7 +172,7 @@ class _Training:
                 self._hmm = hmm
                 self._report(stage, statistics.mean_log_likelihood)
 
-            baum_welch(self._hmm, self._data, self._sequences, steps, stage.maximise, after_step, self._map)
+            baum_welch(self._hmm, self._data, self._sequences, steps, stage.maximise, after_step, self._checkpoint)
 
     def _report(self, stage: _Stage, figure: float | None) -> None:
         self._done += 1
@@ -198,7 +196,7 @@ class _Training:
             slice(start, start + UTTERANCES_PER_BLOCK) for start in range(0, len(self._data), UTTERANCES_PER_BLOCK)
         )
         jobs = ((self._hmm, self._utterances[block], self._sequences[block]) for block in blocks)
-        chosen = self._map(partial(_choose_sequences, pause=self._inventory.pause), jobs)
+        chosen = self._checkpoint.parallel_map(partial(_choose_sequences, pause=self._inventory.pause), jobs)
         self._sequences = [units for sequences in chosen for units in sequences]
 
     def _split(self) -> None:
@@ -247,9 +245,8 @@ def _flat_start(
     log_stay = np.log(1 - 1 / max_mean_durations(table)).astype(np.float32)
     start = make_equal_gaussians(np.concatenate(data), len(table.names))
     hmm = UnitHmm(config, table, start, log_stay, estimate_bigram(units, []))
-    statistics = UnitStatistics(hmm)
-    for x, sequence in zip(data, sequences, strict=True):
-        chain = expand_states(hmm, sequence)
+    chains, posteriors = [expand_states(hmm, sequence) for sequence in sequences], []
+    for x, sequence, chain in zip(data, sequences, chains, strict=True):
         posterior = np.zeros((len(x), len(chain.plain)))
         energy = x[:, inventory.energy]
         # silence lasts up to the first loud frame, and from the last one; the other states divide the rest evenly
@@ -263,8 +260,8 @@ def _flat_start(
         tail = len(energy) - offset
         path[offset:] = silence + speech + np.arange(tail) * (len(chain.plain) - silence - speech) // max(tail, 1)
         posterior[np.arange(len(x)), path] = 1
-        statistics.add(x, collect_statistics(chain, posterior, np.zeros(len(chain.plain))))
-    return replace(hmm, mixtures=reestimate_mixtures(hmm, statistics, data))
+        posteriors.append((posterior, np.zeros(len(chain.plain))))
+    return replace(hmm, mixtures=reestimate_mixtures(hmm, unit_statistics(add_up(hmm, data, chains, posteriors))))
 
 
 def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]) -> UnitHmm:

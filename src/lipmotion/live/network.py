@@ -29,6 +29,10 @@ TAPS, BLOCK = 16, 160
 """Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""
 
 
+LARGEST_SAMPLE = 1e6
+"""Samples beyond this are no sound, also where full scale is not 1."""
+
+
 class Resampler:
     """Sound at 16 kHz, block by block, with a windowed sinc (Kaiser); how it is cut into pieces changes no bit."""
 
@@ -81,18 +85,25 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
         if len(samples) % 2:
             raise InputError(f"{len(samples)} bytes of sound, required whole samples of 16 bits")
         samples = np.frombuffer(samples, "<i2")
-    values = np.asarray(samples)
+    try:
+        values = np.asarray(samples)
+    except ValueError as error:
+        raise InputError(f"no samples ({error}), required an array of shape (N,) or (N, C)") from error
     if (
         values.ndim not in (1, 2)
+        or 0 in values.shape[1:]
         or values.dtype.kind not in "if"
         or (values.dtype.kind == "i" and values.itemsize != 2)
     ):
         raise InputError(
             f"samples of shape {values.shape} and type {values.dtype}, required (N,) or (N, C), floats or int16"
         )
-    floats = values.astype(np.float32) / np.float32(32768) if values.dtype.kind == "i" else values.astype(np.float32)
-    if not np.isfinite(floats).all():
-        raise InputError("samples that are not finite; leave them out, or put 0 there")
+    with np.errstate(over="ignore"):
+        floats = values.astype(np.float32) / np.float32(32768 if values.dtype.kind == "i" else 1)
+    if not (np.abs(floats) <= LARGEST_SAMPLE).all():
+        raise InputError(
+            f"samples that are not finite, or beyond {LARGEST_SAMPLE:g}, required full scale 1; put 0 there"
+        )
     return floats.mean(axis=1, dtype=np.float32) if floats.ndim == 2 else floats
 
 

@@ -146,7 +146,10 @@ class Stream:
         time_s : of the frame after which it rests, for sound that was pushed ahead of what is heard; at most 10 s
                  before the last frame. None: the last frame
         Sound that is pushed now follows these frames; words that were added are forgotten, too.
+        Raises InputError: a time that is not finite.
         """
+        if time_s is not None and not np.isfinite(time_s):
+            raise InputError(f"a rest from {time_s} s on, required a time of the stream")
         last = self._next if time_s is None else min(max(int(time_s / STEP_S) + 1, 0), self._next)
         for _ in range(min(self._next - last, len(self._shown) - 1)):
             self._shown.pop()

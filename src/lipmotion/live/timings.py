@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shorten
 from lipmotion.live.network import STEP_S
 from lipmotion.meshes.fitting.shape_weights import viseme_curves
 from lipmotion.meshes.model.shape_names import VISEMES_15
@@ -21,8 +21,8 @@ VOWEL_SHARE = 1.6
 """In a word whose phones have no times, a vowel is so many times as long as a consonant."""
 BEFORE_S, KEPT_S = 0.2, 1.0
 """Silence before the first word that is known to be silence; and how long phones are kept once they are said."""
-LONGEST_S = 60.0
-"""A word or a phone that lasts longer has its times in another unit."""
+LONGEST_S, LONGEST_GAP_S = 60.0, 600.0
+"""A word or a phone that lasts longer, or is so far ahead, has its times in another unit."""
 
 
 class GivenPhones:
@@ -39,11 +39,19 @@ class GivenPhones:
         """
         spans = [span for span in self._spans if span.end_s > now_s - KEPT_S]
         end_s = spans[-1].end_s if spans else -np.inf
-        for label, begin_s, stop_s in timings:
-            if not (np.isfinite([begin_s, stop_s]).all() and end_s - 1e-6 <= begin_s < stop_s < begin_s + LONGEST_S):
+        for timing in timings:
+            try:
+                label, begin_s, stop_s = (str(timing[0]), *map(float, timing[1:]))
+            except (TypeError, ValueError, LookupError, OverflowError) as error:
                 raise InputError(
-                    f"{label!r} from {begin_s} to {stop_s}, required seconds that go on from {max(end_s, 0):.3f}, and "
-                    f"a start before its end by less than {LONGEST_S:g} s"
+                    f"{shorten(repr(timing))}, required a text with its start and end, seconds ({error})"
+                ) from error
+            ahead_s = begin_s - max(end_s, now_s)
+            if not (ahead_s < LONGEST_GAP_S and end_s - 1e-6 <= begin_s < stop_s < begin_s + LONGEST_S):
+                raise InputError(
+                    f"{shorten(label)!r} from {begin_s} to {stop_s}, required seconds that go on from "
+                    f"{max(end_s, 0):.3f}, a start before its end by less than {LONGEST_S:g} s, and less than "
+                    f"{LONGEST_GAP_S:g} s after what is known"
                 )
             start_s = max(begin_s, end_s)
             before_s = start_s - BEFORE_S if end_s < now_s - KEPT_S else end_s

@@ -6,20 +6,25 @@ Here every worker has a pipe of its own, and the end of a pipe is detected.
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
+import platform
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from itertools import chain, islice
 from multiprocessing import connection as pipes
 from multiprocessing.process import BaseProcess
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
-from lipmotion.errors import CorpusError, InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.errors import CorpusError, InputError, MissingDependencyError
+from lipmotion.extensions import install_command, installed_version
+from lipmotion.kernels.compiler import blas_kernels, one_thread
 from lipmotion.types import ParallelMap
 
 ItemT = TypeVar("ItemT")
@@ -35,6 +40,16 @@ def process_count(count: int | None) -> int:
     if count is not None and count < 1:
         raise InputError(f"{count} processes, required 1 or more; leave the number out for one a core")
     return count or os.cpu_count() or 1
+
+
+def _in_order(numbered: Iterator[tuple[int, ResultT]]) -> Iterator[ResultT]:
+    waiting: dict[int, ResultT] = {}
+    following = 0
+    for number, result in numbered:
+        waiting[number] = result
+        while following in waiting:
+            yield waiting.pop(following)
+            following += 1
 
 
 class Workers:
@@ -53,17 +68,7 @@ class Workers:
         Raises WorkerDiedError: a process died.
         """
         numbered = self._numbered(function, items)
-
-        def in_order() -> Iterator[ResultT]:
-            waiting: dict[int, ResultT] = {}
-            following = 0
-            for number, result in numbered:
-                waiting[number] = result
-                while following in waiting:
-                    yield waiting.pop(following)
-                    following += 1
-
-        return in_order()
+        return _in_order(numbered)
 
     def unordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[ResultT]:
         """Yield the results in the order in which they are ready. Raises WorkerDiedError: a process died."""
@@ -247,3 +252,118 @@ def _begin_below() -> None:
         os._exit(1)
 
     threading.Thread(target=end_with_parent, daemon=True).start()
+
+
+@contextmanager
+def training_pool(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
+    """Give the map that distributes a training, whose results are in the order of the items.
+
+    workers    : number of processes on this machine, or the address of a Dask scheduler
+    utterances : how many the training has: few are not worth a further process
+    Raises as ``cluster_pool``. The map raises CorpusError: a process died; Dask lets others finish its work, thrice.
+    """
+    if isinstance(workers, int):
+        with worker_pool(min(process_count(workers), utterances // UTTERANCES_PER_WORKER)) as team:
+            yield team.ordered_map
+        return
+    with cluster_pool(workers, ordered=True) as pool:
+        yield lambda function, items: pool(partial(_work_alone, function), items)
+
+
+def _work_alone(function: Callable[[ItemT], ResultT], item: ItemT) -> ResultT:
+    with one_thread():
+        return function(item)
+
+
+LOG = logging.getLogger("lipmotion")
+UTTERANCES_PER_WORKER = 32
+"""Smallest number of utterances for which a further process is started."""
+CONNECT_S = 20
+ITEMS_AHEAD = 4
+"""Items a worker of a cluster that are sent ahead, so that none waits, and memory is flat."""
+
+
+class Pool(Protocol):
+    """Applies a function to items in other processes; yields results as they are ready.
+
+    Raises WorkerDiedError: a worker ended; which items are done is not known.
+    """
+
+    def __call__(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        """Yield the result of every item, in any order."""
+
+
+@contextmanager
+def cluster_pool(address: str, out: Path | None = None, *, ordered: bool = False) -> Iterator[Pool]:
+    """Give the workers of a Dask cluster as a pool.
+
+    address : of its scheduler, as ``tcp://HOST:8786``
+    out     : the folder of the outputs, which every worker must see under the same path; None: there is none
+    ordered : results come in the order of the items; a warning says where the last bits of results may differ
+    Raises MissingDependencyError: the package distributed is not installed.
+    Raises InputError: no cluster answers, it has no workers, or they lack lipmotion, its version or the folder.
+    """
+    try:
+        from distributed import Client, KilledWorker, as_completed
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"a cluster needs the package distributed: {install_command('cluster')}, here and on all workers"
+        ) from error
+    with ExitStack() as stack:
+        try:
+            client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
+        except (OSError, TimeoutError, ValueError) as error:
+            raise InputError(f"{address}: no Dask scheduler answers ({error}); start one: dask scheduler") from error
+        _check_workers(client, address, out, ordered=ordered)
+
+        def numbered(function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[tuple[int, ResultT]]:
+            remaining, numbers = enumerate(items), dict[str, int]()
+
+            def submit(count: int) -> Iterator[Any]:
+                for number, item in islice(remaining, count):
+                    future = client.submit(function, item, pure=False)
+                    numbers[future.key] = number
+                    yield future
+
+            running = as_completed(list(submit(ITEMS_AHEAD * sum(client.ncores().values()))), loop=client.loop)
+            try:
+                for future in running:
+                    yield numbers.pop(future.key), future.result()
+                    running.update(list(submit(1)))
+            except KilledWorker as error:
+                raise WorkerDiedError(DIED) from error
+            finally:
+                client.cancel(list(running.futures))
+
+        def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+            results = numbered(function, items)
+            return _in_order(results) if ordered else (result for _, result in results)
+
+        yield each
+
+
+def _check_workers(client: Any, address: str, out: Path | None, *, ordered: bool) -> None:
+    """Raise InputError unless there are workers that can do the work."""
+    try:
+        answers = client.run(describe_worker, str(out), on_error="return")
+    except Exception as error:  # what the scheduler could not send
+        raise InputError(f"{address}: the workers cannot be asked ({error})") from error
+    if not answers:
+        raise InputError(f"{address}: the cluster has no workers; start some: dask worker {address} --nthreads 1")
+    for worker, answer in answers.items():
+        if isinstance(answer, BaseException):
+            raise InputError(
+                f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
+            ) from answer
+        version, sees_folder, processor = answer
+        if version != installed_version():
+            raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
+        if ordered and processor != describe_worker("")[2]:
+            LOG.warning("%s: has another processor (%s): the last bits of the model may differ", worker, processor)
+        if out is not None and not sees_folder:
+            raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
+
+
+def describe_worker(out: str) -> tuple[str, bool, str]:
+    """Return a worker's version of lipmotion, whether it sees a folder, and what kind of processor it has."""
+    return installed_version(), os.path.isdir(out), f"{platform.machine()} {blas_kernels()}"  # noqa: PTH112

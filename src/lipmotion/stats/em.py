@@ -1,14 +1,25 @@
-"""Expectation–maximisation: the loop that all trainers of the package share."""
+"""Expectation–maximisation: the loop that all trainers of the package share, and its E-step over shards of the data."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+import hashlib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from itertools import islice
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.storage.archive import Checkpoint
 
 ModelT = TypeVar("ModelT")
+ShardT = TypeVar("ShardT")
+Sums = Mapping[str, NDArray[Any]]
+"""Sufficient statistics by name: arrays whose values for all data are the sums of those for its parts."""
+SAVE_S = 10.0
+"""A longer E-step is stored so often, and at its end."""
 
 
 class ExpectedStatistics(Protocol):
@@ -75,3 +86,56 @@ def run_em(
         if converged:
             break
     return EmResult(model, statistics, tuple(log_likelihoods), bool(converged))
+
+
+def sum_statistics(
+    expect: Callable[[tuple[ModelT, ShardT]], Sums], model: ModelT, shards: Sequence[ShardT], work: Checkpoint
+) -> Sums:
+    """Return the sufficient statistics of all shards under a model (the E-step); without shards, none.
+
+    expect : a module's function of the model and one shard, which any process may call
+    work   : distributes the shards; its folder keeps what is summed so far, under a digest of model and shards: a
+             training that is repeated after a stop finds it
+    The sum is in the order of the shards: the same to the bit, whoever computes them.
+    """
+    stage = f"sum-{_digest((expect.__qualname__, model, shards))}" if work.folder is not None else ""
+    total = dict(work.load(stage) or {}) if stage else {}
+    done = int(total.pop(_DONE, 0))
+    begun_s = saved_s = time.monotonic()
+    jobs = ((model, shard) for shard in islice(shards, done, None))
+    for number, sums in enumerate(work.parallel_map(expect, jobs), start=done + 1):
+        if total:
+            for name, values in sums.items():
+                total[name] = total[name] + values
+        else:
+            total = dict(sums)
+        now_s = time.monotonic()
+        if stage and now_s - (begun_s if number == len(shards) else saved_s) >= SAVE_S:
+            work.save(stage, {**total, _DONE: np.array(number)})
+            saved_s = now_s
+    return total
+
+
+_DONE = "shards done"
+
+
+def _digest(value: object) -> str:
+    digest = hashlib.blake2b(digest_size=16)
+
+    def add(value: Any) -> None:
+        if isinstance(value, np.ndarray):
+            digest.update(f"{value.dtype} {value.shape}".encode())
+            digest.update(np.ascontiguousarray(value).data)
+        elif is_dataclass(value):
+            for field in fields(value):
+                add(getattr(value, field.name))
+        elif isinstance(value, Mapping):
+            add(list(value.items()))
+        elif isinstance(value, list | tuple):
+            for each in value:
+                add(each)
+        else:
+            digest.update(repr(sorted(value) if isinstance(value, frozenset) else value).encode())
+
+    add(value)
+    return digest.hexdigest()

@@ -87,36 +87,30 @@ class Mixtures:
             np.concatenate([self.variances, other.variances]),
         )
 
-    def em_update(
-        self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32], floor: NDArray[np.float32]
-    ) -> None:
-        """Take one EM step of one density, in place (training works on a ``copy``).
+    def component_sums(self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the sufficient statistics of one density's components [shape=(M, 2 D + 1)].
 
         x       : [shape=(N, D)], the frames in which it has a posterior
         weights : [shape=(N,)], these posteriors
-        floor   : [shape=(D,)], least variance
-        A component with less than two frames of data is switched off.
+        Sums of features, of squared features, and of 1, weighted by the posteriors of the component.
         """
-        posterior = self.responsibilities(density, x, weights)
-        count, first, second = posterior.sum(axis=0), posterior.T @ x, posterior.T @ (x * x)
-        self.set_from_statistics(np.array([density]), count[None], first[None], second[None], floor)
+        return self.responsibilities(density, x, weights).T @ with_squares(x)
 
     def set_from_statistics(
         self,
         densities: NDArray[np.intp],
-        count: NDArray[np.floating[Any]],
-        first: NDArray[np.floating[Any]],
-        second: NDArray[np.floating[Any]],
-        floor: NDArray[np.float32],
+        sums: NDArray[np.floating[Any]],
+        floor: NDArray[np.floating[Any]],
     ) -> None:
         """Set weights, means and variances of densities, in place, to the maximum-likelihood estimates of statistics.
 
-        densities     : [shape=(G',)], each at most once
-        count         : [shape=(G', M)], sums of the posteriors of each component; more than 0 for each density
-        first, second : [shape=(G', M, D)], sums of features and of squared features, weighted by the posteriors
-        floor         : [shape=(D,)], least variance
+        densities : [shape=(G',)], each at most once
+        sums      : [shape=(G', M, 2 D + 1)], as of ``component_sums``, with data for each density
+        floor     : [shape=(D,)], least variance
         A component with less than two frames of data is switched off.
         """
+        first, second = np.split(sums[:, :, :-1], 2, axis=2)
+        count = sums[:, :, -1]
         enough = count >= np.minimum(2.0, count.max(axis=1, keepdims=True))
         safe = np.where(enough, count, 1)[:, :, None]
         mean = first / safe
@@ -127,21 +121,19 @@ class Mixtures:
         self.means[densities] = np.where(enough[:, :, None], mean, 0)
         self.variances[densities] = np.where(enough[:, :, None], variance, 1)
 
-    def map_update(
-        self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32], prior: int, relevance: float
-    ) -> None:
+    def map_update(self, density: int, sums: NDArray[np.floating[Any]], prior: int, relevance: float) -> None:
         """Take one maximum-a-posteriori (MAP) step of one density, in place, with another density as its prior.
 
-        x, weights : as in ``em_update``
-        prior      : the number of the density that is the prior
-        relevance  : weight of the prior, in frames per component
+        sums      : [shape=(M, 2 D + 1)], as of ``component_sums``
+        prior     : the number of the density that is the prior
+        relevance : weight of the prior, in frames per component
         Source: Gauvain & Lee 1994.
         """
-        posterior = self.responsibilities(density, x, weights)
-        count = posterior.sum(axis=0)[:, None]
+        first, of_squares = np.split(sums[:, :-1], 2, axis=1)
+        count = sums[:, -1:]
         prior_weights, mean, variance = np.exp(self.log_weights[prior]), self.means[prior], self.variances[prior]
-        new_mean = (relevance * mean + posterior.T @ x) / (relevance + count)
-        second = (relevance * (variance + mean * mean) + posterior.T @ (x * x)) / (relevance + count)
+        new_mean = (relevance * mean + first) / (relevance + count)
+        second = (relevance * (variance + mean * mean) + of_squares) / (relevance + count)
         total = relevance * len(prior_weights) * prior_weights + count[:, 0]
         with np.errstate(divide="ignore"):
             self.log_weights[density] = np.log(total / total.sum())
@@ -152,7 +144,7 @@ class Mixtures:
         self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32]
     ) -> NDArray[np.float32]:
         """Return the posteriors of the components of a density, times its own [shape=(N, M)]; arguments as of
-        ``em_update``.
+        ``component_sums``.
         """
         components = self.log_components(x, np.array([density]))[:, 0]
         components -= components.max(axis=1, keepdims=True)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.types import ParallelMap
 
 HEADER, ARRAY = "header.json", ".npy"
 OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
@@ -115,12 +116,14 @@ CHECKPOINT_FORMAT = "lipmotion.checkpoint"
 class Checkpoint:
     """A folder with one file for each stage of a job; without a folder, nothing is stored and nothing found.
 
-    folder      : an existing one
-    fingerprint : of everything that the result depends on; a checkpoint with another fingerprint is not used
+    folder       : an existing one
+    fingerprint  : of everything that the result depends on; a checkpoint with another fingerprint is not used
+    parallel_map : distributes the work of the job; the result does not depend on it
     """
 
     folder: Path | None = None
     fingerprint: str = ""
+    parallel_map: ParallelMap = map
 
     def load(self, stage: str) -> dict[str, NDArray[Any]] | None:
         """Return the arrays stored for a stage; None: there are none, or they are damaged or of another job."""

@@ -118,13 +118,13 @@ def _frames(
     pixel_shape = float(stream.sample_aspect_ratio or 1)
     last_s = float("-inf")
     for picture in _pictures_from(container, stream, start_s + span.start_s - ROUNDING_S, damage):
-        if picture.time is None or picture.time - start_s <= last_s:
+        if picture.time is None or max(picture.time - start_s, span.start_s) <= last_s:
             continue  # it has no time, or one that another picture has
-        last_s = picture.time - start_s
+        last_s = max(picture.time - start_s, span.start_s)
         if last_s >= span.end_s - ROUNDING_S:
             break
         _check_size(path, picture.width, picture.height, pixel_shape)
-        yield VideoFrame(max(last_s - span.start_s, 0.0), _upright(picture, pixel_shape, longest_px))
+        yield VideoFrame(last_s - span.start_s, _upright(picture, pixel_shape, longest_px))
     if last_s == float("-inf") and span == WHOLE:
         raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
 

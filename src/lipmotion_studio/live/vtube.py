@@ -18,11 +18,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 from lipmotion.live.consumers import Consumer, LiveSound, read_address
 from lipmotion.live.face import LiveFrame
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.storage.files import atomic_file
+from lipmotion.storage.json_text import from_json, json_errors
 from lipmotion_studio.live.servers import CLOSE_S, check_installed, in_background
 
 PORT = 8001
@@ -39,6 +40,7 @@ MADE = {
     "MouthPressLipOpen": (-1.3, 1.3),
 }
 """Parameters that are made where they are not there, with their ranges."""
+REPLY = "a reply of VTube Studio"
 LOG = logging.getLogger("lipmotion")
 
 
@@ -106,7 +108,7 @@ class VTubeStudio:
                         LOG.warning("VTube Studio was told not to let lipmotion in; allow it there, and begin again")
                         return
                     await self._send_frames(connection, await self._find_parameters(connection))
-            except (OSError, WebSocketException, TimeoutError, asyncio.TimeoutError):
+            except (OSError, WebSocketException, TimeoutError, asyncio.TimeoutError, InputError):
                 if not is_told:
                     LOG.warning("VTube Studio is not at %s; start it, and allow plugins to use its API", self._address)
                 is_told = True
@@ -114,15 +116,18 @@ class VTubeStudio:
 
     async def _authenticate(self, connection: Any) -> bool:
         """Authenticate by the stored token, or ask for one, which the user may refuse."""
-        with suppress(OSError):
+        with suppress(OSError, ValueError):
             token = self._token_file.read_text("ascii")
             reply = await self._ask(connection, "AuthenticationRequest", **PLUGIN, authenticationToken=token)
             if reply.get("authenticated"):
                 return True
-        token = (await self._ask(connection, "AuthenticationTokenRequest", **PLUGIN)).get("authenticationToken") or ""
+        reply = await self._ask(connection, "AuthenticationTokenRequest", **PLUGIN)
+        token = str(reply.get("authenticationToken") or "")
         if not token:
             return False
-        with suppress(OSError, ExportError):  # where nothing can be stored, the user is asked again next time
+        with suppress(
+            OSError, ExportError, ValueError
+        ):  # where nothing can be stored, the user is asked again next time
             self._token_file.parent.mkdir(parents=True, exist_ok=True)
             with atomic_file(self._token_file) as temporary:
                 temporary.touch(mode=0o600)
@@ -133,12 +138,14 @@ class VTubeStudio:
     async def _find_parameters(self, connection: Any) -> set[str]:
         """Return the parameters that can be set; those of ``MADE`` are made where they are not there."""
         reply = await self._ask(connection, "InputParameterListRequest")
-        names = {each["name"] for kind in ("defaultParameters", "customParameters") for each in reply.get(kind, ())}
+        kinds = ("defaultParameters", "customParameters")
+        with json_errors(REPLY):
+            names = {str(dict(each)["name"]) for kind in kinds for each in list(reply.get(kind, ()))}
         for name, (low, high) in MADE.items():
             if name not in names:
                 about = {"explanation": "mouth of speech, by lipmotion", "min": low, "max": high, "defaultValue": 0}
                 reply = await self._ask(connection, "ParameterCreationRequest", parameterName=name, **about)
-                names |= {reply.get("parameterName", "")}
+                names.add(str(reply.get("parameterName")))
         return names
 
     async def _send_frames(self, connection: Any, names: set[str]) -> None:
@@ -152,14 +159,15 @@ class VTubeStudio:
                 await self._ask(connection, "InjectParameterDataRequest", **about)
 
     async def _ask(self, connection: Any, kind: str, **data: Any) -> dict[str, Any]:
-        """Return the data of the reply to a request; empty: it was refused."""
+        """Return the data of the reply to a request; empty: it was refused. Raises InputError: no such reply."""
         number = str(next(self._numbers))
         about = {"apiName": "VTubeStudioPublicAPI", "apiVersion": "1.0", "requestID": number, "messageType": kind}
         await connection.send(json.dumps({**about, "data": data}))
-        while True:
-            reply = json.loads(await connection.recv())
-            if reply.get("requestID") == number:
-                return dict(reply["data"]) if reply["messageType"] != "APIError" else {}
+        with json_errors(REPLY):
+            while True:
+                reply = dict(from_json(await connection.recv()))
+                if reply.get("requestID") == number:
+                    return dict(reply["data"]) if reply["messageType"] != "APIError" else {}
 
 
 @contextmanager

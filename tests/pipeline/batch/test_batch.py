@@ -16,9 +16,11 @@ import pytest
 
 import lipmotion
 from children import LIPMOTION, NOWHERE, Child, child, run_child, wait_until
-from lipmotion import Delivery, Job, Outputs, Request
+from lipmotion import Delivery, Job, Outputs, Request, Run, save_model, train
+from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.formats import motion_suffixes
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
@@ -409,9 +411,28 @@ def test_a_worker_of_a_cluster_is_killed(cluster, toy_speech, settings, tmp_path
 
 
 @pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.filterwarnings("ignore")
+def test_a_training_on_a_cluster_is_that_of_one_process(cluster, toy_corpus, tmp_path):
+    """Also where a worker dies on the way."""
+    address, processes = cluster
+    how = {"engine": engine_named("joint", {}), "recogniser": HmmConfig(mixtures=1, iterations=1)}
+
+    def kill_one(event: object) -> None:
+        if getattr(event, "stage", "").endswith("contexts"):
+            processes[1].kill()
+
+    made = [train(toy_corpus, **how, run=run)[0] for run in (Run(), Run(kill_one, workers=address))]
+    for number, model in enumerate(made):
+        save_model(model, tmp_path / f"{number}.lipmotion")
+    one, other = ((tmp_path / f"{number}.lipmotion").read_bytes() for number in range(2))
+    assert one == other
+
+
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_no_cluster_answers(sounds, settings, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("lipmotion.pipeline.batch.run.CONNECT_S", 1)
+    monkeypatch.setattr("lipmotion.pipeline.workers.CONNECT_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         batch(sounds, tmp_path / "out", settings, cluster="tcp://127.0.0.1:9")

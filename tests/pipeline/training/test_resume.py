@@ -10,13 +10,16 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
+from lipmotion.engines.coupled.training import em_steps
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.multistream import multistream_training
 from lipmotion.motion import posterior_network
+from lipmotion.pipeline import workers
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import labels as fingerprints
-from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.labels import fingerprint_training
+from lipmotion.stats import em
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 from lipmotion.units import Lexicon
 
@@ -114,6 +117,26 @@ def test_stopped_again_and_again(corpus, whole, work, tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(("name", "options"), [("joint", {}), ("coupled", {"chains": "sVis 2vis", "mixtures": 1})])
+def test_finished_shards_are_not_summed_again(corpus, work, tmp_path, monkeypatch, name, options):
+    """The E-steps of a training that is stopped are found again, under what their models and data are."""
+    monkeypatch.setattr(em, "SAVE_S", 0.0)
+    engine, computed = engine_named(name, options), []
+    for module, function in ((multistream_training, "_shard_sums"), (em_steps, "_shard_sums")):
+        usual = getattr(module, function)
+        monkeypatch.setattr(module, function, lambda job, usual=usual: (computed.append(1), usual(job))[1])
+    whole = content(train(corpus, recogniser=CONFIG, engine=engine)[0], tmp_path)
+    count = len(computed)
+    assert count > 3
+    stop = next(i for i, e in enumerate(create_events(corpus)) if getattr(e, "share", 0) > 0.6) + 3
+    with pytest.raises(Stopped):
+        train(corpus, recogniser=CONFIG, engine=engine, run=Run(work=work, monitor=stopping_after(stop)))
+    computed.clear()
+    assert content(train(corpus, recogniser=CONFIG, engine=engine, run=Run(work=work))[0], tmp_path) == whole
+    assert 0 < len(computed) < count
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["corpus", "lexicon"])
 def test_another_job_starts_over(corpus, work, tmp_path, what):
     run(corpus, work)
@@ -143,7 +166,7 @@ def test_a_damaged_checkpoint_is_not_used(corpus, whole, work, tmp_path):
 @pytest.mark.long
 def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monkeypatch):
     """Neither this process's own nor those that the processes it starts would use."""
-    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
+    monkeypatch.setattr(workers, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     with threadpool_limits(1, user_api="blas"):
         assert content(train(corpus, recogniser=CONFIG, run=Run(workers=2))[0], tmp_path) == whole
@@ -152,7 +175,7 @@ def test_threads_of_matrix_products_change_nothing(corpus, whole, tmp_path, monk
 
 @pytest.mark.long
 def test_stopped_in_two_processes(corpus, whole, work, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
+    monkeypatch.setattr(workers, "UTTERANCES_PER_WORKER", 1)
     monkeypatch.setattr(labels, "UTTERANCES_PER_CHECKPOINT", 2)
     before = set(multiprocessing.active_children())
     with pytest.raises(Stopped):

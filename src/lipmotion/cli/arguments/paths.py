@@ -56,8 +56,12 @@ def add_input(
     **more: Any,
 ) -> None:
     """Add an argument that names an input, with the further arguments of ``add_argument``."""
-    action = parser.add_argument(*names, **({"type": Path} | more))
+    action = parser.add_argument(*names, **({"type": _path_or_url if what == "corpus" else Path} | more))
     _declare(parser, "reads", InputArgument(action.dest, what, replaceable, action.type is str, default_path))
+
+
+def _path_or_url(text: str) -> Path | str:
+    return text if "://" in text else Path(text)
 
 
 def add_output(

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_options
-from lipmotion.cli.arguments.options import add_execution, list_or_all, worker_count
+from lipmotion.cli.arguments.options import add_machine_readable, list_or_all, worker_count
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Request
 
@@ -43,7 +43,13 @@ PRESET = (
 )
 VISUAL = "geometry (default), eigenlips (default of xieliu2007 and its systems) or both"
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
+WORKERS = "number of processes (default: one per core), or a Dask scheduler (docs/long-work.md)"
 OTHERS = "also train on transcribed recordings without motion (coupled)"
+
+
+def count_or_address(text: str) -> int | str:
+    """Return a number, or the address of a scheduler. Raises ValueError: neither."""
+    return text if "://" in text else int(text)
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -64,7 +70,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(
         parser, "--from", what="model to start from", dest="start", default="", type=str, metavar="MODEL", help=FROM
     )
-    add_execution(parser)
+    parser.add_argument("--workers", type=count_or_address, metavar="N|tcp://HOST:PORT", help=WORKERS)
+    add_machine_readable(parser)
     parser.set_defaults(run=run)
 
 
@@ -79,6 +86,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.storage.locks import unfinished_work
     from lipmotion.units import Lexicon
 
+    workers = options.workers if isinstance(options.workers, str) else worker_count(options)
     preset = " ".join(options.preset) if options.preset else None
     with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
@@ -95,7 +103,7 @@ def run(options: argparse.Namespace) -> None:
                 visual=options.visual or preset_visual(preset) or GEOMETRY,
                 voices=voices,
                 prior=model_to_start_from(options.start, engine),
-                run=Run(report.receive, work, worker_count(options)),
+                run=Run(report.receive, work, workers),
             )
             save_model(model, options.output)
         figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}

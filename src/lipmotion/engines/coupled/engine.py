@@ -18,11 +18,11 @@ from lipmotion.engines.coupled.conversion.em_conversion import convert, path_mea
 from lipmotion.engines.coupled.explanation import concatenated, describe, explain_frames, unit_posteriors
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import allowed_units
-from lipmotion.engines.coupled.training.coupled_training import fit_coupled
+from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import slice_dynamics, unseen_share
 from lipmotion.motion.generation import Statistics, split_into_blocks
-from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import (
     ChainPosteriors,
     Configuration,
@@ -58,12 +58,9 @@ class CoupledEngine(Engine[CoupledModel]):
         return Inputs(speech_alone=True, encoding=self.config.uses_encoding)
 
     def fit(  # noqa: D102
-        self,
-        examples: Sequence[Example],
-        monitor: Monitor,
-        checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes a minute
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = THREADS
     ) -> Fit[CoupledModel]:
-        return fit_coupled(examples, self.config, monitor)
+        return fit_coupled(examples, self.config, monitor, checkpoint)
 
     def without_closures(self) -> CoupledEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))

@@ -234,14 +234,12 @@ class JointEngine(Engine[JointModel]):
         return Inputs(f0=self.config.f0)
 
     def fit(  # noqa: D102
-        self,
-        examples: Sequence[Example],
-        monitor: Monitor,
-        checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes two minutes
+        self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Fit[JointModel]:
         examples = self._with_channels(examples)
         learning = self._learning(examples)
-        hmm = train_joint(learning.utterances, learning.inventory, learning.units.classes(), self.config.hmm, monitor)
+        classes = learning.units.classes()
+        hmm = train_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor, checkpoint)
         figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
         model = learning.model(hmm)

@@ -179,8 +179,8 @@ class GaussianStatistics:
 
     def add(self, densities: NDArray[np.intp], rows: Array) -> None:
         """Accumulate statistics of single Gaussians: weighted sums of standardised frames [shape=(N, 2 + 2·D)]."""
-        self.frames[densities] += rows[:, 0]
-        self.moments[densities, 0] += rows[:, 1:]
+        np.add.at(self.frames, densities, rows[:, 0])
+        np.add.at(self.moments[:, 0], densities, rows[:, 1:])
 
     def pool(self, groups: NDArray[np.intp], count: int) -> GaussianStatistics:
         """Return the statistics of ``count`` groups of densities; ``groups`` is the group of each [shape=(G,)]."""

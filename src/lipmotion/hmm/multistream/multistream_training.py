@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -20,7 +21,6 @@ from lipmotion.hmm.multistream.densities import (
     STREAMS,
     GaussianStatistics,
     StreamObservations,
-    TiedDensities,
     fit_scale,
     make_standard_normals,
 )
@@ -37,16 +37,15 @@ from lipmotion.hmm.multistream.recognise import check_bounds, measure_durations
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
 from lipmotion.stats.bigram import estimate_bigram
-from lipmotion.stats.em import run_em
+from lipmotion.stats.em import Sums, run_em, sum_statistics
 from lipmotion.stats.trees import Question
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
 
 MIN_STAY_PROBABILITY = 0.05
 """Smallest probability of staying in a state."""
 MIN_MIXTURE_POSTERIOR = 1e-5
 """Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
-FRAMES_AT_ONCE = 50_000
-"""Frames whose statistics for mixtures are accumulated together."""
 Rows = NDArray[np.float32]
 Leaves = Mapping[str, NDArray[np.intp]]
 
@@ -89,7 +88,6 @@ class PreparedUtterances:
 class StatePosteriors(NamedTuple):
     """The posteriors of an utterance's states [shape=(T, S)], and expected transitions to themselves [shape=(S,)]."""
 
-    utterance: int
     states: NDArray[np.float64]
     stay: NDArray[np.float64]
     log_likelihood: float
@@ -99,13 +97,12 @@ class StatePosteriors(NamedTuple):
 class StreamStatistics:
     """The sufficient statistics of utterances for the models of all streams (the result of the E-step).
 
-    triphones : by stream, of every state in context (``PreparedUtterances.triphones``), for one Gaussian each
-    leaves    : by stream, of its leaves, for all their Gaussians
+    densities : by stream, of its leaves, for all their Gaussians, or of every state in context
+                (``PreparedUtterances.triphones``), for one Gaussian each
     stay, occupied : [shape=(R,)], expected transitions of each state without context to itself, and its frames
     """
 
-    triphones: Mapping[str, GaussianStatistics]
-    leaves: Mapping[str, GaussianStatistics]
+    densities: Mapping[str, GaussianStatistics]
     stay: NDArray[np.float64]
     occupied: NDArray[np.float64]
     log_likelihood: float
@@ -137,91 +134,105 @@ def prepare_utterances(
     return PreparedUtterances(tuple(items), tuple(index))
 
 
-def iterate_posteriors(hmm: JointHmm, utterances: PreparedUtterances) -> Iterator[StatePosteriors]:
-    """Give the state posteriors of utterances by length; too short ones, or without an active stream, are left out."""
-    leaves, log_move, weights = utterances.leaves(hmm), hmm.log_move, hmm.config.training
-    usable = [i for i, item in enumerate(utterances.items) if item.fits and set(weights.active) & set(item.streams)]
-    items = [utterances.items[i] for i in usable]
-    counts = [len(item.monophones) for item in items]
-    for batch in group_by_length([item.frames for item in items], counts):
-        frames = np.array([items[i].frames for i in batch], np.intp)
-        states = np.array([counts[i] for i in batch], np.intp)
-        log_emission = np.zeros((frames.max(), len(batch), states.max()))
-        log_keep, log_leave = np.full((2, len(batch), states.max()), -1.0)
-        for u, i in enumerate(batch):
-            item, inside = items[i], (slice(frames[u]), u, slice(states[u]))
-            streams = {name: stream for name, stream in item.streams.items() if name in weights.active}
-            item_leaves = {name: leaves[name][item.triphones] for name in streams}
-            log_emission[inside] = hmm.log_density(streams, item_leaves, weights)
-            log_keep[inside[1:]], log_leave[inside[1:]] = hmm.log_stay[item.monophones], log_move[item.monophones]
-        posterior, stay, log_likelihood = chain_posteriors(log_emission, log_keep, log_leave, frames, states)
-        for u, i in enumerate(batch):
-            if log_likelihood[u] > LOG_ZERO / 2:
-                of_item = posterior[: frames[u], u, : states[u]]
-                yield StatePosteriors(usable[i], of_item, stay[u, : states[u]], float(log_likelihood[u]))
+def batch_posteriors(
+    hmm: JointHmm, leaves: Leaves, items: Sequence[PreparedUtterance]
+) -> Iterator[tuple[PreparedUtterance, StatePosteriors]]:
+    """Give utterances with the posteriors of their states; those without a path are left out."""
+    if not items:
+        return
+    weights, log_move = hmm.config.training, hmm.log_move
+    frames = np.array([item.frames for item in items], np.intp)
+    states = np.array([len(item.monophones) for item in items], np.intp)
+    log_emission = np.zeros((frames.max(), len(items), states.max()))
+    log_keep, log_leave = np.full((2, len(items), states.max()), -1.0)
+    for u, item in enumerate(items):
+        inside = (slice(frames[u]), u, slice(states[u]))
+        streams = {name: stream for name, stream in item.streams.items() if name in weights.active}
+        item_leaves = {name: leaves[name][item.triphones] for name in streams}
+        log_emission[inside] = hmm.log_density(streams, item_leaves, weights)
+        log_keep[inside[1:]], log_leave[inside[1:]] = hmm.log_stay[item.monophones], log_move[item.monophones]
+    posterior, stay, log_likelihood = chain_posteriors(log_emission, log_keep, log_leave, frames, states)
+    for u, item in enumerate(items):
+        if log_likelihood[u] > LOG_ZERO / 2:
+            of_item = posterior[: frames[u], u, : states[u]]
+            yield item, StatePosteriors(of_item, stay[u, : states[u]], float(log_likelihood[u]))
 
 
-class _MixtureAccumulator:
-    """The statistics of frames for mixtures, accumulated over many utterances at once: that is faster."""
+class _Accounts(NamedTuple):
+    """Models, the leaves of all states in context, and whether statistics are those of these states, not of leaves."""
 
-    def __init__(self, tied: TiedDensities) -> None:
-        self._tied, self._statistics = tied, GaussianStatistics.zeros(*tied.mixtures.size)
-        self._waiting: list[tuple[Rows, NDArray[np.intp], Rows]] = []
-
-    def add(self, rows: Rows, leaves: NDArray[np.intp], posterior: Rows) -> None:
-        """Add an utterance with the leaves [shape=(S,)] and posteriors [shape=(T, S)] of its states."""
-        frame, state = np.nonzero(posterior > MIN_MIXTURE_POSTERIOR)
-        self._waiting.append((rows[frame], leaves[state], posterior[frame, state]))
-        if sum(len(leaves_of_frames) for _, leaves_of_frames, _ in self._waiting) > FRAMES_AT_ONCE:
-            self.statistics()
-
-    def statistics(self) -> GaussianStatistics:
-        """Return the statistics of all frames so far."""
-        if self._waiting:
-            rows, leaves, weights = (np.concatenate(arrays) for arrays in zip(*self._waiting, strict=True))
-            self._tied.accumulate_components(self._statistics, rows, leaves, weights)
-            self._waiting.clear()
-        return self._statistics
+    hmm: JointHmm
+    leaves: Leaves
+    by_triphone: bool
 
 
 def accumulate_statistics(
-    hmm: JointHmm, utterances: PreparedUtterances, posteriors: Iterator[StatePosteriors] | None = None
+    hmm: JointHmm, utterances: PreparedUtterances, work: Checkpoint = NO_CHECKPOINT, *, by_triphone: bool = False
 ) -> StreamStatistics:
-    """Return the sufficient statistics of utterances (E-step), with their state posteriors (None: the model's)."""
-    triphones = {
-        name: GaussianStatistics.zeros(len(utterances.triphones), 1, len(model.scale.mean))
-        for name, model in hmm.models.items()
-    }
-    mixed = {
-        name: _MixtureAccumulator(model.tied) for name, model in hmm.models.items() if model.tied.mixtures.size[1] > 1
-    }
-    stay, occupied, leaf_of = np.zeros(len(hmm.log_stay)), np.zeros(len(hmm.log_stay)), utterances.leaves(hmm)
+    """Return the sufficient statistics of utterances (E-step), of leaves or of every state in context.
+
+    Utterances that are too short, or without an active stream, are left out.
+    """
+    active = set(hmm.config.training.active)
+    usable = [item for item in utterances.items if item.fits and active & set(item.streams)]
+    batches = group_by_length([item.frames for item in usable], [len(item.monophones) for item in usable])
+    shards = [[usable[i] for i in batch] for batch in batches] or [[]]
+    accounts = _Accounts(hmm, utterances.leaves(hmm), by_triphone)
+    return _statistics(hmm, sum_statistics(_shard_sums, accounts, shards, work))
+
+
+def _shard_sums(job: tuple[_Accounts, Sequence[PreparedUtterance]]) -> Sums:
+    accounts, items = job
+    return _add_up(accounts, batch_posteriors(accounts.hmm, accounts.leaves, items))
+
+
+def _add_up(accounts: _Accounts, posteriors: Iterable[tuple[PreparedUtterance, StatePosteriors]]) -> Sums:
+    """Return the statistics of utterances with the posteriors of their states."""
+    hmm, leaves, by_triphone = accounts
+    statistics, waiting = (
+        dict[str, GaussianStatistics](),
+        defaultdict[str, list[tuple[Rows, NDArray[np.intp], Rows]]](list),
+    )
+    for name, model in hmm.models.items():
+        count, components, dimensions = model.tied.mixtures.size
+        statistics[name] = GaussianStatistics.zeros(len(leaves[name]) if by_triphone else count, components, dimensions)
+    stay, occupied = np.zeros((2, len(hmm.log_stay)))
     log_likelihood, frames = 0.0, 0
-    for posterior in iterate_posteriors(hmm, utterances) if posteriors is None else posteriors:
-        item = utterances.items[posterior.utterance]
+    for item, posterior in posteriors:
         states = posterior.states.astype(np.float32)
         states[states < MIN_POSTERIOR] = 0
-        by_triphone = (states @ item.member).T
+        by_state = (states @ item.member).T
         for name, rows in item.streams.items():
-            triphones[name].add(item.distinct, by_triphone @ rows)
-            if name in mixed:
-                mixed[name].add(rows, leaf_of[name][item.triphones], states)
+            if hmm.models[name].tied.mixtures.size[1] > 1:
+                frame, state = np.nonzero(states > MIN_MIXTURE_POSTERIOR)
+                waiting[name].append((rows[frame], leaves[name][item.triphones][state], states[frame, state]))
+            else:
+                densities = item.distinct if by_triphone else leaves[name][item.distinct]
+                statistics[name].add(densities, by_state @ rows)
         np.add.at(stay, item.monophones, posterior.stay)
         np.add.at(occupied, item.monophones, posterior.states.sum(axis=0))
         log_likelihood += posterior.log_likelihood
         frames += item.frames
-    leaves = {
-        name: mixed[name].statistics() if name in mixed else triphones[name].pool(leaf_of[name], model.forest.size)
-        for name, model in hmm.models.items()
-    }
-    return StreamStatistics(triphones, leaves, stay, occupied, log_likelihood, frames)
+    for name, pairs in waiting.items():  # of many utterances at once: that is faster
+        arrays = (np.concatenate(each) for each in zip(*pairs, strict=True))
+        hmm.models[name].tied.accumulate_components(statistics[name], *arrays)
+    sums = {"stay": stay, "occupied": occupied, "log likelihood": np.array(log_likelihood), "frames": np.array(frames)}
+    for name, own in statistics.items():
+        sums |= {f"{name} frames": own.frames, f"{name} moments": own.moments}
+    return sums
+
+
+def _statistics(hmm: JointHmm, sums: Sums) -> StreamStatistics:
+    densities = {name: GaussianStatistics(sums[f"{name} frames"], sums[f"{name} moments"]) for name in hmm.models}
+    total = float(sums["log likelihood"]), int(sums["frames"])
+    return StreamStatistics(densities, sums["stay"], sums["occupied"], *total)
 
 
 def reestimate_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
     """Return the models re-estimated from sufficient statistics (the M-step)."""
     floor = hmm.config.variance_floor
     models = {
-        name: replace(model, tied=model.tied.reestimate(statistics.leaves[name], floor))
+        name: replace(model, tied=model.tied.reestimate(statistics.densities[name], floor))
         for name, model in hmm.models.items()
     }
     measured = statistics.stay / np.maximum(statistics.occupied, 1e-9)
@@ -264,9 +275,10 @@ def train_joint(
     classes: Mapping[str, frozenset[str]],
     config: JointConfig,
     monitor: Monitor = silent_monitor,
+    work: Checkpoint = NO_CHECKPOINT,
 ) -> JointHmm:
     """Return models of all streams, trained together: the last of ``grow_joint``, which says what it takes."""
-    *_, hmm = grow_joint(utterances, inventory, classes, config, monitor)
+    *_, hmm = grow_joint(utterances, inventory, classes, config, monitor, work)
     return with_durations(hmm, utterances)
 
 
@@ -276,6 +288,7 @@ def grow_joint(
     classes: Mapping[str, frozenset[str]],
     config: JointConfig,
     monitor: Monitor = silent_monitor,
+    work: Checkpoint = NO_CHECKPOINT,
 ) -> Iterator[JointHmm]:
     """Yield models of all streams, trained together, of 1, 2, 4 … Gaussians for speech, then of more for motion.
 
@@ -294,13 +307,13 @@ def grow_joint(
     splits = [count.bit_length() - 1 for count in (config.mixtures, config.motion_mixtures)]
     widths = [config.plain_iterations, 1, config.iterations, *(2 * config.iterations * count for count in splits), 1]
     plain, trees, tied, *mixed, last = _split_monitor(monitor, widths)
-    hmm = _run_em(hmm, prepared, "units", config.plain_iterations, plain)
-    hmm = _tie_states(hmm, prepared, context_questions(inventory, classes), trees)
-    hmm = _run_em(hmm, prepared, "units in context", config.iterations, tied)
+    hmm = _run_em(hmm, prepared, "units", config.plain_iterations, plain, work)
+    hmm = _tie_states(hmm, prepared, context_questions(inventory, classes), trees, work)
+    hmm = _run_em(hmm, prepared, "units in context", config.iterations, tied, work)
     yield hmm
     for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
         for part in _split_monitor(of_stream, [1] * count) if name in hmm.models else ():
-            split = _split(hmm, prepared, name, part)
+            split = _split(hmm, prepared, name, part, work)
             if split is None:
                 break
             hmm = split
@@ -329,15 +342,16 @@ def _start(
             "check that units and recordings belong together, or give units fewer states"
         )
 
-    def posteriors() -> Iterator[StatePosteriors]:
-        for number, (item, utterance) in enumerate(zip(prepared.items, utterances, strict=True)):
+    def posteriors() -> Iterator[tuple[PreparedUtterance, StatePosteriors]]:
+        for item, utterance in zip(prepared.items, utterances, strict=True):
             if item.fits:
                 positions = expand_triphones(inventory, utterance.units).positions
                 posterior = np.zeros((item.frames, len(item.monophones)))
                 posterior[np.arange(item.frames), _spread_states(positions, item.frames, utterance.bounds)] = 1
-                yield StatePosteriors(number, posterior, np.maximum(posterior.sum(axis=0) - 1, 0), 0.0)
+                yield item, StatePosteriors(posterior, np.maximum(posterior.sum(axis=0) - 1, 0), 0.0)
 
-    return reestimate_hmm(hmm, accumulate_statistics(hmm, prepared, posteriors())), prepared
+    sums = _add_up(_Accounts(hmm, prepared.leaves(hmm), by_triphone=False), posteriors())
+    return reestimate_hmm(hmm, _statistics(hmm, sums)), prepared
 
 
 def _make_equal_models(
@@ -381,20 +395,22 @@ def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
     return [sub_monitor(monitor, start, stop) for start, stop in pairwise(edges.tolist())]
 
 
-def _run_em(hmm: JointHmm, prepared: PreparedUtterances, stage: str, steps: int, monitor: Monitor) -> JointHmm:
+def _run_em(
+    hmm: JointHmm, prepared: PreparedUtterances, stage: str, steps: int, monitor: Monitor, work: Checkpoint
+) -> JointHmm:
 
     def report(step: int, _: JointHmm, statistics: StreamStatistics) -> None:
         monitor(Progress(stage, step, steps, step / steps, statistics.mean_log_likelihood))
 
-    return run_em(hmm, lambda model: accumulate_statistics(model, prepared), reestimate_hmm, steps, report).model
+    return run_em(hmm, lambda model: accumulate_statistics(model, prepared, work), reestimate_hmm, steps, report).model
 
 
 def _tie_states(
-    hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question, ...], monitor: Monitor
+    hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question, ...], monitor: Monitor, work: Checkpoint
 ) -> JointHmm:
     """Return the models with their states in context tied by decision trees, one Gaussian a leaf."""
     config, triphones = hmm.config, prepared.triphones
-    statistics = accumulate_statistics(hmm, prepared).triphones
+    statistics = accumulate_statistics(hmm, prepared, work, by_triphone=True).densities
     costs = TreeCosts(config.tree_factor, config.least_frames, config.variance_floor, config.both_neighbours)
     models = {}
     for step, (name, model) in enumerate(hmm.models.items(), start=1):
@@ -409,14 +425,16 @@ def _tie_states(
     return replace(hmm, models=models)
 
 
-def _split(hmm: JointHmm, prepared: PreparedUtterances, name: str, monitor: Monitor) -> JointHmm | None:
+def _split(
+    hmm: JointHmm, prepared: PreparedUtterances, name: str, monitor: Monitor, work: Checkpoint
+) -> JointHmm | None:
     """Return the models with a stream's Gaussians split, and trained; None: too little data."""
-    model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared).leaves[name]
+    model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared, work).densities[name]
     if not model.tied.can_split(statistics):
         return None
     tied = model.tied.split(statistics)
     new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})
-    return _run_em(new, prepared, f"{tied.mixtures.size[1]} Gaussians for {name}", hmm.config.iterations, monitor)
+    return _run_em(new, prepared, f"{tied.mixtures.size[1]} Gaussians for {name}", hmm.config.iterations, monitor, work)
 
 
 def _prepare(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> PreparedUtterances:

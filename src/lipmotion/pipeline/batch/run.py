@@ -7,14 +7,11 @@ import os
 import uuid
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from typing import Protocol, TypeVar
 
-from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError, shorten
-from lipmotion.extensions import install_command, installed_version
+from lipmotion.errors import CorpusError, ExportError, shorten
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     FAILED,
@@ -41,25 +38,9 @@ from lipmotion.pipeline.batch.report import (
     write_reports,
 )
 from lipmotion.pipeline.job import Job
-from lipmotion.pipeline.workers import WorkerDiedError, process_count, worker_pool
+from lipmotion.pipeline.workers import ItemT, Pool, ResultT, WorkerDiedError, cluster_pool, process_count, worker_pool
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
-
-ItemT = TypeVar("ItemT")
-ResultT = TypeVar("ResultT")
-CONNECT_S = 20
-ITEMS_AHEAD = 4
-"""Items a worker of a cluster that are sent ahead, so that none waits, and memory is flat."""
-
-
-class Pool(Protocol):
-    """Applies a function to items in other processes; yields results as they are ready.
-
-    Raises WorkerDiedError: a worker ended; which items are done is not known.
-    """
-
-    def __call__(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-        """Yield the result of every item, in any order."""
 
 
 @contextmanager
@@ -71,64 +52,6 @@ def local_pool(jobs: int) -> Iterator[Pool]:
             yield from workers.unordered_map(function, items)
 
     yield each
-
-
-@contextmanager
-def cluster_pool(address: str, out: Path) -> Iterator[Pool]:
-    """Give the workers of a Dask cluster as a pool.
-
-    address : of its scheduler, as ``tcp://HOST:8786``
-    out     : the folder of the outputs, which every worker must see under the same path
-    Raises MissingDependencyError: the package distributed is not installed.
-    Raises InputError: no cluster answers, it has no workers, or they lack lipmotion, its version or the folder.
-    """
-    try:
-        from distributed import Client, KilledWorker, as_completed
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"a cluster needs the package distributed: {install_command('cluster')}, here and on all workers"
-        ) from error
-    with ExitStack() as stack:
-        try:
-            client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
-        except (OSError, TimeoutError, ValueError) as error:
-            raise InputError(f"{address}: no Dask scheduler answers ({error}); start one: dask scheduler") from error
-        try:
-            answers = client.run(describe_worker, str(out), on_error="return")
-        except Exception as error:  # what the scheduler could not send
-            raise InputError(f"{address}: the workers cannot be asked ({error})") from error
-        if not answers:
-            raise InputError(f"{address}: the cluster has no workers; start some: dask worker {address} --nthreads 1")
-        for worker, answer in answers.items():
-            if isinstance(answer, BaseException):
-                raise InputError(
-                    f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
-                ) from answer
-            version, sees_folder = answer
-            if version != installed_version():
-                raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
-            if not sees_folder:
-                raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
-
-        def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-            remaining = iter(items)
-            first = list(islice(remaining, ITEMS_AHEAD * sum(client.ncores().values())))
-            running = as_completed(client.map(function, first, pure=False), loop=client.loop)
-            try:
-                for future in running:
-                    yield future.result()
-                    running.update(client.submit(function, item, pure=False) for item in islice(remaining, 1))
-            except KilledWorker as error:
-                raise WorkerDiedError(str(error)) from error
-            finally:
-                client.cancel(list(running.futures))
-
-        yield each
-
-
-def describe_worker(out: str) -> tuple[str, bool]:
-    """Return a worker's version of lipmotion, and whether it sees a folder."""
-    return installed_version(), os.path.isdir(out)  # noqa: PTH112
 
 
 LOG = logging.getLogger("lipmotion")

@@ -28,7 +28,7 @@ from lipmotion.speech.recognition.agreement import transcript_fit
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.sources import sha256_of
-from lipmotion.types import Item, Monitor, ParallelMap, Progress, Span, Timeline, Unit, Utterance
+from lipmotion.types import Item, Monitor, Progress, Span, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
@@ -95,12 +95,12 @@ PhonesOrReason = Timeline[Unit] | str
 
 
 def label_utterances(
-    utterances: Sequence[Utterance], labeller: Labeller, monitor: Monitor, checkpoint: Checkpoint, each: ParallelMap
+    utterances: Sequence[Utterance], labeller: Labeller, monitor: Monitor, checkpoint: Checkpoint
 ) -> Iterator[tuple[Utterance, PhonesOrReason]]:
     """Yield every utterance with its phones in time, or with the reason why it has none.
 
     monitor    : called with the progress, and with the utterances without phones
-    checkpoint : stores the phones of every ``UTTERANCES_PER_CHECKPOINT`` utterances
+    checkpoint : distributes the work, and stores the phones of every ``UTTERANCES_PER_CHECKPOINT`` utterances
     """
     starts = range(0, len(utterances), UTTERANCES_PER_CHECKPOINT)
     blocks = [utterances[start : start + UTTERANCES_PER_CHECKPOINT] for start in starts]
@@ -108,7 +108,7 @@ def label_utterances(
     unlabelled = (block for block, arrays in zip(blocks, stored, strict=True) if arrays is None)
     # without mouth pictures, which take time to send to another process
     missing = [[replace(each, track=replace(each.track, crops=None)) for each in block] for block in unlabelled]
-    labelled = iter(each(partial(_label_block, labeller=labeller), missing))
+    labelled = iter(checkpoint.parallel_map(partial(_label_block, labeller=labeller), missing))
     done = 0
     for number, (block, arrays) in enumerate(zip(blocks, stored, strict=True)):
         results = _from_arrays(arrays) if arrays is not None else next(labelled)

@@ -39,7 +39,7 @@ from lipmotion.pipeline.training.labels import (
     warn_of_missing_transcripts,
 )
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
-from lipmotion.pipeline.workers import process_count, worker_pool
+from lipmotion.pipeline.workers import training_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import LOG_ENERGY
@@ -56,7 +56,6 @@ from lipmotion.types import (
     Features,
     Monitor,
     Motion,
-    ParallelMap,
     Progress,
     Speech,
     Timeline,
@@ -79,7 +78,6 @@ def train_phone_models(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint = NO_CHECKPOINT,
-    each: ParallelMap = map,
 ) -> UnitHmm:
     """Return phone models trained on recordings and their words.
 
@@ -94,12 +92,10 @@ def train_phone_models(
         TranscribedUtterance(analysed(audio).mfcc(warp).values, tuple(lexicon.pronunciations(word) for word in words))
         for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
     ]
-    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint, each)
+    return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint)
 
 
 LOG = logging.getLogger("lipmotion")
-UTTERANCES_PER_WORKER = 32
-"""Smallest number of utterances for which a further process is started."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +120,7 @@ class Run:
     work    : a folder for checkpoints, from which the same call continues after it was stopped
               (``storage.locks.unfinished_work`` creates one); the model is the same to the byte. None: no checkpoints
     workers : number of processes, fewer if the corpus is small. With more than one, a script must be guarded by
-              ``if __name__ == "__main__":``
+              ``if __name__ == "__main__":``. Or the address of a Dask scheduler, as ``tcp://HOST:8786``
 
     >>> Run(workers=2).workers
     2
@@ -132,7 +128,7 @@ class Run:
 
     monitor: Monitor = silent_monitor
     work: Path | None = None
-    workers: int = 1
+    workers: int | str = 1
 
 
 DEFAULT_RUN, TRAINING_LIST = Run(), Selection("train")
@@ -197,20 +193,19 @@ def train(  # noqa: PLR0913
     eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
     utterances = with_common_channels([with_visual_channels(each, visual, eigenlips) for each in utterances])
     job = fingerprint_training(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
-    checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
-    with worker_pool(min(process_count(run.workers), len(chosen) // UTTERANCES_PER_WORKER)) as team:
+    with training_pool(run.workers, len(chosen)) as each:
+        checkpoint = Checkpoint(run.work, job, each)
         monitor = sub_monitor(run.monitor, 0, 0.5)
-        phones, examples, skipped = phones_and_examples(
-            utterances, recogniser, lexicon, monitor, checkpoint, team.ordered_map
-        )
+        phones, examples, skipped = phones_and_examples(utterances, recogniser, lexicon, monitor, checkpoint)
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
         people, speakers = [speaker_of[example.name] for example in examples], None
         if len(set(filter(None, people))) > 1:
             examples, speakers = map_to_mean_person(examples, people)
         sound = {utterance.name: utterance.audio for utterance in utterances}
-        examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
+        examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), each)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
-    fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
+        learning = sub_monitor(run.monitor, 0.6, 1, "learning motion: ")
+        fit = engine.fit([*examples, *speech_examples], learning, checkpoint)
     if not fit.uses_prior:
         prior = None
     used = tuple(example.name for example in examples)
@@ -238,14 +233,13 @@ def phones_and_examples(
     lexicon: Lexicon,
     monitor: Monitor,
     checkpoint: Checkpoint,
-    each: ParallelMap,
 ) -> tuple[UnitHmm, list[Example], dict[str, str]]:
     """Return phone models, the examples for an engine, and the reason for every utterance that is not used.
 
     Raises CorpusError: no utterance can be used.
     """
     learning, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
-    phones = _train_phone_models(utterances, lexicon, recogniser, learning, checkpoint, each)
+    phones = _train_phone_models(utterances, lexicon, recogniser, learning, checkpoint)
     judged = utterances[:: -(-len(utterances) // JUDGED_RECORDINGS)]
     phones = replace(phones, speaker=mean_speaker_vector(analysed(utterance.audio) for utterance in judged))
     examples: list[Example] = []
@@ -253,7 +247,7 @@ def phones_and_examples(
     labelled: list[tuple[Utterance, Timeline[Unit]]] = []
     warn_of_missing_transcripts(utterances)
     labeller = partial(label_phones, phones=Recogniser(phones), lexicon=lexicon)
-    for utterance, units in label_utterances(utterances, labeller, labelling, checkpoint, each):
+    for utterance, units in label_utterances(utterances, labeller, labelling, checkpoint):
         if isinstance(units, str):
             skipped[utterance.name] = units
             continue
@@ -304,7 +298,6 @@ def _train_phone_models(
     config: HmmConfig,
     monitor: Monitor,
     checkpoint: Checkpoint,
-    each: ParallelMap,
 ) -> UnitHmm:
     """Return phone models of all transcribed or labelled utterances, or those of the shipped model."""
     transcribed: list[tuple[Audio, tuple[str, ...]]] = []
@@ -333,7 +326,7 @@ def _train_phone_models(
     vocabulary = dict.fromkeys(word for _, words in transcribed for word in words)
     warn_of_guesses(tuple(vocabulary), lexicon)
     lexicon = Lexicon(lexicon.user | pronunciations)
-    return train_phone_models([*transcribed, *labelled], lexicon, config, monitor, checkpoint, each)
+    return train_phone_models([*transcribed, *labelled], lexicon, config, monitor, checkpoint)
 
 
 def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:

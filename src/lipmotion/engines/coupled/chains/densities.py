@@ -151,11 +151,6 @@ class EmissionStatistics:
             products[:, densities] += (flat @ features).reshape(*weight.shape[1:], -1)
         self.occupancy[:, densities] += weight.sum(axis=0, dtype=np.float64)
 
-    def plus(self, other: EmissionStatistics) -> EmissionStatistics:
-        """Return the sum of both statistics."""
-        products = tuple(a + b for a, b in zip(self.products, other.products, strict=True))
-        return EmissionStatistics(products, self.occupancy + other.occupancy)
-
 
 def zero_emission_statistics(group: StreamGroup) -> EmissionStatistics:
     """Return zero statistics for a stream group."""

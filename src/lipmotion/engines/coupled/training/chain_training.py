@@ -26,6 +26,7 @@ from lipmotion.engines.coupled.training.em_steps import (
 )
 from lipmotion.stats.em import EmResult, run_em
 from lipmotion.stats.mixture import Mixtures
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.units import find_similar_phone
 
 LEAST_FRAMES = 10
@@ -240,7 +241,7 @@ def growing_chains(
     data: Sequence[AlignedUtterance],
     schedule: MixtureSchedule,
     report: Report = no_report,
-    workers: int = 1,
+    work: Checkpoint = NO_CHECKPOINT,
 ) -> Iterator[EmResult[Chains, ChainStatistics]]:
     """Yield results of EM, started by Viterbi training: chains with 1, 2, 4, … Gaussians, each to convergence.
 
@@ -252,7 +253,7 @@ def growing_chains(
     chains = initial_chains(structure, streams, data, schedule.weights, floors)
     utterances = [lattice_utterance(chains, utterance) for utterance in data]
     while True:
-        result = train_to_convergence(chains, utterances, floors, schedule.most_steps, report, workers)
+        result = train_to_convergence(chains, utterances, floors, schedule.most_steps, report, work)
         yield result
         counts = component_counts(result.model)
         if all(count >= most for count, most in zip(counts, schedule.mixtures, strict=True)):
@@ -266,7 +267,7 @@ def train_to_convergence(
     floors: Sequence[Single],
     most_steps: int,
     report: Report,
-    workers: int,
+    work: Checkpoint,
     *,
     speech_only: bool = False,
 ) -> EmResult[Chains, ChainStatistics]:
@@ -274,7 +275,7 @@ def train_to_convergence(
     streams = range(1 if speech_only else len(chains.streams))
     return run_em(
         chains,
-        lambda chains: e_step(chains, utterances, workers),
+        lambda chains: e_step(chains, utterances, work),
         lambda chains, statistics: m_step(chains, statistics, floors, streams=streams, transitions=not speech_only),
         most_steps,
         lambda _, chains, statistics: report(TrainingStep(component_counts(chains), statistics.mean_log_likelihood)),

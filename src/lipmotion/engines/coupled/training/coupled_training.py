@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -59,6 +59,7 @@ from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
 from lipmotion.stats.curves import mark_known_dynamics
 from lipmotion.stats.em import EmResult
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
 
@@ -69,7 +70,7 @@ def train_on_speech(
     speech_only: Sequence[AlignedUtterance],
     config: CoupledConfig,
     report: Report = no_report,
-    workers: int = 1,
+    work: Checkpoint = NO_CHECKPOINT,
 ) -> Chains:
     """Return chains whose densities of speech are re-estimated from other speakers as well; all else stays.
 
@@ -92,7 +93,7 @@ def train_on_speech(
     most = present if chains.structure.kind == HMM else (max(config.speech_only_mixtures, present[0]), *present[1:])
     while True:
         result = train_to_convergence(
-            chains, utterances, floors, config.speech_only_steps, report, workers, speech_only=True
+            chains, utterances, floors, config.speech_only_steps, report, work, speech_only=True
         )
         if component_counts(result.model) == most:
             return result.model
@@ -100,11 +101,24 @@ def train_on_speech(
 
 
 Array = NDArray[np.float64]
+ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 SPEECH = "speech"
 
 
-def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> Fit[CoupledModel]:
+def _threaded(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+    """Kernels and matrix products release the interpreter's lock."""
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, 8)) as pool:
+        yield from pool.map(function, items)
+
+
+THREADS = Checkpoint(parallel_map=_threaded)
+"""Nothing is stored; threads of this process share the work."""
+
+
+def fit_coupled(
+    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor, work: Checkpoint = THREADS
+) -> Fit[CoupledModel]:
     """Return a coupled model trained on examples of speech with its motion, and figures of the training.
 
     Its figures are ``frames``, ``joint_states``, and ``converged``: whether EM with the greatest number of Gaussians
@@ -115,11 +129,11 @@ def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Mon
     Raises CorpusError: no example with observed motion, or examples of different channels.
     Raises InputError: no such unit set, or a structure that does not fit together.
     """
-    return deque(growing_models(examples, config, monitor), maxlen=1)[0]()
+    return deque(growing_models(examples, config, monitor, work), maxlen=1)[0]()
 
 
 def growing_models(
-    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
+    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor, work: Checkpoint = THREADS
 ) -> Iterator[Callable[[], Fit[CoupledModel]]]:
     """Yield functions that return the models of 1, 2, 4, … Gaussians on the way to that of ``fit_coupled``. Raises as
     that.
@@ -154,7 +168,7 @@ def growing_models(
             doublings = max(config.speech_only_mixtures // config.mixtures, 1).bit_length()
             most_steps = config.speech_only_steps * doublings
             report = _reporter("more speech", most_steps, second_monitor)
-            chains = train_on_speech(chains, data, speech_only, config, report, workers())
+            chains = train_on_speech(chains, data, speech_only, config, report, work)
         model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
         model = replace(model, encoding=encoding)
         if config.dynamic and config.acoustic_regression:
@@ -176,13 +190,8 @@ def growing_models(
     names, schedule = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
     most_steps = schedule.most_steps * max(schedule.mixtures).bit_length()
     report = _reporter("chains", most_steps, sub_monitor(monitor, 0, first_share))
-    for grown in growing_chains(structure, names, data, schedule, report, workers()):
+    for grown in growing_chains(structure, names, data, schedule, report, work):
         yield partial(finished, grown)
-
-
-def workers() -> int:
-    """Return the number of threads that share the work; the result does not depend on it."""
-    return min(os.cpu_count() or 1, 8)
 
 
 def frames_away_from_speech(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
@@ -285,8 +294,3 @@ def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Ar
         return motion[utterance.observations.observed[1]]
 
     return list(_threaded(generated, data))
-
-
-def _threaded(function: Callable[[AlignedUtterance], ResultT], data: Sequence[AlignedUtterance]) -> Iterator[ResultT]:
-    with ThreadPoolExecutor(workers()) as pool:
-        yield from pool.map(function, data)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +19,11 @@ from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units
 from lipmotion.errors import InputError
+from lipmotion.stats.em import Sums, sum_statistics
+from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 
-BATCH = 16
-"""Utterances whose statistics are accumulated together before they are added to those of other batches."""
+SHARD = 16
+"""Utterances of a shard of the E-step."""
 LEAST_FRAMES = 3.0
 """A density with less data than so many frames stays as it is."""
 FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
@@ -63,26 +63,20 @@ class ChainStatistics:
         """Log likelihood per frame."""
         return self.log_likelihood / self.frames
 
-    def plus(self, other: ChainStatistics) -> ChainStatistics:
-        """Return the sum of both statistics."""
-        return ChainStatistics(
-            tuple(a.plus(b) for a, b in zip(self.emissions, other.emissions, strict=True)),
-            self.transition_counts + other.transition_counts,
-            self.log_likelihood + other.log_likelihood,
-            self.frames + other.frames,
-        )
 
-
-def e_step(chains: Chains, utterances: Sequence[LatticeUtterance], workers: int = 1) -> ChainStatistics:
-    """Return the sufficient statistics of utterances, whatever the workers. Raises InputError: none has a path."""
-    starts = range(0, len(utterances), BATCH)
-    jobs = ((chains, utterances[start : start + BATCH]) for start in starts)
-    total: ChainStatistics | None = None
-    for batch in _ordered_results(_batch_statistics, jobs, workers):
-        total = batch if total is None else total.plus(batch)
-    if total is None or not total.frames:
+def e_step(chains: Chains, utterances: Sequence[LatticeUtterance], work: Checkpoint = NO_CHECKPOINT) -> ChainStatistics:
+    """Return the sufficient statistics of utterances, whoever computes them. Raises InputError: none has a path."""
+    shards = [utterances[start : start + SHARD] for start in range(0, len(utterances), SHARD)]
+    sums = sum_statistics(_shard_sums, chains, shards, work)
+    if not sums or not sums["frames"]:
         raise InputError(f"none of {len(utterances)} recordings has a path through the chains; check their labels")
-    return total
+    emissions = tuple(
+        EmissionStatistics(
+            tuple(sums[f"products {number} {stream}"] for stream in group.streams), sums[f"occupancy {number}"]
+        )
+        for number, group in enumerate(chains.groups)
+    )
+    return ChainStatistics(emissions, sums["transitions"], float(sums["log likelihood"]), float(sums["frames"]))
 
 
 def m_step(
@@ -119,7 +113,7 @@ def variance_floors(observations: Sequence[AudioVisualObservations]) -> tuple[Si
     return tuple(floors)
 
 
-def _batch_statistics(job: tuple[Chains, Sequence[LatticeUtterance]]) -> ChainStatistics:
+def _shard_sums(job: tuple[Chains, Sequence[LatticeUtterance]]) -> Sums:
     chains, utterances = job
     emission_statistics = tuple(zero_emission_statistics(group) for group in chains.groups)
     transition_counts = np.zeros(chains.transitions.statistic_count)
@@ -143,15 +137,9 @@ def _batch_statistics(job: tuple[Chains, Sequence[LatticeUtterance]]) -> ChainSt
         transition_counts[lattice.transition_index] += weight * posteriors.transition_counts
         log_likelihood += weight * posteriors.log_likelihood
         frames += weight * observations.frames
-    return ChainStatistics(emission_statistics, transition_counts, log_likelihood, frames)
-
-
-def _ordered_results(
-    function: Callable[[Any], ChainStatistics], jobs: Iterable[Any], workers: int
-) -> Iterator[ChainStatistics]:
-    """Yield the results in the order of the jobs. Kernels and matrix products release the interpreter's lock."""
-    if workers < 2:
-        yield from map(function, jobs)
-        return
-    with ThreadPoolExecutor(workers) as pool:
-        yield from pool.map(function, jobs)
+    sums = {"transitions": transition_counts, "log likelihood": np.array(log_likelihood), "frames": np.array(frames)}
+    for number, (group, statistics) in enumerate(zip(chains.groups, emission_statistics, strict=True)):
+        products = zip(group.streams, statistics.products, strict=True)
+        sums |= {f"products {number} {stream}": array for stream, array in products}
+        sums[f"occupancy {number}"] = statistics.occupancy
+    return sums
