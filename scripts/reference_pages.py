@@ -36,6 +36,7 @@ SEE = {
     "addon": "formats",
     "evaluate": "measures",
     "compare": "compare",
+    "league": "results/league",
     "experiment": "report measures",
     "study": "study study-analysis",
     "info": "start",

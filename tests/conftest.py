@@ -6,7 +6,9 @@ import os
 # has other work. It computes under ``kernels.compiler.one_thread``; two threads: ``make test-portable``.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import ctypes
 import signal
+import sys
 import wave
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
@@ -29,6 +31,8 @@ from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
 
 SENTENCES = 12
+MAX_HEARD = 40
+"""Sounds whose posteriors are kept: those of the toy, and some before."""
 FIXED, EXPLORE = "fixed", "explore"
 """Profiles of Hypothesis: the same examples every time; and ``--hypothesis-profile=explore``: others, and more."""
 MORE_SENTENCES = 10
@@ -125,6 +129,17 @@ def hasty_training(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module", autouse=True)
+def released(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What a file of tests has cached goes with it, and what was freed to the system: glibc keeps up to 64 MB of it."""
+    yield
+    for value in vars(request.module).values():
+        if getattr(value, "__module__", "") == request.module.__name__ and hasattr(value, "cache_clear"):
+            value.cache_clear()
+    if sys.platform == "linux":
+        ctypes.CDLL(None).malloc_trim(0)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def heard_once() -> Iterator[None]:
     """The phone network hears the same toy sentences in a hundred trainings: what it said is known by the sound."""
@@ -135,6 +150,8 @@ def heard_once() -> Iterator[None]:
         sound = sha256(samples.tobytes()).digest()
         if sound not in said:
             said[sound] = hear(self, samples)
+            if len(said) > MAX_HEARD:
+                del said[next(iter(said))]
         return said[sound].copy()
 
     with pytest.MonkeyPatch.context() as patched:

@@ -1,5 +1,6 @@
 import json
 
+from cli.conftest import check_refused
 from lipmotion import compare
 from lipmotion.measures.evaluation_table import comparison_table
 
@@ -32,3 +33,7 @@ def test_programs_read_lines_of_json(run, here):
     done = run("compare", "a.csv", "a.csv", "--machine-readable")
     assert (done.code, done.err) == (0, [])
     assert json.loads(done.out[-1])["figures"]["reference"] == "a.csv"
+
+
+def test_a_league_without_adapters_says_where_they_are(run, toy_corpus):
+    check_refused(run("league", str(toy_corpus.path), "-o", "report", "--adapters", "nowhere"), 3, "extras/league")

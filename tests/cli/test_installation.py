@@ -35,6 +35,7 @@ def test_packages(declared):
         Requirement("numpy", ">=2"),
         Requirement("pytest", "<1"),
         Requirement("no-such-package", "==1"),
+        Requirement("no-such-package", "==2", "sys_platform == 'none'"),
         Requirement("no-such-kind", "", "sys_platform == 'none'"),
         Requirement("numpy", ">=2", "", "plots"),
         Requirement("no-such-package", ">=1", "", "study"),

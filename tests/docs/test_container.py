@@ -25,7 +25,10 @@ def pins(name: str) -> set[str]:
 
 def test_what_is_copied_is_there():
     copied = [name for line in after("COPY") for name in line.split()[:-1]]
-    assert {"requirements", "pyproject.toml", "src"} <= set(copied)
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    packed = re.findall(r'^"(\w+)/\w+" = ', project.split("wheel.force-include]")[1].split("\n[")[0], re.MULTILINE)
+    assert {"requirements", "pyproject.toml", "src", *packed} <= set(copied)
+    assert packed
     assert all((ROOT / name).exists() for name in copied)
     kept = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
     assert kept[0] == "*"

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lipmotion import Staging
-from lipmotion.errors import InputError
+from lipmotion import Staging, errors
 from lipmotion.units.phones import BLAIR
 from lipmotion_faces.cut_out import read_cut_out
 
@@ -73,5 +72,5 @@ def test_folders_that_cannot_be_a_character(
     tmp_path: Path, names: str, damage: Callable[[Path], object], message: str
 ) -> None:
     damage(draw(tmp_path, names))
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(errors.InputError, match=message):
         read_cut_out(tmp_path)

@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.articulation.contact import LARGEST_GAP
-from lipmotion.articulation.mouth import TUCKED_GAP, jaw_drop
+from lipmotion.articulation import contact, mouth
 from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
 from lipmotion_faces.portrait.design import STEPS, closed_curve, mirror_curve, open_curve, path_points, stroke
 from lipmotion_faces.portrait.geometry import TEETH_EDGE, MouthPose, lip_outlines, mouth_interior
@@ -15,12 +14,12 @@ LIPS = WOMAN.lips
 
 
 def pose(gap: float, width: float = 1.0, fullness: float = 1.0, **gestures: float) -> MouthPose:
-    return MouthPose(gap, width, fullness, float(jaw_drop(gap)), **gestures)
+    return MouthPose(gap, width, fullness, float(mouth.jaw_drop(gap)), **gestures)
 
 
 shares = {name: st.floats(0, 1) for name in ("tuck", "tongue", "protrusion", "spread", "press", "teeth", "oval")}
 poses = st.builds(
-    pose, gap=st.floats(0, LARGEST_GAP), width=st.floats(0.5, 1.35), fullness=st.floats(0.75, 1.25), **shares
+    pose, gap=st.floats(0, contact.LARGEST_GAP), width=st.floats(0.5, 1.35), fullness=st.floats(0.75, 1.25), **shares
 )
 DESIGNS = {"woman": WOMAN, "man": MAN, "cartoon": CARTOON}
 designs = st.sampled_from(sorted(DESIGNS))
@@ -34,17 +33,12 @@ def test_outlines_never_cross_and_the_gap_is_exact(name, drawn):
     shape = lip_outlines(design.lips, drawn, X)
     within = mouth_interior(design.lips, drawn, X, shape)
     for upper, lower in [
-        (shape.upper_outer, shape.upper_inner),
-        (shape.upper_inner, shape.lower_inner),
-        (shape.lower_inner, shape.lower_outer),
-        (shape.upper_inner, within.teeth_upper),
-        (within.teeth_upper, shape.lower_inner),
-        (shape.upper_inner, within.teeth_lower),
-        (within.teeth_lower, shape.lower_inner),
-        (shape.upper_inner, within.tongue_top),
-        (within.tongue_top, within.tongue_bottom),
-        (within.tongue_bottom, shape.lower_inner + 0.03),
-    ]:
+        (shape.upper_outer, shape.upper_inner), (shape.upper_inner, shape.lower_inner),
+        (shape.lower_inner, shape.lower_outer), (shape.upper_inner, within.teeth_upper),
+        (within.teeth_upper, shape.lower_inner), (shape.upper_inner, within.teeth_lower),
+        (within.teeth_lower, shape.lower_inner), (shape.upper_inner, within.tongue_top),
+        (within.tongue_top, within.tongue_bottom), (within.tongue_bottom, shape.lower_inner + 0.03),
+    ]:  # fmt: skip
         assert (upper <= lower + 1e-9).all()
     gap = shape.lower_inner - shape.upper_inner
     assert gap[MIDDLE] == pytest.approx(drawn.gap, abs=1e-6)
@@ -82,7 +76,7 @@ def test_lower_teeth_are_hidden_but_where_both_rows_are_shown():
 
 
 def test_tucked_the_lower_lip_is_behind_the_upper_teeth():
-    for gap in TUCKED_GAP:
+    for gap in mouth.TUCKED_GAP:
         drawn = pose(gap, tuck=1.0)
         shape = lip_outlines(LIPS, drawn, X)
         near = np.abs(X) < 0.05
@@ -143,7 +137,7 @@ def test_the_corners_of_an_oval_are_halfway_down() -> None:
 
 
 def test_above_a_tucked_lip_the_opening_is_full_of_upper_teeth_and_arched_upwards() -> None:
-    drawn = pose(TUCKED_GAP[0], tuck=1.0)
+    drawn = pose(mouth.TUCKED_GAP[0], tuck=1.0)
     shape = lip_outlines(LIPS, drawn, X)
     within = mouth_interior(LIPS, drawn, X, shape)
     near = np.abs(X) < 0.6 * shape.inner_half_width

@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
-from lipmotion_faces import Staging, make_face, stage_face
-from lipmotion_faces.portrait.geometry import MouthPose
-from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths, paint_shapes
+from lipmotion_faces import Staging, make_face, stage_face, testing
+from lipmotion_faces.portrait import geometry, layered
 from lipmotion_faces.portrait.svg_document import parse_drawing
-from lipmotion_faces.testing import check_face
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robot.svg"
 WHOLE = np.array([[1.0, 0, 0], [0, 1, 0]])
@@ -27,12 +25,12 @@ def svg(inside: str, box: str = "0 0 40 40") -> bytes:
 def picture(inside: str, size: int = 40) -> np.ndarray:
     """Return the cover of shapes [shape=(size, size)]."""
     shapes = [(shape, (0.0, 0.0)) for _, shape in parse_drawing(svg(inside)).shapes]
-    return paint_shapes(shapes, WHOLE, size, size)[..., 3]
+    return layered.paint_shapes(shapes, WHOLE, size, size)[..., 3]
 
 
 @pytest.mark.long
 def test_the_example_keeps_the_contract():
-    check_face(make_face(str(ROBOT)))
+    testing.check_face(make_face(str(ROBOT)))
 
 
 @pytest.mark.parametrize(
@@ -64,7 +62,7 @@ def test_shapes_cover_what_they_should(shape, area):
 
 def test_colours_and_order():
     drawing = parse_drawing(svg('<rect width="40" height="40" fill="#f00"/><rect width="20" height="40" fill="blue"/>'))
-    layer = paint_shapes([(shape, (0.0, 0.0)) for _, shape in drawing.shapes], WHOLE, 40, 40)
+    layer = layered.paint_shapes([(shape, (0.0, 0.0)) for _, shape in drawing.shapes], WHOLE, 40, 40)
     assert layer[20, 10].tolist() == [0, 0, 255, 1]
     assert layer[20, 30].tolist() == [255, 0, 0, 1]
 
@@ -76,31 +74,23 @@ def test_colours_and_order():
         ('<rect fill="url(#a)" width="1" height="1"/>', "reference"),
         ('<g style="filter:url(file:///etc/passwd)"><rect width="1" height="1"/></g>', "reference"),
         ('<use xmlns:xlink="http://www.w3.org/1999/xlink" xlink:href="other.svg#a"/>', "not read|reference"),
-        ("<script>alert(1)</script>", "<script> is not read"),
-        ('<rect width="1" height="1" onclick="x()"/>', "script"),
-        ("<style>@import url(a.css)</style>", "<style> is not read"),
-        ("<text>a</text>", "<text> is not read"),
-        ("<foreignObject/>", "not read"),
-        ('<path d="M 0 0 L 1"/>', "ends within"),
-        ('<path d="M 0 0 X 1"/>', "cannot be read"),
-        ('<path d="1 2 3"/>', "without a command"),
+        ("<script>alert(1)</script>", "<script> is not read"), ('<rect width="1" height="1" onclick="x()"/>', "script"),
+        ("<style>@import url(a.css)</style>", "<style> is not read"), ("<text>a</text>", "<text> is not read"),
+        ("<foreignObject/>", "not read"), ('<path d="M 0 0 L 1"/>', "ends within"),
+        ('<path d="M 0 0 X 1"/>', "cannot be read"), ('<path d="1 2 3"/>', "without a command"),
         ('<rect width="wide" height="1"/>', "width is 'wide'"),
         ('<rect width="1" height="1" fill="nocolour"/>', "required a plain colour"),
         ('<polygon points="1 2 3"/>', "pairs"),
-        ('<g transform="rotate(a)"><rect width="1" height="1"/></g>', "transform"),
-        ("<g>" * 80 + "</g>" * 80, "deep"),
-        ("", "no shape"),
-        ('<path d="M0 0L1e9 1"/>', "numbers up to"),
+        ('<g transform="rotate(a)"><rect width="1" height="1"/></g>', "transform"), ("<g>" * 80 + "</g>" * 80, "deep"),
+        ("", "no shape"), ('<path d="M0 0L1e9 1"/>', "numbers up to"),
         ('<rect width="1" height="1" transform="scale(1e200)"/>', "transform"),
         ('<g transform="scale(1e5)"><g transform="scale(1e5)"><rect width="1" height="1"/></g></g>', "enlarge"),
-        ('<rect width="nan" height="1"/>', "width is 'nan'"),
-        ('<rect width="1" height="1e999"/>', "inf in '1e999'"),
+        ('<rect width="nan" height="1"/>', "width is 'nan'"), ('<rect width="1" height="1e999"/>', "inf in '1e999'"),
         ('<g stroke-width="' + " " * 200 + '1"/>', "required a number"),
-        ('<path d="M0 0a1 1 0 2 1 1 1"/>', "cannot be read at"),
-        ('<path d="M0 0"><animate/></path>', "in a shape"),
+        ('<path d="M0 0a1 1 0 2 1 1 1"/>', "cannot be read at"), ('<path d="M0 0"><animate/></path>', "in a shape"),
         ("&a;", "undefined entity"),
     ],
-)
+)  # fmt: skip
 def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
     with pytest.raises(InputError, match=words):
         parse_drawing(svg(inside))
@@ -188,25 +178,25 @@ def said(*phones: str) -> Timeline[Unit]:
 
 
 def test_sounds_choose_their_mouths():
-    key = MOUTHS["rest"]
-    poses = [MouthPose(key.gap, teeth=0)] * 5
+    key = layered.MOUTHS["rest"]
+    poses = [geometry.MouthPose(key.gap, teeth=0)] * 5
     for name in ("fv", "aa", "oo", "th", "ee", "mbp"):
-        k = MOUTHS[name]
-        poses += [MouthPose(k.gap, k.width, **{name: getattr(k, name) for name in k._fields[2:]})] * 5
-    shown = choose_mouths(poses, list(MOUTHS), 25.0)
+        k = layered.MOUTHS[name]
+        poses += [geometry.MouthPose(k.gap, k.width, **{name: getattr(k, name) for name in k._fields[2:]})] * 5
+    shown = layered.choose_mouths(poses, list(layered.MOUTHS), 25.0)
     assert shown[2::5] == ["rest", "fv", "aa", "oo", "th", "ee", "mbp"]
 
 
 def test_a_mouth_that_is_missing_is_replaced_and_closures_are_never_skipped():
-    poses = [MouthPose(0.2)] * 10 + [MouthPose(0.0, press=1.0)] + [MouthPose(0.2)] * 10
-    assert choose_mouths(poses, ["rest", "eh"], 60.0) == ["eh"] * 10 + ["rest"] + ["eh"] * 10
+    poses = [geometry.MouthPose(0.2)] * 10 + [geometry.MouthPose(0.0, press=1.0)] + [geometry.MouthPose(0.2)] * 10
+    assert layered.choose_mouths(poses, ["rest", "eh"], 60.0) == ["eh"] * 10 + ["rest"] + ["eh"] * 10
 
 
 def test_mouths_do_not_flicker():
     rng = np.random.default_rng(0)
-    poses = [MouthPose(float(gap)) for gap in 0.16 + 0.02 * rng.standard_normal(100)]
-    shown = choose_mouths(poses, list(MOUTHS), 25.0)
-    alone = [choose_mouths([pose], list(MOUTHS), 25.0)[0] for pose in poses]
+    poses = [geometry.MouthPose(float(gap)) for gap in 0.16 + 0.02 * rng.standard_normal(100)]
+    shown = layered.choose_mouths(poses, list(layered.MOUTHS), 25.0)
+    alone = [layered.choose_mouths([pose], list(layered.MOUTHS), 25.0)[0] for pose in poses]
 
     def changes(names):
         return sum(one != other for one, other in pairwise(names))

@@ -2,11 +2,9 @@ import numpy as np
 import pytest
 
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
-from lipmotion_faces import Staging, stage_face
-from lipmotion_faces.head import Head
+from lipmotion_faces import Staging, head, stage_face
 
 pytestmark = pytest.mark.video
-mediapipe = pytest.importorskip("mediapipe")
 
 INNER_LIPS, CORNERS, OUTER_LIPS, EYES = (13, 14), (61, 291), (0, 17), (33, 263)
 
@@ -27,6 +25,7 @@ def syllables() -> tuple[Motion, Timeline[Unit]]:
 def tracked(frames: list[np.ndarray]) -> np.ndarray:
     """Return opening, width and outer of each frame [shape=(T, 3)]; NaN where no face was found."""
     rows = []
+    mediapipe = pytest.importorskip("mediapipe")
     with mediapipe.solutions.face_mesh.FaceMesh(max_num_faces=1, refine_landmarks=True) as mesh:
         for frame in frames:
             faces = mesh.process(frame).multi_face_landmarks
@@ -38,8 +37,8 @@ def tracked(frames: list[np.ndarray]) -> np.ndarray:
 
 
 FACES = {
-    "woman": (stage_face("woman", Staging(size=480)), (0.95, 0.85, 0.9), 1.25),
-    "head": (Head(size=(720, 720)), (0.97, 0.9, 0.95), 1.35),
+    "woman": (lambda: stage_face("woman", Staging(size=480)), (0.95, 0.85, 0.9), 1.25),
+    "head": (lambda: head.Head(size=(720, 720)), (0.97, 0.9, 0.95), 1.35),
 }
 """Faces, how closely what is measured follows opening, width and outer, and the largest ratio of the openings."""
 
@@ -48,7 +47,7 @@ FACES = {
 def test_the_drawn_motion_is_tracked_as_large_as_given_and_closed_where_closed(name):
     face, correlations, largest = FACES[name]
     motion, units = syllables()
-    drawn, measured = motion.resampled(25.0).values, tracked(list(face.render(motion, units, fps=25.0)))
+    drawn, measured = motion.resampled(25.0).values, tracked(list(face().render(motion, units, fps=25.0)))
     assert np.isfinite(measured).all()  # the face is found in every frame
     for column, least in enumerate(correlations):
         assert np.corrcoef(drawn[:, column], measured[:, column])[0, 1] >= least

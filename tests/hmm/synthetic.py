@@ -5,15 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lipmotion.hmm import network, unit_training
 from lipmotion.hmm.align import align_units, choose_pronunciations
 from lipmotion.hmm.model import HmmConfig, UnitHmm, make_plain_states
-from lipmotion.hmm.network import compute_log_likelihoods
-from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures
 
 SILENCE, PAUSE = "sil", "sp"
-INVENTORY = UnitInventory(SILENCE, PAUSE, energy=0)
+INVENTORY = unit_training.UnitInventory(SILENCE, PAUSE, energy=0)
 UNITS = ("a", "b", "c", "d", "e")
 
 
@@ -104,11 +103,11 @@ def within_silence(words: Sequence[Sequence[str]]) -> tuple[str, ...]:
 
 
 def align(hmm: UnitHmm, features: np.ndarray, units: Sequence[str]) -> np.ndarray:
-    return align_units(hmm, compute_log_likelihoods(hmm, features), units)
+    return align_units(hmm, network.compute_log_likelihoods(hmm, features), units)
 
 
 def choose(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]):
-    return choose_pronunciations(hmm, compute_log_likelihoods(hmm, features), words, PAUSE)
+    return choose_pronunciations(hmm, network.compute_log_likelihoods(hmm, features), words, PAUSE)
 
 
 def chosen_units(hmm: UnitHmm, features: np.ndarray, words: Sequence[Sequence[Sequence[str]]]) -> tuple[str, ...]:
@@ -125,7 +124,7 @@ def recordings(seed: int, count: int, who: Speaker, pauses: bool = False):
             units += [PAUSE] * (pauses and number % 2 == 0 and position == 2)
             units += word
         features, where = who.say(draw, [*units, SILENCE])
-        transcribed.append(TranscribedUtterance(features, tuple((word,) for word in words)))
+        transcribed.append(unit_training.TranscribedUtterance(features, tuple((word,) for word in words)))
         said.append((*units, SILENCE))
         edges.append(where)
     return transcribed, said, edges

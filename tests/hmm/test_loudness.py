@@ -4,9 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
-from lipmotion.hmm import loudness
-from lipmotion.hmm.align import align_units, choose_pronunciations
-from lipmotion.hmm.network import compute_log_likelihoods, penalise_silence, penalise_speech
+from lipmotion.hmm import align, loudness, network
 
 ROOM = -10.0
 """The level of the room in ``line``, in which the loudest moments have 0."""
@@ -85,13 +83,13 @@ def stranger():
 def test_loud_frames_are_neither_aligned_with_silence_nor_chosen_as_pauses():
     hmm, features, edges, loud = stranger()
     units, words = (SILENCE, "a", "b", SILENCE), ((("a",),), (("b",),))
-    free = compute_log_likelihoods(hmm, features)
-    bound = penalise_silence(hmm, free, loud)
-    without, bounds = align_units(hmm, free, units), align_units(hmm, bound, units)
+    free = network.compute_log_likelihoods(hmm, features)
+    bound = network.penalise_silence(hmm, free, loud)
+    without, bounds = align.align_units(hmm, free, units), align.align_units(hmm, bound, units)
     assert without[3] - without[1] < 8
     assert (bounds[1], bounds[3]) == (edges[1], edges[3])
     for densities, pauses in ((free, True), (bound, False)):
-        parts = choose_pronunciations(hmm, densities, words, PAUSE)
+        parts = align.choose_pronunciations(hmm, densities, words, PAUSE)
         assert (PAUSE in [unit for part in parts for unit in part.units]) == pauses
 
 
@@ -109,9 +107,9 @@ def test_quiet_frames_are_silence_whatever_they_sound_like():
     hmm, features, _, _loud = stranger()
     quiet = np.zeros(len(features), bool)
     quiet[:4] = True
-    values = penalise_speech(hmm, compute_log_likelihoods(hmm, features), quiet).log_density(2, 6, None)
+    values = network.penalise_speech(hmm, network.compute_log_likelihoods(hmm, features), quiet).log_density(2, 6, None)
     free = [hmm.table.density(SILENCE, 0), hmm.table.density(PAUSE, 0)]
     assert set(values[:2].argmax(axis=1)) <= {hmm.table.density(SILENCE, k) for k in range(3)} | set(free)
-    plain = compute_log_likelihoods(hmm, features).log_density(2, 6, None)
+    plain = network.compute_log_likelihoods(hmm, features).log_density(2, 6, None)
     assert np.array_equal(values[2:], plain[2:])
     assert np.array_equal(values[:, free], plain[:, free])

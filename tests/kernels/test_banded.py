@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import banded
+from kernels.conftest import load_numba
 from lipmotion.kernels.banded import normal_equations, pin, solve, solve_mlpg
 from oracles import trajectories
 
@@ -51,23 +51,6 @@ def test_pins_agree_with_elimination(seed, frames, data):
     assert all(values[t, c] == value for t, c, value in pins)
 
 
-def test_pins_at_the_ends_and_side_by_side_are_exact():
-    for frames in ((0, 1, 2), (5, 4), (8, 7, 6), tuple(range(9))):
-        mean, precision = statistics(11, 9)
-        pins = [(t, 1, 0.5 - 0.1 * t) for t in frames]
-        bands = normal_equations(mean, precision)
-        for t, channel, value in pins:
-            pin(bands, t, channel, value)
-        values, _ = solve(bands)
-        assert [values[t, 1] for t in frames] == [value for _, _, value in pins]
-        assert values[:, 1] == pytest.approx(dense(mean, precision, pins)[1][0], abs=1e-10)
-        unpinned, _ = dense(mean, precision)[0]  # the other channel does not change
-        assert values[:, 0] == pytest.approx(unpinned, abs=1e-10)
-        values, variance = solve_mlpg(mean, precision, {(t, 1): value for t, _, value in pins})
-        assert not variance[list(frames), 1].any()
-        assert (np.delete(variance[:, 1], frames) > 0).all()
-
-
 @given(seed=SEEDS, frames=LENGTHS)
 @settings(max_examples=25)
 def test_static_windows_alone_generate_the_means(seed, frames):
@@ -87,25 +70,17 @@ def test_means_of_a_real_curve_generate_that_curve(seed, frames):
     assert values[:, 0] == pytest.approx(curve, abs=1e-10)
 
 
-def test_what_sticks_out_at_the_ends_counts_for_nothing():
-    mean, precision = statistics(4, 8)
-    other = mean.copy()
-    other[[0, -1], 1:] = 1e6
-    assert np.array_equal(solve(normal_equations(mean, precision))[0], solve(normal_equations(other, precision))[0])
-
-
 def forms(monkeypatch, compute) -> list:
     """Return the results of NumPy and of the compiled form."""
     results = []
     for compiled in (False, True):
-        monkeypatch.setattr(banded, "pays", lambda _, compiled=compiled: compiled)
+        load_numba(monkeypatch, compiled)
         results.append(compute())
     return results
 
 
 @pytest.mark.parametrize(("frames", "channels"), [(1, 1), (2, 7), (3, 2), (5, 1), (60, 33)])
 def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
-    pytest.importorskip("numba")
     mean, precision = statistics(frames, frames, channels)
     plain, fast = forms(monkeypatch, lambda: solve_mlpg(mean, precision))
     assert np.array_equal(plain, fast)

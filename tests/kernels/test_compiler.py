@@ -6,17 +6,10 @@ import numpy as np
 import pytest
 
 from children import environment, run_child
+from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
-from lipmotion.kernels import compiler
-from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.kernels.compiler import compiled
-from lipmotion.kernels.factorial import factorial_posteriors
-from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
-from lipmotion.kernels.forward_backward import chain_posteriors
-from lipmotion.kernels.normals import normal_sums
-from lipmotion_faces.kernels import affine, painting
-from lipmotion_faces.kernels.raster import draw
-from lipmotion_faces.kernels.shading import shade
+from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward, normals
+from lipmotion_faces.kernels import affine, painting, raster, shading
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
 TESTS = Path(__file__).parents[1]
@@ -25,8 +18,7 @@ TESTS = Path(__file__).parents[1]
 @pytest.fixture
 def unused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process in which numba can be imported but was not."""
-    monkeypatch.setattr(compiler, "numba_works", lambda: True)
-    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    load_numba(monkeypatch, False)
 
 
 @pytest.mark.usefixtures("unused")
@@ -45,19 +37,19 @@ def sequences() -> list[np.ndarray]:
     """Return what the kernels of sequences make of small, random input."""
     random = np.random.default_rng(0)
     stay, ends = random.uniform(0.3, 0.9, (2, 3)), np.full((2, 3), 1 / 6)
-    loop = Loop(stay, 1 - stay[:1], 1 - stay[1], random.dirichlet(np.ones(3), 3), ends, ends)
+    loop = factorial_loops.Loop(stay, 1 - stay[:1], 1 - stay[1], random.dirichlet(np.ones(3), 3), ends, ends)
     logs = [random.normal(-20, 2, (4, 6)).astype(np.float32) for _ in range(2)]
     found: list[Any] = []
     for kind in (np.float32, np.float64):
-        given = FactorialLogLikelihoods.of(*(log.astype(kind) for log in logs))
-        posteriors = factorial_posteriors(loop, loop, given, 2)
+        given = factorial_loops.FactorialLogLikelihoods.of(*(log.astype(kind) for log in logs))
+        posteriors = factorial.factorial_posteriors(loop, loop, given, 2)
         found += [*posteriors[:2], *posteriors.audio_counts, posteriors.log_likelihood]
-        found += factorial_best_path(loop, loop, given)
+        found += factorial_loops.factorial_best_path(loop, loop, given)
         arrays, _ = phone_loop(1, units=9, states=2)
         found += network_posteriors(random.normal(-20, 4, (3, len(arrays["emission"]))).astype(kind), **arrays)
     log_emission, moves = random.normal(0, 3, (5, 2, 3)), np.log(random.uniform(0.2, 0.8, (2, 2, 3)))
-    found += chain_posteriors(log_emission, *moves, np.array([5, 4]), np.array([3, 2]))
-    found += solve_mlpg(*random.uniform(0.5, 1, (2, 4, 3, 2)))
+    found += forward_backward.chain_posteriors(log_emission, *moves, np.array([5, 4]), np.array([3, 2]))
+    found += banded.solve_mlpg(*random.uniform(0.5, 1, (2, 4, 3, 2)))
     return found
 
 
@@ -66,11 +58,11 @@ def pictures() -> list[np.ndarray]:
     random = np.random.default_rng(1)
     points, finishes = random.uniform([0, 0, -2], [16, 12, -1], (9, 3)), random.uniform(0, 1, (2, 7))
     vertices = [random.normal(size=shape) for shape in ((9, 3), (9, 3), 3, (9, 3), (9, 2), (9, 3))]
-    light = np.abs(shade(*vertices, random.integers(0, 2, 9), finishes, random.uniform(0, 1, (6, 6))))
+    light = np.abs(shading.shade(*vertices, random.integers(0, 2, 9), finishes, random.uniform(0, 1, (6, 6))))
     triangles = random.integers(0, 9, (20, 3)).astype(np.int32)
     plain, textured, frame, moved = (np.zeros((12, 16, 3), np.uint8) for _ in range(4))
     opacity, behind, tone = np.zeros((12, 16), np.uint8), np.zeros((12, 16, 3), np.float32), np.arange(256).astype("u1")
-    draw(points, light, triangles, (0, 0, 16, 12), behind, tone, plain)
+    raster.draw(points, light, triangles, (0, 0, 16, 12), behind, tone, plain)
     looks = np.array([[0, SOLID], [0, CLEAR]] * 10, np.int32)
     texels = random.integers(0, 65536, (16, 4)).astype(np.uint16)
     surface = TexturedTriangles(
@@ -87,7 +79,7 @@ def pictures() -> list[np.ndarray]:
     stacked = np.zeros((12, 16, 4), np.uint16)
     painting.stack(layer, layer, np.dstack([layer, layer[..., 0]]) / 255, target, stacked)
     drawn = [light, plain, textured, opacity, frame, layer, target, moved, stacked]
-    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), normal_sums(points, triangles)]
+    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), normals.normal_sums(points, triangles)]
 
 
 @pytest.mark.long
@@ -134,7 +126,7 @@ def halves(x: float) -> float:
 
 def test_compiled_code_is_kept_on_disk():
     pytest.importorskip("numba")
-    function = cast("Any", compiled(halves))
+    function = cast("Any", compiler.compiled(halves))
     assert function(3.0) == 1.5
     assert function.kernel.stats.cache_path is not None
 
@@ -143,7 +135,7 @@ def test_what_cannot_be_kept_is_compiled_all_the_same():
     places: dict = {}
     exec(compile("def double(x):\n    return 2 * x\n", "nowhere", "exec"), places)  # noqa: S102  (no file, no cache)
     pytest.importorskip("numba")
-    function = compiled(places["double"])
+    function = compiler.compiled(places["double"])
     assert function(3.0) == 6.0
     assert function.kernel.stats.cache_path is None
 
@@ -152,18 +144,26 @@ def _sum(a: float, b: float) -> float:
     return a + b
 
 
+def keep_in(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return a kernel whose machine code is kept in a folder."""
+    numba = pytest.importorskip("numba")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+    numba.config.reload_config()
+    kernel = cast("Any", compiler.compiled(_sum))
+    kernel.prepare()
+    return kernel
+
+
 @pytest.mark.long
 def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    numba = pytest.importorskip("numba")
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    assert compiled(_sum)(1.0, 2.0) == 3.0
+    assert keep_in(tmp_path, monkeypatch)(1.0, 2.0) == 3.0
     files = sorted(path for path in tmp_path.rglob("*") if path.is_file())
     assert {path.suffix for path in files} == {".nbi", ".nbc"}
     for suffix in (".nbi", ".nbc"):
         for damage in (b"", b"\xe9rubbish", None):
             for path in (path for path in files if path.suffix == suffix):
                 path.write_bytes(path.read_bytes()[:-1] if damage is None else damage)
-            again, after = cast("Any", compiled(_sum)), cast("Any", compiled(_sum))
+            again, after = cast("Any", compiler.compiled(_sum)), cast("Any", compiler.compiled(_sum))
             assert again(1.0, 2.0) == after(1.0, 2.0) == 3.0
             assert not again.kernel.stats.cache_hits, "it was damaged"
             assert after.kernel.stats.cache_hits, "it is whole again"
@@ -171,12 +171,9 @@ def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.Mo
 
 @pytest.mark.long
 def test_a_cache_that_takes_nothing_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    numba = pytest.importorskip("numba")
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    kernel = compiled(_sum)
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", full)
+    kernel = keep_in(tmp_path, monkeypatch)
+    for folder in tmp_path.iterdir():  # it has become a file
+        folder.rmdir()
+        folder.touch()
     assert kernel(1.0, 2.0) == 3.0
+    assert kernel.kernel.stats.cache_misses

@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from kernels.networks import arrays_of
-from lipmotion.kernels import forward_backward
-from lipmotion.kernels import paths as kernel_paths
-from lipmotion.kernels.factorial import factorial_posteriors
+from lipmotion.kernels import factorial, forward_backward
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
 from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, cheapest_arrivals, trace_back
@@ -144,7 +142,7 @@ def of_factorial(draw, spread, extreme, kind=np.float64):
     frames = int(draw.integers(1, 5))
     audio, visual, logs = factorial_model(draw, frames, spread, extreme)
     logs = logs._replace(**{name: getattr(logs, name).astype(kind) for name in ("audio", "visual", "pair")})
-    found = factorial_posteriors(audio, visual, logs, stretch=int(draw.integers(1, 5)))
+    found = factorial.factorial_posteriors(audio, visual, logs, stretch=int(draw.integers(1, 5)))
     joint, counts, log_likelihood = factorial_oracle.posteriors(audio, visual, logs)
     single = kind is np.float32
     right = near(found.log_likelihood, log_likelihood, spread, single)
@@ -270,14 +268,6 @@ ONCE_WRONG = {
     "factorial, single": [(30, 135), (100, 61), (300, 119), (1e3, 18)],
 }
 """Spreads and numbers of cases in which probabilities counted that compiled forms once set to 0, or raised."""
-
-
-@pytest.fixture(params=["numpy", "compiled"])
-def form(request, monkeypatch) -> None:
-    """What has two forms is tested in both."""
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-    monkeypatch.setattr(kernel_paths, "pays", lambda _: request.param == "compiled")
 
 
 def wrong_cases(name: str) -> list[tuple[float, int]]:

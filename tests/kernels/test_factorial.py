@@ -24,20 +24,6 @@ def random_model(seed: int, frames: int, shapes=((2, 2), (2, 1)), spread: float 
     return audio, visual, FactorialLogLikelihoods(*logs, own, np.stack(np.unravel_index(chosen, sizes), axis=1))
 
 
-def agree(model, tolerance=1e-9) -> None:
-    found = factorial_posteriors(*model)
-    joint, counts, log_likelihood = oracle.posteriors(*model)
-    assert found.audio == pytest.approx(joint.sum(axis=2), abs=tolerance)
-    assert found.visual == pytest.approx(joint.sum(axis=1), abs=tolerance)
-    pairs = model[2].pairs
-    assert found.pair == pytest.approx(joint[:, pairs[:, 0], pairs[:, 1]], abs=tolerance)
-    for mine, wanted in zip((found.audio_counts, found.visual_counts), counts, strict=True):
-        for name, values in wanted.items():
-            assert getattr(mine, name) == pytest.approx(values, abs=tolerance)
-    assert found.audio_counts.initial.ravel() == pytest.approx(joint[0].sum(axis=1), abs=tolerance)
-    assert found.log_likelihood == pytest.approx(log_likelihood, abs=1e-8)
-
-
 def test_agrees_with_the_network_of_all_joint_states():
     for precision in (np.float32, np.float64):
         audio, visual, logs = random_model(2, 20, ((3, 5), (2, 4)), 5.0, 20)
@@ -68,15 +54,6 @@ def test_posteriors_sum_to_one_and_counts_are_as_many_as_steps():
         assert counts.enter.sum(axis=0) + counts.stay[0] == pytest.approx(frames[1:, 0].sum(axis=0), abs=1e-4)
 
 
-def test_a_pair_of_its_own_density_may_be_where_both_states_are_masked():
-    audio, visual, logs = random_model(6, 3, pairs=1)
-    a, v = logs.pairs[0]
-    logs.audio[1, a], logs.visual[1, v] = -np.inf, -np.inf
-    agree((audio, visual, logs))
-    logs.audio[1], logs.visual[1] = -np.inf, -np.inf
-    agree((audio, visual, logs))
-
-
 def test_a_recording_without_a_path_has_probability_0():
     audio, visual, logs = random_model(7, 5, pairs=0)
     logs.visual[3] = -np.inf
@@ -96,28 +73,3 @@ def test_single_precision_is_close_however_loud():
         assert found.pair == pytest.approx(wanted.pair, abs=1e-4)
         assert found.audio_counts.enter == pytest.approx(wanted.audio_counts.enter, abs=1e-3)
         assert found.log_likelihood == pytest.approx(wanted.log_likelihood, rel=1e-6)
-
-
-def test_a_unit_far_behind_comes_back_in_single_precision():
-    """Log densities are 72 nats lower for a unit, later 85 for another; a third, worse one never differs so much."""
-    audio, visual, _ = random_model(9, 1, ((2, 3), (1, 1)), pairs=0)
-    same = np.full((2, 3), 0.5)
-    audio = audio._replace(
-        stay=same, onward=same[:1], leave=same[0], enter=np.eye(3), initial=same / 3, final=same + 0.5
-    )
-    log_density = np.repeat([[-72.0, 0, -66.0] * 2, [0, -85.0, -66.0] * 2], 20, axis=0) / 20
-    logs = FactorialLogLikelihoods.of(log_density.astype(np.float32), np.zeros((40, 1), np.float32))
-    found = factorial_posteriors(audio, visual, logs)
-    assert found.audio[:, ::3].sum(axis=1) == pytest.approx(np.ones(40), abs=1e-4)
-
-
-@pytest.mark.parametrize(("kind", "ends", "middle"), [(np.float64, 360, 1000), (np.float32, 90, 300)])
-def test_a_path_is_found_that_is_far_behind_both_forward_and_backward(kind, ends, middle):
-    """One unit is better at the beginning and at the end, the other in between, and by more."""
-    half = np.full((1, 2), 0.5)
-    audio = Loop(half, half[:0], half[0], np.eye(2), half, half + 0.5)
-    visual = Loop(np.ones((1, 1)), np.ones((0, 1)), np.zeros(1), *np.ones((3, 1, 1)))
-    log_density = np.repeat([[0, -ends], [-middle, 0], [0, -ends]], 3, axis=0).astype(kind) / 3
-    found = factorial_posteriors(audio, visual, FactorialLogLikelihoods.of(log_density, np.zeros((9, 1), kind)))
-    assert found.audio[:, 1] == pytest.approx(np.ones(9), abs=1e-4)
-    assert found.log_likelihood == pytest.approx(np.log(0.5) - 2 * ends, abs=1e-4)

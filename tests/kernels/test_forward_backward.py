@@ -81,14 +81,3 @@ def test_agrees_with_the_enumeration_of_all_paths(seed, sizes, padding):
             assert log_likelihood[u] <= LOG_ZERO / 2
         else:
             assert log_likelihood[u] == pytest.approx(wanted_log_likelihood, abs=1e-9)
-
-
-@given(seed=st.integers(0, 2**32 - 1), loudness=st.sampled_from([1.0, 1e3, 1e5]))
-@settings(max_examples=25)
-def test_posteriors_of_every_frame_sum_to_one(seed, loudness):
-    (log_emission, *rest), _ = padded(seed, [(60, 7), (31, 5), (7, 7)])
-    posterior, stay, _ = chain_posteriors(log_emission * loudness, *rest)
-    for u, frames in enumerate((60, 31, 7)):
-        assert posterior[:frames, u].sum(axis=1) == pytest.approx(np.ones(frames), abs=1e-6)
-        moves = (7, 5, 7)[u]  # all other transitions are of states to themselves
-        assert stay[u].sum() == pytest.approx(frames - moves, abs=1e-6)

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kernels.networks import arrays_of, network_posteriors, phone_loop, random_network
+from kernels.networks import network_posteriors, phone_loop, random_network
 from lipmotion.kernels.arcs import arc_layout
 from lipmotion.kernels.network import ForwardBackwardNetwork
 
@@ -36,53 +36,6 @@ def test_single_precision_is_close_however_loud(seed, spread):
     exact, _, wanted = network_posteriors(log_emission.astype(float), **arrays)
     assert posterior == pytest.approx(exact, abs=1e-4)
     assert log_likelihood == pytest.approx(wanted, rel=1e-6)
-
-
-def test_the_only_path_is_found_though_everything_else_is_far_more_probable():
-    arcs = {(0, 0): -0.5, (0, 1): -0.5, (1, 1): -0.5}
-    chain = {"emission": np.arange(2), **arrays_of(arcs, 2)}
-    chain["log_initial"], chain["log_final"] = (np.array(ends, np.float32) for ends in ([0, -np.inf], [-np.inf, 0]))
-    log_emission = np.array([[-5000.0, 0], [0, -4000.0]])
-    posterior, counts, log_likelihood = network_posteriors(log_emission, **chain)
-    assert posterior == pytest.approx(np.eye(2))
-    assert counts == pytest.approx([0, 1, 0])
-    assert log_likelihood == pytest.approx(-9000.5)
-
-
-@pytest.mark.parametrize(("kind", "ends", "middle"), [(np.float64, 360, 1000), (np.float32, 90, 300)])
-def test_a_path_is_found_that_is_far_behind_both_forward_and_backward(kind, ends, middle):
-    """One state is better at the beginning and at the end, the other in between, and by more."""
-    separate = separate_states(np.log([0.5, 0.5]), [0, 0])
-    log_emission = np.repeat([[0, -ends], [-middle, 0], [0, -ends]], 6, axis=0).astype(kind) / 6
-    found = separate.posteriors(log_emission, separate.layout.order, np.array([18]))
-    assert found.posterior[:, separate.layout.place[1]] == pytest.approx(np.ones(18), abs=1e-4)
-    assert found.log_likelihood[0] == pytest.approx(np.log(0.5) - 2 * ends, abs=1e-4)
-
-
-def separate_states(log_initial, log_final) -> ForwardBackwardNetwork:
-    """Return a network of two states without arcs between them."""
-    ends = {"log_initial": np.array(log_initial), "log_final": np.array(log_final)}
-    return ForwardBackwardNetwork.of(**arrays_of({(0, 0): 0.0, (1, 1): 0.0}, 2), **ends)
-
-
-@pytest.mark.parametrize(("kind", "first", "last"), [(np.float64, -225.0, -200.0), (np.float32, -25.0, -45.0)])
-def test_where_paths_cannot_begin_nothing_is_raised_that_counts_at_the_end(kind, first, last):
-    found = separate_states([0, -np.inf], [last, 0]).posteriors(
-        np.array([[first, 0]], kind), np.arange(2), np.array([1])
-    )
-    assert found.posterior == pytest.approx(np.array([[1, 0]]))
-    assert found.log_likelihood[0] == pytest.approx(first + last)
-
-
-@pytest.mark.parametrize(
-    ("kind", "logs", "last"), [(np.float64, (-500.0, -700.0), -290.0), (np.float32, (-620.0, -650.0), -40.0)]
-)
-def test_best_densities_of_chains_that_do_not_go_together_hide_no_joint_state(kind, logs, last):
-    factors = [np.array([[0, logs[1]]], kind), np.array([[0, logs[0]]], kind)]
-    columns = [np.array([0, 1]), np.array([1, 0])]
-    found = separate_states([0, 0], [last, 0]).product_posteriors(factors, columns, np.array([1]))
-    assert found.posterior == pytest.approx(np.array([[0, 1]]), abs=1e-3)
-    assert found.log_likelihood[0] == pytest.approx(logs[1], abs=1e-3)
 
 
 def test_no_path_says_so():
@@ -147,19 +100,6 @@ def test_densities_of_chains_are_as_their_products(seed, chains, spread):
     assert found.posterior == pytest.approx(wanted.posterior, abs=tolerance)
     assert found.counts == pytest.approx(wanted.counts, abs=30 * tolerance)
     assert found.log_likelihood == pytest.approx(wanted.log_likelihood, abs=1e-8 if spread < 1e4 else 1e-4)
-
-
-@pytest.mark.parametrize(("against", "frames"), [(3.0, 40), (20.0, 3), (100.0, 3)])
-def test_a_state_far_behind_comes_back_in_single_precision(against, frames):
-    """Log densities favour a state by up to 300 nats, and then more another one that cannot be reached from it."""
-    expectation = separate_states(np.log([0.5, 0.5]), [0, 0])
-    log_emission = np.zeros((3 * frames, 2), np.float32)
-    log_emission[:frames, 0], log_emission[frames:, 1] = -against, -against
-    found = expectation.product_posteriors([log_emission], [expectation.layout.order], np.array([3 * frames]))
-    posterior = found.posterior[:, expectation.layout.place]
-    assert posterior[:, 0] == pytest.approx(np.ones(3 * frames), abs=1e-5)
-    assert found.log_likelihood[0] == pytest.approx(np.log(0.5) - frames * against, rel=1e-6)
-    assert found.counts == pytest.approx([3 * frames - 1, 0], abs=1e-3)
 
 
 def test_recordings_left_by_single_precision_spoil_no_others():

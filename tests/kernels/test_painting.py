@@ -29,14 +29,6 @@ def test_cover_is_that_of_counted_points():
     assert layer[..., 3] == pytest.approx(layer[..., 0] / 100, abs=1e-5)
 
 
-def test_a_texture_runs_from_top_to_bottom_and_from_left_to_right():
-    layer = np.zeros((8, 5, 4), np.float32)
-    texture = np.array([[[0.0, 0, 0, 1], [100, 0, 0, 1]], [[0, 80, 0, 1], [100, 80, 0, 1]]])
-    painting.paint_band(layer, np.zeros((1, 5)), np.full((1, 5), 8.0), np.linspace(0, 1, 5), texture)
-    assert layer[3, :, 0] == pytest.approx([0, 25, 50, 75, 100])
-    assert layer[:, 2, 1] == pytest.approx(80 * (np.arange(8) + 0.5) / 8)
-
-
 def test_a_shift_by_whole_pixels_moves_the_picture_and_half_a_pixel_is_the_mean_of_two():
     source = np.random.default_rng(2).integers(0, 256, (12, 10, 4), np.uint16)
     target = np.empty((12, 10, 4), np.uint8)

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kernels.conftest import load_numba
 from kernels.networks import phone_loop, random_network
 from lipmotion.kernels import paths
 from lipmotion.kernels.paths import NetworkArrays, Windows
@@ -18,20 +19,7 @@ def asked(log_emission: np.ndarray):
     return lambda first, end: log_emission[first:end], len(log_emission)
 
 
-@pytest.fixture(params=["numpy", "compiled"], autouse=True)
-def form(request, monkeypatch) -> None:
-    """Every test runs with both forms, NumPy and compiled, and with blocks of ``BLOCK`` frames."""
-    monkeypatch.setattr(paths, "BLOCK_SCORES", 0)
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-    monkeypatch.setattr(paths, "pays", lambda _: request.param == "compiled")
-
-
-@pytest.fixture(params=[1, 3, 2048])
-def block(request, monkeypatch) -> int:
-    monkeypatch.setattr(paths, "BLOCK", request.param)
-    monkeypatch.setattr(paths, "WINDOW_BLOCK", request.param)
-    return request.param
+pytestmark = pytest.mark.usefixtures("form")
 
 
 @given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 80), block=st.integers(1, 90))
@@ -39,11 +27,8 @@ def block(request, monkeypatch) -> int:
 def test_blocks_change_nothing(seed, frames, block):
     arrays, arcs = random_network(seed, states=7, densities=4, density_of_arcs=0.3)
     log_emission = random_emission(seed, frames, 4)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paths, "BLOCK", 1000)
-        whole, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays))
-        patch.setattr(paths, "BLOCK", block)
-        path, in_blocks = paths.best_path(*asked(log_emission), NetworkArrays(**arrays))
+    whole, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays))
+    path, in_blocks = paths.best_path(*asked(log_emission), NetworkArrays(**arrays), block_frames=block)
     assert np.array_equal(path, whole)
     assert in_blocks == pytest.approx(score, abs=1e-3)
     if np.isfinite(score):  # and the score is that of the path
@@ -68,18 +53,18 @@ def left_to_right(states: int, densities: int = 8) -> dict:
     }
 
 
-@pytest.mark.usefixtures("block")
-def test_a_network_longer_than_the_recording_is_impossible_and_one_as_long_has_one_path():
+@pytest.mark.parametrize("block", [1, 3, None])
+def test_a_network_longer_than_the_recording_is_impossible_and_one_as_long_has_one_path(block):
     chain = NetworkArrays(**left_to_right(8))
     for frames in [1, 2, 3, 4, 6, 7]:
-        _, score = paths.best_path(*asked(np.zeros((frames, 8), np.float32)), chain)
+        _, score = paths.best_path(*asked(np.zeros((frames, 8), np.float32)), chain, block_frames=block)
         assert score == -np.inf
-    path, score = paths.best_path(*asked(np.zeros((8, 8), np.float32)), chain)
+    path, score = paths.best_path(*asked(np.zeros((8, 8), np.float32)), chain, block_frames=block)
     assert path.tolist() == list(range(8))
     assert score == pytest.approx(-3.5)
     gap = Windows(np.array([0, 600, 700]), np.array([100, 1000, 1000]))  # windows without room
     three, log_emission = NetworkArrays(**left_to_right(3, 7)), random_emission(0, 1000, 7)
-    assert paths.best_path(*asked(log_emission), three, windows=gap)[1] == -np.inf
+    assert paths.best_path(*asked(log_emission), three, windows=gap, block_frames=block)[1] == -np.inf
 
 
 def test_hours_lose_no_precision():
@@ -87,17 +72,16 @@ def test_hours_lose_no_precision():
     log_emission = np.full((30_000, 2), -80.0, np.float32)
     log_emission[:17_000, 0] += 0.25
     log_emission[17_000:, 1] += 0.25
-    path, score = paths.best_path(*asked(log_emission), NetworkArrays(**chain))
+    path, score = paths.best_path(*asked(log_emission), NetworkArrays(**chain), block_frames=2048)
     assert path.argmax() == 17_000
     assert score == pytest.approx(30_000 * -79.75 - 29_999 * 0.5, rel=1e-6)
 
 
 def both(monkeypatch, log_emission: np.ndarray, arrays: dict, beam: float | None = None) -> list:
     """Return the paths and scores of NumPy and of the compiled form."""
-    pytest.importorskip("numba")
     found = []
     for compiled in (False, True):
-        monkeypatch.setattr(paths, "pays", lambda _, compiled=compiled: compiled)
+        load_numba(monkeypatch, compiled)
         found.append(paths.best_path(*asked(log_emission), NetworkArrays(**arrays), beam=beam))
     return found
 
@@ -142,15 +126,15 @@ def random_windows(seed: int, states: int, frames: int) -> Windows:
     return Windows(first, np.sort(draw.integers(0, frames + 2, states)))
 
 
-@pytest.mark.usefixtures("block")
-def test_agrees_with_the_enumeration_of_all_paths_in_the_windows():
+@pytest.mark.parametrize("block", [1, 3, None])
+def test_agrees_with_the_enumeration_of_all_paths_in_the_windows(block):
     possible = 0
     for frames in range(1, 6):
         for seed in range(8):
             arrays, arcs = random_network(seed, states=4, densities=3, density_of_arcs=0.6)
             windows = random_windows(seed, 4, frames)
             log_emission = random_emission(seed, frames, 3)
-            path, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays), windows=windows)
+            path, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays), None, windows, block)
             moments = np.arange(frames)[:, None]
             inside = (moments >= windows.first) & (moments < windows.end)
             of_states = np.where(inside, log_emission[:, arrays["emission"]], -np.inf)
@@ -165,18 +149,17 @@ def test_agrees_with_the_enumeration_of_all_paths_in_the_windows():
     assert possible > 15
 
 
-def test_wide_windows_change_nothing_and_narrow_ones_are_kept(monkeypatch):
-    monkeypatch.setattr(paths, "WINDOW_BLOCK", 37)
+def test_wide_windows_change_nothing_and_narrow_ones_are_kept():
     states, frames = 60, 900
     log_emission, chain = random_emission(3, frames, 7), NetworkArrays(**left_to_right(states, 7))
     everywhere = Windows(np.zeros(states, np.intp), np.full(states, frames))
     free, score = paths.best_path(*asked(log_emission), chain)
-    path, same = paths.best_path(*asked(log_emission), chain, windows=everywhere)
+    path, same = paths.best_path(*asked(log_emission), chain, None, everywhere, 37)
     assert np.array_equal(path, free)
     assert same == pytest.approx(score, abs=0.1)
     middles = np.linspace(0, frames, states).astype(np.intp)
     windows = Windows(np.maximum(middles - 40, 0), np.minimum(middles + 40, frames))
-    path, less = paths.best_path(*asked(log_emission), chain, windows=windows)
+    path, less = paths.best_path(*asked(log_emission), chain, None, windows, 37)
     assert less <= score + 0.1
     assert np.all(windows.first[path] <= np.arange(frames))
     assert np.all(np.arange(frames) < windows.end[path])

@@ -67,19 +67,3 @@ def test_the_nearer_triangle_is_seen_whatever_the_order():
         picture = drawn(points, colours, triangles)
         assert picture[20, 20].tolist() == [0, 255, 0]
         assert picture[7, 7].tolist() == [255, 0, 0]
-
-
-def test_triangles_seen_from_behind_are_not_drawn():
-    assert (drawn(square(5, 5, 30, 30), np.ones((4, 3)), [[0, 2, 1]], background=0.2)[0:40] == 51).all()
-
-
-def test_only_the_area_is_changed():
-    picture = drawn(square(0, 0, WIDTH, HEIGHT), np.ones((4, 3)), FACING, area=(10, 12, 30, 20))
-    assert (picture[12:20, 10:30] == 255).all()
-    assert int((picture != 7).any(axis=2).sum()) == 8 * 20
-
-
-def test_colours_go_evenly_from_corner_to_corner():
-    colours = [[0, 0, 0], [0, 0, 0], [1, 1, 1], [1, 1, 1]]
-    row = drawn(square(0, 0, 51, 20), colours, FACING)[10, :51, 0].astype(int)
-    assert np.abs(np.diff(row) - 5).max() <= 1

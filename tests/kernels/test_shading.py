@@ -3,7 +3,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import normals
 from lipmotion.kernels.normals import normal_sums
 from lipmotion_faces.kernels import shading
 from oracles import shading as oracle
@@ -32,9 +31,8 @@ def test_every_bit_is_that_of_the_definition(seed):
     assert forms[0].any()
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_normals_are_those_of_the_triangles_around_a_vertex(monkeypatch, compiled):
-    monkeypatch.setattr(normals, "pays", lambda: compiled)
+@pytest.mark.usefixtures("form")
+def test_normals_are_those_of_the_triangles_around_a_vertex():
     places = np.array([[0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 5], [9, 9, 9]], float)
     sums = normal_sums(places, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     assert sums == pytest.approx(np.array([[15, 0, 6], [0, 0, 6], [15, 0, 6], [15, 0, 0], [0, 0, 0]], float))

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion_faces.kernels.textured import CLEAR, CUT, SOLID, TexturedTriangles, draw_textured
+from lipmotion_faces.kernels.textured import SOLID, TexturedTriangles, draw_textured
 from oracles import raster as oracle
 
 TONE = np.arange(256).astype(np.uint8)
@@ -94,38 +94,3 @@ def test_a_texture_on_a_slanting_surface_is_seen_in_perspective():
     texture[0, 32:, :3] = 0
     picture, _ = drawn(points, WHITE, surface(FACING, CORNERS[FACING], texture))
     assert int((picture[20, 1:40, 0] > 127).sum()) + 1 == pytest.approx(30, abs=1)
-
-
-def test_clear_places_of_a_cut_surface_are_holes():
-    texture = np.ones((1, 2, 4))
-    texture[0, 1, 3] = 0
-    points = square(8, 10, 28, 30)
-    cut, _ = drawn(points, WHITE, surface(FACING, CORNERS[FACING], texture, kind=CUT))
-    assert cut[20, 13].tolist() == [255, 255, 255]
-    assert cut[20, 23].tolist() == [0, 0, 0]
-    solid, _ = drawn(points, WHITE, surface(FACING, CORNERS[FACING], texture))
-    assert solid[20, 23].tolist() == [255, 255, 255]
-
-
-def test_a_blended_surface_is_mixed_with_what_is_behind_it():
-    texture = np.ones((1, 1, 4))
-    points = [*square(8, 10, 28, 30, 1.0), *square(0, 0, 40, 40, 0.5)]
-    light = np.concatenate([WHITE, np.tile([0.0, 1.0, 0.0], (4, 1))])
-    both = surface([*FACING, *(np.array(FACING) + 4)], np.zeros((4, 3, 2)), texture, factor=0.25)
-    both.looks[:2, 1] = CLEAR
-    both.alphas[2:, 1] = 1.0
-    picture, opacity = drawn(points, light, both)
-    assert picture[20, 20].tolist() == pytest.approx([64, 255, 64], abs=1)
-    assert opacity[20, 20] == 255
-    alone, part = drawn(points[:4], WHITE, surface(FACING, CORNERS[FACING], texture, kind=CLEAR, factor=0.25))
-    assert alone[20, 20].tolist() == pytest.approx([64, 64, 64], abs=1)
-    assert abs(int(part[20, 20]) - 64) <= 1
-
-
-def test_highlights_keep_the_colour_of_the_lamp_and_half_a_pixel_is_half_the_light():
-    black = surface(FACING, CORNERS[FACING], np.array([[[0.0, 0, 0, 1]]]))
-    picture, _ = drawn(square(8, 10, 28, 30), WHITE, black, shine=np.full((4, 3), 0.5))
-    assert picture[20, 20].tolist() == pytest.approx([127, 127, 127], abs=1)
-    picture, opacity = drawn(square(8.5, 10, 20, 15), WHITE, surface(FACING, CORNERS[FACING], np.ones((1, 1, 4))))
-    assert (picture[10:15, 8] == 127).all()
-    assert abs(int(opacity[12, 8]) - 127) <= 1

@@ -69,13 +69,6 @@ def test_no_division_is_cheaper(frames: int, labels: int, hold: int, change: flo
     assert paths.division_cost(found, cost, change) == pytest.approx(least, abs=1e-9)
 
 
-@settings(max_examples=15)
-@given(frames=st.integers(1, 300), hold=st.integers(1, 12), seed=st.integers(0, 2**32 - 1))
-def test_every_segment_is_held(frames: int, hold: int, seed: int) -> None:
-    found = best_segments(np.random.default_rng(seed).exponential(3, (frames, 9)), hold, 0.0)
-    assert paths.is_division(found, frames, hold)
-
-
 @settings(max_examples=25)
 @given(st.integers(1, 60), st.integers(1, 5), st.integers(0, 2**32 - 1))
 def test_ties_neither_split_nor_shorten(frames: int, hold: int, seed: int) -> None:

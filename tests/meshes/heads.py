@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.types import Motion
-from lipmotion_faces.characters.gltf_writer import write_gltf_scene
-from lipmotion_faces.characters.scene import Scene
+from lipmotion_faces.characters import gltf_writer, scene
 
 SEAM, HALF = -0.86, 0.3
 """Height of the mouth and half its width, in eye distances."""
@@ -121,7 +120,7 @@ def shaped(mesh: Mesh, weights: dict[str, float]) -> NDArray[np.float64]:
 
 def write_glb(path: Path, mesh: Mesh, weights: Motion | None = None) -> None:
     """A mesh with its blendshapes, and their weights over time, as a file."""
-    write_gltf_scene(path, Scene(mesh, weights))
+    gltf_writer.write_gltf_scene(path, scene.Scene(mesh, weights))
 
 
 def write_obj(path: Path, mesh: Mesh, vertices: NDArray[np.float64] | None = None) -> None:

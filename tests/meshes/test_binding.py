@@ -7,7 +7,6 @@ import pytest
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.meshes.fitting import lip_placement
-from lipmotion.meshes.fitting.lip_placement import part_named_lips, place_lips_by_points, place_lips_by_shape
 from lipmotion.meshes.model.binding import MAX_WEIGHTS, bind, paint_weights, skin_vertices
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.surface import build_surface
@@ -24,8 +23,8 @@ def mesh():
 @pytest.fixture(scope="module")
 def binding(mesh):
     named = lip_points(mesh)
-    surface = part_named_lips(mesh, named)
-    return bind(mesh, surface, place_lips_by_points(mesh, surface, named))
+    surface = lip_placement.part_named_lips(mesh, named)
+    return bind(mesh, surface, lip_placement.place_lips_by_points(mesh, surface, named))
 
 
 def _moved(binding, mesh, chosen, way):
@@ -147,7 +146,7 @@ GRID = 0.05 * SIZE
 
 def _named(mesh):
     named = lip_points(mesh)
-    return place_lips_by_points(mesh, part_named_lips(mesh, named), named)
+    return lip_placement.place_lips_by_points(mesh, lip_placement.part_named_lips(mesh, named), named)
 
 
 def _offsets(mesh, placement):
@@ -162,7 +161,7 @@ def _offsets(mesh, placement):
 @pytest.mark.parametrize("named", [False, True])
 def test_points_are_where_the_mouth_is_the_upper_ones_on_the_upper_lip(named):
     mesh, template = head(), mouth_template()
-    placement = _named(mesh) if named else place_lips_by_shape(mesh, build_surface(mesh))
+    placement = _named(mesh) if named else lip_placement.place_lips_by_shape(mesh, build_surface(mesh))
     assert _offsets(mesh, placement) < 1.5 * GRID
     assert placement.scale == pytest.approx(SIZE * 2 * HALF / template.width, rel=0.25)
     drop = (shaped(mesh, {"jawOpen": 1.0}) - mesh.vertices)[placement.vertices, 1]
@@ -178,8 +177,8 @@ def test_a_turned_head_is_found_by_its_eye_corners():
     for point, x in ((33, -0.5), (263, 0.5)):
         named[point] = int(np.abs(mesh.vertices[:, :2] / SIZE - [x, 0.0]).sum(axis=1).argmin())
     turned = Mesh(mesh.vertices @ turn.T, mesh.triangles)
-    placement = place_lips_by_points(turned, part_named_lips(turned, named), named)
-    upright = place_lips_by_points(mesh, part_named_lips(mesh, named), named)
+    placement = lip_placement.place_lips_by_points(turned, lip_placement.part_named_lips(turned, named), named)
+    upright = lip_placement.place_lips_by_points(mesh, lip_placement.part_named_lips(mesh, named), named)
     assert placement.vertices.tolist() == upright.vertices.tolist()
     np.testing.assert_allclose(placement.axes, turn @ upright.axes, atol=1e-9)
     moved = placement.to_mesh(np.array([[0.0, -1, 0]]))
@@ -191,14 +190,14 @@ def test_mouths_that_do_not_open_are_refused():
     named = lip_points(head(shapes=False))
     named[14] = named[13] + len(COLUMNS)
     with pytest.raises(InputError, match="hang together"):
-        place_lips_by_points(mesh, build_surface(mesh), named)
+        lip_placement.place_lips_by_points(mesh, build_surface(mesh), named)
     whole = Blendshape.between("jawOpen", mesh.vertices, mesh.vertices - [0, SIZE, 0])
     with pytest.raises(InputError, match="parts no lips"):
-        place_lips_by_shape(Mesh(mesh.vertices, mesh.triangles, shapes=(whole,)), build_surface(mesh))
+        lip_placement.place_lips_by_shape(Mesh(mesh.vertices, mesh.triangles, shapes=(whole,)), build_surface(mesh))
     mesh = head()
     closed = Mesh(mesh.vertices, mesh.triangles, shapes=tuple(s for s in mesh.shapes if s.name == "mouthPucker"))
     with pytest.raises(InputError, match="the mesh has: mouthPucker"):
-        place_lips_by_shape(closed, build_surface(closed))
+        lip_placement.place_lips_by_shape(closed, build_surface(closed))
 
 
 def test_named_points_are_checked():
@@ -210,15 +209,15 @@ def test_named_points_are_checked():
         ({61: 0, 291: 1, 13: 2, 14: 3, 5: 4}, "5 is no lip or jaw point"),
     ):
         with pytest.raises(InputError, match=message):
-            place_lips_by_points(mesh, build_surface(mesh), named)
+            lip_placement.place_lips_by_points(mesh, build_surface(mesh), named)
 
 
 def test_of_a_dense_mesh_some_vertices_are_compared(monkeypatch):
     mesh = head()
     surface = build_surface(mesh)
-    whole = place_lips_by_shape(mesh, surface)
+    whole = lip_placement.place_lips_by_shape(mesh, surface)
     monkeypatch.setattr(lip_placement, "MAX_PAIRS", 1500)
-    thinned = place_lips_by_shape(mesh, surface)
+    thinned = lip_placement.place_lips_by_shape(mesh, surface)
     assert (thinned.vertices != whole.vertices).any()
     assert _offsets(mesh, thinned) < 2 * GRID
     assert thinned.scale == pytest.approx(whole.scale, rel=0.2)

@@ -11,6 +11,7 @@ from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import FADE_S, crossfade_phones
 from lipmotion.articulation.rest import rest_in_pauses
+from lipmotion.meshes.fitting import driven, eyes_and_brows, lip_placement, shape_weights
 from lipmotion.meshes.fitting.blendshape_motion import (
     arkit_mouth,
     arkit_weights,
@@ -18,21 +19,9 @@ from lipmotion.meshes.fitting.blendshape_motion import (
     is_of_blendshapes,
     with_mouth,
 )
-from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, eye_and_brow_weights
-from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
-from lipmotion.meshes.fitting.shape_weights import (
-    MAX_CLOSED_WEIGHT,
-    VISEME_OF_PHONE,
-    solve_shape_weights,
-    weigh_visemes,
-)
-from lipmotion.meshes.model.face_shapes import find_face_shapes
+from lipmotion.meshes.model import face_shapes, shape_names, surface
 from lipmotion.meshes.model.mesh import ANGLES
-from lipmotion.meshes.model.shape_names import VISEMES_15
-from lipmotion.meshes.model.surface import build_surface
-from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit
-from lipmotion.types.delivery import parse_moods
+from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit, delivery
 from lipmotion.types.motion import RADIAN
 from lipmotion.units import PHONES
 from lipmotion_faces.base import stage_liveliness
@@ -67,7 +56,7 @@ def test_lips_narrow_and_spread() -> None:
 
 def test_motion_that_became_weights_comes_back() -> None:
     said = motion()
-    back = with_mouth(solve_shape_weights(said, units(), arkit_mouth()))
+    back = with_mouth(shape_weights.solve_shape_weights(said, units(), arkit_mouth()))
     assert np.corrcoef(back["opening"], said["opening"])[0, 1] > 0.99
     assert np.corrcoef(back["width"], said["width"])[0, 1] > 0.9
 
@@ -90,8 +79,8 @@ def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> N
 
 def test_a_mesh_shows_the_weights_that_are_given() -> None:
     mesh = head()
-    placement = place_lips_by_shape(mesh, build_surface(mesh))
-    character = DrivenCharacter(mesh, placement, find_face_shapes(mesh, placement), None)
+    placement = lip_placement.place_lips_by_shape(mesh, surface.build_surface(mesh))
+    character = driven.DrivenCharacter(mesh, placement, face_shapes.find_face_shapes(mesh, placement), None)
     assert character.shapes is not None
     moved = with_mouth(weights(jawOpen=[0.0, 0.25, 0.5], mouthClose=[0.0] * 3))
     rest, half, whole = character.vertices(moved, Timeline(()), np.arange(3) / 100)
@@ -118,10 +107,10 @@ def captured(curves: dict[str, object]) -> Motion:
 
 @pytest.mark.parametrize("mood", ["", "afraid", "happy", "disgusted"])
 def test_a_face_moves_as_in_the_file_of_its_own_curves(mood: str) -> None:
-    played = staged(with_moods(TALK, parse_moods(mood)), seed=3)
-    weights = eye_and_brow_weights(played)
+    played = staged(with_moods(TALK, delivery.parse_moods(mood)), seed=3)
+    weights = eyes_and_brows.eye_and_brow_weights(played)
     again = staged(captured(weights | dict(zip(ANGLES, played.turn.T, strict=True))), seed=4)
-    for name, curve in eye_and_brow_weights(again).items():
+    for name, curve in eyes_and_brows.eye_and_brow_weights(again).items():
         assert curve == pytest.approx(weights.get(name, 0), abs=1e-12), name
     for name in ("lids", "gaze", "turn"):
         assert getattr(again, name) == pytest.approx(getattr(played, name), abs=1e-12), name
@@ -130,7 +119,7 @@ def test_a_face_moves_as_in_the_file_of_its_own_curves(mood: str) -> None:
 
 
 def test_curves_that_never_move_leave_the_face_to_itself() -> None:
-    nothing = {name: np.zeros(60) for names in MOVED_BY.values() for name in names}
+    nothing = {name: np.zeros(60) for names in eyes_and_brows.MOVED_BY.values() for name in names}
     alone, beside = (staged(captured(curves)) for curves in ({}, nothing))
     for name in ("lids", "brows", "gaze", "turn"):
         assert getattr(alone, name).any(), name
@@ -141,8 +130,8 @@ def test_curves_that_never_move_leave_the_face_to_itself() -> None:
 
 
 def test_each_side_is_kept_and_a_mood_is_added() -> None:
-    tired = with_moods(captured({"browDownLeft": 0.8, "browInnerUp": 0.3}), parse_moods("tired"))
-    weights = eye_and_brow_weights(staged(tired))
+    tired = with_moods(captured({"browDownLeft": 0.8, "browInnerUp": 0.3}), delivery.parse_moods("tired"))
+    weights = eyes_and_brows.eye_and_brow_weights(staged(tired))
     assert weights["browDownLeft"] == pytest.approx(0.8)
     assert weights["browInnerUp"] == pytest.approx(0.3 + 0.1)
     assert not weights["browDownRight"].any()
@@ -162,15 +151,17 @@ def test_the_3d_head_shows_what_was_captured() -> None:
 
 
 def test_every_phone_has_a_viseme_and_silence_and_closures_have_theirs():
-    assert set(VISEME_OF_PHONE) == set(PHONES)
-    assert set(VISEME_OF_PHONE.values()) == set(VISEMES_15)
-    found = weigh_visemes(units(), spoken_mouth(motion(), units()))
+    assert set(shape_weights.VISEME_OF_PHONE) == set(PHONES)
+    assert set(shape_weights.VISEME_OF_PHONE.values()) == set(shape_names.VISEMES_15)
+    found = shape_weights.weigh_visemes(units(), spoken_mouth(motion(), units()))
     assert found["viseme_sil"][[0, 20, 160, 200]] == pytest.approx([1, 1, 1, 1])
     assert found["viseme_PP"][[55, 95]] == pytest.approx([1, 1])
     assert found["viseme_aa"][75] > 0.9
     assert found["viseme_ou"][115] > 0.6
     nothing, closed = Timeline(()), Motion(np.zeros((5, 1)), 25.0, (Channel("opening"),))
-    assert weigh_visemes(nothing, spoken_mouth(closed, nothing))["viseme_sil"] == pytest.approx(np.ones(5))
+    assert shape_weights.weigh_visemes(nothing, spoken_mouth(closed, nothing))["viseme_sil"] == pytest.approx(
+        np.ones(5)
+    )
 
 
 @settings(max_examples=25)
@@ -187,15 +178,15 @@ def test_visemes_add_up_to_1_or_less_and_held_ones_to_1(phones, rate_hz, opening
     frames = int(rate_hz * (end + 0.5)) + 1
     still = Motion(np.full((frames, 1), opening), rate_hz, (Channel("opening"),))
     said = Timeline(tuple(spans))
-    motion = weigh_visemes(said, spoken_mouth(still, said))
-    held = weigh_visemes(said, spoken_mouth(still, said), held=True)
+    motion = shape_weights.weigh_visemes(said, spoken_mouth(still, said))
+    held = shape_weights.weigh_visemes(said, spoken_mouth(still, said), held=True)
     np.testing.assert_allclose(held.values.sum(axis=1), 1, atol=1e-9)
     assert motion.values.sum(axis=1).max() <= 1 + 1e-9
     assert motion.values.min() >= 0
     closed = motion["viseme_sil"] + motion["viseme_PP"]
     contact = spoken_mouth(still, said).contact
     assert closed[contact] == pytest.approx(1)
-    assert closed[~contact].max(initial=0) <= MAX_CLOSED_WEIGHT + 1e-9
+    assert closed[~contact].max(initial=0) <= shape_weights.MAX_CLOSED_WEIGHT + 1e-9
 
 
 def test_visemes_follow_how_open_and_how_round_the_mouth_is():
@@ -203,7 +194,7 @@ def test_visemes_follow_how_open_and_how_round_the_mouth_is():
     found = {}
     for opening in (0.03, 0.1, 0.25):
         still = Motion(np.full((150, 1), opening), 100.0, (Channel("opening"),))
-        found[opening] = weigh_visemes(said, spoken_mouth(still, said))
+        found[opening] = shape_weights.weigh_visemes(said, spoken_mouth(still, said))
     hissed = [found[opening]["viseme_SS"][50] for opening in (0.03, 0.1)]
     assert 0.2 < hissed[0] < hissed[1] - 0.2
     assert found[0.25]["viseme_aa"][50] > found[0.1]["viseme_aa"][50] + 0.2
@@ -227,8 +218,8 @@ def test_visemes_rest_where_the_curves_do():
     for style, rests in (("rest", True), ("natural", False)):
         moved = rest_in_pauses(generation, style).motion
         found, arkit = (
-            weigh_visemes(spoken, spoken_mouth(moved, spoken)),
-            solve_shape_weights(moved, spoken, arkit_mouth()),
+            shape_weights.weigh_visemes(spoken, spoken_mouth(moved, spoken)),
+            shape_weights.solve_shape_weights(moved, spoken, arkit_mouth()),
         )
         assert (found["viseme_sil"][80] > 0.99) == rests
         assert (arkit["jawOpen"][80] < 0.01) == rests

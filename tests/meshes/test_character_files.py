@@ -8,11 +8,8 @@ import pytest
 
 from fuzz.character_floods import CHARACTER_FLOODS
 from fuzz.inputs import lay_out
-from lipmotion.errors import InputError
-from lipmotion.types import WEIGHT, Channel, Motion
-from lipmotion_faces.characters.character_files import read_character, read_obj
-from lipmotion_faces.characters.file_limits import ALLOWANCE, Budget
-from lipmotion_faces.characters.gltf_writer import write_animated_gltf
+from lipmotion import errors, types
+from lipmotion_faces.characters import character_files, file_limits, gltf_writer
 from meshes.gltf import document, glb
 from meshes.heads import head, shaped, write_obj
 
@@ -29,7 +26,7 @@ def _obj(tmp_path, text, name="head.obj"):
 
 def test_polygons_become_triangles_and_materials_parts(tmp_path):
     (tmp_path / "look.mtl").write_text("newmtl skin\nKd 0.5 0.25 2\nNs 60\n")
-    mesh = read_obj(_obj(tmp_path, QUAD + "usemtl teeth\nf -1 -2 -3\n"))
+    mesh = character_files.read_obj(_obj(tmp_path, QUAD + "usemtl teeth\nf -1 -2 -3\n"))
     assert [(part.name, part.first, part.stop) for part in mesh.parts] == [("skin", 0, 2), ("teeth", 2, 3)]
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [3, 2, 1]]
     assert mesh.parts[0].material.colour == (0.5, 0.25, 1.0)
@@ -38,7 +35,7 @@ def test_polygons_become_triangles_and_materials_parts(tmp_path):
 
 def test_parts_that_are_written_alternately_are_put_together(tmp_path):
     text = QUAD + "usemtl teeth\nf 1 2 3\nusemtl skin\nf 2 3 4\n"
-    mesh = read_obj(_obj(tmp_path, text))
+    mesh = character_files.read_obj(_obj(tmp_path, text))
     assert [(part.name, part.stop - part.first) for part in mesh.parts] == [("skin", 3), ("teeth", 1)]
     assert mesh.uv[1].tolist() == [[0, 0], [1, 1], [0, 1]]  # of corners, not of vertices
 
@@ -49,7 +46,7 @@ def test_a_folder_has_a_neutral_mesh_and_shapes(tmp_path):
     for name in ("jawOpen", "mouthPucker"):
         write_obj(tmp_path / f"{name}.obj", mesh, shaped(mesh, {name: 1.0}))
     write_obj(tmp_path / "older_person.obj", mesh)
-    read = read_character(tmp_path)
+    read = character_files.read_character(tmp_path)
     assert read.shape_names == ("jawOpen", "mouthPucker")
     np.testing.assert_allclose(shaped(read, {"jawOpen": 1}), shaped(mesh, {"jawOpen": 1}), atol=1e-3)
 
@@ -57,20 +54,20 @@ def test_a_folder_has_a_neutral_mesh_and_shapes(tmp_path):
 def test_what_is_written_is_read_but_no_library_elsewhere(tmp_path):
     mesh = head(shapes=False)
     write_obj(tmp_path / "head.obj", mesh)
-    read = read_character(tmp_path / "head.obj")
+    read = character_files.read_character(tmp_path / "head.obj")
     np.testing.assert_allclose(read.vertices, mesh.vertices, atol=1e-7)
     assert read.triangles.tolist() == mesh.triangles.tolist()
     assert [part.name for part in read.parts] == ["face", "teeth"]
     (tmp_path / "look.mtl").write_text("newmtl skin\nKd 1 0 0\n")
     (tmp_path / "deeper").mkdir()
-    mesh = read_obj(_obj(tmp_path / "deeper", QUAD.replace("look.mtl", "../look.mtl")))
+    mesh = character_files.read_obj(_obj(tmp_path / "deeper", QUAD.replace("look.mtl", "../look.mtl")))
     assert mesh.parts[0].material.colour == (0.8, 0.8, 0.8)
 
 
 def test_other_files_and_folders_are_refused(tmp_path):
     def refused(path, message):
-        with pytest.raises(InputError, match=message):
-            read_character(path)
+        with pytest.raises(errors.InputError, match=message):
+            character_files.read_character(path)
 
     for name in ("head.fbx", "head"):
         refused(_obj(tmp_path, QUAD, name), r"one of \.glb \.gltf \.vrm \.obj")
@@ -83,29 +80,25 @@ def test_other_files_and_folders_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("v 0 0 0\n", "no polygons"),
-        ("v 0 0\nf 1 1 1\n", "no vertex of 3 numbers"),
-        ("v 0 0 nan\nf 1 1 1\n", "not finite"),
-        ("v 0 0 zero\nf 1 1 1\n", "zero"),
-        (QUAD + "f 1 2 9\n", "names vertex 9 of 4 in line 12"),
-        (QUAD + "f 0 1 2\n", "names vertex 0"),
-        (QUAD + "f 1 2\n", "2 corners"),
-        (QUAD + "f one two three\n", "line 12"),
+        ("v 0 0 0\n", "no polygons"), ("v 0 0\nf 1 1 1\n", "no vertex of 3 numbers"),
+        ("v 0 0 nan\nf 1 1 1\n", "not finite"), ("v 0 0 zero\nf 1 1 1\n", "zero"),
+        (QUAD + "f 1 2 9\n", "names vertex 9 of 4 in line 12"), (QUAD + "f 0 1 2\n", "names vertex 0"),
+        (QUAD + "f 1 2\n", "2 corners"), (QUAD + "f one two three\n", "line 12"),
     ],
-)
+)  # fmt: skip
 def test_damaged_files_are_refused(tmp_path, text, message):
-    with pytest.raises(InputError, match=message):
-        read_obj(_obj(tmp_path, text))
+    with pytest.raises(errors.InputError, match=message):
+        character_files.read_obj(_obj(tmp_path, text))
 
 
 def test_names_that_no_file_has_are_as_missing_ones(tmp_path):
     for name in ("", "é" * 200, "a" * 5000, "..", "."):
-        mesh = read_obj(_obj(tmp_path, QUAD.replace("look.mtl", name)))
+        mesh = character_files.read_obj(_obj(tmp_path, QUAD.replace("look.mtl", name)))
         assert [part.name for part in mesh.parts] == ["skin"]
     for name in ("é" * 200, "a" * 5000, ".."):
         (tmp_path / "look.mtl").write_text(f"newmtl skin\nmap_Kd {name}\nmap_Kd\n", encoding="utf-8")
         with pytest.warns(UserWarning, match="not in the same folder"):
-            assert read_obj(_obj(tmp_path, QUAD)).parts[0].material.texture is None
+            assert character_files.read_obj(_obj(tmp_path, QUAD)).parts[0].material.texture is None
 
 
 REFUSED = {
@@ -128,21 +121,21 @@ def laid_out(name: str, folder: Path) -> Path:
 
 def test_expensive_characters_are_refused_with_what_is_too_much(tmp_path: Path) -> None:
     for number, (name, message) in enumerate(REFUSED.items()):
-        with pytest.raises(InputError, match=message):
-            read_character(laid_out(name, tmp_path / str(number)))
+        with pytest.raises(errors.InputError, match=message):
+            character_files.read_character(laid_out(name, tmp_path / str(number)))
     for name in READ:  # what is not in the scene costs nothing
-        assert len(read_character(laid_out(name, tmp_path / name)).triangles) == 2
+        assert len(character_files.read_character(laid_out(name, tmp_path / name)).triangles) == 2
 
 
 def test_a_budget_is_that_of_all_files_together(tmp_path: Path) -> None:
-    budget = Budget()
-    budget.spend("vertices", ALLOWANCE["vertices"])
-    most = ALLOWANCE["vertices"]
-    with pytest.raises(InputError, match=f"{most + 1} vertices, required at most {most}"):
+    budget = file_limits.Budget()
+    budget.spend("vertices", file_limits.ALLOWANCE["vertices"])
+    most = file_limits.ALLOWANCE["vertices"]
+    with pytest.raises(errors.InputError, match=f"{most + 1} vertices, required at most {most}"):
         budget.spend("vertices", 1)
-    budget.spend("bytes of files", ALLOWANCE["bytes of files"] - 3)
+    budget.spend("bytes of files", file_limits.ALLOWANCE["bytes of files"] - 3)
     (tmp_path / "head.bin").write_bytes(b"four")
-    with pytest.raises(InputError, match="bytes of files"):
+    with pytest.raises(errors.InputError, match="bytes of files"):
         budget.file_bytes(tmp_path / "head.bin", "buffer")
 
 
@@ -154,14 +147,14 @@ def test_buffers_lead_to_no_pipe_folder_or_other_folder(tmp_path: Path) -> None:
     for uri in ("pipe.bin", "loop.bin", "..", ".", "", "%2e%2e/x", "a/b.bin", "x" * 5000, "\ud800", "data:,x", "a\0b"):
         content["buffers"][0]["uri"] = uri
         (tmp_path / "head.gltf").write_text(json.dumps(content))
-        with pytest.raises(InputError):
-            read_character(tmp_path / "head.gltf")
+        with pytest.raises(errors.InputError):
+            character_files.read_character(tmp_path / "head.gltf")
 
 
 def test_lines_of_obj_are_counted_before_they_are_read(tmp_path: Path) -> None:
     path = tmp_path / "head.obj"
     wrong = {
-        "lines, required at most": b"\n" * (ALLOWANCE["lines"] + 1),
+        "lines, required at most": b"\n" * (file_limits.ALLOWANCE["lines"] + 1),
         "is no vertex of 3 numbers in line 2": b"#\nv\nv\n",
         "a line of 80001 bytes": b"f" + b" 1" * 40_000,
         "a polygon of 1001 corners": b"v 0 0 0\nf" + b" 1" * 1001,
@@ -169,14 +162,14 @@ def test_lines_of_obj_are_counted_before_they_are_read(tmp_path: Path) -> None:
     }
     for message, content in wrong.items():
         path.write_bytes(content)
-        with pytest.raises(InputError, match=message):
-            read_character(path)
+        with pytest.raises(errors.InputError, match=message):
+            character_files.read_character(path)
 
 
 def test_a_file_without_scenes_is_animated(tmp_path: Path) -> None:
     content, binary = document()
     del content["scene"], content["scenes"]
     (tmp_path / "head.glb").write_bytes(glb(content, binary))
-    moved = Motion(np.zeros((3, 1)), 30.0, (Channel("jawOpen", WEIGHT),))
-    assert write_animated_gltf(tmp_path / "a.glb", tmp_path / "head.glb", moved, "a.wav")
-    assert len(read_character(tmp_path / "a.glb").shapes) == 2
+    moved = types.Motion(np.zeros((3, 1)), 30.0, (types.Channel("jawOpen", types.WEIGHT),))
+    assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", tmp_path / "head.glb", moved, "a.wav")
+    assert len(character_files.read_character(tmp_path / "a.glb").shapes) == 2

@@ -6,7 +6,7 @@ import pytest
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.face_shapes import life_scale
+from lipmotion.meshes.model import face_shapes, rig_tables
 from lipmotion.meshes.model.mesh import (
     HEAD,
     JAW,
@@ -17,11 +17,9 @@ from lipmotion.meshes.model.mesh import (
     bone_kind,
     merge_bones,
 )
-from lipmotion.meshes.model.rig_tables import table_path, write_rig_table
 from lipmotion.types.delivery import parse_moods
-from lipmotion_faces.characters.binding_files import save_binding, write_weights
+from lipmotion_faces.characters import binding_files, gltf_scene
 from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
-from lipmotion_faces.characters.gltf_scene import read_gltf
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, VISEMES, head, lip_points, renamed, shaped, write_glb, write_obj
 from meshes.speech import motion, units
@@ -73,8 +71,8 @@ def test_only_the_moving_vertices_move(files):
 
 def test_bindings_are_stored_and_painted(files):
     computed = load_character(files / "head.obj", points=files / "points.csv")
-    save_binding(files / "head.binding", computed.binding, computed.mesh)
-    write_weights(files / "weights.csv", computed.binding)
+    binding_files.save_binding(files / "head.binding", computed.binding, computed.mesh)
+    binding_files.write_weights(files / "weights.csv", computed.binding)
     stored = load_character(files / "head.obj", binding=files / "head.binding")
     painted = load_character(files / "head.obj", points=files / "points.csv", binding=files / "weights.csv")
     expected = np.stack([*computed.vertices(motion(), units(), TIME_S)])
@@ -159,7 +157,7 @@ def test_any_names_are_understood_by_their_rows(file):
     halves.append(replace(next(each for each in halves if each.name == shapes["mouthFunnel"]), name="other half"))
     write_glb(file, replace(head(), shapes=tuple(halves)))
     rows = "".join(f"{own},{known},,\n" for known, own in shapes.items())
-    table_path(file).write_text(f"{COLUMNS}{rows}other half,mouthFunnel,,\n", encoding="utf-8")
+    rig_tables.table_path(file).write_text(f"{COLUMNS}{rows}other half,mouthFunnel,,\n", encoding="utf-8")
     character = load_character(file)
     weights = character.weights(motion(), units())
     for name in plain.names:
@@ -171,18 +169,18 @@ def test_any_names_are_understood_by_their_rows(file):
 
 def test_the_table_of_what_was_found_changes_nothing_and_weights_that_are_given_back_stay(file):
     before = load_character(file)
-    write_rig_table(before.table_file, before.table_rows())
+    rig_tables.write_rig_table(before.table_file, before.table_rows())
     after = load_character(file)
     assert after.table_rows() == before.table_rows()
     np.testing.assert_array_equal(after.weights(motion(), units()).values, before.weights(motion(), units()).values)
-    table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,0.03\nmouthPucker,mouthPucker,1.2,\n")
+    rig_tables.table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,0.03\nmouthPucker,mouthPucker,1.2,\n")
     character = load_character(file)
     weights = character.weights(motion(), units())
     np.testing.assert_allclose(character.weights(weights, units()).values, weights.values, atol=0.03)
 
 
 def test_gains_weaken_the_mouth_and_lips_still_touch(file):
-    table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,\nmouthPressLeft,mouthPressLeft,1,0.2\n")
+    rig_tables.table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,\nmouthPressLeft,mouthPressLeft,1,0.2\n")
     character = load_character(file)
     weights = character.weights(motion(), units())
     whole = load_character(file.rename(file.with_name("other.glb"))).weights(motion(), units())
@@ -201,7 +199,7 @@ def test_gains_weaken_the_mouth_and_lips_still_touch(file):
      ("jawOpen,jawOpen,,\nmouthPucker,ou,,\n", "has jawOpen and ou; leave the sources of one kind empty")],
 )  # fmt: skip
 def test_damaged_tables_are_refused(file, rows, message):
-    table_path(file).write_text(COLUMNS + rows)
+    rig_tables.table_path(file).write_text(COLUMNS + rows)
     with pytest.raises(InputError, match=message):
         load_character(file)
 
@@ -213,7 +211,7 @@ def test_a_head_in_metres_parts_its_lips_as_far_as_in_centimetres(file):
         write_glb(file, replace(mesh, vertices=unit * mesh.vertices, shapes=shapes))
         found.append(load_character(file))
     centimetres, metres = found
-    assert life_scale(centimetres.mesh, centimetres.placement) == pytest.approx(9.0)
+    assert face_shapes.life_scale(centimetres.mesh, centimetres.placement) == pytest.approx(9.0)
     np.testing.assert_allclose(metres.shapes.gap, centimetres.shapes.gap, rtol=1e-3, atol=1e-6)
 
 
@@ -277,7 +275,7 @@ def test_bones_are_read_from_skins_and_nodes(tmp_path):
     content["meshes"].append({"primitives": [{"attributes": {"POSITION": 0}, "indices": 3}]})
     path = tmp_path / "head.glb"
     path.write_bytes(glb(content, with_skin(content, binary, joints, weights)))
-    mesh = read_gltf(path)
+    mesh = gltf_scene.read_gltf(path)
     bones = {bone.kind: bone for bone in mesh.bones}
     assert len(mesh.vertices) == 2 * len(POSITIONS)
     assert bones[NECK].rows.tolist() == [*range(8)]

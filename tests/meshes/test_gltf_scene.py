@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion_faces.characters.gltf_scene import read_gltf
-from lipmotion_faces.characters.meshopt import decode_attributes, decode_exponents, decode_indices, decode_triangles
+from lipmotion_faces.characters import gltf_scene, meshopt
 from meshes.gltf import (
     OPEN,
     POSITIONS,
@@ -23,7 +22,7 @@ from meshes.heads import shaped
 def _read(tmp_path, content, binary=None, name="head.glb"):
     path = tmp_path / name
     path.write_bytes(glb(content, binary) if binary is not None else json.dumps(content).encode())
-    return read_gltf(path)
+    return gltf_scene.read_gltf(path)
 
 
 def test_a_mesh_with_morph_targets(tmp_path):
@@ -155,7 +154,7 @@ def test_what_is_wrong_is_said(tmp_path, change, message):
 def test_what_is_no_gltf_is_refused(tmp_path, content):
     (tmp_path / "head.glb").write_bytes(content)
     with pytest.raises(InputError, match=r"head\.glb"):
-        read_gltf(tmp_path / "head.glb")
+        gltf_scene.read_gltf(tmp_path / "head.glb")
 
 
 def test_attributes_come_back():
@@ -164,7 +163,7 @@ def test_attributes_come_back():
         smooth = np.cumsum(rng.integers(-2, 3, (count, stride)), axis=0)
         smooth[:, ::3] = rng.integers(0, 256, (count, len(range(0, stride, 3))))
         elements = (smooth & 255).astype(np.uint8)
-        np.testing.assert_array_equal(decode_attributes(packed_attributes(elements), count, stride), elements)
+        np.testing.assert_array_equal(meshopt.decode_attributes(packed_attributes(elements), count, stride), elements)
 
 
 TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")
@@ -181,17 +180,17 @@ TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")
 def test_triangles_of_both_versions_indices_and_exponents(start, triangles):
     """Streams of the reference implementation (meshoptimizer): fresh, shared, repeated and arbitrary vertices."""
     stream = bytes.fromhex(start) + TAIL
-    assert decode_triangles(stream, 3 * len(triangles)).reshape(-1, 3).tolist() == triangles
+    assert meshopt.decode_triangles(stream, 3 * len(triangles)).reshape(-1, 3).tolist() == triangles
     stream = bytes.fromhex("d1 00 04 cd 01 04 07 98 1f 00 00 00 00")
-    assert decode_indices(stream, 6).tolist() == [0, 1, 51, 2, 49, 1000]
+    assert meshopt.decode_indices(stream, 6).tolist() == [0, 1, 51, 2, 49, 1000]
     stored = np.array([[3 | (-1 & 0xFF) << 24, (-5 & 0xFFFFFF) | 2 << 24]], np.uint32).view(np.uint8)
-    np.testing.assert_allclose(decode_exponents(stored), [[1.5, -20.0]])
+    np.testing.assert_allclose(meshopt.decode_exponents(stored), [[1.5, -20.0]])
 
 
 def test_damaged_streams_are_refused():
     for stream in (b"", b"\xa0", b"\xb0" + b"\0" * 60, b"\xa1" + b"\0" * 60, b"\xa0" + b"\xff" * 40):
         with pytest.raises(InputError, match=r"export it (again|without)"):
-            decode_attributes(stream, 100, 8)
-    for decode in (decode_triangles, decode_indices):
+            meshopt.decode_attributes(stream, 100, 8)
+    for decode in (meshopt.decode_triangles, meshopt.decode_indices):
         with pytest.raises(InputError):
             decode(b"\xe1\xff\xff" + b"\x80" * 20, 300)

@@ -4,9 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion import read_motion
-from lipmotion.errors import InputError
-from lipmotion.formats import readable_suffixes
+from lipmotion import errors, formats, read_motion
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes import gltf
 from meshes.heads import head, write_glb
@@ -66,7 +64,7 @@ def test_expressions_of_a_vrm_animation(tmp_path: Path) -> None:
     motion, _ = read_motion(animated(tmp_path, [0, 1 / 30, 2 / 30], rows, "LINEAR", target, name="a.vrma"))
     assert (motion.rate_hz, motion.names) == (30, ("eyeBlinkLeft", "eyeBlinkRight"))
     assert motion["eyeBlinkRight"] == pytest.approx([0, 0.75, 1], abs=1e-6)
-    assert {".glb", ".gltf", ".vrma"} <= {*readable_suffixes()}
+    assert {".glb", ".gltf", ".vrma"} <= {*formats.readable_suffixes()}
 
 
 def test_what_moves_no_face_or_is_damaged_is_refused(tmp_path: Path) -> None:
@@ -80,7 +78,7 @@ def test_what_moves_no_face_or_is_damaged_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
     (tmp_path / "d.glb").write_bytes(b"no")
     for message, file in cases.items():
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             read_motion(file)
 
 

@@ -6,11 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.errors import ExportError
-from lipmotion.types import WEIGHT, Channel, Motion
-from lipmotion_faces.characters.character_files import read_character
-from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
-from lipmotion_faces.characters.gltf_writer import find_named_sound, sound_extras, write_animated_gltf
+from lipmotion import errors, types
+from lipmotion_faces.characters import character_files, gltf_document, gltf_writer
 from meshes import gltf
 from meshes.heads import head, shaped, write_glb
 
@@ -18,7 +15,7 @@ from meshes.heads import head, shaped, write_glb
 def test_a_mesh_comes_back(tmp_path):
     mesh = head()
     write_glb(tmp_path / "head.glb", mesh)
-    read = read_character(tmp_path / "head.glb")
+    read = character_files.read_character(tmp_path / "head.glb")
     assert read.shape_names == mesh.shape_names
     for name in ("jawOpen", "mouthSmileLeft", "eyeBlinkLeft"):
         written, again = shaped(mesh, {name: 1.0})[mesh.triangles], shaped(read, {name: 1.0})[read.triangles]
@@ -26,22 +23,22 @@ def test_a_mesh_comes_back(tmp_path):
 
 
 def test_colours_of_vertices_are_written_and_a_channel_that_is_no_shape_is_refused(tmp_path):
-    other = Motion(np.zeros((3, 1)), 25.0, (Channel("opening"),))
-    with pytest.raises(ExportError, match="no blendshape 'opening'"):
+    other = types.Motion(np.zeros((3, 1)), 25.0, (types.Channel("opening"),))
+    with pytest.raises(errors.ExportError, match="no blendshape 'opening'"):
         write_glb(tmp_path / "head.glb", head(), other)
     assert not list(tmp_path.iterdir())
     mesh = head(shapes=False)
     colours = np.random.default_rng(0).random(mesh.vertices.shape)
     write_glb(tmp_path / "head.glb", replace(mesh, colours=colours))
-    document = read_gltf_document(tmp_path / "head.glb")
+    document = gltf_document.read_gltf_document(tmp_path / "head.glb")
     assert "COLOR_0" in document.json["meshes"][0]["primitives"][0]["attributes"]
 
 
 @pytest.mark.parametrize(
     ("extras", "found"),
-    [(sound_extras("../a b/#1 50%.wav", 0.5), "../a b/#1 50%.wav"),
+    [(gltf_writer.sound_extras("../a b/#1 50%.wav", 0.5), "../a b/#1 50%.wav"),
      ({"audio": {"uri": "ä.wav"}}, "ä.wav"),
-     (sound_extras("a.wav", 2**63), None),
+     (gltf_writer.sound_extras("a.wav", 2**63), None),
      ({"audio": {"uri": "https://example.org/a.wav"}}, None),
      ({"audio": {"uri": "file:a.wav"}}, None),
      ({"audio": {"uri": "/a.wav"}}, None),
@@ -53,13 +50,13 @@ def test_colours_of_vertices_are_written_and_a_channel_that_is_no_shape_is_refus
 def test_paths_from_the_folder_of_the_file_count(tmp_path, extras, found):
     text = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"extras": extras}]})
     (tmp_path / "a.gltf").write_text(text, encoding="utf-8")
-    named = find_named_sound(tmp_path / "a.gltf")
+    named = gltf_writer.find_named_sound(tmp_path / "a.gltf")
     assert (named and named[0]) == (found and tmp_path / found)
 
 
-def weights(*names: str) -> Motion:
+def weights(*names: str) -> types.Motion:
     values = np.random.default_rng(4).random((9, len(names)))
-    return Motion(values, 30.0, tuple(Channel(name, WEIGHT) for name in names))
+    return types.Motion(values, 30.0, tuple(types.Channel(name, types.WEIGHT) for name in names))
 
 
 @pytest.fixture
@@ -82,8 +79,8 @@ def original(tmp_path: Path) -> Path:
 
 
 def test_everything_stays_and_the_animation_comes_first(original: Path, tmp_path: Path) -> None:
-    assert write_animated_gltf(tmp_path / "a.glb", original, weights("jawOpen", "mouthFunnel"), "a.wav")
-    before, after = read_gltf_document(original), read_gltf_document(tmp_path / "a.glb")
+    assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", original, weights("jawOpen", "mouthFunnel"), "a.wav")
+    before, after = gltf_document.read_gltf_document(original), gltf_document.read_gltf_document(tmp_path / "a.glb")
     for name in ("images", "meshes", "materials", "nodes"):
         assert after.items(name) == before.items(name)
     assert after.json["asset"] == before.json["asset"]
@@ -91,13 +88,13 @@ def test_everything_stays_and_the_animation_comes_first(original: Path, tmp_path
     assert after.json["accessors"][: len(before.json["accessors"])] == before.json["accessors"]
     assert after.buffers[0][: len(before.buffers[0])] == before.buffers[0]
     assert after.json["scenes"][0]["extras"] == {"audio": {"uri": "a.wav", "start_s": 0.0}}
-    assert read_character(tmp_path / "a.glb").shape_names == head().shape_names
+    assert character_files.read_character(tmp_path / "a.glb").shape_names == head().shape_names
 
 
 def written_curves(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return the times of the first animation of a head, and its weights by name."""
-    document = read_gltf_document(path)
-    sampler, arrays = document.json["animations"][0]["samplers"][0], GltfArrays(document)
+    document = gltf_document.read_gltf_document(path)
+    sampler, arrays = document.json["animations"][0]["samplers"][0], gltf_document.GltfArrays(document)
     times_s = arrays.floats(sampler["input"], 1)[:, 0]
     stored = arrays.floats(sampler["output"], 1).reshape(len(times_s), -1)
     return times_s, dict(zip(head().shape_names, stored.T, strict=True))
@@ -107,7 +104,7 @@ def written_curves(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
 def test_the_animation_has_the_weights(original: Path, tmp_path: Path, added: bool) -> None:
     moved = weights("jawOpen", "mouthFunnel")
     if added:
-        assert write_animated_gltf(tmp_path / "a.glb", original, moved)
+        assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", original, moved)
     else:
         write_glb(tmp_path / "a.glb", head(), moved)
     times_s, stored = written_curves(tmp_path / "a.glb")
@@ -117,8 +114,8 @@ def test_the_animation_has_the_weights(original: Path, tmp_path: Path, added: bo
 
 
 def test_held_weights_change_at_once(original: Path, tmp_path: Path) -> None:
-    moved = Motion(np.array([[0.0], [0.0], [1.0]]), 10.0, (Channel("jawOpen", WEIGHT),))
-    assert write_animated_gltf(tmp_path / "a.glb", original, moved, stepped=["jawOpen"])
+    moved = types.Motion(np.array([[0.0], [0.0], [1.0]]), 10.0, (types.Channel("jawOpen", types.WEIGHT),))
+    assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", original, moved, stepped=["jawOpen"])
     times_s, stored = written_curves(tmp_path / "a.glb")
     assert times_s == pytest.approx([0, 0.1, 0.199, 0.2])
     assert stored["jawOpen"] == pytest.approx([0, 0, 0, 1])
@@ -131,5 +128,5 @@ def test_what_is_no_morph_target_and_buffers_elsewhere_are_left_to_another_write
     content["buffers"][0]["uri"] = gltf.data_uri(binary)
     (tmp_path / "elsewhere.gltf").write_text(json.dumps(content))
     for path, moved in ((original, weights("jawOpen", "vowel_aa")), (tmp_path / "elsewhere.gltf", weights("target 0"))):
-        assert not write_animated_gltf(tmp_path / "a.glb", path, moved)
+        assert not gltf_writer.write_animated_gltf(tmp_path / "a.glb", path, moved)
         assert not (tmp_path / "a.glb").exists()

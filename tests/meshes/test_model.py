@@ -1,12 +1,10 @@
 import numpy as np
 import pytest
 
-from lipmotion.errors import ExportError, InputError
+from lipmotion import errors, types
 from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
-from lipmotion.meshes.model import shape_names
+from lipmotion.meshes.model import shape_names, surface
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
-from lipmotion.meshes.model.surface import drop_back_sides
-from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion_faces.characters.scene import HeadTurn, Scene, compute_shading_normals
 from meshes.heads import head, shaped
 
@@ -30,24 +28,20 @@ def test_displacements_of_some_vertices_and_of_what_moves_alone():
 
 
 WRONG = [
-    ({"vertices": CORNERS[:, :2]}, "shape"),
-    ({"vertices": np.full((4, 3), np.nan)}, "finite"),
-    ({"triangles": SQUARE + 1}, "1 to 4, required 0 to 3"),
-    ({"triangles": SQUARE[:, :2]}, "required"),
-    ({"triangles": SQUARE - 1}, "-1 to 2"),
-    ({"triangles": SQUARE.astype(float)}, "whole numbers"),
-    ({"uv": np.zeros((2, 2))}, "uv"),
-    ({"parts": (MeshPart("a", 0, 1),)}, "parts"),
+    ({"vertices": CORNERS[:, :2]}, "shape"), ({"vertices": np.full((4, 3), np.nan)}, "finite"),
+    ({"triangles": SQUARE + 1}, "1 to 4, required 0 to 3"), ({"triangles": SQUARE[:, :2]}, "required"),
+    ({"triangles": SQUARE - 1}, "-1 to 2"), ({"triangles": SQUARE.astype(float)}, "whole numbers"),
+    ({"uv": np.zeros((2, 2))}, "uv"), ({"parts": (MeshPart("a", 0, 1),)}, "parts"),
     ({"parts": (MeshPart("a", 0, 1), MeshPart("b", 0, 2))}, "parts"),
     ({"shapes": (Blendshape("a", np.array([9]), np.zeros((1, 3))),)}, "'a'"),
     ({"shapes": (Blendshape("a", np.array([1, 2]), np.zeros((1, 3))),)}, "as many"),
     ({"shapes": (Blendshape("a", np.array([1]), np.zeros((1, 3))),) * 2}, "one name"),
-]
+]  # fmt: skip
 
 
 def test_what_does_not_fit_is_refused():
     for changes, message in WRONG:
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             _mesh(**changes)
 
 
@@ -59,7 +53,7 @@ def test_a_part_with_both_sides_is_held_once():
     uv = np.arange(6 * 3 * 2.0).reshape(6, 3, 2)
     parts = (MeshPart("one", 0, 2), MeshPart("leaf", 2, 6))
     places = np.concatenate([PLACES, PLACES + 5])
-    mesh = drop_back_sides(Mesh(places, np.concatenate([FRONT, FRONT + 4, BACK + 4]), parts, uv=uv))
+    mesh = surface.drop_back_sides(Mesh(places, np.concatenate([FRONT, FRONT + 4, BACK + 4]), parts, uv=uv))
     assert mesh.triangles.tolist() == [*FRONT.tolist(), *(FRONT + 4).tolist()]
     assert [(part.first, part.stop, part.material.two_sided) for part in mesh.parts] == [(0, 2, False), (2, 4, True)]
     np.testing.assert_allclose(mesh.uv, uv[:4])
@@ -74,7 +68,7 @@ def test_other_meshes_stay_as_they_are():
         (np.concatenate([FRONT, BACK]), parts),
     ):
         mesh = Mesh(PLACES, triangles, of or ())
-        assert drop_back_sides(mesh) is mesh
+        assert surface.drop_back_sides(mesh) is mesh
 
 
 def test_normals_of_both_sides_do_not_cancel_out():
@@ -82,8 +76,8 @@ def test_normals_of_both_sides_do_not_cancel_out():
     np.testing.assert_allclose(normals.rest, np.tile([0.0, 0, 1], (4, 1)))
 
 
-def weights(name: str = "jawOpen") -> Motion:
-    return Motion(np.linspace(0, 1, 4)[:, None], 25.0, (Channel(name, WEIGHT),))
+def weights(name: str = "jawOpen") -> types.Motion:
+    return types.Motion(np.linspace(0, 1, 4)[:, None], 25.0, (types.Channel(name, types.WEIGHT),))
 
 
 def test_weights_are_in_the_order_of_the_mesh_and_what_is_no_shape_is_refused() -> None:
@@ -91,7 +85,7 @@ def test_weights_are_in_the_order_of_the_mesh_and_what_is_no_shape_is_refused() 
     column = head().shape_names.index("jawOpen")
     assert table[:, column] == pytest.approx(np.linspace(0, 1, 4))
     assert np.delete(table, column, axis=1) == pytest.approx(np.zeros((4, table.shape[1] - 1)))
-    with pytest.raises(ExportError, match="no blendshape 'opening'"):
+    with pytest.raises(errors.ExportError, match="no blendshape 'opening'"):
         Scene(head(), weights("opening"))
 
 
@@ -99,7 +93,7 @@ def test_weights_are_in_the_order_of_the_mesh_and_what_is_no_shape_is_refused() 
 def test_a_turn_that_does_not_fit_is_refused(vertices: int | None, frames: int) -> None:
     share = np.ones(len(head().vertices) if vertices is None else vertices)
     turn = HeadTurn(np.zeros(3), share, np.tile([0.0, 0, 0, 1], (frames, 1)))
-    with pytest.raises(InputError, match=f"and \\({frames}, 4\\) frames, required"):
+    with pytest.raises(errors.InputError, match=f"and \\({frames}, 4\\) frames, required"):
         Scene(head(), weights(), turn)
 
 

@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from lipmotion import errors, types
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
-from lipmotion.errors import InputError
-from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, move_points
-from lipmotion.meshes.fitting.lip_placement import place_lips_by_shape
+from lipmotion.meshes.fitting import blendshape_motion, lip_placement
 from lipmotion.meshes.fitting.shape_weights import (
     OPPOSED,
     CurveCosts,
@@ -14,26 +13,24 @@ from lipmotion.meshes.fitting.shape_weights import (
     round_lips,
     solve_shape_weights,
 )
-from lipmotion.meshes.model.face_shapes import find_face_shapes
-from lipmotion.meshes.model.surface import build_surface
-from lipmotion.types import Channel, Motion, Timeline
+from lipmotion.meshes.model import face_shapes, surface
 from meshes.heads import VISEMES, head, renamed
 from meshes.speech import PHONES, motion, units
 
 
 def _shapes_of(mesh):
-    return find_face_shapes(mesh, place_lips_by_shape(mesh, build_surface(mesh)))
+    return face_shapes.find_face_shapes(mesh, lip_placement.place_lips_by_shape(mesh, surface.build_surface(mesh)))
 
 
 @pytest.fixture(scope="module", params=["mesh", "reference"])
 def shapes(request):
-    return _shapes_of(head()) if request.param == "mesh" else arkit_mouth()
+    return _shapes_of(head()) if request.param == "mesh" else blendshape_motion.arkit_mouth()
 
 
 @pytest.fixture(scope="module")
 def weights(shapes):
     """Of motion with points for the mesh, of distances alone for the reference."""
-    return solve_shape_weights(motion(points=shapes is not arkit_mouth()), units(), shapes)
+    return solve_shape_weights(motion(points=shapes is not blendshape_motion.arkit_mouth()), units(), shapes)
 
 
 def test_weights_are_between_0_and_1_and_smooth_and_pucker_in_oo(weights):
@@ -42,7 +39,7 @@ def test_weights_are_between_0_and_1_and_smooth_and_pucker_in_oo(weights):
     assert np.abs(np.diff(weights.values, axis=0)).max() < 0.25
     assert (weights["mouthClose"] - weights["jawOpen"]).max() < 1e-9
     assert weights["mouthPucker"][115] > weights["mouthPucker"][75] + 0.04  # aa
-    of_reference = solve_shape_weights(motion(), units(), arkit_mouth())["mouthPucker"]
+    of_reference = solve_shape_weights(motion(), units(), blendshape_motion.arkit_mouth())["mouthPucker"]
     assert of_reference[115] > 0.38
     assert of_reference[75] < 0.3
 
@@ -61,7 +58,7 @@ def test_shapes_that_undo_each_other_are_not_there_at_once(weights):
 
 def test_the_gap_is_that_of_the_motion(weights, shapes):
     gap = weights.values @ shapes.gap
-    wanted = move_points(motion(), units()).mouth.gap
+    wanted = blendshape_motion.move_points(motion(), units()).mouth.gap
     phone = np.array([name for name, start, end in PHONES for _ in range(round(100 * (end - start)))] + ["sil"])
     free = ~np.isin(phone, ["p", "m"])
     assert np.abs(gap - wanted)[free].max() < 0.012
@@ -92,8 +89,8 @@ def test_known_weights_come_back():
     known[:, shapes.row("jawOpen")] = 0.4 * wave
     known[:, shapes.row("mouthPucker")] = 0.5 * wave[::-1]
     placed = np.einsum("ts,spc->tpc", known, shapes.moved)
-    found = solve_shape_weights(_of(placed, known @ shapes.gap), Timeline(()), shapes, _EXACT)
-    found = Motion(found.values[30:], 100.0, found.channels)  # before: the rest pose
+    found = solve_shape_weights(_of(placed, known @ shapes.gap), types.Timeline(()), shapes, _EXACT)
+    found = types.Motion(found.values[30:], 100.0, found.channels)  # before: the rest pose
     assert np.abs(found["jawOpen"] - known[:, shapes.row("jawOpen")]).max() < 0.08
     assert np.abs(found["mouthPucker"] - known[:, shapes.row("mouthPucker")]).max() < 0.12
 
@@ -118,10 +115,10 @@ def _of(displacements, gap):
     places = template.places + displacements
     rest = np.tile(template.places, (30, 1, 1))
     places = np.concatenate([rest, places])
-    channels = [Channel(f"{axis}_{point}") for point in template.points for axis in "xyz"]
+    channels = [types.Channel(f"{axis}_{point}") for point in template.points for axis in "xyz"]
     opening = np.concatenate([np.zeros(30), np.maximum(gap, 0)])[:, None]
     values = np.concatenate([opening, opening, places.reshape(len(places), -1)], axis=1)
-    return Motion(values, 100.0, (Channel("opening"), Channel("lip_gap"), *channels))
+    return types.Motion(values, 100.0, (types.Channel("opening"), types.Channel("lip_gap"), *channels))
 
 
 def test_each_frame_is_the_bounded_least_squares_solution():
@@ -151,14 +148,14 @@ def test_more_cost_is_smoother():
     targets, costs = np.random.default_rng(2).random((50, 4)), (CurveCosts(smooth=cost) for cost in (0.0, 5.0))
     rough, smooth = (np.abs(np.diff(fit_bounded_curves(np.eye(4), targets, each), axis=0)).sum() for each in costs)
     assert smooth < rough / 2
-    with pytest.raises(InputError, match="do not fit"):
+    with pytest.raises(errors.InputError, match="do not fit"):
         fit_bounded_curves(np.zeros((2, 3)), np.zeros((5, 4)))
-    with pytest.raises(InputError, match="not finite"):
+    with pytest.raises(errors.InputError, match="not finite"):
         fit_bounded_curves(np.full((2, 3), np.nan), np.zeros((5, 3)))
 
 
 def test_the_weights_are_never_less_round_than_before():
-    shapes = arkit_mouth()
+    shapes = blendshape_motion.arkit_mouth()
     weights = np.full((3, len(shapes.names)), 0.3)
     result = round_lips(weights, shapes, np.array([0.0, 0.5, 1.0]))
     pucker, smile = shapes.row("mouthPucker"), shapes.row("mouthSmileLeft")
@@ -169,7 +166,7 @@ def test_the_weights_are_never_less_round_than_before():
 
 def test_points_of_round_lips_come_together_and_forward():
     template = mouth_template()
-    moved = move_points(motion(points=False), units()).displacements
+    moved = blendshape_motion.move_points(motion(points=False), units()).displacements
     right, left = moved[115, template.row(RIGHT_CORNER)], moved[115, template.row(LEFT_CORNER)]  # uw
     assert right[0] > 0.03
     assert left[0] < -0.03

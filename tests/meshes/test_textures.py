@@ -6,14 +6,10 @@ from PIL import Image
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart, Texture
-from lipmotion_faces.characters.character_files import read_obj, read_obj_folder
-from lipmotion_faces.characters.gltf_scene import read_gltf
-from lipmotion_faces.characters.textures import decode_srgb, read_texture, texture_table
-from lipmotion_faces.head.stage import figure, head_mesh
+from lipmotion_faces.characters import character_files, gltf_scene, textures
 from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion_faces.rendering.rasteriser import Camera, flat
 from meshes.gltf import UV, document, glb, textured_document, with_colours
-from meshes.heads import write_glb
 
 QUARTERS = np.array([[[255, 0, 0, 255], [0, 255, 0, 255]], [[0, 0, 255, 255], [255, 255, 255, 0]]], np.uint8)
 """Red, green; blue, clear white."""
@@ -81,7 +77,7 @@ def test_the_picture_of_an_obj_is_that_of_its_library_in_the_same_folder(tmp_pat
     (tmp_path / "head.mtl").write_text("newmtl skin\nKd 1 1 1\nmap_Kd skin.png\n")
     lines = ["mtllib head.mtl", "v 0 0 0", "v 1 0 0", "v 1 1 0", "v 0 1 0", "vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1"]
     (tmp_path / "head.obj").write_text("\n".join([*lines, "usemtl skin", "f 1/1 2/2 3/3 4/4"]))
-    mesh = read_obj(tmp_path / "head.obj")
+    mesh = character_files.read_obj(tmp_path / "head.obj")
     assert mesh.parts[0].material.alpha == MASK
     picture = picture_of(mesh)
     assert [int(picture[row, column].argmax()) for row, column in ((18, 18), (18, 46), (46, 18))] == [0, 1, 2]
@@ -89,7 +85,7 @@ def test_the_picture_of_an_obj_is_that_of_its_library_in_the_same_folder(tmp_pat
     (tmp_path / "head.mtl").write_text("newmtl skin\nmap_Kd ../skin.png\n")
     (tmp_path.parent / "skin.png").write_bytes(encoded())
     with pytest.warns(UserWarning, match="not in the same folder"):
-        assert read_obj(tmp_path / "head.obj").parts[0].material.texture is None
+        assert character_files.read_obj(tmp_path / "head.obj").parts[0].material.texture is None
 
 
 def test_far_away_a_chequered_picture_is_grey():
@@ -106,10 +102,10 @@ def test_far_away_a_chequered_picture_is_grey():
 
 
 def test_reductions_end_with_one_pixel_and_clear_pixels_do_not_colour_them():
-    table = texture_table([Texture(np.repeat(np.repeat(QUARTERS, 3, axis=0), 2, axis=1))])
+    table = textures.texture_table([Texture(np.repeat(np.repeat(QUARTERS, 3, axis=0), 2, axis=1))])
     assert table.levels[:, 1:].tolist() == [[4, 6], [2, 3], [1, 1]]
     clear = Texture(np.array([[[255, 0, 0, 255], [0, 255, 0, 0]]], np.uint8))
-    last = texture_table([clear]).texels[-1]
+    last = textures.texture_table([clear]).texels[-1]
     assert last.tolist() == [65535, 0, 0, 32768]
 
 
@@ -129,8 +125,8 @@ def test_opacity_in_a_box_is_never_less_or_more_than_said():
 
 @pytest.mark.parametrize("content", [b"", b"GIF89a", encoded()[:40]])
 def test_what_is_no_picture_is_none_and_large_ones_are_reduced(content):
-    assert read_texture(content) is None
-    texture = read_texture(encoded(np.zeros((10, 3000, 4), np.uint8)))
+    assert textures.read_texture(content) is None
+    texture = textures.read_texture(encoded(np.zeros((10, 3000, 4), np.uint8)))
     assert texture.pixels.shape[1] == 1024
     with pytest.raises(InputError, match=r"required \(H, W, 4\)"):
         Texture(np.zeros((2, 2, 3), np.uint8))
@@ -145,7 +141,7 @@ FULL = {"<f4": 1, "u1": 255, "<u2": 65535}
 
 def _read(tmp_path, content, binary):
     (tmp_path / "head.glb").write_bytes(glb(content, binary))
-    return read_gltf(tmp_path / "head.glb")
+    return gltf_scene.read_gltf(tmp_path / "head.glb")
 
 
 def _coloured(tmp_path, colours, material=None, *, normalised=False):
@@ -162,15 +158,15 @@ def test_colours_of_every_kind_are_read_as_light(tmp_path, kind, normalised, wid
     given = np.concatenate([LIGHT, np.ones((4, 1))], axis=1)[:, :width] * FULL[kind]
     stored = (given if kind == "<f4" else np.rint(given)).astype(kind)
     mesh = _coloured(tmp_path, stored, normalised=normalised)
-    np.testing.assert_allclose(decode_srgb(mesh.colours), LIGHT, atol=0.003)
+    np.testing.assert_allclose(textures.decode_srgb(mesh.colours), LIGHT, atol=0.003)
 
 
 def test_colours_are_multiplied_by_that_of_the_material_and_white_at_most(tmp_path):
     factor = [0.5, 1.0, 0.25, 1.0]
     mesh = _coloured(tmp_path, LIGHT.astype("<f4"), {"pbrMetallicRoughness": {"baseColorFactor": factor}})
-    np.testing.assert_allclose(decode_srgb(mesh.colours), LIGHT * factor[:3], atol=1e-6)
+    np.testing.assert_allclose(textures.decode_srgb(mesh.colours), LIGHT * factor[:3], atol=1e-6)
     mesh = _coloured(tmp_path, (LIGHT * 4).astype("<f4"))
-    np.testing.assert_allclose(decode_srgb(mesh.colours), np.minimum(LIGHT * 4, 1), atol=1e-6)
+    np.testing.assert_allclose(textures.decode_srgb(mesh.colours), np.minimum(LIGHT * 4, 1), atol=1e-6)
 
 
 def test_a_texture_is_multiplied_by_colours(tmp_path):
@@ -218,33 +214,21 @@ def test_colours_that_do_not_fit_are_refused(tmp_path, change, message):
         _read(tmp_path, content, binary)
 
 
-@pytest.mark.long
-def test_colours_of_the_head_come_back_from_its_own_file(tmp_path):
-    head = head_mesh(figure())
-    write_glb(tmp_path / "head.glb", head)
-    back = read_gltf(tmp_path / "head.glb")
-    assert len(back.triangles) == len(head.triangles)
-    for part in head.parts:
-        same = next(each for each in back.parts if each.material.name == part.name)
-        before = head.colours[head.triangles[part.first : part.stop]]
-        np.testing.assert_allclose(back.colours[back.triangles[same.first : same.stop]], before, atol=1e-5)
-
-
 def test_colours_of_obj_vertices(tmp_path):
     rows = ["v 0 0 0 1 0 0.5", "v 1 0 0 0 1 0", "v 1 1 0", "v 0 1 0 0 0 1"]
     (tmp_path / "neutral.obj").write_text("\n".join(rows) + "\n" + SQUARE)
-    mesh = read_obj(tmp_path / "neutral.obj")
+    mesh = character_files.read_obj(tmp_path / "neutral.obj")
     np.testing.assert_allclose(mesh.colours, [[1, 0, 0.5], [0, 1, 0], mesh.parts[0].material.colour, [0, 0, 1]])
-    np.testing.assert_allclose(read_obj_folder(tmp_path).colours, mesh.colours)
+    np.testing.assert_allclose(character_files.read_obj_folder(tmp_path).colours, mesh.colours)
     (tmp_path / "a.obj").write_text("v 0 0 0 255 0 51\nv 1 0 0 0 255 0\nv 1 1 0 0 0 0\nv 0 1 0 0 0 0\n" + SQUARE)
-    np.testing.assert_allclose(read_obj(tmp_path / "a.obj").colours[0], [1, 0, 0.2])
+    np.testing.assert_allclose(character_files.read_obj(tmp_path / "a.obj").colours[0], [1, 0, 0.2])
     (tmp_path / "a.obj").write_text("v 0 0 0 red 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n" + SQUARE)
     with pytest.raises(InputError, match="export the mesh as OBJ again"):
-        read_obj(tmp_path / "a.obj")
+        character_files.read_obj(tmp_path / "a.obj")
 
 
 @pytest.mark.parametrize("colour", ["", " 1 1 1", " 1.0"])
 def test_obj_vertices_without_colours_or_all_white_have_those_of_materials(tmp_path, colour):
     places = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
     (tmp_path / "a.obj").write_text("".join(f"v {place}{colour}\n" for place in places) + SQUARE)
-    assert read_obj(tmp_path / "a.obj").colours is None
+    assert character_files.read_obj(tmp_path / "a.obj").colours is None

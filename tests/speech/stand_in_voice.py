@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion import types, units
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, SynthesisedSentence, Synthesiser, SyntheticVoice
-from lipmotion.types import Span, Timeline
-from lipmotion.units import Lexicon, split_words
 from speech.sounds import write_wave
 from testing.formant_synthesiser import synthesise
 
@@ -22,13 +21,13 @@ def say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedS
     """Yield texts, every phone of the same length, between short pauses."""
     path = folder / "said.wav"
     for text in texts:
-        lexicon = Lexicon()
-        words = [phone for word in split_words(text) for phone in lexicon.pronunciations(word)[0]]
+        lexicon = units.Lexicon()
+        words = [phone for word in units.split_words(text) for phone in lexicon.pronunciations(word)[0]]
         labels = ["sil", *words, "sil"]
         audio, timeline = synthesise([(label, EACH_S) for label in labels], rate_hz=RATE_HZ, seed=len(voice))
         write_wave(path, np.round(np.clip(audio.samples, -1, 1) * 32_767).astype(np.int16), RATE_HZ)
-        spans = tuple(Span(span.start_s, span.end_s, span.label.phone) for span in timeline)
-        yield SynthesisedSentence(read_audio(path), Timeline(spans), path)
+        spans = tuple(types.Span(span.start_s, span.end_s, span.label.phone) for span in timeline)
+        yield SynthesisedSentence(read_audio(path), types.Timeline(spans), path)
 
 
 def install(monkeypatch: pytest.MonkeyPatch, voices: tuple[SyntheticVoice, ...] = VOICES) -> None:

@@ -1,25 +1,13 @@
 import tracemalloc
-from collections import Counter
-from collections.abc import Callable, Sequence
-from typing import Any
-from zlib import crc32
 
 import numpy as np
 import pytest
 
-from lipmotion import Model, animate, load_model
-from lipmotion.errors import InputError
-from lipmotion.speech.features import analysed_audio as module
-from lipmotion.speech.features import mfcc as front_end
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion import errors, types
+from lipmotion.speech.features import analysed_audio, speaker_similarity
 from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc, spectrum
-from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS
-from lipmotion.speech.recognition.agreement import agreement_score
 from lipmotion.speech.recognition.general import general_features
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.voice_activity import find_passages
-from lipmotion.types import Audio
-from lipmotion.units import Lexicon
 from testing.toy import ToySentence, toy_sentences
 
 
@@ -28,27 +16,8 @@ def sentence() -> ToySentence:
     return toy_sentences(3)[0]
 
 
-@pytest.fixture
-def computed(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, bytes, int]]:
-    """Counts what the front end computes: by filter bank or energy, and samples."""
-    counts: Counter[tuple[str, bytes, int]] = Counter()
-
-    def counting(kind: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        def counted(samples: np.ndarray, banks: Sequence[np.ndarray] = (np.zeros(0),)) -> Any:
-            counts.update((kind, bank.tobytes(), crc32(samples.tobytes())) for bank in banks)
-            return function(samples, banks) if kind == "filters" else function(samples)
-
-        return counted
-
-    monkeypatch.setattr(front_end, "log_mels", counting("filters", front_end.log_mels))
-    counted_energy = counting("energy", front_end.log_energy)
-    for owner in (front_end, module):
-        monkeypatch.setattr(owner, "log_energy", counted_energy)
-    return counts
-
-
-def of_samples(*parts: np.ndarray) -> AnalysedAudio:
-    return analysed(Audio(np.concatenate(parts).astype(np.float32), 16_000))
+def of_samples(*parts: np.ndarray) -> analysed_audio.AnalysedAudio:
+    return analysed_audio.analysed(types.Audio(np.concatenate(parts).astype(np.float32), 16_000))
 
 
 def whole_frames(number: int) -> np.ndarray:
@@ -60,19 +29,19 @@ def silence(seconds: float, units: float = 0.0) -> np.ndarray:
     return np.random.default_rng(0).uniform(-units, units, round(16_000 * seconds)) / 32768
 
 
-def kinds(audio: AnalysedAudio) -> list[np.ndarray]:
+def kinds(audio: analysed_audio.AnalysedAudio) -> list[np.ndarray]:
     return [audio.mfcc().values, audio.mfcc(0.88).values, audio.spectrum, audio.general_features, audio.log_energy]
 
 
 def test_every_kind_is_that_of_the_passage_at_its_level(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
+    audio = analysed_audio.analysed(sentence.audio)
     (passage,) = audio.passages
     first, end = find_passages(log_energy(sentence.audio.samples))[0]
     lead, recorded = first - passage.first, sentence.audio.samples[first * HOP : end * HOP]
-    sound = Audio(passage.audio.samples[lead * HOP :][: len(recorded)], 16_000)
+    sound = types.Audio(passage.audio.samples[lead * HOP :][: len(recorded)], 16_000)
     rows = slice(lead, lead + len(recorded) // HOP + 1)
     assert np.corrcoef(sound.samples, recorded)[0, 1] == pytest.approx(1)
-    for warp, features in zip(WARPS, audio.mfcc_of_warps(WARPS), strict=True):
+    for warp, features in zip(speaker_similarity.WARPS, audio.mfcc_of_warps(speaker_similarity.WARPS), strict=True):
         assert passage.audio.mfcc(warp).values[rows] == pytest.approx(mfcc(sound, warp).values, abs=1e-5)
         assert features is audio.mfcc(warp)
         assert features.duration_s == sentence.audio.duration_s
@@ -94,16 +63,10 @@ def test_features_are_normalised_over_the_passage_alone() -> None:
 @pytest.mark.parametrize(
     ("before_s", "after_s", "units", "decibels"),
     [
-        (0.5, 0.5, 0, 0),
-        (0, 5, 0, 0),
-        (5, 0, 0, 0),
-        pytest.param(60, 0, 0, 0, marks=pytest.mark.long),
-        (5, 0.5, 1, 0),
-        (5, 0.5, 25, 0),
-        (0, 0, 0, -40),
-        (2, 2, 5, -6),
+        (0.5, 0.5, 0, 0), (0, 5, 0, 0), (5, 0, 0, 0), pytest.param(60, 0, 0, 0, marks=pytest.mark.long), (5, 0.5, 1, 0),
+        (5, 0.5, 25, 0), (0, 0, 0, -40), (2, 2, 5, -6),
     ],
-)
+)  # fmt: skip
 def test_silence_and_gain_change_no_features(before_s: float, after_s: float, units: float, decibels: float) -> None:
     """But that two frames at either end are left out, whose windows reach into it, and those of a noise as loud."""
     line = whole_frames(0)
@@ -165,63 +128,31 @@ def test_where_nothing_is_said_all_features_are_0() -> None:
 
 
 def test_a_passage_is_not_divided_further_and_what_keeps_its_features_stays_itself(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
+    audio = analysed_audio.analysed(sentence.audio)
     (passage,) = audio.passages
     assert not audio.is_passage
     assert passage.audio.is_passage
     assert passage.audio.frames == len(passage.audio.mfcc().values)
-    assert analysed(audio) is audio
+    assert analysed_audio.analysed(audio) is audio
+    assert all(once is again for once, again in zip(kinds(passage.audio), kinds(passage.audio), strict=True))
+    features = mfcc(sentence.audio)
+    assert analysed_audio.analysed(sentence.audio, features).mfcc() is features
     assert audio.samples is sentence.audio.samples
     assert audio.duration_s == sentence.audio.duration_s
-    with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
-        analysed(Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
+    with pytest.raises(errors.InputError, match="need 16000 Hz, found 44100 Hz"):
+        analysed_audio.analysed(types.Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
 
 
 def test_a_stretch_has_the_features_of_the_whole(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
+    audio = analysed_audio.analysed(sentence.audio)
     stretch = audio.stretch(60, 160)
     assert len(stretch.samples) == 16_000
     for whole, part in zip(kinds(audio), kinds(stretch), strict=True):
         assert np.array_equal(part, whole[60:161])
 
 
-def test_features_that_are_known_are_not_computed(sentence: ToySentence, computed: Counter[Any]) -> None:
-    features = mfcc(sentence.audio)
-    computed.clear()
-    assert analysed(sentence.audio, features).mfcc() is features
-    assert not computed
-
-
-def long_audio() -> Audio:
-    sentences = toy_sentences(12)
-    samples = np.concatenate([sentence.audio.samples for sentence in sentences])
-    assert len(samples) / 160 > JUDGED_FRAMES
-    return Audio(samples, 16_000)
-
-
-@pytest.mark.parametrize("kind", ["fast", "general", pytest.param("auto", marks=pytest.mark.long)])
-@pytest.mark.parametrize("is_long", [False, pytest.param(True, marks=pytest.mark.long)])
-def test_each_kind_is_computed_once_for_all_that_is_done_with_a_recording(
-    sentence: ToySentence, kind: str, is_long: bool, computed: Counter[Any]
-) -> None:
-    audio: AnalysedAudio = analysed(long_audio() if is_long else sentence.audio)
-    recogniser = Recogniser(load_model().phones, kind)
-    recognised = recogniser.recognise(audio, audio.mfcc())
-    recogniser.align_phones(audio, audio.mfcc(), recognised)
-    aligned = recogniser.align(audio, audio.mfcc(), sentence.words, Lexicon())
-    agreement_score(audio, aligned)
-    assert set(computed.values()) == {1}
-    if not is_long:  # features at no warp and general ones, and at the other warps; of the longest passage alone
-        assert sum(what == "filters" for what, *_ in computed) == (2 if kind == "general" else 6)
-
-
-def test_animate_computes_each_kind_once(toy_model: Model, sentence: ToySentence, computed: Counter[Any]) -> None:
-    animate(sentence.audio, model=toy_model, transcript=" ".join(sentence.words))
-    assert set(computed.values()) == {1}
-
-
 def test_features_of_silence_take_no_more_memory_than_they_are() -> None:
-    audio = AnalysedAudio(np.zeros(120 * 16_000, np.float32), 16_000)
+    audio = analysed_audio.AnalysedAudio(np.zeros(120 * 16_000, np.float32), 16_000)
     assert not audio.passages
     tracemalloc.start()
     bands = audio.spectrum

@@ -8,19 +8,7 @@ from hypothesis import strategies as st
 from lipmotion.errors import InputError
 from lipmotion.hmm.align import PlacedWord, SpokenWord
 from lipmotion.kernels.paths import Windows
-from lipmotion.speech.recognition import anchors as module
-from lipmotion.speech.recognition.anchors import (
-    FREE_FRAMES,
-    LINE_TOLERANCE_S,
-    WORD_TOLERANCE_S,
-    align_within,
-    anchors_of,
-    feasible_windows,
-    fitted,
-    lateness_s,
-    pressed_words,
-    windows_of,
-)
+from lipmotion.speech.recognition import anchors
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
 
 
@@ -34,11 +22,14 @@ def transcript(*lines: TranscriptLine) -> TimedTranscript:
 
 def test_words_have_the_times_of_their_line_or_their_own():
     timed = TranscriptLine((TimedWord("c"), TimedWord("d", 4.5, 4.75), TimedWord("e")), 4.0, 5.0)
-    found = anchors_of(transcript(line("a b", 1.0, 2.0), timed, line("f")))
+    found = anchors.anchors_of(transcript(line("a b", 1.0, 2.0), timed, line("f")))
     nan = np.nan
     np.testing.assert_allclose(found.start_s, [1.0, 1.0, 4.0, 4.5, nan, nan])
     np.testing.assert_allclose(found.end_s, [2.0, 2.0, nan, 4.75, 5.0, nan])
-    assert found.tolerance_s.tolist() == [LINE_TOLERANCE_S] * 3 + [WORD_TOLERANCE_S] + [LINE_TOLERANCE_S] * 2
+    assert (
+        found.tolerance_s.tolist()
+        == [anchors.LINE_TOLERANCE_S] * 3 + [anchors.WORD_TOLERANCE_S] + [anchors.LINE_TOLERANCE_S] * 2
+    )
     assert found.groups.tolist() == [0, 0, 1, 2, 3, 4]
 
 
@@ -57,8 +48,8 @@ def test_words_have_the_times_of_their_line_or_their_own():
     ],
 )
 def test_windows_are_the_times_and_the_tolerance(lines: list[TranscriptLine], first: list[int], end: list[int]):
-    found = anchors_of(transcript(*lines))
-    windows = windows_of(found, found.tolerance_s, 3000)
+    found = anchors.anchors_of(transcript(*lines))
+    windows = anchors.windows_of(found, found.tolerance_s, 3000)
     assert (windows.first.tolist(), windows.end.tolist()) == (first, end)
 
 
@@ -68,9 +59,9 @@ times = st.one_of(st.none(), st.floats(-5, 40))
 @given(spans=st.lists(st.tuples(times, times), min_size=1, max_size=12), frames=st.integers(10, 3000))
 @settings(max_examples=50)
 def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames):
-    found = anchors_of(transcript(*(line("a b", start_s, end_s) for start_s, end_s in spans)))
+    found = anchors.anchors_of(transcript(*(line("a b", start_s, end_s) for start_s, end_s in spans)))
     least = np.full(len(found.start_s), 3, np.intp)
-    windows, tolerance_s = feasible_windows(found, found.tolerance_s, least, 3, frames)
+    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, least, 3, frames)
     assert np.all(np.diff(windows.first) >= 0)
     assert np.all(np.diff(windows.end) >= 0)
     assert np.all(tolerance_s >= found.tolerance_s)
@@ -85,9 +76,9 @@ def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames)
 
 def test_windows_without_room_are_widened_where_it_lacks():
     crowded = [line("a", 1.0, 2.0), line(" ".join("b" * 100), 20.0, 20.5), line("c", 60.0, 61.0)]
-    found = anchors_of(transcript(*crowded))
+    found = anchors.anchors_of(transcript(*crowded))
     least = np.full(102, 9, np.intp)
-    windows, tolerance_s = feasible_windows(found, found.tolerance_s, least, 3, 10_000)
+    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, least, 3, 10_000)
     assert tolerance_s[50] > 4
     assert tolerance_s[0] <= tolerance_s[50]
     assert windows.end[100] - windows.first[1] >= 900
@@ -104,9 +95,9 @@ def found_words(*starts: int, fits: Sequence[float] | None = None) -> list[Place
 
 def test_words_that_begin_or_end_with_their_window_are_pressed():
     windows = Windows(np.array([0, 100, 200]), np.array([150, 300, 500]))
-    assert pressed_words(found_words(20, 120, 250), windows, 500).tolist() == [False, False, False]
-    assert pressed_words(found_words(20, 100, 250), windows, 500).tolist() == [False, True, False]
-    assert pressed_words(found_words(20, 150, 300), windows, 500).tolist() == [True, True, False]
+    assert anchors.pressed_words(found_words(20, 120, 250), windows, 500).tolist() == [False, False, False]
+    assert anchors.pressed_words(found_words(20, 100, 250), windows, 500).tolist() == [False, True, False]
+    assert anchors.pressed_words(found_words(20, 150, 300), windows, 500).tolist() == [True, True, False]
 
 
 class Search:
@@ -129,7 +120,9 @@ def many_lines(count: int) -> TimedTranscript:
 
 def aligned(search: Search, frames: int = 12_000) -> list[int]:
     count = len(search.starts)
-    placed, _ = align_within(anchors_of(many_lines(count)), np.full(count, 3, np.intp), 3, frames, search)
+    placed, _ = anchors.align_within(
+        anchors.anchors_of(many_lines(count)), np.full(count, 3, np.intp), 3, frames, search
+    )
     return [item.start for item in placed[1:]]
 
 
@@ -164,7 +157,7 @@ def test_a_word_that_presses_stays_where_it_does_not_fit_better_elsewhere():
 def test_a_time_far_off_is_reported(caplog):
     starts = [1000 * n for n in range(1, 11)]
     starts[4:7] = [start - 950 for start in starts[4:7]]
-    found = aligned(Search(starts, elsewhere=-9.0), frames=FREE_FRAMES + 1)
+    found = aligned(Search(starts, elsewhere=-9.0), frames=anchors.FREE_FRAMES + 1)
     assert found[:4] == starts[:4]
     (record,) = caplog.records
     message = "at 3 of the 10 times of the transcript the words do not fit the sound, first at 50.00 s; check them"
@@ -177,7 +170,7 @@ def test_times_of_something_else_are_not_used(caplog):
     (record,) = caplog.records
     assert record.getMessage() == "the times of the transcript do not fit the sound; they are not used"
     caplog.clear()
-    assert aligned(Search(starts), frames=FREE_FRAMES + 1) != starts  # too long for that
+    assert aligned(Search(starts), frames=anchors.FREE_FRAMES + 1) != starts  # too long for that
     assert "at 10 of the 10 times" in caplog.text
 
 
@@ -200,8 +193,8 @@ def test_a_shift_of_all_times_is_found(late_s, caplog):
     duration_s = spans[-1][1] + 1
     loud = loud_at(spans, duration_s)
     shifted = transcript(*(line("a", start_s + late_s, end_s + late_s) for start_s, end_s in spans))
-    assert lateness_s(shifted, loud) == pytest.approx(late_s, abs=0.05)
-    corrected = fitted(shifted, loud, duration_s)
+    assert anchors.lateness_s(shifted, loud) == pytest.approx(late_s, abs=0.05)
+    corrected = anchors.fitted(shifted, loud, duration_s)
     assert [each.start_s for each in corrected.lines] == pytest.approx([start_s for start_s, _ in spans], abs=0.05)
     (record,) = caplog.records
     which = "late" if late_s > 0 else "early"
@@ -215,26 +208,27 @@ def test_no_shift_is_found_where_there_is_none():
     loud = loud_at(spans, spans[-1][1] + 1)
     inexact = [(start_s + draw.normal(0, 0.6), end_s + draw.normal(0.5, 0.6)) for start_s, end_s in spans]
     lines = [line("a", start_s, max(start_s, end_s)) for start_s, end_s in inexact]
-    assert lateness_s(transcript(*lines), loud) == 0
+    assert anchors.lateness_s(transcript(*lines), loud) == 0
     others = spoken_spans(seed + 100, 60)  # times of something else
-    assert lateness_s(transcript(*(line("a", *span) for span in others)), loud) == 0
-    assert lateness_s(transcript(line("a"), line("b")), loud) == 0
-    assert lateness_s(transcript(line("a", 1.0, 2.0)), np.zeros(0, bool)) == 0
+    assert anchors.lateness_s(transcript(*(line("a", *span) for span in others)), loud) == 0
+    assert anchors.lateness_s(transcript(line("a"), line("b")), loud) == 0
+    assert anchors.lateness_s(transcript(line("a", 1.0, 2.0)), np.zeros(0, bool)) == 0
 
 
 def test_lines_after_the_end_are_left_out(caplog):
     loud = np.ones(1000, bool)
-    kept = fitted(transcript(line("a", 1.0, 2.0), line("b"), line("c", 10.5, 12.0), line("d", 11.5, 12.0)), loud, 10.0)
+    kept = anchors.fitted(
+        transcript(line("a", 1.0, 2.0), line("b"), line("c", 10.5, 12.0), line("d", 11.5, 12.0)), loud, 10.0
+    )
     assert kept.words == ("a", "b", "c")
     (record,) = caplog.records
     assert "goes on after the recording ends at 10.00 s; its last 1 lines are left out" in record.getMessage()
     with pytest.raises(InputError, match=r"begins at 20\.00 s, the recording ends at 10\.00 s; give the transcript"):
-        fitted(transcript(line("a", 20.0, 22.0)), loud, 10.0)
+        anchors.fitted(transcript(line("a", 20.0, 22.0)), loud, 10.0)
 
 
-def test_widening_ends(monkeypatch):
-    monkeypatch.setattr(module, "MOST_WIDENINGS", 3)
-    found = anchors_of(transcript(line(" ".join("a" * 50), 1.0, 1.1)))
-    windows, tolerance_s = feasible_windows(found, found.tolerance_s, np.full(50, 90, np.intp), 3, 3000)
+def test_widening_ends():
+    found = anchors.anchors_of(transcript(line(" ".join("a" * 50), 1.0, 1.1)))
+    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, np.full(50, 90, np.intp), 3, 3000)
     assert np.all(np.isinf(tolerance_s))
     assert (windows.first.max(), windows.end.min()) == (0, 3000)

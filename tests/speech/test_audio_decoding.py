@@ -2,7 +2,6 @@ import os
 import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
@@ -13,7 +12,6 @@ from PIL import Image
 from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import _TrackDecoder, read_audio
-from lipmotion.storage.media import open_media
 from speech.opened import opened_in
 from speech.sounds import babble, late_by, write_constant_flac, write_sound, write_stamped, write_wave
 
@@ -191,14 +189,6 @@ def referring(content: bytes, name: bytes) -> bytes:
     return bytes(grown)
 
 
-def test_addresses_are_not_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: dict[str, Any] = {}
-    monkeypatch.setattr(av, "open", lambda name, **options: asked.update(options, name=name))
-    open_media(tmp_path / "a.wav")
-    assert asked["name"] == f"file:{tmp_path / 'a.wav'}"
-    assert asked["options"]["protocol_whitelist"] == "file"
-
-
 def test_a_hole_keeps_what_follows_in_time(tmp_path: Path, original: Samples, caplog: pytest.LogCaptureFixture) -> None:
     for suffix, codec in (("mkv", "pcm_s16le"), ("mp4", "aac")):
         caplog.clear()
@@ -300,14 +290,6 @@ def test_minutes_of_digital_silence_are_no_crime_but_each_rate_is_checked(tmp_pa
     path = write_constant_flac(tmp_path / "a.flac", 60, rates_hz=(8000, 1))
     with pytest.raises(InputError, match=r"a\.flac: sampled at 1 Hz, required 4000 to 1000000; export the recording"):
         read_audio(path)
-
-
-def test_a_sound_without_video(tmp_path: Path) -> None:
-    from lipmotion_faces.tracking.frames import open_video
-
-    sound = write_sound(tmp_path / "blind.mp3", babble(44_100), 44_100, "libmp3lame", cover=True)
-    with pytest.raises(InputError, match="has no video stream"), open_video(sound):
-        pass
 
 
 @pytest.mark.long

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.errors import CorpusError, InputError
+from lipmotion import errors, types
 from lipmotion.motion.predictors import PredictorTraining
 from lipmotion.motion.prior_regression import EncodingRegression
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features import analysed_audio, mfcc
 from lipmotion.speech.features.encoding import (
     COMPONENTS,
     LEVEL,
@@ -17,10 +17,8 @@ from lipmotion.speech.features.encoding import (
     log_mel_spectrum,
     shipped_encoder,
 )
-from lipmotion.speech.features.mfcc import HOP, WINDOW
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.examples import example
-from lipmotion.types import Audio, Example
 from speech.made_voices import pulses, recording, vowels
 
 RATE_HZ = 16_000
@@ -37,7 +35,7 @@ def test_a_tone_is_loud_in_its_band_alone() -> None:
     """The bands are Slaney's: 200/3 Hz apart in centre below 1 kHz times 0.5577 of a mel step."""
     samples = np.sin(2 * np.pi * 440 * np.arange(RATE_HZ) / RATE_HZ).astype(np.float32) / LEVEL
     spectrum = log_mel_spectrum(samples)
-    assert spectrum.shape == ((RATE_HZ - WINDOW) // HOP + 1, 80)
+    assert spectrum.shape == ((RATE_HZ - mfcc.WINDOW) // mfcc.HOP + 1, 80)
     top = 15 + np.log(8) * 27 / np.log(6.4)
     assert np.all(spectrum.argmax(axis=1) == round(440 * 3 / 200 / (top / 81)) - 1)
     assert spectrum.min() == pytest.approx((-4.5 + 4) / 4, abs=1e-6)
@@ -50,7 +48,7 @@ def test_the_forward_pass_is_that_of_the_network() -> None:
     eight components. With activations of eight bits, as the file has them, rows differ by a fifth of their deviation.
     """
     samples = read_audio(WELCOME).samples
-    padded = np.pad(samples, (0, 8 * RATE_HZ + WINDOW - HOP - len(samples)))
+    padded = np.pad(samples, (0, 8 * RATE_HZ + mfcc.WINDOW - mfcc.HOP - len(samples)))
     rows = encode_window(log_mel_spectrum(padded.astype(np.float32))[:800], shipped_encoder())
     expected = np.loadtxt(Path(__file__).with_name("encoder_reference.csv"), delimiter=",")
     assert rows[5:285:20, :8] == pytest.approx(expected, abs=0.04)
@@ -76,21 +74,21 @@ def test_rows_do_not_depend_on_what_is_asked_for() -> None:
 
 
 def test_silence_around_and_gain_change_nothing(spoken: NDArray[np.float32]) -> None:
-    plain = analysed(Audio(spoken, RATE_HZ)).encoding.astype(float)
+    plain = analysed_audio.analysed(types.Audio(spoken, RATE_HZ)).encoding.astype(float)
     later = np.concatenate([np.zeros(3 * RATE_HZ, np.float32), spoken * np.float32(0.01)])
-    moved = analysed(Audio(later, RATE_HZ)).encoding.astype(float)[300 : 300 + len(plain)]
+    moved = analysed_audio.analysed(types.Audio(later, RATE_HZ)).encoding.astype(float)[300 : 300 + len(plain)]
     assert np.abs(moved - plain).max() < 0.02 * np.abs(plain).max()
 
 
 def test_features_of_a_passage_are_those_of_the_whole(spoken: NDArray[np.float32]) -> None:
-    audio = analysed(Audio(spoken, RATE_HZ))
+    audio = analysed_audio.analysed(types.Audio(spoken, RATE_HZ))
     (passage,) = audio.passages
     own = passage.audio.encoding[passage.own.start - passage.first :][: len(audio.encoding)]
     assert np.array_equal(audio.encoding[: len(own)], own)
     assert np.array_equal(audio.stretch(20, 60).encoding, audio.encoding[20:61])
 
 
-def encoded_example(seed: int) -> tuple[Example, NDArray[np.float64]]:
+def encoded_example(seed: int) -> tuple[types.Example, NDArray[np.float64]]:
     """An example whose motion is a sum of the encoding of two moments."""
     one = example(("aa", "t", "iy", "s"), seed)
     rng, frames = np.random.default_rng(seed), len(one.valid)
@@ -119,9 +117,9 @@ def test_speech_without_an_encoding_is_refused() -> None:
     fitted = EncodingRegression.fit(PredictorTraining([one], [motion], 2)).predictor
     without = replace(one.speech, encoding=None)
     assert not fitted.can_predict(without)
-    with pytest.raises(InputError, match="no encoding"):
+    with pytest.raises(errors.InputError, match="no encoding"):
         fitted.predict(without)
-    with pytest.raises(CorpusError, match="without encoding"):
+    with pytest.raises(errors.CorpusError, match="without encoding"):
         EncodingRegression.fit(PredictorTraining([replace(one, speech=without)], [motion], 2))
-    with pytest.raises(CorpusError, match="no frame"):
+    with pytest.raises(errors.CorpusError, match="no frame"):
         EncodingRegression.fit(PredictorTraining([replace(one, valid=np.zeros_like(one.valid))], [motion], 2))

@@ -3,9 +3,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
-from lipmotion.speech.features import f0 as module
-from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.f0 import candidates, correlations, lags, log_f0, prosody_of
+from lipmotion.speech.features import analysed_audio, f0
 from lipmotion.types import Audio
 from speech import f0_oracle
 from testing.formant_synthesiser import PHONE_TARGETS, synthesise
@@ -37,7 +35,7 @@ def steady(hertz: float, duration_s: float = 1.0) -> Array:
 
 def found(samples: NDArray[np.float32]) -> Array:
     """Return F0 in hertz."""
-    return np.exp(log_f0(Audio(samples, RATE_HZ)).astype(float))
+    return np.exp(f0.log_f0(Audio(samples, RATE_HZ)).astype(float))
 
 
 def at_frames(hertz: Array) -> Array:
@@ -47,20 +45,20 @@ def at_frames(hertz: Array) -> Array:
 
 def test_correlations_are_their_slow_twin() -> None:
     samples = voice(np.linspace(90, 200, 1700)) + noise(1700) / 20
-    assert lags()[1::2].tolist() == list(range(10, 68))
+    assert f0.lags()[1::2].tolist() == list(range(10, 68))
     for n in (0, 5, 10):
-        fast = correlations(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
+        fast = f0.correlations(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
         x = f0_oracle.frame(samples.astype(float), n)
         silence = 1e-5 + f0_oracle.frication(samples.astype(float), n)
-        slow = [f0_oracle.correlation(x, int(lag), silence) for lag in lags()[1::2]]
+        slow = [f0_oracle.correlation(x, int(lag), silence) for lag in f0.lags()[1::2]]
         assert fast[1::2] == pytest.approx(slow, abs=1e-4)
 
 
 def test_the_best_peaks_are_the_candidates() -> None:
-    correlation = np.zeros((2, len(lags())), np.float32)
+    correlation = np.zeros((2, len(f0.lags())), np.float32)
     correlation[0, 39:42] = 0.5, 0.9, 0.7
-    pitch, cost = candidates(correlation)
-    lag = lags()[40] + 0.5 / 6  # the top of the parabola, a sixth of a step later
+    pitch, cost = f0.candidates(correlation)
+    lag = f0.lags()[40] + 0.5 / 6  # the top of the parabola, a sixth of a step later
     assert np.exp(pitch[0, 0]) == pytest.approx(4000 / lag)
     assert cost[0, 0] == pytest.approx(1 - (0.9 + 1 / 120) * (1 - 0.2 * lag / (4000 / 60)))
     assert np.isinf(cost[1:, 0]).all()
@@ -69,8 +67,8 @@ def test_the_best_peaks_are_the_candidates() -> None:
 
 def test_the_number_of_frames_is_that_of_the_features() -> None:
     for count in (400, 479, 480, 559, 560, 561, 4001):
-        result = log_f0(Audio(noise(count), RATE_HZ))
-        assert result.shape == (len(analysed(Audio(noise(count), RATE_HZ)).mfcc().values),)
+        result = f0.log_f0(Audio(noise(count), RATE_HZ))
+        assert result.shape == (len(analysed_audio.analysed(Audio(noise(count), RATE_HZ)).mfcc().values),)
         assert result.dtype == np.float32
 
 
@@ -81,8 +79,9 @@ def test_a_known_frequency_is_found() -> None:
 
 
 def test_glides_have_no_jumps_and_frame_n_is_centred_at_n_times_10_ms() -> None:
+    """The first is longer than a block."""
     for vowel, noise_db, (first_hz, last_hz) in (("a", -3, (65, 390)), ("i", -10, (390, 65)), ("u", -40, (120, 240))):
-        hertz = first_hz * (last_hz / first_hz) ** np.linspace(0, 1, 3 * RATE_HZ)
+        hertz = first_hz * (last_hz / first_hz) ** np.linspace(0, 1, (12 if noise_db == -3 else 3) * RATE_HZ)
         ratio = found(voice(hertz, vowel, noise_db))[2:-2] / at_frames(hertz)[2:-2]
         assert np.abs(np.log(ratio)).max() < 0.1
         assert np.abs(np.log(ratio)).mean() < 0.01
@@ -94,7 +93,7 @@ def test_speech_is_voiced_where_it_is() -> None:
     for pitch_hz in (70, 220):
         names = ["sil", *(name for name in PHONE_TARGETS if name not in ("sil", "sp")), "sil"]
         audio, phones = synthesise([(name, 0.15) for name in names], pitch_hz=pitch_hz)
-        result = np.exp(log_f0(audio).astype(float))
+        result = np.exp(f0.log_f0(audio).astype(float))
         known = pitch_hz * np.linspace(1.06, 0.94, len(result))
         error = np.abs(result / known - 1)
         assert np.nanmedian(error) < 0.005
@@ -138,17 +137,6 @@ def test_loudness_and_an_offset_change_nothing() -> None:
     assert found(samples + np.float32(0.5)) == pytest.approx(found(samples), rel=2e-3, nan_ok=True)
 
 
-def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
-    hertz = 120 + 40 * np.sin(np.arange(RATE_HZ) / 4000)
-    samples = voice(hertz)
-    samples[8_000:12_000] = noise(4000) / 10
-    whole = found(samples)
-    assert 0 < np.isnan(whole).sum() < len(whole)
-    for block in (1, 7, 64):
-        monkeypatch.setattr(module, "BLOCK", block)
-        assert found(samples) == pytest.approx(whole, rel=1e-4, nan_ok=True)
-
-
 def test_very_short_recordings_work() -> None:
     for count in (400, 401, 639, 1600):
         result = found(voice(steady(200))[:count])
@@ -162,7 +150,7 @@ def test_level_and_pitch_of_a_tone_that_rises_and_gets_louder():
     hz, gain = np.where(time_s < 1, 120.0, 180.0), np.where(time_s < 1, 0.1, 0.4)
     phase = 2 * np.pi * np.cumsum(hz) / 16_000
     samples = gain * sum(np.sin(k * phase) / k for k in range(1, 6))
-    voice = prosody_of(Audio(samples.astype(np.float32), 16_000))
+    voice = f0.prosody_of(Audio(samples.astype(np.float32), 16_000))
     assert len(voice.level_db) == len(voice.log_f0) == 201
     assert voice.level_db[120:180].mean() - voice.level_db[20:80].mean() == pytest.approx(20 * np.log10(4), abs=0.3)
     assert np.exp(np.nanmedian(voice.log_f0[20:80])) == pytest.approx(120, rel=0.03)
@@ -170,10 +158,10 @@ def test_level_and_pitch_of_a_tone_that_rises_and_gets_louder():
 
 
 def test_silence_is_quiet_and_without_pitch_and_a_level_is_the_mean_power_of_10_ms_before_and_after():
-    silent = prosody_of(Audio(np.zeros(16_000, np.float32), 16_000))
+    silent = f0.prosody_of(Audio(np.zeros(16_000, np.float32), 16_000))
     assert silent.level_db.max() < -80
     assert not np.isfinite(silent.log_f0).any()
     samples = np.random.default_rng(4).normal(0, 0.1, 1_650).astype(np.float32)
-    levels = prosody_of(Audio(samples, 16_000)).level_db
+    levels = f0.prosody_of(Audio(samples, 16_000)).level_db
     around = [samples[max(160 * n - 160, 0) : 160 * n + 160].astype(float) for n in range(11)]
     assert levels == pytest.approx([10 * np.log10(np.mean(part**2) + 1e-9) for part in around])

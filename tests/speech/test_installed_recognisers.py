@@ -10,13 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion import errors, types
 from lipmotion.speech.recognition import installed_recognisers
-from lipmotion.speech.recognition.installed_recognisers import recognise_words
-from lipmotion.types import Audio, TimedTranscript
 
 WORDS = [(" See", 0.1, 0.5), (" five,", 0.6, 1.0), (" 20-foot", 1.0, 1.6)]
-AUDIO = Audio(np.linspace(-1, 1, 20_000, dtype=np.float32), 16_000)
+AUDIO = types.Audio(np.linspace(-1, 1, 20_000, dtype=np.float32), 16_000)
 
 
 @pytest.fixture(autouse=True)
@@ -97,7 +95,7 @@ def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
     return given
 
 
-def check_words(transcript: TimedTranscript | None) -> None:
+def check_words(transcript: types.TimedTranscript | None) -> None:
     assert transcript.words == ("see", "five", "20", "foot")
     times = [time for word in transcript.lines[0].words for time in (word.start_s, word.end_s)]
     assert times == pytest.approx([0.1, 0.5, 0.6, 1.0, 1.0, 1.36, 1.36, 1.6])
@@ -106,25 +104,25 @@ def check_words(transcript: TimedTranscript | None) -> None:
 
 def test_whisper(whisper: type[WhisperModel], tmp_path: Path) -> None:
     for _ in range(2):
-        check_words(recognise_words(AUDIO, "whisper"))
+        check_words(installed_recognisers.recognise_words(AUDIO, "whisper"))
     options = {"device": "cpu", "compute_type": "int8", "local_files_only": True}
     assert whisper.loaded == [(str(tmp_path), options)]
 
 
 def test_whisper_without_times_of_words_and_in_another_language(
-    whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    whisper: type[WhisperModel], caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(whisper, "segments", [SimpleNamespace(start=0.5, end=2.0, text=" [Music] Hi!", words=None)])
-    found = recognise_words(AUDIO, "whisper")
+    whisper.segments = [SimpleNamespace(start=0.5, end=2.0, text=" [Music] Hi!", words=None)]
+    found = installed_recognisers.recognise_words(AUDIO, "whisper")
     assert found.words == ("hi",)
     assert (found.lines[0].words[0].start_s, found.lines[0].end_s) == (None, 2.0)
-    monkeypatch.setattr(whisper, "language", "fr")
-    assert recognise_words(AUDIO, "whisper") is None
+    whisper.language = "fr"
+    assert installed_recognisers.recognise_words(AUDIO, "whisper") is None
     assert "recognises the language 'fr', not English; its words are not used" in caplog.text
 
 
 def test_vosk(vosk: list[bytes]) -> None:
-    check_words(recognise_words(AUDIO, "vosk"))
+    check_words(installed_recognisers.recognise_words(AUDIO, "vosk"))
     sound = np.frombuffer(b"".join(vosk), "<i2")
     assert len(sound) == 20_000
     assert (sound[0], sound[-1]) == (-32_768, 32_767)
@@ -133,8 +131,8 @@ def test_vosk(vosk: list[bytes]) -> None:
 @pytest.mark.usefixtures("whisper", "vosk")
 def test_models_that_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(kind: str, message: str) -> None:
-        with pytest.raises(InputError, match=message):
-            recognise_words(AUDIO, kind)
+        with pytest.raises(errors.InputError, match=message):
+            installed_recognisers.recognise_words(AUDIO, kind)
 
     (tmp_path / "model.bin").write_bytes(b"bad")
     refused("whisper", "faster-whisper cannot read this model: Unsupported model binary")
@@ -153,5 +151,5 @@ def test_models_that_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_packages_that_are_not_installed(kind: str, package: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.delenv(f"LIPMOTION_{kind.upper()}_MODEL")  # what to install comes first
-    with pytest.raises(MissingDependencyError, match=rf'needs {package}: pip install ".*\[{kind}\]"'):
-        recognise_words(AUDIO, kind)
+    with pytest.raises(errors.MissingDependencyError, match=rf'needs {package}: pip install ".*\[{kind}\]"'):
+        installed_recognisers.recognise_words(AUDIO, kind)

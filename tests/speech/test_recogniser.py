@@ -6,16 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Model, load_model
-from lipmotion.errors import AlignmentError, CorpusError, InputError
+from lipmotion import Model, errors, load_model
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.pipeline.training.train import train_phone_models
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition import general as general_module
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.recognition import recogniser
 from lipmotion.speech.recognition import recogniser as module
-from lipmotion.speech.recognition import word_search
 from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Timeline, Unit, silent_monitor
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
@@ -30,24 +27,18 @@ def sentences() -> list[ToySentence]:
 
 
 @pytest.fixture(scope="module")
-def passage(sentences: list[ToySentence]) -> AnalysedAudio:
-    """The sound of a passage, whose frames are those in which it is recognised."""
-    return analysed(sentences[0].audio).passages[0].audio
-
-
-@pytest.fixture(scope="module")
 def hmm(toy_model: Model) -> UnitHmm:
     return toy_model.phones
 
 
 def align(hmm: UnitHmm, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: str = "own") -> Timeline[Unit]:
     heard = analysed(audio)
-    return Recogniser(hmm, kind).align(heard, heard.mfcc(), words, lexicon)
+    return recogniser.Recogniser(hmm, kind).align(heard, heard.mfcc(), words, lexicon)
 
 
 def recognise(hmm: UnitHmm, audio: Audio, kind: str = "own") -> Timeline[Unit]:
     heard = analysed(audio)
-    return Recogniser(hmm, kind).recognise(heard, heard.mfcc())
+    return recogniser.Recogniser(hmm, kind).recognise(heard, heard.mfcc())
 
 
 def phones(units: Timeline[Unit]) -> list[str]:
@@ -78,14 +69,11 @@ def test_the_words_are_found_where_they_are(hmm: UnitHmm, sentences: list[ToySen
     assert np.percentile(np.abs(errors_s), 90) < 0.05
 
 
-def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after(
-    hmm: UnitHmm, passage: AnalysedAudio, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bounds = np.array([0, 10, 12, 40, 60, passage.frames])
-    monkeypatch.setattr(word_search, "decode_path", lambda *_: (("sil", "p", "sil", "aa", "sil"), bounds))
-    found = recognise(hmm, passage)
+def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after_and_silences_are_one() -> None:
+    bounds = np.array([0, 10, 12, 40, 60, 80, 100])
+    found = module._timeline([(phone, "") for phone in ("sil", "p", "sil", "aa", "sil", "sil")], bounds, 1.0)
     assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
-    assert covers(found, passage.duration_s)
+    assert covers(found, 1.0)
     assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
 
 
@@ -145,10 +133,10 @@ def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: UnitHmm, se
 def test_too_many_words_for_the_sound_and_an_unknown_kind_are_refused(
     hmm: UnitHmm, sentences: list[ToySentence]
 ) -> None:
-    with pytest.raises(AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+"):
+    with pytest.raises(errors.AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+"):
         align(hmm, sentences[0].audio, ["baby"] * 50, Lexicon())
-    with pytest.raises(InputError, match="'best'; required one of: auto, words, fast, own, general"):
-        Recogniser(hmm, "best")
+    with pytest.raises(errors.InputError, match="'best'; required one of: auto, words, fast, own, general"):
+        recogniser.Recogniser(hmm, "best")
 
 
 @pytest.mark.recordings
@@ -186,20 +174,9 @@ def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: li
     assert aligned == align(hmm, said.audio, said.words, lexicon, "general")
     assert aligned != align(hmm, said.audio, said.words, lexicon, "own")
     found = recognise(hmm, said.audio, "auto")
-    again = Recogniser(hmm, "general").align_phones(said.audio, analysed(said.audio).mfcc(), found)
+    again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, analysed(said.audio).mfcc(), found)
     assert phones(found) == phones(again)
     assert [span.start_s for span in found] == pytest.approx([span.start_s for span in again], abs=0.011)
-
-
-def test_noises_are_silence_and_silences_are_one(
-    hmm: UnitHmm, passage: AnalysedAudio, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bounds = np.array([0, 10, 30, 40, 60, 80, passage.frames])
-    labels = ("+spn+", "sil", "aa", "+nsn+", "sil", "+spn+")
-    monkeypatch.setattr(word_search, "decode_path", lambda *_: (labels, bounds))
-    found = recognise(hmm, passage, "general")
-    assert phones(found) == ["sil", "aa", "sil"]
-    assert [span.start_s for span in found] == pytest.approx([0, 0.295, 0.395])
 
 
 @pytest.mark.recordings
@@ -234,13 +211,9 @@ def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model
     assert np.exp(combined.hmm.bigram.log_probability).sum(axis=1) == pytest.approx(1, abs=1e-4)
 
 
-@pytest.mark.parametrize(("kept", "trust"), [(0, 0.4), (9, 0.0), (9, 0.4)])
-def test_evidence_is_the_sum_of_both(
-    toy_model: Model, trust: float, kept: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(general_module, "KEPT_FRAMES", kept)
-    draw = np.random.default_rng(0)
-    own, general = draw.normal(size=(2, 9, 39)).astype(np.float32)
+@pytest.mark.parametrize("trust", [0.0, 0.4])
+def test_evidence_is_the_sum_of_both(toy_model: Model, trust: float) -> None:
+    own, general = np.random.default_rng(0).normal(size=(2, 9, 39)).astype(np.float32)
     combined = combine_phones(toy_model.phones)
     log_likelihoods = combined_log_likelihoods(combined, own, trust, general)
     wanted = general_model().log_density(general)[:, combined.columns] + trust * combined.hmm.mixtures.log_likelihood(
@@ -272,5 +245,5 @@ def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) 
     bad = (good[0][0], ("five",) * 100)
     hmm = train_phone_models([*good, bad], Lexicon(), SMALL, silent_monitor)
     assert np.array_equal(hmm.mixtures.means, train_phone_models(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
-    with pytest.raises(CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
+    with pytest.raises(errors.CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
         train_phone_models([bad], Lexicon(), SMALL, silent_monitor)

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.errors import InputError
-from lipmotion.types import Audio
+from lipmotion import errors, types
 from lipmotion_faces.corpus.sound_offset import ALIKE, BEEP, CLAP, sound_marks, sound_offset
 from speech.recorded_twice import RATE_HZ, beep, clap, recorded_twice, speech_like
 
@@ -48,30 +47,30 @@ def test_claps_and_beeps_are_found_where_they_are():
     chance = np.random.default_rng(1)
     samples = scene(chance, CLAP) + 1e-3 * chance.normal(size=int(6.2 * RATE_HZ))
     samples[: RATE_HZ // 4] += beep(2000.0)[: RATE_HZ // 4]
-    marks = sound_marks(Audio(samples.astype(np.float32), RATE_HZ))
+    marks = sound_marks(types.Audio(samples.astype(np.float32), RATE_HZ))
     assert [(mark.kind, round(mark.time_s, 1)) for mark in marks if mark.time_s < 2] == [(BEEP, 0.0), (CLAP, MARK_S)]
     assert marks[0].hertz == pytest.approx(2000, abs=32)
 
 
 def test_speech_holds_no_beep():
     chance = np.random.default_rng(2)
-    marks = sound_marks(Audio(scene(chance, "").astype(np.float32), RATE_HZ))
+    marks = sound_marks(types.Audio(scene(chance, "").astype(np.float32), RATE_HZ))
     assert not [mark for mark in marks if mark.kind == BEEP]
 
 
 def test_different_sounds_are_refused():
     chance = np.random.default_rng(3)
-    one, other = (Audio(scene(chance, "").astype(np.float32), RATE_HZ) for _ in range(2))
-    with pytest.raises(InputError, match=r"is not clear: no clap and no beep is in both.*give the offset"):
+    one, other = (types.Audio(scene(chance, "").astype(np.float32), RATE_HZ) for _ in range(2))
+    with pytest.raises(errors.InputError, match=r"is not clear: no clap and no beep is in both.*give the offset"):
         sound_offset(one, other)
 
 
 def test_silence_and_two_rates_are_refused():
     for samples in (np.zeros(RATE_HZ), np.full(RATE_HZ, 0.5), np.zeros(50)):
-        silent = Audio(samples.astype(np.float32), RATE_HZ)
-        with pytest.raises(InputError):
+        silent = types.Audio(samples.astype(np.float32), RATE_HZ)
+        with pytest.raises(errors.InputError):
             sound_offset(silent, silent)
         assert sound_marks(silent) == ()
     sound = np.zeros(RATE_HZ, np.float32)
-    with pytest.raises(InputError, match="16000 and 48000 Hz, required one rate"):
-        sound_offset(Audio(sound, RATE_HZ), Audio(sound, 48_000))
+    with pytest.raises(errors.InputError, match="16000 and 48000 Hz, required one rate"):
+        sound_offset(types.Audio(sound, RATE_HZ), types.Audio(sound, 48_000))

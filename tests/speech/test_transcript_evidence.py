@@ -8,11 +8,8 @@ from numpy.typing import NDArray
 from lipmotion import Model, load_model
 from lipmotion.corpora.folder import spell_name
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition import agreement
+from lipmotion.speech.recognition import agreement, general, recogniser
 from lipmotion.speech.recognition import transcript_evidence as module
-from lipmotion.speech.recognition.general import PHONES as GENERAL_PHONES
-from lipmotion.speech.recognition.general import general_features, general_model
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import (
     GAP_COST,
     PHONE_COST,
@@ -222,7 +219,7 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
 ) -> None:
     """Frame by frame, by name."""
     sentence = sentences[0]
-    density = general_model().log_density(general_features(sentence.audio))
+    density = general.general_model().log_density(general.general_features(sentence.audio))
     names = {"ax": "AH", "axr": "ER", "ix": "IH"}
     spoken = [
         (n, number, span.label.phone)
@@ -232,9 +229,9 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
     ]
     wanted: dict[int, list[float]] = {}
     for frame, number, phone in spoken[:: agreement.FRAME_STEP]:
-        row = GENERAL_PHONES.index(names.get(phone, phone.upper()))
+        row = general.PHONES.index(names.get(phone, phone.upper()))
         wanted.setdefault(number, []).append(
-            max(density[frame].reshape(len(GENERAL_PHONES), 3)[row].max(), agreement.WORST_SCORE)
+            max(density[frame].reshape(len(general.PHONES), 3)[row].max(), agreement.WORST_SCORE)
         )
     mean = np.mean([np.mean(scores) for scores in wanted.values()])
     assert agreement.agreement_score(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
@@ -242,7 +239,7 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
 
 @pytest.mark.long
 def test_right_words_agree_and_wrong_ones_do_not(sentences: list[ToySentence], toy_model: Model) -> None:
-    phones = Recogniser(toy_model.phones, "auto")
+    phones = recogniser.Recogniser(toy_model.phones, "auto")
     for said in sentences:
         features = analysed(said.audio).mfcc()
         right, order, wrong = (
@@ -305,7 +302,7 @@ def test_places_near_one_another_are_one_stretch() -> None:
 def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Path) -> None:
     """Docs/robustness.md."""
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[::4]
-    phones, whole, half = Recogniser(load_model().phones, "auto"), 0, 0
+    phones, whole, half = recogniser.Recogniser(load_model().phones, "auto"), 0, 0
     for name in names:
         audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), spell_name(name)
         assert words is not None
@@ -321,7 +318,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
 def test_real_recordings(recordings: Path) -> None:
     """No false alarm, and most transcripts of other clips found (docs/robustness.md)."""
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[::2]
-    phones = Recogniser(load_model().phones, "auto")
+    phones = recogniser.Recogniser(load_model().phones, "auto")
     right, wrong = [], []
     for name, other in zip(names, [*names[7:], *names[:7]], strict=True):
         audio = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv")
@@ -339,7 +336,7 @@ def test_real_recordings(recordings: Path) -> None:
 def test_synthetic_voices_are_believed() -> None:
     """What they say in their own way does not decide alone: by the mean over frames most of them were doubted."""
     texts = "Loyal boys voice their choice to employers.", "Sharp knives belong in the upper drawer."
-    phones = Recogniser(load_model().phones, "auto")
+    phones = recogniser.Recogniser(load_model().phones, "auto")
     for voice in installed_voices()[::2]:
         audio, _ = next(speak_sentences([texts[0]], voice))
         right, wrong = (

@@ -8,11 +8,8 @@ from numpy.typing import NDArray
 
 from lipmotion import animate
 from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, average_power, find_spoken_frames
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW, log_energy
-from lipmotion.speech.sound import voice_activity
-from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db, levels_db_at, quietest_s, spoken_spans
+from lipmotion.speech.features import analysed_audio, mfcc
+from lipmotion.speech.sound import audio_files, pauses, voice_activity
 from lipmotion.types import Audio
 from lipmotion.units import is_silent
 from testing.toy import toy_sentences
@@ -75,7 +72,7 @@ def test_stretches_are_in_order_bounded_and_hold_all_sound() -> None:
 def spoken(number: int) -> Samples:
     """Return a sentence of the toy corpus, in whole frames."""
     samples = toy_sentences(12)[number].audio.samples
-    return samples[: len(samples) // HOP * HOP]
+    return samples[: len(samples) // mfcc.HOP * mfcc.HOP]
 
 
 def noise(seconds: float, units: float) -> Samples:
@@ -90,7 +87,7 @@ def louder(samples: Samples, decibels: float) -> Samples:
 
 def passages(*parts: Samples) -> list[voice_activity.Stretch]:
     """Return the passages of sounds that follow one another."""
-    return voice_activity.find_passages(log_energy(np.concatenate(parts)))
+    return voice_activity.find_passages(mfcc.log_energy(np.concatenate(parts)))
 
 
 def moved(found: list[voice_activity.Stretch], frames: int) -> list[voice_activity.Stretch]:
@@ -111,7 +108,7 @@ def test_a_passage_is_the_same_whatever_silence_is_around_it(before_s: float, af
 
 def test_a_noise_as_loud_as_the_room_may_be_its_margin_and_nothing_more() -> None:
     (found,) = moved(passages(noise(5, 25), spoken(0), noise(5, 25)), -500)
-    sound = np.flatnonzero(find_spoken_frames(log_energy(spoken(0))))
+    sound = np.flatnonzero(find_spoken_frames(mfcc.log_energy(spoken(0))))
     assert sound[0] - voice_activity.PASSAGE_MARGIN - 2 <= found.first <= sound[0] - 10
     assert sound[-1] + 10 <= found.end <= sound[-1] + voice_activity.PASSAGE_MARGIN + 3
 
@@ -126,13 +123,13 @@ def test_a_passage_is_the_same_at_any_level(decibels: float) -> None:
 def test_lines_are_passages_of_their_own_whatever_their_levels(gap_s: float, decibels: float) -> None:
     """The room of a line 30 dB softer is more than 80 dB beneath the other: its margins hold nothing, or all of it."""
     one, other = spoken(1), spoken(0)
-    place = len(one) // HOP + round(100 * gap_s)
+    place = len(one) // mfcc.HOP + round(100 * gap_s)
     (first_alone,), (second_alone,) = passages(one, noise(9, 0)), passages(other)
     first, second = passages(one, noise(gap_s, 0), louder(other, decibels))
     assert first == first_alone
     (second,) = moved([second], -place)
     if decibels:
-        sound = np.flatnonzero(find_spoken_frames(log_energy(other)))
+        sound = np.flatnonzero(find_spoken_frames(mfcc.log_energy(other)))
         assert second_alone.first <= second.first <= sound[0] + 3
         assert sound[-1] - 3 <= second.end <= second_alone.end
     else:
@@ -145,14 +142,14 @@ def test_lines_are_passages_of_their_own_whatever_their_levels(gap_s: float, dec
 
 def test_a_pause_within_a_line_does_not_divide_it() -> None:
     samples = spoken(0)
-    half = len(samples) // HOP // 2 * HOP
+    half = len(samples) // mfcc.HOP // 2 * mfcc.HOP
     assert len(passages(samples[:half], noise(0.4, 0), samples[half:])) == 1
 
 
 def test_every_line_of_a_stem_of_ten_minutes_is_a_passage() -> None:
-    energies = [log_energy(spoken(number)) for number in range(12)]
+    energies = [mfcc.log_energy(spoken(number)) for number in range(12)]
     loudest = max(float(values.max()) for values in energies)
-    stem = np.full(60_000, loudest + np.log(DYNAMIC_RANGE), np.float32)
+    stem = np.full(60_000, loudest + np.log(mfcc.DYNAMIC_RANGE), np.float32)
     starts = [300 + 4900 * number for number in range(12)]
     for start, values in zip(starts, energies, strict=True):
         stem[start : start + len(values)] = values
@@ -189,13 +186,13 @@ def test_what_is_no_voice_is_no_passage(sound: NDArray[np.float64], units: float
 
 def level_passage(samples: Samples) -> Samples:
     """Return a passage at the level of all passages."""
-    gain = voice_activity.passage_gain(log_energy(samples))
+    gain = voice_activity.passage_gain(mfcc.log_energy(samples))
     return voice_activity.apply_gain(samples, np.arange(len(gain)), gain)
 
 
 def loudness_db(samples: Samples, seconds: slice) -> float:
     """Return the level of the loudest quarter of a second in some seconds of a recording."""
-    level = average_power(log_energy(samples)) - np.log(WINDOW)
+    level = average_power(mfcc.log_energy(samples)) - np.log(mfcc.WINDOW)
     return float(level[100 * seconds.start : 100 * seconds.stop].max() / DECIBEL)
 
 
@@ -210,7 +207,7 @@ def test_a_passage_has_one_gain_and_the_level_of_all(decibels: float) -> None:
 
 def test_a_voice_that_becomes_softer_is_raised() -> None:
     """It falls by 28 dB within two seconds."""
-    samples = np.concatenate([spoken(number)[40 * HOP : 240 * HOP] for number in range(4)])
+    samples = np.concatenate([spoken(number)[40 * mfcc.HOP : 240 * mfcc.HOP] for number in range(4)])
     fall_db = np.interp(np.arange(len(samples)) / RATE_HZ, [2, 4], [0, 28])
     falling = (samples * 10 ** (-fall_db / 20)).astype(np.float32)
     levelled = level_passage(falling)
@@ -233,8 +230,8 @@ IN_NOISE = VOICES[:2]
 
 
 def in_frames(path: Path) -> Samples:
-    samples = read_audio(path).samples
-    return samples[: len(samples) // HOP * HOP]
+    samples = audio_files.read_audio(path).samples
+    return samples[: len(samples) // mfcc.HOP * mfcc.HOP]
 
 
 def assert_same_motion(line: Samples, samples: Samples, place: int, largest: float = 0.005) -> None:
@@ -273,15 +270,15 @@ def test_silence_gain_and_another_line_change_no_motion_of_a_real_voice(recordin
     for gap_s, decibels in ((0.5, 0), (1, -30), (5, 30)):
         before, after = louder(other, -max(decibels, 0)), louder(line, min(decibels, 0))
         samples = np.concatenate([before, noise(gap_s, 0), after])
-        assert_same_motion(line, samples, len(other) // HOP + round(100 * gap_s))
+        assert_same_motion(line, samples, len(other) // mfcc.HOP + round(100 * gap_s))
 
 
 def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:
     sentence = toy_sentences(3)[0]
     samples, tone = sentence.audio.samples.copy(), slice(16_000, 22_400)
-    assert [analysed(each.audio).tones for each in toy_sentences(12)] == [[]] * 12
+    assert [analysed_audio.analysed(each.audio).tones for each in toy_sentences(12)] == [[]] * 12
     samples[tone] = np.float32(0.3) * np.sin(2 * np.pi * 1000 * np.arange(6400) / 16_000).astype(np.float32)
-    audio = AnalysedAudio(samples, 16_000)
+    audio = analysed_audio.AnalysedAudio(samples, 16_000)
     ((first, end),) = audio.tones
     assert abs(first - 100) <= 8
     assert 120 < end <= 142
@@ -292,20 +289,20 @@ def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:
 def test_noise_stands_in_the_gaps_of_a_noise_gate() -> None:
     """Beside digital silence all speech would look alike, and every voice like that of the training."""
     samples = toy_sentences(3)[0].audio.samples.copy()
-    assert voice_activity.fill_gaps(samples, log_energy(samples)) is samples
+    assert voice_activity.fill_gaps(samples, mfcc.log_energy(samples)) is samples
     samples[16_000:20_000] = 0
-    filled = voice_activity.fill_gaps(samples, log_energy(samples))
+    filled = voice_activity.fill_gaps(samples, mfcc.log_energy(samples))
     assert np.array_equal(filled[:15_800], samples[:15_800])
     assert np.array_equal(filled[20_200:], samples[20_200:])
-    loud = average_power(log_energy(samples)).max()
-    drop = (loud - log_energy(filled)[104:122]) / DECIBEL
+    loud = average_power(mfcc.log_energy(samples)).max()
+    drop = (loud - mfcc.log_energy(filled)[104:122]) / DECIBEL
     assert drop.min() > 30
     assert drop.max() < 36
 
 
 def test_hours_of_silence_are_searched_for_tones_block_by_block() -> None:
     samples = np.zeros(4 * 60 * 16_000, np.float32)
-    energy = log_energy(samples)
+    energy = mfcc.log_energy(samples)
     tracemalloc.start()
     try:
         assert voice_activity.find_tones(samples, energy) == []
@@ -332,37 +329,37 @@ SPANS = [(0.5, 1.5), (2.0, 3.2), (4.0, 4.6)]
 
 def test_levels_are_those_of_the_sound():
     sine = np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE).astype(np.float32)
-    levels = levels_db(Audio(0.1 * sine, RATE))
+    levels = pauses.levels_db(Audio(0.1 * sine, RATE))
     assert levels.shape == (100,)
     assert levels[10:-10] == pytest.approx(-23.0, abs=0.3)  # 20 dB below full scale, 3 for a sine
-    assert levels_db(Audio(np.zeros(RATE, np.float32), RATE)).tolist() == [-100.0] * 100
+    assert pauses.levels_db(Audio(np.zeros(RATE, np.float32), RATE)).tolist() == [-100.0] * 100
 
 
 def test_spans_between_pauses_are_not_divided_by_short_dips_and_clicks_are_none():
-    np.testing.assert_allclose(spoken_spans(levels_db(loud_in(SPANS, 5.0))), SPANS, atol=0.04)
-    found = spoken_spans(levels_db(loud_in([(0.5, 1.0), (1.12, 1.5), (2.5, 2.53)], 4.0)))
+    np.testing.assert_allclose(pauses.spoken_spans(pauses.levels_db(loud_in(SPANS, 5.0))), SPANS, atol=0.04)
+    found = pauses.spoken_spans(pauses.levels_db(loud_in([(0.5, 1.0), (1.12, 1.5), (2.5, 2.53)], 4.0)))
     np.testing.assert_allclose(found, [(0.5, 1.5)], atol=0.04)
 
 
 def test_loudness_may_change_in_an_hour():
     loud, soft = loud_in(SPANS * 1, 60.0, gain=0.2, noise=1e-2), loud_in(SPANS, 60.0, gain=0.004, noise=1e-4)
     both = Audio(np.concatenate([loud.samples, soft.samples]), RATE)
-    found = spoken_spans(levels_db(both))
+    found = pauses.spoken_spans(pauses.levels_db(both))
     expected = [*SPANS, *((start_s + 60, end_s + 60) for start_s, end_s in SPANS)]
     np.testing.assert_allclose([span for span in found if span[0] % 60 < 5], expected, atol=0.05)
 
 
 def test_the_quietest_place():
-    levels = levels_db(loud_in([(0.0, 1.0), (1.1, 2.0)], 2.0))
-    assert quietest_s(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
-    assert quietest_s(levels, 1.0, 1.0) == pytest.approx(1.0)
+    levels = pauses.levels_db(loud_in([(0.0, 1.0), (1.1, 2.0)], 2.0))
+    assert pauses.quietest_s(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
+    assert pauses.quietest_s(levels, 1.0, 1.0) == pytest.approx(1.0)
 
 
 def test_levels_at_any_time_also_of_less_than_a_step():
     sound = loud_in(SPANS, 5.0)
-    levels, times_s = levels_db(sound), np.array([-1.0, 0.005, 1.005, 1.01, 99.0])
-    found = levels_db_at(sound, times_s)
+    levels, times_s = pauses.levels_db(sound), np.array([-1.0, 0.005, 1.005, 1.01, 99.0])
+    found = pauses.levels_db_at(sound, times_s)
     assert found == pytest.approx([levels[0], levels[0], levels[100], levels[100:102].mean(), levels[-1]])
     for samples in (0, 159):
-        found = levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
-        assert found == pytest.approx([QUIETEST_DB] * 3)
+        found = pauses.levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
+        assert found == pytest.approx([pauses.QUIETEST_DB] * 3)

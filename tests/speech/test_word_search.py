@@ -1,16 +1,15 @@
+import sys
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lipmotion import load_model
-from lipmotion.errors import MissingDependencyError
+from lipmotion import errors, load_model
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition import recogniser, word_search
-from lipmotion.speech.recognition.recognised_speech import Recognition
-from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.recognition.word_search import FoundWord, is_filler, score_words, words_in
+from lipmotion.speech.recognition import recognised_speech, recogniser, word_search
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples
 from lipmotion.types import Audio
@@ -21,9 +20,12 @@ SAID = "please speak and my lips will move five big blue boats float by".split()
 
 
 @pytest.fixture(autouse=True)
-def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Words are searched by pocketsphinx where no phone recogniser is installed."""
-    monkeypatch.setattr(recogniser, "installed_phone_recogniser", lambda: None)
+    monkeypatch.setitem(sys.modules, "hama", None)
+    installed_phone_recogniser.cache_clear()
+    yield
+    installed_phone_recogniser.cache_clear()
 
 
 @pytest.fixture(scope="module")
@@ -31,22 +33,22 @@ def welcome() -> Audio:
     return read_audio(WELCOME)
 
 
-def recognition(audio: Audio, kind: str = "auto") -> Recognition:
-    return Recogniser(load_model().phones, kind).recognition(audio, analysed(audio).mfcc())
+def recognition(audio: Audio, kind: str = "auto") -> recognised_speech.Recognition:
+    return recogniser.Recogniser(load_model().phones, kind).recognition(audio, analysed(audio).mfcc())
 
 
 @cache
-def of_welcome(kind: str) -> Recognition:
+def of_welcome(kind: str) -> recognised_speech.Recognition:
     """Return what is recognised in the welcome, as it is."""
     return recognition(read_audio(WELCOME), kind)
 
 
-def texts(found: Recognition) -> list[str]:
+def texts(found: recognised_speech.Recognition) -> list[str]:
     return [span.label.text for span in found.words]
 
 
 def test_words_decide_the_phones_of_english(welcome: Audio) -> None:
-    aligned = Recogniser(load_model().phones).align(welcome, analysed(welcome).mfcc(), SAID, Lexicon())
+    aligned = recogniser.Recogniser(load_model().phones).align(welcome, analysed(welcome).mfcc(), SAID, Lexicon())
     for found in (of_welcome("auto"), of_welcome("words")):
         assert texts(found) == SAID
         assert found.word_s > 9 * found.phone_s
@@ -69,16 +71,16 @@ def test_other_kinds_do_not_search_for_words(welcome: Audio, kind: str, monkeypa
 
 
 def test_confidences_grow_with_fit_and_posterior() -> None:
-    by_fit = [score_words(fit, 0.5) for fit in np.linspace(-40, 5, 100)]
-    by_posterior = [score_words(-0.5, share) for share in np.linspace(0, 1, 100)]
+    by_fit = [word_search.score_words(fit, 0.5) for fit in np.linspace(-40, 5, 100)]
+    by_posterior = [word_search.score_words(-0.5, share) for share in np.linspace(0, 1, 100)]
     assert by_fit == sorted(by_fit)
     assert by_posterior == sorted(by_posterior)
-    assert 0 <= score_words(-99, 0) < 0.1
-    assert 0.7 < score_words(0, 1) <= 1
+    assert 0 <= word_search.score_words(-99, 0) < 0.1
+    assert 0.7 < word_search.score_words(0, 1) <= 1
 
 
 def recognise_as(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
-    monkeypatch.setattr(word_search, "words_in", lambda _: tuple(FoundWord(word, 0.5) for word in words))
+    monkeypatch.setattr(word_search, "words_in", lambda _: tuple(word_search.FoundWord(word, 0.5) for word in words))
 
 
 def test_words_that_do_not_fit_are_not_believed(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,7 +108,7 @@ def test_too_many_words_are_not_believed_and_none_leave_the_phones_as_they_are(
 
 
 def test_words_that_are_doubted_still_favour_their_phones(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
-    def agreement(found: Recognition) -> float:
+    def agreement(found: recognised_speech.Recognition) -> float:
         instants = np.arange(0.5, 5, 0.01)
         return float(np.mean([_phone_at(found, time_s) == _phone_at(true, time_s) for time_s in instants]))
 
@@ -116,7 +118,7 @@ def test_words_that_are_doubted_still_favour_their_phones(welcome: Audio, monkey
     assert agreement(recognition(welcome)) > agreement(plain) + 0.05
 
 
-def _phone_at(found: Recognition, time_s: float) -> str:
+def _phone_at(found: recognised_speech.Recognition, time_s: float) -> str:
     return next(span.label.phone for span in found.units if time_s < span.end_s)
 
 
@@ -153,40 +155,40 @@ def test_other_languages_have_no_confident_words(recordings: Path) -> None:
 
 def test_words_of_a_sentence() -> None:
     audio = read_audio(WELCOME)
-    words = words_in(stretch_samples(audio, Stretch(0, len(audio.samples) // 160)))
+    words = word_search.words_in(stretch_samples(audio, Stretch(0, len(audio.samples) // 160)))
     found = [word.text for word in words]
     assert all(0 <= word.posterior <= 1 for word in words)
     assert sum(word.posterior for word in words) > len(words) / 2
     assert {"please", "speak", "lips", "five", "big", "blue", "boats"} <= set(found)
     assert all(Lexicon().known(word) for word in found)
-    assert not any(is_filler(word) or "(" in word for word in found)
+    assert not any(word_search.is_filler(word) or "(" in word for word in found)
 
 
 def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers() -> None:
-    assert [words_in(samples) for samples in (b"", bytes(2), bytes(320))] == [()] * 3
+    assert [word_search.words_in(samples) for samples in (b"", bytes(2), bytes(320))] == [()] * 3
     audio = Audio(np.repeat(np.array([0.0, 0.5, -2.0], np.float32), 160), 16_000)
     samples = np.frombuffer(stretch_samples(audio, Stretch(1, 3)), "<i2")
     assert len(samples) == 320
     assert samples[0] == pytest.approx(16_383, abs=1)
     assert samples[-1] == -32_768
-    assert all(is_filler(entry) for entry in ("<s>", "</s>", "[NOISE]", "++UH++"))
-    assert not is_filler("'bout")
+    assert all(word_search.is_filler(entry) for entry in ("<s>", "</s>", "[NOISE]", "++UH++"))
+    assert not word_search.is_filler("'bout")
 
 
 def test_one_recording_does_not_change_the_next() -> None:
     audio = read_audio(WELCOME)
     samples = stretch_samples(audio, Stretch(0, 120))
     noise = np.random.default_rng(0).normal(0, 9000, 8_000).astype("<i2").tobytes()
-    first = words_in(samples)
-    words_in(noise)
-    assert words_in(samples) == first
+    first = word_search.words_in(samples)
+    word_search.words_in(noise)
+    assert word_search.words_in(samples) == first
 
 
-def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(word_search, "find_english_data", lambda: tmp_path)
+def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     word_search._decoder.cache_clear()
     try:
-        with pytest.raises(MissingDependencyError, match="pip install pocketsphinx"):
-            words_in(b"")
+        with pytest.raises(errors.MissingDependencyError, match="pip install pocketsphinx"):
+            word_search.words_in(b"")
     finally:
         word_search._decoder.cache_clear()

@@ -134,16 +134,6 @@ def test_the_models_own_data_ask_for_no_change() -> None:
         assert oracle.objective(prior, other) < oracle.objective(prior, identity(SIZE))
 
 
-def test_own_statistics_are_those_of_many_frames_drawn() -> None:
-    draw = np.random.default_rng(6)
-    mixtures = random_mixtures(draw, densities=2, gaussians=1)
-    features, densities = spoken(draw, mixtures, 10_000)
-    found, _ = collect_transform_statistics(mixtures, features, densities, identity(SIZE))
-    expected = prior_statistics(mixtures, np.arange(2)).times(10_000)
-    np.testing.assert_allclose(found.quadratic / 10_000, expected.quadratic / 10_000, atol=0.3)
-    np.testing.assert_allclose(found.linear / 10_000, expected.linear / 10_000, atol=0.3)
-
-
 def test_a_prior_holds_a_transform_of_few_frames_back() -> None:
     draw = np.random.default_rng(9)
     mixtures = random_mixtures(draw)

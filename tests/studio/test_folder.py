@@ -71,18 +71,17 @@ def test_a_project_that_is_not_there_is_an_empty_one(tmp_path):
     assert (tmp_path / "hero.studio" / PROJECT).is_file()
 
 
-def test_what_cannot_be_written_is_not_kept(lines, monkeypatch):
+def test_what_cannot_be_written_is_not_kept(lines):
     with open_folder(lines) as folder:
-        before = folder.project
-
-        def refuse() -> None:
-            raise ExportError("the disk is full")
-
-        monkeypatch.setattr(folder, "save", refuse)
+        before, file = folder.project, folder.path / PROJECT
+        content = file.read_bytes()
+        file.unlink()
+        file.mkdir()
         with pytest.raises(ExportError):
             folder.change_recording(1, lambda line: replace(line, mark="redo"))
         assert folder.project == before
-        monkeypatch.undo()
+        file.rmdir()
+        file.write_bytes(content)
 
 
 def test_a_project_is_what_its_document_says():

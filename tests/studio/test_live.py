@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 from children import wait_until
-from lipmotion import LiveFrame
-from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion import LiveFrame, errors
 from lipmotion.live.consumers import Listener, LiveSound, json_line, open_consumer
 from lipmotion.live.face import WEIGHT_NAMES
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
@@ -27,8 +26,7 @@ from websockets.sync.client import connect
 from websockets.sync.server import serve
 from websockets.typing import Origin
 
-from lipmotion_studio.live import servers, vtube
-from lipmotion_studio.live.talking_head import TalkingHead
+from lipmotion_studio.live import servers, talking_head, vtube
 from lipmotion_studio.live.window import LiveWindow
 
 RATE_HZ = 16_000
@@ -118,10 +116,10 @@ def test_pages_of_other_sites_may_not_listen(capsys):
 def test_an_address_that_is_taken_and_a_missing_package_are_told(capsys, monkeypatch):
     with opened("websocket", capsys) as (_, address):
         port = port_of(address)
-        with pytest.raises(InputError, match=f"websocket:{port}"), open_consumer(f"websocket:{port}", print):
+        with pytest.raises(errors.InputError, match=f"websocket:{port}"), open_consumer(f"websocket:{port}", print):
             pass
     monkeypatch.setitem(sys.modules, "websockets.asyncio.server", None)
-    with pytest.raises(MissingDependencyError, match="live"), open_consumer("websocket", print):
+    with pytest.raises(errors.MissingDependencyError, match="live"), open_consumer("websocket", print):
         pass
 
 
@@ -140,7 +138,7 @@ def test_talking_head_gets_sound_with_its_blendshapes(capsys):
             head(frame(number, **weights))
 
     with opened("talkinghead", capsys) as (head, address):
-        assert isinstance(head, TalkingHead)
+        assert isinstance(head, talking_head.TalkingHead)
         assert isinstance(head, Listener)
         with connect(address, proxy=None) as client:
             assert calls(client, 1) == [("streamStart", {"sampleRate": RATE_HZ, "lipsyncType": "blendshapes"})]

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from children import wait_until
-from lipmotion import Corpus, Model, load_model
-from lipmotion.errors import InputError
+from lipmotion import Corpus, Model, errors, load_model
 from testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
@@ -242,14 +241,14 @@ def test_a_damaged_state_is_an_error_with_a_way_back(tmp_path, damage):
     trainer = Trainer(folder)
     assert (trainer.document(), str(file) in trainer.damage, trainer.is_restorable) == (None, True, True)
     for act in (trainer.retry, lambda: trainer.begin("voice", "a", [], VoiceOptions())):
-        with pytest.raises(InputError, match="damaged"):
+        with pytest.raises(errors.InputError, match="damaged"):
             act()
     assert file.read_text(encoding="utf-8") == damage
     trainer.restore()
     document = trainer.document() or {}
     assert (document["name"], document["error"], trainer.damage) == ("me", "no memory", "")
     assert [each.read_text(encoding="utf-8") for each in file.parent.glob("*.damaged-*")] == [damage]
-    with pytest.raises(InputError, match="not damaged"):
+    with pytest.raises(errors.InputError, match="not damaged"):
         trainer.restore()
 
 
@@ -258,5 +257,5 @@ def test_a_damaged_state_without_a_copy_is_an_error(tmp_path):
     (tmp_path / TRAINING / "state.json").write_text("{", encoding="utf-8")
     trainer = Trainer(ProjectFolder(tmp_path))
     assert (trainer.is_restorable, "remove" in trainer.damage) == (False, True)
-    with pytest.raises(InputError, match="damaged"):
+    with pytest.raises(errors.InputError, match="damaged"):
         trainer.restore()

@@ -4,7 +4,6 @@ import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -80,20 +79,6 @@ def test_the_voice_and_the_lexicon_name_the_revision_that_they_saw(studio):
     assert (late.status, len(studio.folder.lexicon().user["tear"])) == (409, 1)
 
 
-def test_two_windows_lose_nothing_of_what_was_acknowledged(studio):
-    """Six changes at once, all of the line as it was: one is made, and is there."""
-    seen = studio.ready()["revision"]
-    ways: list[tuple[str, Any]] = [("transcript", {"text": "mama"}), ("remove", {}), ("mark", {"mark": "redo"})]
-    ways += [("edits", {"steps": [f"phone {number} is p"]}) for number in (2, 3, 4)]
-    requests = [(f"/api/lines/1/{what}", {"revision": seen, **content}) for what, content in reversed(ways)]
-    replies = studio.ask_together(*requests, *[("/api/project", None)] * 3)
-    assert [reply.status for reply in replies[6:]] == [200] * 3
-    made = [reply.content for reply in replies[:6] if reply.status == 200]
-    assert len(made) == 1, [reply.body for reply in replies[:6]]
-    if "steps" in made[0]:
-        assert studio.ready()["steps"] == made[0]["steps"]
-
-
 def test_damaged_edits_are_an_error_with_a_way_back(studio):
     assert studio.edit("phone 3 is p").status == 200
     seen, file = studio.row(), studio.folder.edits(studio.folder.recording(1))
@@ -123,17 +108,6 @@ def test_edits_that_others_make_of_an_open_line_are_seen(studio):
     content = {"revision": state["revision"], "steps": ["phone 4 is p"]}
     assert studio.ask("/api/lines/1/edits", content).status in (409, 503)
     assert studio.ready()["steps"] == ["phone 3 is p"]
-
-
-def test_a_sound_that_was_exchanged_is_neither_opened_nor_played_nor_exported(studio):
-    sound = studio.folder.sound(studio.folder.recording(1))
-    assert studio.ask("/api/lines/1/sound.wav").status == 200
-    sound.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
-    refused = [studio.ask("/api/lines/1/sound.wav"), studio.ask("/api/lines/1/video", {"start_s": 0, "end_s": 0.2})]
-    assert [(reply.status, "another recording" in reply.content["error"]) for reply in refused] == [(422, True)] * 2
-    (failed,) = studio.ask("/api/lines/1/export", {"files": [".csv"]}).content["failed"]
-    assert "another recording" in failed["error"]
-    assert not (studio.folder.path / "exports" / "line.csv").exists()
 
 
 def test_a_project_of_an_earlier_version_adopts_its_sounds(toy_speech, toy_sentence, toy_model, tmp_path, caplog):

@@ -40,19 +40,12 @@ async def answered(
     sent |= {"authorization": f"Bearer {token}"} if token else {}
     sent = {"host": "127.0.0.1"} | sent | (headers or {})
     scope = {
-        "type": "http",
-        "asgi": {"version": "3.0", "spec_version": "2.4"},
-        "http_version": "1.1",
-        "method": method or ("GET" if content is None else "POST"),
-        "scheme": "http",
-        "path": path.partition("?")[0],
-        "raw_path": path.partition("?")[0].encode(),
-        "query_string": path.partition("?")[2].encode(),
-        "root_path": "",
-        "headers": [(name.encode(), value.encode("latin-1")) for name, value in sent.items()],
-        "server": ("test", 80),
+        "type": "http", "asgi": {"version": "3.0", "spec_version": "2.4"}, "http_version": "1.1",
+        "method": method or ("GET" if content is None else "POST"), "scheme": "http", "path": path.partition("?")[0],
+        "raw_path": path.partition("?")[0].encode(), "query_string": path.partition("?")[2].encode(), "root_path": "",
+        "headers": [(name.encode(), value.encode("latin-1")) for name, value in sent.items()], "server": ("test", 80),
         "client": ("test", 1),
-    }
+    }  # fmt: skip
     messages: list[dict[str, Any]] = []
     waiting = [{"type": "http.request", "body": body, "more_body": False}]
 

@@ -4,19 +4,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from lipmotion_studio.study import manifest, settings
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
-from lipmotion_studio.study.manifest import (
-    VIDEOS,
-    Study,
-    StudyVideo,
-    anchor_trials,
-    attention_trials,
-    list_questions,
-    main_trials,
-    practice_trials,
-    write_manifest,
-)
-from lipmotion_studio.study.settings import SCALES
 
 CONDITIONS = ("recording", "visemes", "phones")
 SENTENCES = ("one", "two", "three", "four", "five", "six")
@@ -25,46 +14,51 @@ VALUES = {PAIRED: "first", MOS: "3", RANKING: "70"}
 
 def small_study(
     folder: Path, kind: str = PAIRED, *, sentences: tuple[str, ...] = SENTENCES, content: bytes = b"a video of "
-) -> Study:
+) -> manifest.Study:
     """Write a study whose videos are not videos into a new folder, and return it."""
-    (folder / VIDEOS).mkdir(parents=True)
+    (folder / manifest.VIDEOS).mkdir(parents=True)
     videos = []
     for sentence in sentences:
         for condition in (*CONDITIONS, *([ANCHOR] if sentence == sentences[0] or kind == RANKING else [])):
             data = content + f"{sentence} by {condition}".encode()
             digest = sha256(data).hexdigest()
-            videos.append(StudyVideo(f"{digest[:32]}.mp4", sentence, condition, 0.5, digest, {"made": "test"}))
-            (folder / VIDEOS / videos[-1].file).write_bytes(data)
+            videos.append(manifest.StudyVideo(f"{digest[:32]}.mp4", sentence, condition, 0.5, digest, {"made": "test"}))
+            (folder / manifest.VIDEOS / videos[-1].file).write_bytes(data)
     return planned(folder, kind, sentences, videos)
 
 
-def planned(folder: Path, kind: str, sentences: tuple[str, ...], videos: list[StudyVideo]) -> Study:
+def planned(folder: Path, kind: str, sentences: tuple[str, ...], videos: list[manifest.StudyVideo]) -> manifest.Study:
     """Write the manifest of a study with one trial for practice and one that checks attention, and return it."""
     numbers = {(video.sentence, video.condition): n for n, video in enumerate(videos)}
-    trials = main_trials(kind, CONDITIONS, sentences, numbers)
-    anchors = anchor_trials("recording", sentences[:1], numbers) if kind == PAIRED else []
-    study = Study(
+    trials = manifest.main_trials(kind, CONDITIONS, sentences, numbers)
+    anchors = manifest.anchor_trials("recording", sentences[:1], numbers) if kind == PAIRED else []
+    study = manifest.Study(
         kind=kind,
         title="A study",
         consent="You agree.\nReally.",
         instructions="Watch.",
-        scales=tuple(SCALES) if kind == MOS else (),
+        scales=tuple(settings.SCALES) if kind == MOS else (),
         seed=3,
         conditions={name: name for name in CONDITIONS},
         sentences={name: {"file": name} for name in sentences},
         videos=tuple(videos),
-        trials=(*practice_trials(trials, 1, 3), *trials, *anchors, *attention_trials(kind, trials, 1, 3)),
+        trials=(
+            *manifest.practice_trials(trials, 1, 3),
+            *trials,
+            *anchors,
+            *manifest.attention_trials(kind, trials, 1, 3),
+        ),
         made_by={"lipmotion": "test"},
     )
-    write_manifest(study, folder)
+    manifest.write_manifest(study, folder)
     return study
 
 
-def scripted_answer(study: Study, place: dict[str, Any], value: str = "") -> dict[str, Any]:
+def scripted_answer(study: manifest.Study, place: dict[str, Any], value: str = "") -> dict[str, Any]:
     """Return what the page would send for a trial, in whose place a rater is."""
     trial = next(each for each in study.trials)
     count = len(place["videos"])
-    asked = {PAIRED: 1, MOS: len(list_questions(study, trial)), RANKING: count}[study.kind]
+    asked = {PAIRED: 1, MOS: len(manifest.list_questions(study, trial)), RANKING: count}[study.kind]
     return {
         "trial": place["trial"],
         "values": [value or VALUES[study.kind]] * asked,

@@ -5,20 +5,17 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.job import Job
-from lipmotion.pipeline.request import Outputs, Request
+from lipmotion import errors, types
+from lipmotion.pipeline import job, request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.sources import sha256_of
-from lipmotion.types import Audio
-from lipmotion_faces.video.mp4 import write_mp4
-from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata
+from lipmotion_faces.video import mp4, synthetic_mark
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.design import design_study, encode_video, make_condition, parse_conditions, read_sentences
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
 from lipmotion_studio.study.settings import Region, StudySettings
 
-DRAWN = Job(Request(), Outputs(face="portrait"))
+DRAWN = job.Job(request.Request(), request.Outputs(face="portrait"))
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)
 
 
@@ -28,7 +25,7 @@ def write_video(path: Path, shade: int, seconds: float = 0.4) -> None:
     picture = np.zeros((48, 64, 3), np.uint8) + np.linspace(0, 200, 64).astype(np.uint8)[:, None]
     picture[..., 2] = shade
     sound = np.sin(np.arange(round(16_000 * seconds)) * 0.4).astype(np.float32) * 0.5
-    write_mp4(path, [picture] * round(25 * seconds), fps=25, audio=Audio(sound, 16_000))
+    mp4.write_mp4(path, [picture] * round(25 * seconds), fps=25, audio=types.Audio(sound, 16_000))
 
 
 @pytest.fixture
@@ -109,19 +106,19 @@ def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here):
         audio = read_audio(here / f"{float(ms)}.mp4")
         begins.append(int(np.argmax(np.abs(audio.samples) > 0.2)) / audio.rate_hz)
     assert begins[1] - begins[0] == pytest.approx(0.2, abs=0.03)
-    with pytest.raises(InputError, match="longer sentences"):
+    with pytest.raises(errors.InputError, match="longer sentences"):
         encode_video(source, here / "late.mp4", source, Region(), 5000.0)
 
 
 def test_the_mark_of_a_synthetic_video_stays(here):
-    source, mark = here / "said" / "one.mp4", mark_metadata()
+    source, mark = here / "said" / "one.mp4", synthetic_mark.mark_metadata()
     picture = np.zeros((48, 64, 3), np.uint8)
-    write_mp4(here / "a.mp4", [picture] * 10, fps=25, audio=read_audio(source), tags=mark.tags, xmp=mark.xmp)
+    mp4.write_mp4(here / "a.mp4", [picture] * 10, fps=25, audio=read_audio(source), tags=mark.tags, xmp=mark.xmp)
     for name, is_marked in (("a.mp4", True), ("said/one.mp4", False)):
         encode_video(here / name, here / "shown.mp4", source, Region())
         with av.open(str(here / "shown.mp4")) as container:
-            assert (container.metadata.get("comment") == STATEMENT) == is_marked
-        assert (SOURCE_TYPE.encode() in (here / "shown.mp4").read_bytes()) == is_marked
+            assert (container.metadata.get("comment") == synthetic_mark.STATEMENT) == is_marked
+        assert (synthetic_mark.SOURCE_TYPE.encode() in (here / "shown.mp4").read_bytes()) == is_marked
 
 
 def test_only_the_region_is_shown(here):
@@ -132,7 +129,7 @@ def test_only_the_region_is_shown(here):
     with av.open(str(here / "study" / VIDEOS / study.videos[0].file)) as container:
         assert (container.streams.video[0].width, container.streams.video[0].height) == (32, 24)
     for text in ("0,0,1", "a,b,c,d", "0.5,0,0.6,1", "0,0,0,1", "-0.1,0,1,1", "nan,0,1,1"):
-        with pytest.raises(InputError, match="LEFT,TOP,WIDTH,HEIGHT"):
+        with pytest.raises(errors.InputError, match="LEFT,TOP,WIDTH,HEIGHT"):
             StudySettings(region=text)
 
 
@@ -145,7 +142,7 @@ def test_only_the_region_is_shown(here):
     ],
 )  # fmt: skip
 def test_conditions_that_are_refused(conditions, says):
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(errors.InputError, match=says):
         parse_conditions(conditions)
 
 
@@ -165,29 +162,29 @@ def test_sources_that_lack_something(here, prepare, source, says):
     if not says:
         assert callable(make_condition(str(here / source), said, DRAWN))
         return
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(errors.InputError, match=says):
         make_condition(str(here / source), said, DRAWN)
 
 
 def test_recordings_without_pictures_cannot_be_shown():
     said = read_sentences([Path("examples/welcome.flac")])
-    with pytest.raises(InputError, match="has no pictures"):
+    with pytest.raises(errors.InputError, match="has no pictures"):
         make_condition("recording", said, DRAWN)
 
 
 def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here):
     (here / "study").mkdir()
-    with pytest.raises(ExportError, match="exists"):
+    with pytest.raises(errors.ExportError, match="exists"):
         design_study(here / "study", PAIRED, ["recording", f"ours={here / 'ours'}"], [here / "said"])
     (here / "ours" / "two.mp4").write_bytes(b"no video")
     before = set(here.iterdir())
-    with pytest.raises(InputError):
+    with pytest.raises(errors.InputError):
         design_study(here / "new", PAIRED, ["recording", f"ours={here / 'ours'}"], [here / "said"])
     assert set(here.iterdir()) == before
 
 
 def test_two_sentences_of_one_name_are_refused(here):
-    with pytest.raises(InputError, match="two sentences are called 'one'"):
+    with pytest.raises(errors.InputError, match="two sentences are called 'one'"):
         read_sentences([here / "said", here / "ours" / "one.mp4"])
 
 

@@ -11,9 +11,8 @@ import pytest
 from children import wait_until
 from lipmotion.types import Audio
 from lipmotion_faces.video.mp4 import write_mp4
+from lipmotion_studio.study import conduct, manifest
 from lipmotion_studio.study.answers import MOS, PAIRED, RANKING, Answer
-from lipmotion_studio.study.conduct import collect_answers
-from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo
 from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screens
 from study.firefox import BOTH, Opens
 from study.served import Server, served
@@ -25,23 +24,23 @@ SCREENS = ((1200, 900, "light"), (1200, 900, "dark"), (320, 640, "light"), (320,
 LIMIT_S = 60.0
 
 
-def shown_study(folder: Path, kind: str) -> Study:
+def shown_study(folder: Path, kind: str) -> manifest.Study:
     """Write a study of one sentence, whose videos are real and short."""
-    (folder / VIDEOS).mkdir(parents=True)
+    (folder / manifest.VIDEOS).mkdir(parents=True)
     sound = Audio(np.sin(np.arange(8000) * 0.17).astype(np.float32) * 0.2, 16_000)
     videos = []
     for n, condition in enumerate((*CONDITIONS, "anchor")):
         frames = [np.full((120, 160, 3), (60 * n, 16 * step, 128), np.uint8) for step in range(12)]
-        path = folder / VIDEOS / "made.mp4"
+        path = folder / manifest.VIDEOS / "made.mp4"
         write_mp4(path, frames, fps=25, audio=sound)
         digest = sha256(path.read_bytes()).hexdigest()
         path.rename(path.with_name(f"{digest[:32]}.mp4"))
-        videos.append(StudyVideo(f"{digest[:32]}.mp4", "one", condition, 0.5, digest, {"made": "test"}))
+        videos.append(manifest.StudyVideo(f"{digest[:32]}.mp4", "one", condition, 0.5, digest, {"made": "test"}))
     return planned(folder, kind, ("one",), videos)
 
 
 @contextmanager
-def at_work(opens: Opens, tmp_path: Path, kind: str) -> Iterator[tuple[Browser, Server, Study]]:
+def at_work(opens: Opens, tmp_path: Path, kind: str) -> Iterator[tuple[Browser, Server, manifest.Study]]:
     study = shown_study(tmp_path / "study", kind)
     (tmp_path / "home").mkdir()
     with served(tmp_path / "study", tmp_path / "errors.txt") as server, opens(tmp_path / "home") as window:
@@ -81,14 +80,14 @@ def answer(window: Browser, act: Callable[[], object]) -> None:
     wait_until(lambda: done(window) > before, LIMIT_S)
 
 
-def take_part(window: Browser, study: Study, act: Callable[[], object]) -> None:
+def take_part(window: Browser, study: manifest.Study, act: Callable[[], object]) -> None:
     for _ in study.trials:
         answer(window, act)
     wait_for(window, "thanks")
 
 
 def answers(tmp_path: Path) -> list[Answer]:
-    return [row for row in collect_answers(tmp_path / "study") if not row.practice]
+    return [row for row in conduct.collect_answers(tmp_path / "study") if not row.practice]
 
 
 def test_pairs_by_keys(opens, tmp_path):

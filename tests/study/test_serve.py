@@ -8,9 +8,8 @@ import pytest
 
 from children import wait_until
 from lipmotion.errors import InputError
-from lipmotion_studio.study.conduct import collect_answers, serve_study
+from lipmotion_studio.study import conduct, store
 from lipmotion_studio.study.manifest import VIDEOS
-from lipmotion_studio.study.store import ANSWERS
 from study.hostile import FOREIGN, hostile_requests
 from study.served import Connection, ScriptedRater, raw_reply, send_junk, served
 from study.small_study import small_study
@@ -35,7 +34,7 @@ def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path):
             wait_until(lambda enough=enough: sum(len(rater.acknowledged) for rater in raters) >= enough)  # type: ignore[misc]
             servers[-1].kill()
             known = [dict(rater.acknowledged) for rater in raters]
-            with closing(sqlite3.connect(folder / ANSWERS)) as database:
+            with closing(sqlite3.connect(folder / store.ANSWERS)) as database:
                 stored = database.execute("SELECT rater, trial, value FROM answers").fetchall()
             values = {(rater, trial): value for rater, trial, value in stored}
             assert len(values) == len(stored) >= sum(map(len, known))
@@ -45,7 +44,7 @@ def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path):
         assert [rater.failure for rater in raters] == [None] * RATERS
         assert not any(rater.is_alive() for rater in raters)
         servers[-1].kill()
-    rows = collect_answers(folder)
+    rows = conduct.collect_answers(folder)
     assert len(rows) == RATERS * len(study.trials)
     assert len({(row.rater, row.trial, row.question) for row in rows}) == len(rows)
     by_rater = sorted(
@@ -91,12 +90,12 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
         later.close()
         server.kill()
     assert "Traceback" not in errors.read_text(encoding="utf-8")
-    assert collect_answers(folder) == []
+    assert conduct.collect_answers(folder) == []
 
 
 def test_a_port_that_is_taken_is_said(tmp_path):
     small_study(tmp_path / "study")
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(InputError, match="another --port"):
-        serve_study(tmp_path / "study", port=taken.getsockname()[1])
+        conduct.serve_study(tmp_path / "study", port=taken.getsockname()[1])
     with pytest.raises(InputError, match="another --port"):
-        serve_study(tmp_path / "study", port=70_000)
+        conduct.serve_study(tmp_path / "study", port=70_000)

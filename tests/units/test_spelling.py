@@ -2,8 +2,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.errors import InputError
-from lipmotion.units import PHONES, Lexicon, is_silent
+from lipmotion import errors, units
 from lipmotion.units.spelling import guess_pronunciation, remove_accents
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
@@ -34,7 +33,7 @@ def test_rules() -> None:
 def test_any_word_can_be_said(word: str) -> None:
     phones = guess_pronunciation(word)
     assert phones
-    assert all(phone in PHONES and not is_silent(phone) for phone in phones)
+    assert all(phone in units.PHONES and not units.is_silent(phone) for phone in phones)
 
 
 def test_accents_are_left_out() -> None:
@@ -47,11 +46,11 @@ def test_accents_are_left_out() -> None:
 
 
 def test_a_word_with_accents_is_said_as_the_dictionary_says_it_without() -> None:
-    lexicon = Lexicon()
+    lexicon = units.Lexicon()
     assert lexicon.pronunciations("café") == lexicon.pronunciations("cafe")
     assert all(map(lexicon.known, "café zoë josé renée naïve señor".split()))
     assert not lexicon.known("grögu")
-    assert Lexicon({"café": (("k", "ae"),)}).pronunciations("café") == (("k", "ae"),)
+    assert units.Lexicon({"café": (("k", "ae"),)}).pronunciations("café") == (("k", "ae"),)
 
 
 def test_it_says_what_it_cannot_guess() -> None:
@@ -60,12 +59,12 @@ def test_it_says_what_it_cannot_guess() -> None:
         ("éкран", r"\(а к н р\)"), ("한", r"\(한\)"), ("mp3", r"\(3\)"), ("''", r"\(no letters\)"),
         ("", r"\(no letters\)"),
     ):  # fmt: skip
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             guess_pronunciation(word)
 
 
 def test_a_message_repeats_the_beginning_of_a_word() -> None:
     for word in ("ж" * 1000, "".join(map(chr, range(0x3B1, 0x3C9))) * 100 + "日" * 90):
-        with pytest.raises(InputError, match=r"\.\.\.' is said") as caught:
+        with pytest.raises(errors.InputError, match=r"\.\.\.' is said") as caught:
             guess_pronunciation(word)
         assert len(str(caught.value)) < 300

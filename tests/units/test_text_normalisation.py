@@ -5,8 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.units import check_phones, check_text, check_words, split_words
-from lipmotion.units.spelling import MAX_MARKS, normalise_text
+from lipmotion.units import check_phones, check_text, check_words, spelling, split_words
 from lipmotion.units.text_normalisation import (
     ALWAYS_ALLOWED_CHARACTERS,
     ALWAYS_ALLOWED_PHONES,
@@ -101,9 +100,9 @@ def test_a_letter_keeps_thirty_marks() -> None:
     """More would be sorted, which takes the square of the time; half-width and Tibetan marks hide what they are."""
     for mark in ("\u0301", "\u0316\u0301", "\u0f73", "\uff9e"):
         many = "a" + mark * 200_000
-        kept = "a" + (mark * 200_000)[:MAX_MARKS]
-        assert normalise_text(many) == unicodedata.normalize("NFKC", kept)
-        assert normalise_text("e\u0301" * 100) == "é" * 100
+        kept = "a" + (mark * 200_000)[: spelling.MAX_MARKS]
+        assert spelling.normalise_text(many) == unicodedata.normalize("NFKC", kept)
+        assert spelling.normalise_text("e\u0301" * 100) == "é" * 100
 
 
 def test_a_text_may_be_as_long_as_can_be_said() -> None:

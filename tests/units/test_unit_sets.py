@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.errors import InputError
-from lipmotion.types import Unit
+from lipmotion import errors, types
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, UnitSet, is_silent, list_phone_classes, load_unit_set
 from lipmotion.units.unit_sets import GROUPS
 
@@ -140,7 +139,7 @@ WRONG = {
 def test_a_wrong_table_is_refused(case: str, tmp_path: Path) -> None:
     text, message = WRONG[case]
     assert text != GOOD
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(errors.InputError, match=message):
         load_unit_set(written(tmp_path, text))
 
 
@@ -152,13 +151,13 @@ def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
         (tmp_path, r"not a file|directory|folder"),
         (tmp_path / "binary", "UTF-8"),
     ):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             load_unit_set(asked)
 
 
 def test_a_unit_is_a_word() -> None:
     for unit in ("", "a b", " a", "a\n"):
-        with pytest.raises(InputError, match="not a word"):
+        with pytest.raises(errors.InputError, match="not a word"):
             UnitSet("mine", {**load_unit_set("phone").unit_of_phone, "zh": unit})
 
 
@@ -179,29 +178,29 @@ def test_the_table_in_the_document_is_one(tmp_path: Path) -> None:
 
 
 def test_a_table_is_small_and_so_are_messages(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="required at most 262144: is it a unit table"):
+    with pytest.raises(errors.InputError, match="required at most 262144: is it a unit table"):
         load_unit_set(written(tmp_path, "#" * 300_000))
     for text in ("x " + "q" * 9000, "x" * 9000, "x" * 9000 + " b sil"):
-        with pytest.raises(InputError) as caught:
+        with pytest.raises(errors.InputError) as caught:
             load_unit_set(written(tmp_path, text))
         assert len(str(caught.value)) < 500
 
 
 def test_what_is_spoken_has_the_unit_of_its_phone_or_else_its_own() -> None:
     units = UNIT_SETS["eVis"]
-    assert units.unit_of(Unit("p", "sil-hidden+aa")) == "bilabial"
-    assert units.unit_of(Unit("", "bilabial")) == "bilabial"
-    for label in (Unit("", "MBP"), Unit("xx", "bilabial"), Unit("")):
-        with pytest.raises(InputError):
+    assert units.unit_of(types.Unit("p", "sil-hidden+aa")) == "bilabial"
+    assert units.unit_of(types.Unit("", "bilabial")) == "bilabial"
+    for label in (types.Unit("", "MBP"), types.Unit("xx", "bilabial"), types.Unit("")):
+        with pytest.raises(errors.InputError):
             units.unit_of(label)
 
 
 def test_a_unit_alone_tells_its_phone_only_where_it_has_one() -> None:
     for name, unit, label in (
-        ("eVis", "aw", Unit("aw", "aw")),
-        ("eVis", "bilabial", Unit("", "bilabial")),
-        ("eVis", "silence", Unit("sil", "silence")),
-        ("2vis", "closed", Unit("", "closed")),
-        ("phone", "sp", Unit("sp", "sp")),
+        ("eVis", "aw", types.Unit("aw", "aw")),
+        ("eVis", "bilabial", types.Unit("", "bilabial")),
+        ("eVis", "silence", types.Unit("sil", "silence")),
+        ("2vis", "closed", types.Unit("", "closed")),
+        ("phone", "sp", types.Unit("sp", "sp")),
     ):
         assert UNIT_SETS[name].label(unit) == label

@@ -3,9 +3,7 @@ import pytest
 from lipmotion import load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.units import Lexicon, find_words, group_words, split_words
-from lipmotion.units.text_normalisation import tokenise
-from lipmotion.units.written_forms import MAX_READINGS, list_readings
+from lipmotion.units import Lexicon, find_words, group_words, split_words, text_normalisation, written_forms
 from testing.formant_synthesiser import synthesise
 
 USUAL = (
@@ -107,17 +105,17 @@ def test_the_usual_reading(text: str, words: str) -> None:
 
 
 def test_a_form_has_few_readings_and_a_word_has_one() -> None:
-    assert list_readings("boat") == (("boat",),)
+    assert written_forms.list_readings("boat") == (("boat",),)
     for text, _ in USUAL:
-        for token in tokenise(text):
-            found = list_readings(token)
-            assert 1 <= len(found) == len(set(found)) <= MAX_READINGS
+        for token in text_normalisation.tokenise(text):
+            found = written_forms.list_readings(token)
+            assert 1 <= len(found) == len(set(found)) <= written_forms.MAX_READINGS
             assert all(word == word.lower() and not any(map(str.isdecimal, word)) for said in found for word in said)
 
 
 @pytest.mark.parametrize(("text", "said"), SAID)
 def test_what_else_may_be_said_is_a_reading(text: str, said: str) -> None:
-    (token,) = tokenise(text)
+    (token,) = text_normalisation.tokenise(text)
     forms = Lexicon().spoken_forms(token)
     phones = [phone for word in said.split() for phone in Lexicon().pronunciations(word)[0]]
     assert phones in [[phone for phone, word in form if word] for form in forms]
@@ -135,7 +133,7 @@ def test_the_sound_chooses_the_reading() -> None:
         audio, _ = synthesise(
             [("sil", 0.2), *((phone, 0.09) for phone in phones), ("sil", 0.2)], rate_hz=16_000, seed=1
         )
-        given = ("mother", "saw", *tokenise(text), "to", "baby")
+        given = ("mother", "saw", *text_normalisation.tokenise(text), "to", "baby")
         units = recogniser.align(audio, analysed(audio).mfcc(), given, lexicon)
         found = tuple(span.label for span in group_words(units) if span.label)
         wrong += [(text, found)] if found != words else []

@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -6,7 +7,6 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion_faces.tracking import mediapipe as face_finder
 from lipmotion_faces.tracking.mediapipe import FaceFinder, parts
 
 Box = tuple[float, float, float, float]  # left, top, side, score, px of a picture of 1280 × 720
@@ -80,10 +80,7 @@ def test_parts_cover_the_picture(height, width):
 
 
 def test_missing_mediapipe_is_named_when_it_is_first_needed(monkeypatch):
-    def missing(_: str) -> None:
-        raise MissingDependencyError("MediaPipe")
-
-    monkeypatch.setattr(face_finder, "import_solution", missing)
+    monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
     with FaceFinder() as finder, pytest.raises(MissingDependencyError):
         finder.boxes(np.zeros((48, 64, 3), np.uint8))
 

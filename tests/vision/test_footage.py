@@ -10,7 +10,6 @@ from lipmotion_faces.tracking import video_scan
 from lipmotion_faces.tracking.footage import footage_frames, footage_groups, read_video_frames, track_footage
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.video_scan import scan_video
 from vision.scripted import Opened, face
 from vision.variants import write_frames
 
@@ -162,7 +161,7 @@ class Follower(Opened):
 def followed(monkeypatch):
     pytest.importorskip("cv2")
     monkeypatch.setattr(video_scan, "FaceFollower", Follower)
-    monkeypatch.setattr(Follower, "share", 1.0)
+    Follower.share = 1.0
 
 
 def scenes(path: Path, cuts: list[int], count: int = 120) -> Path:
@@ -179,7 +178,7 @@ def scenes(path: Path, cuts: list[int], count: int = 120) -> Path:
 @pytest.mark.usefixtures("followed")
 def test_times_and_cuts(tmp_path):
     shares: list[float] = []
-    found = scan_video(scenes(tmp_path / "a.mp4", [30, 77], 260), shares.append)
+    found = video_scan.scan_video(scenes(tmp_path / "a.mp4", [30, 77], 260), shares.append)
     np.testing.assert_allclose(found.times_s, np.arange(260) / 25, atol=1e-6)
     np.testing.assert_allclose(found.cuts_s, [1.2, 77 / 25], atol=1e-6)
     assert found.rate_hz == 25
@@ -189,21 +188,21 @@ def test_times_and_cuts(tmp_path):
 
 @pytest.mark.usefixtures("followed")
 def test_faces_are_looked_for_every_two_seconds(tmp_path):
-    scan_video(write_frames(tmp_path / "a.mp4", [np.full((48, 64, 3), n, np.uint8) for n in range(120)]))
+    video_scan.scan_video(write_frames(tmp_path / "a.mp4", [np.full((48, 64, 3), n, np.uint8) for n in range(120)]))
     assert Follower.shown == pytest.approx([0, 50, 100], abs=2)
 
 
 @pytest.mark.usefixtures("followed")
-def test_the_person_matters_only_where_there_are_others(tmp_path, monkeypatch):
+def test_the_person_matters_only_where_there_are_others(tmp_path):
     path = scenes(tmp_path / "a.mp4", [])
-    assert scan_video(path).person == ()
-    monkeypatch.setattr(Follower, "share", 0.6)
-    assert len(scan_video(path).person) == 1
+    assert video_scan.scan_video(path).person == ()
+    Follower.share = 0.6
+    assert len(video_scan.scan_video(path).person) == 1
 
 
 @pytest.mark.usefixtures("followed")
 def test_a_video_that_is_cut_short_is_told(tmp_path):
     content = write_frames(tmp_path / "a.mkv", [np.full((48, 64, 3), n, np.uint8) for n in range(120)]).read_bytes()
-    assert scan_video(tmp_path / "a.mkv").damage == ()
+    assert video_scan.scan_video(tmp_path / "a.mkv").damage == ()
     (tmp_path / "a.mkv").write_bytes(content[: round(0.6 * len(content))])
-    assert scan_video(tmp_path / "a.mkv").damage[-1].startswith("cut short: pictures up to ")
+    assert video_scan.scan_video(tmp_path / "a.mkv").damage[-1].startswith("cut short: pictures up to ")

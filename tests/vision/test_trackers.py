@@ -7,17 +7,13 @@ import numpy as np
 import pytest
 
 from children import run_child
-from lipmotion import prepare
-from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.extensions import GROUPS, install_command
-from lipmotion_faces.tracking.mediapipe import FaceFinder, FaceMesh, MediaPipe, quiet_stderr
-from lipmotion_faces.tracking.packages import import_opencv
+from lipmotion import errors, extensions, prepare
+from lipmotion_faces.tracking import mediapipe, packages, trackers
 from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, TRACKERS, LandmarkTracker, make_tracker
 from vision.scripted import NoFinder, Opened
 
 
-class Brightest(LandmarkTracker, Opened):
+class Brightest(trackers.LandmarkTracker, Opened):
     """Finds a face around the brightest place of a picture."""
 
     def versions(self) -> dict[str, str]:
@@ -32,29 +28,29 @@ class Brightest(LandmarkTracker, Opened):
 
     def faces(self, image: np.ndarray) -> list[np.ndarray]:
         y, x = (int(place) for place in np.unravel_index(int(image[..., 0].argmax()), image.shape[:2]))
-        points = np.random.default_rng(0).uniform(-30, 30, (len(TRACKED_POINTS), 3)) + np.array([x, y, 0])
-        for side, corner in zip((-20, 20), EYE_CORNERS, strict=True):
-            points[TRACKED_POINTS.index(corner)] = x + side, y, 0
+        points = np.random.default_rng(0).uniform(-30, 30, (len(trackers.TRACKED_POINTS), 3)) + np.array([x, y, 0])
+        for side, corner in zip((-20, 20), trackers.EYE_CORNERS, strict=True):
+            points[trackers.TRACKED_POINTS.index(corner)] = x + side, y, 0
         return [points]
 
 
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
     points = {"brightest": f"{__name__}:Brightest", "wrong": "json:dumps"}
-    entries = {name: metadata.EntryPoint(name, value, TRACKERS.group) for name, value in points.items()}
-    monkeypatch.setitem(TRACKERS.__dict__, "_installed", entries)
+    entries = {name: metadata.EntryPoint(name, value, trackers.TRACKERS.group) for name, value in points.items()}
+    monkeypatch.setitem(trackers.TRACKERS.__dict__, "_installed", entries)
 
 
 @pytest.mark.usefixtures("installed")
 def test_a_tracker_is_chosen_by_name() -> None:
-    assert isinstance(make_tracker(), MediaPipe)
-    assert isinstance(make_tracker().boxes(), FaceFinder)
-    assert type(make_tracker("brightest")).__name__ == "Brightest"
-    assert TRACKERS.group in GROUPS
-    with pytest.raises(InputError, match="no tracker 'other'; there are: mediapipe, brightest, wrong"):
-        make_tracker("other")
-    with pytest.raises(InputError, match="required a class of LandmarkTracker"):
-        make_tracker("wrong")
+    assert isinstance(trackers.make_tracker(), mediapipe.MediaPipe)
+    assert isinstance(trackers.make_tracker().boxes(), mediapipe.FaceFinder)
+    assert type(trackers.make_tracker("brightest")).__name__ == "Brightest"
+    assert trackers.TRACKERS.group in extensions.GROUPS
+    with pytest.raises(errors.InputError, match="no tracker 'other'; there are: mediapipe, brightest, wrong"):
+        trackers.make_tracker("other")
+    with pytest.raises(errors.InputError, match="required a class of LandmarkTracker"):
+        trackers.make_tracker("wrong")
 
 
 @pytest.mark.usefixtures("installed")
@@ -68,9 +64,9 @@ def test_an_installed_tracker_finds_the_face_of_a_video(write_video, monkeypatch
 
 def test_a_name_that_is_none_is_refused_before_the_work(write_video, tmp_path: Path) -> None:
     path = write_video(ticks=range(20))
-    with pytest.raises(InputError, match="no tracker 'other'"):
+    with pytest.raises(errors.InputError, match="no tracker 'other'"):
         track(path, tracker="other")
-    with pytest.raises(InputError, match="no tracker 'other'; there are: mediapipe"):
+    with pytest.raises(errors.InputError, match="no tracker 'other'; there are: mediapipe"):
         prepare(path, tmp_path / "corpus", tracker="other")
     assert not (tmp_path / "corpus").exists()
 
@@ -78,10 +74,10 @@ def test_a_name_that_is_none_is_refused_before_the_work(write_video, tmp_path: P
 def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
     monkeypatch.setitem(sys.modules, "cv2", None)
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
-    for load, package in ((import_opencv, "OpenCV"), (FaceMesh, "MediaPipe")):
-        with pytest.raises(MissingDependencyError, match=package) as caught:
+    for load, package in ((packages.import_opencv, "OpenCV"), (mediapipe.FaceMesh, "MediaPipe")):
+        with pytest.raises(errors.MissingDependencyError, match=package) as caught:
             load()
-        assert install_command("video") in str(caught.value)
+        assert extensions.install_command("video") in str(caught.value)
         assert "Python < 3.13" in str(caught.value)
 
 
@@ -92,12 +88,12 @@ def test_versions_need_the_packages(monkeypatch):
         raise metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(metadata, "version", missing)
-    with pytest.raises(MissingDependencyError, match="mediapipe"):
-        make_tracker().versions()
+    with pytest.raises(errors.MissingDependencyError, match="mediapipe"):
+        trackers.make_tracker().versions()
 
 
 def test_native_messages_are_dropped_only_inside(capfd):
-    with quiet_stderr():
+    with mediapipe.quiet_stderr():
         os.write(2, b"noise")
     os.write(2, b"news")
     assert capfd.readouterr().err == "news"

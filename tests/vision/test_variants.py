@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
-from lipmotion.types import Track
-from lipmotion_faces.tracking.mediapipe import FaceMesh
+from lipmotion import errors, types
+from lipmotion_faces.tracking import mediapipe, trackers
 from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS
 from vision.variants import Image, covered, frames_of, in_a_room, write_frames, zoomed
 
 pytestmark = [pytest.mark.video, pytest.mark.recordings]
@@ -29,12 +27,12 @@ def frames(source: Path) -> list[Image]:
 
 
 @pytest.fixture(scope="module")
-def usual(source: Path) -> Track:
+def usual(source: Path) -> types.Track:
     return track(source, crops=False)
 
 
 @pytest.fixture(scope="module")
-def stranger(recordings: Path) -> tuple[list[Image], Track]:
+def stranger(recordings: Path) -> tuple[list[Image], types.Track]:
     pytest.importorskip("mediapipe")
     path = recordings / "grid-others" / "swwp2s.mpg"
     return frames_of(path), track(path, crops=False)
@@ -43,14 +41,14 @@ def stranger(recordings: Path) -> tuple[list[Image], Track]:
 @pytest.fixture(scope="module")
 def mouths(frames: list[Image]) -> list[tuple[NDArray[np.float64], float]]:
     """Where the mouth is in every frame, and the distance between the eyes."""
-    column = {index: n for n, index in enumerate(TRACKED_POINTS)}
-    with FaceMesh() as mesh:
+    column = {index: n for n, index in enumerate(trackers.TRACKED_POINTS)}
+    with mediapipe.FaceMesh() as mesh:
         faces = [mesh.faces(image)[0] for image in frames]
-    right, left = (column[index] for index in EYE_CORNERS)
+    right, left = (column[index] for index in trackers.EYE_CORNERS)
     return [(face[column[13], :2], float(np.linalg.norm(face[right, :2] - face[left, :2]))) for face in faces]
 
 
-def alike(found: Track, usual: Track, at: NDArray[np.intp] | slice = slice(None)) -> float:
+def alike(found: types.Track, usual: types.Track, at: NDArray[np.intp] | slice = slice(None)) -> float:
     """Return the correlation of the two openings, at frames of the usual one that are seen in the other."""
     time_s = usual.motion.time_s[at]
     opening = np.interp(time_s, found.motion.time_s, found.motion["opening"])
@@ -58,7 +56,7 @@ def alike(found: Track, usual: Track, at: NDArray[np.intp] | slice = slice(None)
     return float(np.corrcoef(opening[seen], usual.motion["opening"][at][seen])[0, 1])
 
 
-def unseen(found: Track) -> list[int]:
+def unseen(found: types.Track) -> list[int]:
     return np.flatnonzero(~found.seen).tolist()
 
 
@@ -71,7 +69,7 @@ def unseen(found: Track) -> list[int]:
     ],
 )
 def test_a_face_that_is_small_in_the_picture(
-    tmp_path: Path, frames: list[Image], usual: Track, size: tuple[int, int], scale: float, least: float
+    tmp_path: Path, frames: list[Image], usual: types.Track, size: tuple[int, int], scale: float, least: float
 ) -> None:
     width, height = size
     shown = in_a_room(
@@ -86,7 +84,7 @@ def test_a_face_that_is_small_in_the_picture(
 
 @pytest.mark.long
 def test_something_before_the_mouth(
-    tmp_path: Path, frames: list[Image], usual: Track, mouths: list[tuple[NDArray[np.float64], float]]
+    tmp_path: Path, frames: list[Image], usual: types.Track, mouths: list[tuple[NDArray[np.float64], float]]
 ) -> None:
     hidden = range(30, 45)
     shown = [
@@ -100,7 +98,7 @@ def test_something_before_the_mouth(
 
 
 def test_somebody_else_between(
-    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
+    tmp_path: Path, frames: list[Image], usual: types.Track, stranger: tuple[list[Image], types.Track]
 ) -> None:
     shown = [stranger[0][n] if n in MIDDLE else frame for n, frame in enumerate(frames)]
     found = track(write_frames(tmp_path / "a.mp4", shown), crops=False)
@@ -110,28 +108,28 @@ def test_somebody_else_between(
 
 
 def test_half_of_it_somebody_else_is_refused(
-    tmp_path: Path, frames: list[Image], stranger: tuple[list[Image], Track]
+    tmp_path: Path, frames: list[Image], stranger: tuple[list[Image], types.Track]
 ) -> None:
     path = write_frames(tmp_path / "a.mp4", [*frames[:38], *stranger[0][38:75]])
-    with pytest.raises(InputError, match=r"no face in 37 of 75 frames \(cut at 1\.52 s; another face"):
+    with pytest.raises(errors.InputError, match=r"no face in 37 of 75 frames \(cut at 1\.52 s; another face"):
         track(path, crops=False)
 
 
-def test_a_jump_cut_to_the_same_person_is_followed(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+def test_a_jump_cut_to_the_same_person_is_followed(tmp_path: Path, frames: list[Image], usual: types.Track) -> None:
     found = track(write_frames(tmp_path / "a.mp4", [*frames[:38], *zoomed(frames[38:])]), crops=False)
     assert unseen(found) == []
     assert alike(found, usual) > 0.98
     assert found.notes == ("cut at 1.52 s",)
 
 
-def test_damage_is_told(tmp_path: Path, frames: list[Image], usual: Track) -> None:
+def test_damage_is_told(tmp_path: Path, frames: list[Image], usual: types.Track) -> None:
     content = write_frames(tmp_path / "a.mkv", frames).read_bytes()
     (tmp_path / "a.mkv").write_bytes(content[: round(0.7 * len(content))])
     found = track(tmp_path / "a.mkv", crops=False)
     assert found.notes[0].startswith("cut short: pictures up to ")
     assert alike(found, usual, slice(len(found.seen) - 4)) > 0.99
     (tmp_path / "a.mkv").write_bytes(content[: round(0.3 * len(content))])
-    with pytest.raises(InputError, match=r"pictures for 0\.\d of 3\.0 s; required at least half"):
+    with pytest.raises(errors.InputError, match=r"pictures for 0\.\d of 3\.0 s; required at least half"):
         track(tmp_path / "a.mkv", crops=False)
 
 

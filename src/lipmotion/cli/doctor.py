@@ -125,7 +125,8 @@ def doctor() -> Iterator[InstalledPart]:
         yield InstalledPart(
             "packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install ."
         )
-    for each in (each for each in declared if not each.extra):
+    needed = sorted((each for each in declared if not each.extra), key=lambda each: each.applies)
+    for each in {each.name: each for each in needed}.values():  # of several by one name, that for this Python
         state: State = "absent" if not each.applies else "works" if each.is_met else "broken"
         command = f"pip install '{each.name}{each.versions}'"
         texts = {

@@ -21,8 +21,7 @@ Scores = NDArray[np.float32]
 LogEmission = Callable[[int, int], NDArray[np.float32]]
 """Function of a first frame and an end: returns the log densities of these frames [shape=(end - first, G)]."""
 BLOCK, BLOCK_SCORES = 2048, 1 << 22
-"""Frames whose scores are in memory at a time, and scores, whichever are more; earlier scores are computed again from
-checkpoints."""
+"""Frames whose scores are in memory at a time, and scores, whichever are more; earlier ones are computed again."""
 WINDOW_BLOCK = 512
 """Frames that are searched at a time, through the states that may have one of them; scores before them are computed
 again from checkpoints."""
@@ -62,6 +61,7 @@ def best_path(
     network: NetworkArrays,
     beam: float | None = None,
     windows: Windows | None = None,
+    block_frames: int | None = None,
 ) -> tuple[Index, float]:
     """Return the most probable path and its log probability (-inf: no path).
 
@@ -72,13 +72,13 @@ def best_path(
     beam         : states with a score lower than the best of the frame by more than this are dropped: that is faster,
                    but may miss the best path, or every path; None: exact
     windows      : the frames that each state may have; None: any
+    block_frames : frames whose scores are in memory at a time, B; None: as many as are fastest
     Returns the states of the path [shape=(T,)], and its score. Scores are relative to the best of their frame and in
     single precision: no path is lost, but one may be preferred to another that is better by less than their rounding.
-    Cost: O(T·E) time, O((T / B + B)·(S + G)) memory, with B frames in a block; with windows E and S are of the states
-    and arcs that have windows in one block, so both are linear in the duration where windows are short.
+    Cost: O(T·E) time, O((T / B + B)·(S + G)) memory; with windows E and S are of those that have windows in one block.
     """
     least = np.float32(-np.inf if beam is None else -beam)
-    length = WINDOW_BLOCK if windows else max(BLOCK, BLOCK_SCORES // len(network.emission))
+    length = block_frames or (WINDOW_BLOCK if windows else max(BLOCK, BLOCK_SCORES // len(network.emission)))
     starts = range(0, max(count - 1, 1), length)
     blocks = [_Block(network, windows, start, min(start + length + 1, count)) for start in starts]
     path = np.full(count, -1, np.intp)

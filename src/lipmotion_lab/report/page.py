@@ -166,18 +166,19 @@ class FinishedPart:
     section: Section
 
 
-def report_html(
+def report_html(  # noqa: PLR0913
     title: str,
     about: Mapping[str, str],
     finished: Sequence[FinishedPart],
     left_open: Mapping[str, str],
     failed: Mapping[str, str],
     *,
-    quick: bool,
+    subtitle: str = "How the systems of three papers, and those of this project, do on a corpus.",
+    how_to_read: str = HOW_TO_READ,
+    quick: bool = False,
 ) -> str:
     """Return the page of a report; ``left_open`` and ``failed``: reasons by experiment."""
     style = resources.files(__package__).joinpath("report.css").read_text("utf-8")
-    subtitle = "How the systems of three papers, and those of this project, do on a corpus."
     header = element("header", element("h1", title), element("p", subtitle, class_="quiet"))
     entries = [
         element("li", element("strong", element("a", each.section.title, href=f"#{each.name}")), each.section.verdict)
@@ -187,7 +188,7 @@ def report_html(
         entries += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
     warning = [element("p", QUICK_WARNING, class_="warning")] if quick else []
     overview = element("ul", *entries, class_="overview")
-    main = element("main", *warning, overview, element("p", HOW_TO_READ, class_="quiet"), *map(_section, finished))
+    main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_section, finished))
     footer = element("footer", element("h2", "The corpus and the run"), _listed(about))
     return whole_page(title, style, header, main, footer, script=SCRIPT)
 
@@ -228,11 +229,7 @@ def _section(part: FinishedPart) -> Html:
         section.table.as_html(part.name),
         *more,
         *_clip(part),
-        *(
-            [element("h3", "Pictures like the paper's"), element("div", *pictures, class_="pictures")]
-            if pictures
-            else []
-        ),
+        *([element("h3", "Pictures"), element("div", *pictures, class_="pictures")] if pictures else []),
         element(
             "details",
             element("summary", "How this was made"),
@@ -266,17 +263,17 @@ def _clip(part: FinishedPart) -> list[Html]:
         )
         for video in part.record["videos"]
     ]
-    together = element("button", "Play all together", type="button", class_="together", hidden=True)
+    together = [element("button", "Play all together", type="button", class_="together", hidden=True)] if videos else []
     said = f", “{words}”" if words else ""
     return [
         element("h3", "One recording, seen and heard"),
         element(
             "p",
-            f"{name}{said}: of the compared recordings the one with most p, b and m, whatever the systems make of it. "
-            "Sound alone was given.",
+            f"{name}{said}: of the compared recordings the one with most p, b and m, whatever the systems make of it."
+            f"{' Sound alone was given.' if videos else ''}",
             class_="quiet",
         ),
-        element("div", together, element("div", *videos, class_="videos"), class_="clip"),
+        element("div", *together, element("div", *videos, class_="videos"), class_="clip"),
         element("h3", "Its opening of the mouth"),
         element("p", "Dashed: recorded, in eye distances; line: generated; shaded: p, b and m.", class_="quiet"),
         element("div", *draw_curves(part.motion, part.section.shown), class_="grid"),

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import KINDS, chains, observations, structure
-from lipmotion.engines import engine_named
+from lipmotion import engines, types
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.explanation import (
     chain_states,
@@ -17,7 +17,6 @@ from lipmotion.engines.coupled.explanation import (
 )
 from lipmotion.motion import generation
 from lipmotion.testing.examples import CHANNELS, examples, speech, timeline
-from lipmotion.types import Explanation, NamedProbability, silent_monitor
 from oracles import coupled as oracle
 
 every = pytest.mark.parametrize(("kind", "sets", "limit"), [kind for kind in KINDS if kind[2] is not None])
@@ -82,8 +81,8 @@ def coupled_options(name):
 
 @cache
 def fitted(name):
-    engine = engine_named("coupled", coupled_options(name))
-    model = engine.fit(examples(4), silent_monitor).model
+    engine = engines.engine_named("coupled", coupled_options(name))
+    model = engine.fit(examples(4), types.silent_monitor).model
     spoken = speech(timeline(SENTENCE))
     inference = engine.inferred(model, spoken.features.values, engine.lattice(model, spoken, slice(None)))
     return model, inference
@@ -91,7 +90,7 @@ def fitted(name):
 
 def explanation(name, row):
     model, inference = fitted(name)
-    return explain_frames([Explanation(row / 100, row, None, "", {})], model, inference, [row])[0]
+    return explain_frames([types.Explanation(row / 100, row, None, "", {})], model, inference, [row])[0]
 
 
 @pytest.mark.parametrize("name", ["ph-vi-CHMM", pytest.param("ph-vi-FHMM", marks=pytest.mark.long)])
@@ -146,14 +145,14 @@ def test_in_silence_away_from_speech_the_mean_is_the_rest_pose():
     model, inference = fitted("ph-vi-CHMM")
     assert model.is_away_from_speech(inference.posteriors.chains[0])[5]
     (found,) = explanation("ph-vi-CHMM", 5).regressions
-    assert found.shares == (NamedProbability("rest", 1.0),)
+    assert found.shares == (types.NamedProbability("rest", 1.0),)
     assert found.channels["opening"].value == pytest.approx(model.rest_pose[0])
 
 
 def test_recordings_of_several_blocks_are_explained_as_one(monkeypatch):
     monkeypatch.setattr(generation, "BLOCK_FRAMES", 60)
     monkeypatch.setattr(generation, "MARGIN_FRAMES", 50)
-    engine, (model, _) = engine_named("coupled", coupled_options("ph-vi-CHMM")), fitted("ph-vi-CHMM")
+    engine, (model, _) = engines.engine_named("coupled", coupled_options("ph-vi-CHMM")), fitted("ph-vi-CHMM")
     spoken = speech(timeline(SENTENCE))
     posteriors = engine.posteriors(model, spoken)
     result = engine.generate(model, spoken)
@@ -169,14 +168,14 @@ def test_recordings_of_several_blocks_are_explained_as_one(monkeypatch):
 def test_without_a_path_an_explanation_has_no_chains():
     model, inference = fitted("ph-vi-CHMM")
     impossible = type(inference.posteriors)(*[*vars(inference.posteriors).values()][:4], -np.inf)
-    nothing = Explanation(0.0, 0, None, "", {})
+    nothing = types.Explanation(0.0, 0, None, "", {})
     lost = type(inference)(inference.observations, inference.lattice, inference.emissions, impossible)
     assert explain_frames([nothing], model, lost, [0]) == [nothing]
 
 
 def test_it_leans_on_recognised_phones_as_far_as_the_voice_is_unknown_or_words_confirm_them():
-    engine = engine_named("coupled", {"states": 1, "asynchrony": 0, "mixtures": 1, "closures": False})
-    model = engine.fit(examples(4), silent_monitor).model
+    engine = engines.engine_named("coupled", {"states": 1, "asynchrony": 0, "mixtures": 1, "closures": False})
+    model = engine.fit(examples(4), types.silent_monitor).model
     recognised = replace(speech(timeline(SENTENCE)), units_known=False)
 
     def motion(of, confidence, voice):

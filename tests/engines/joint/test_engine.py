@@ -4,12 +4,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from lipmotion.engines import engine_from_settings, engine_named
+from lipmotion import engines, errors, types
 from lipmotion.engines.joint.engine import JointEngine, JointModel
-from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import StreamWeights
 from lipmotion.testing.examples import example, examples, speech, timeline
-from lipmotion.types import Example, Generation, Span, Speech, Timeline, Unit, silent_monitor
 from lipmotion.units import UNIT_SETS
 
 SOUND = speech(timeline(("t", "aa", "p", "iy", "m", "uw", "s", "aa")))
@@ -19,25 +17,25 @@ E_VIS = UNIT_SETS["eVis"]
 
 @cache
 def trained(units: str) -> JointModel:
-    return engine(units).fit(examples(8), silent_monitor).model
+    return engine(units).fit(examples(8), types.silent_monitor).model
 
 
 def engine(units: str = "eVis", recognises: bool = True, **options: object) -> JointEngine:
-    found = engine_named("joint", {"units": units, "recognise_units": recognises, "mixtures": 1} | options)
+    found = engines.engine_named("joint", {"units": units, "recognise_units": recognises, "mixtures": 1} | options)
     assert isinstance(found, JointEngine)
     return found
 
 
-def generated(spoken: Speech, units: str = "eVis", **options: object) -> Generation:
+def generated(spoken: types.Speech, units: str = "eVis", **options: object) -> types.Generation:
     return engine(units, **options).generate(trained(units), spoken)
 
 
-def recognised(units: str = "eVis", **options: object) -> Generation:
+def recognised(units: str = "eVis", **options: object) -> types.Generation:
     """What it makes of sound alone: the phones of another recogniser, which it does not ask."""
     return generated(replace(SOUND, units=OTHER_WORDS, units_known=False), units, **options)
 
 
-def spans(units: Timeline[Unit]) -> list[tuple[float, float, str]]:
+def spans(units: types.Timeline[types.Unit]) -> list[tuple[float, float, str]]:
     return [(span.start_s, span.end_s, span.label.phone) for span in units]
 
 
@@ -65,7 +63,7 @@ def test_recognised_units_are_units_and_no_phones() -> None:
             assert span.label.phone == "sil"
         else:
             assert len(E_VIS.phones(unit)) > 1
-            assert span.label == Unit("", unit, confidence=0.0)
+            assert span.label == types.Unit("", unit, confidence=0.0)
 
 
 @pytest.mark.long
@@ -99,10 +97,10 @@ def test_a_closed_unit_that_silence_shares_closes_nothing_by_itself() -> None:
     assert pinned.motion.values == pytest.approx(free.motion.values, abs=1e-9)
 
 
-def late(units: Timeline[Unit], by_s: float) -> Timeline[Unit]:
+def late(units: types.Timeline[types.Unit], by_s: float) -> types.Timeline[types.Unit]:
     """Return units whose inner bounds are all later."""
     edges = [units[0].start_s, *(span.start_s + by_s for span in units.spans[1:]), units[-1].end_s]
-    return Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges, edges[1:], units, strict=False)))
+    return types.Timeline(tuple(types.Span(a, b, s.label) for a, b, s in zip(edges, edges[1:], units, strict=False)))
 
 
 def test_own_alignment_gives_the_times_of_the_sound_to_the_phones_of_words() -> None:
@@ -119,7 +117,7 @@ def test_own_alignment_gives_the_times_of_the_sound_to_the_phones_of_words() -> 
 
 def test_units_without_room_for_their_states_keep_their_times() -> None:
     crowded = timeline(("t", "aa") * 40, 0.02)
-    hasty = replace(SOUND, units=Timeline(tuple(span for span in crowded if span.end_s < 2.0)))
+    hasty = replace(SOUND, units=types.Timeline(tuple(span for span in crowded if span.end_s < 2.0)))
     assert spans(generated(hasty, own_alignment=True).units) == spans(hasty.units)
 
 
@@ -135,11 +133,11 @@ def test_a_flat_start_is_that_of_units_of_equal_length() -> None:
         speech = replace(each.speech, features=features)
         cut.append(replace(each, speech=speech, motion=motion, valid=each.valid[:144]))
     labels = [span.label for span in whole[0].speech.units]
-    equal = Timeline(tuple(Span(0.18 * n, 0.18 * (n + 1), label) for n, label in enumerate(labels)))
+    equal = types.Timeline(tuple(types.Span(0.18 * n, 0.18 * (n + 1), label) for n, label in enumerate(labels)))
     divided = [replace(each, speech=replace(each.speech, units=equal)) for each in cut]
 
-    def means(data: list[Example], flat: bool) -> np.ndarray:
-        hmm = engine("phone", flat_start=flat).fit(data, silent_monitor).model.hmm
+    def means(data: list[types.Example], flat: bool) -> np.ndarray:
+        hmm = engine("phone", flat_start=flat).fit(data, types.silent_monitor).model.hmm
         return hmm.models["speech"].tied.mixtures.means
 
     flat = means(cut, flat=True)
@@ -150,7 +148,7 @@ def test_a_flat_start_is_that_of_units_of_equal_length() -> None:
 
 def test_the_stages_of_a_training_are_trainings_of_their_own() -> None:
     data = examples(8)
-    stages = list(engine(mixtures=4).growing_models(data, silent_monitor))
+    stages = list(engine(mixtures=4).growing_models(data, types.silent_monitor))
     assert [stage.hmm.models["speech"].tied.mixtures.size[1] for stage in stages] == [1, 2, 4]
     alone = trained("eVis")
     assert np.array_equal(
@@ -162,18 +160,18 @@ def test_the_stages_of_a_training_are_trainings_of_their_own() -> None:
 def test_the_two_features_of_the_paper_alone() -> None:
     """§3: "only two features for the lips (mouth opening, pucker)"; the others are in no part of the model."""
     alone = engine(channels="opening width", motion_mixtures=2)
-    model = alone.fit(examples(8), silent_monitor).model
+    model = alone.fit(examples(8), types.silent_monitor).model
     assert model.space.dimensions == 2
     made, every = alone.generate(model, SOUND).motion, generated(SOUND).motion
     assert made.names == ("opening", "width")
     assert np.corrcoef(made["opening"], every["opening"])[0, 1] > 0.9
     assert set(every.names) > set(made.names)
-    with pytest.raises(InputError, match="pucker"):
-        engine(channels="opening pucker").fit(examples(2), silent_monitor)
+    with pytest.raises(errors.InputError, match="pucker"):
+        engine(channels="opening pucker").fit(examples(2), types.silent_monitor)
 
 
 def test_the_preset_is_the_system_of_the_paper() -> None:
-    config = engine_from_settings(preset="hofer2008").config
+    config = engines.engine_from_settings(preset="hofer2008").config
     assert (config.units, config.states, config.f0) == ("eVis", 5, True)
     assert (config.closures, config.articulation) == (False, False)
     assert config.recognise_units
@@ -181,16 +179,16 @@ def test_the_preset_is_the_system_of_the_paper() -> None:
     assert config.hmm.both_neighbours
     assert config.hmm.recognition == StreamWeights(motion=0.0)
     settings = ["speech_weight=0.5", "f0_weight=0.25", "motion_weight=2", "recognition_f0_weight=0"]
-    weighted = engine_from_settings(preset="hofer2008", settings=settings).config.hmm
+    weighted = engines.engine_from_settings(preset="hofer2008", settings=settings).config.hmm
     assert weighted.training == StreamWeights(0.5, 0.25, 0.25, 0.25, 2.0)
     assert weighted.recognition == StreamWeights(1.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def test_weights_that_switch_everything_off_and_units_of_another_set_are_refused() -> None:
-    with pytest.raises(InputError, match="no stream takes part in recognition"):
-        engine_named("joint", {"recognition_speech_weight": 0.0, "f0": False})
-    with pytest.raises(InputError, match="all streams are switched off in training"):
-        engine_named("joint", {"speech_weight": 0.0, "f0_weight": 0.0, "motion_weight": 0.0})
-    unknown = Timeline((Span(0.0, 1.0, Unit("", "WQ")),))
-    with pytest.raises(InputError, match=r"unknown unit 'WQ' without a phone; give a phone, or one of aw ay"):
+    with pytest.raises(errors.InputError, match="no stream takes part in recognition"):
+        engines.engine_named("joint", {"recognition_speech_weight": 0.0, "f0": False})
+    with pytest.raises(errors.InputError, match="all streams are switched off in training"):
+        engines.engine_named("joint", {"speech_weight": 0.0, "f0_weight": 0.0, "motion_weight": 0.0})
+    unknown = types.Timeline((types.Span(0.0, 1.0, types.Unit("", "WQ")),))
+    with pytest.raises(errors.InputError, match=r"unknown unit 'WQ' without a phone; give a phone, or one of aw ay"):
         generated(replace(SOUND, units=unknown))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import PHONE_S, array, costs_of, inventory, target_of, timeline, with_stress
-from lipmotion.engines.selection.concatenation import concatenated, pieces_of, shown_units
+from lipmotion.engines.selection import concatenation, search, windows
 from lipmotion.engines.selection.costs import (
     ABUTTING_JOIN,
     FRACTIONS,
@@ -16,9 +16,6 @@ from lipmotion.engines.selection.costs import (
     SelectionConfig,
     Target,
 )
-from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.windows import phone_windows
 from lipmotion.types import Span, Timeline, Unit
 
 NAMED = {"protected": "p", "invisible": "t", "normal": "s"}
@@ -45,7 +42,7 @@ def test_each_edge_of_a_word_that_differs_costs_once() -> None:
     assert costs.target_costs(target_of(costs, "iy | aa | iy"), 1, every) == pytest.approx([0, 0.07, 0.07, 0.14])
     assert costs.target_costs(target_of(costs, "iy aa iy"), 1, every) == pytest.approx([0.14, 0.07, 0.07, 0])
     wordless = costs.target(
-        phone_windows([Timeline(tuple(Span(n, n + 1.0, Unit("iy")) for n in range(3)))]), None, None
+        windows.phone_windows([Timeline(tuple(Span(n, n + 1.0, Unit("iy")) for n in range(3)))]), None, None
     )
     assert costs.target_costs(wordless, 1, every) == pytest.approx(0)
 
@@ -66,7 +63,7 @@ def test_motion_unlike_the_guide_costs_unless_the_sounds_are_alike() -> None:
     predicted = np.stack([np.full((len(FRACTIONS), 1), each) for each in (0.5, 0.55, 0.9)]).astype(np.float16)
     costs = costs_of(replace(units, predicted=predicted), guide=2.0, trust=0.1)
     wanted = np.full((1, len(FRACTIONS), 1), 0.5)
-    target = costs.target(phone_windows([timeline("aa")]), wanted, wanted)
+    target = costs.target(windows.phone_windows([timeline("aa")]), wanted, wanted)
     distance = 0.3**2 * 2 * PHONE_S * 10
     assert costs.target_costs(target, 0, array(0, 1, 2)) == pytest.approx([0, distance / 4, distance], rel=1e-2)
 
@@ -109,18 +106,18 @@ def test_units_overlap_where_table_1_says() -> None:
         for after, share in row.items():
             for kind in (JOIN_BEFORE, JOIN_AFTER):
                 costs, target, units = overlapping(NAMED[before], NAMED[after], kind)
-                pieces = pieces_of(costs, target, np.array(units))
+                pieces = concatenation.pieces_of(costs, target, np.array(units))
                 assert [piece.join for piece in pieces[1:]] == [kind]
                 middle_s = PHONE_S * (1 + share)
                 assert pieces[1].start_s == pytest.approx(middle_s), (before, after)
-                motion = concatenated(costs.inventory, target, pieces, 61)[:, 0]
+                motion = concatenation.concatenated(costs.inventory, target, pieces, 61)[:, 0]
                 crossing_s = np.interp(0.5, motion, np.arange(61) / 100)
                 assert crossing_s == pytest.approx(middle_s, abs=0.003), (before, after)
                 reach_s = min(share, 1 - share) * PHONE_S - 0.01  # as far from the join as it is from an edge of aa
                 assert (
                     0 < motion[round((middle_s - reach_s) * 100)] < 0.5 < motion[round((middle_s + reach_s) * 100)] < 1
                 )
-                recording = shown_units(target, pieces, 60) // 3
+                recording = concatenation.shown_units(target, pieces, 60) // 3
                 assert (recording == 1).sum() == pytest.approx((3 * PHONE_S - middle_s) * 100, abs=1)
 
 
@@ -146,23 +143,6 @@ def test_velocities_that_differ_cost_where_units_are_joined() -> None:
     assert costs.join_costs(target_of(costs, "aa iy"), 1, array(1), array(2)) == pytest.approx(wanted)
 
 
-def test_the_default_costs_prefer_the_right_word_stress_and_duration() -> None:
-    def chosen(units: RecordedUnits, text: str, *stress: int) -> int:
-        """Return the recording of the vowel, which is the second phone."""
-        costs = costs_of(units, SelectionConfig())
-        found = select(costs, target_of(costs, text, stress or None)).units[1]
-        return int(units.windows.recording[found])
-
-    assert [chosen(inventory("b iy s", "b iy | s"), text) for text in ("b iy s", "b iy | s")] == [0, 1]
-    stressed = with_stress(inventory("b iy s", "b iy s"), -1, 0, -1, -1, 1, -1)
-    assert [chosen(stressed, "b iy s", -1, stress, -1) for stress in (0, 1)] == [0, 1]
-    for factor in (0.5, 1.5):
-        units = inventory("b iy s", "b iy s")
-        times_s = units.windows.times_s.copy()
-        times_s[:3] *= factor
-        assert chosen(replace(units, windows=replace(units.windows, times_s=times_s)), "b iy s") == 1
-
-
 def test_by_default_a_cut_in_a_cluster_and_a_merge_in_another_stress_cost_more() -> None:
     costs = costs_of(inventory("uw", "uw", "s l"), SelectionConfig())
     inside, between = (costs.join_costs(target_of(costs, text), 1, array(0), array(1)) for text in ("s l", "s | l"))
@@ -181,8 +161,8 @@ def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
     """§4: "smoothed for the last 5% of the first unit, and the first 5% of the second unit"."""
     units = inventory("s iy", "uw n", levels=(0, 1), duration_s=1.0)
     costs = costs_of(units)
-    target = costs.target(phone_windows([timeline("s iy uw n", 1.0)]), None, None)
-    motion = concatenated(units, target, pieces_of(costs, target, np.arange(4)), 401)[:, 0]
+    target = costs.target(windows.phone_windows([timeline("s iy uw n", 1.0)]), None, None)
+    motion = concatenation.concatenated(units, target, concatenation.pieces_of(costs, target, np.arange(4)), 401)[:, 0]
     bent = np.flatnonzero((motion > 1e-9) & (motion < 1 - 1e-9))
     assert (bent[0], bent[-1]) == pytest.approx((200 - 0.05 * 200, 200 + 0.05 * 200), abs=1)
     assert np.diff(motion).min() >= 0
@@ -193,6 +173,6 @@ def test_by_default_units_merge_in_a_vowel_rather_than_abut_behind_a_plosive() -
     units = inventory("s p", "uw n", "s p uw", "uw n")
     costs = costs_of(units, SelectionConfig())
     target = target_of(costs, "s p uw n")
-    pieces = pieces_of(costs, target, select(costs, target).units)
+    pieces = concatenation.pieces_of(costs, target, search.select(costs, target).units)
     assert ABUTTING_JOIN not in [piece.join for piece in pieces[1:]]
     assert (pieces[0].unit, pieces[0].stop + (pieces[1].join == JOIN_AFTER)) == (4, 3)

@@ -3,11 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.engines import engine_named
+from lipmotion import engines, errors
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.selection_training import SEGMENT_S, target_of
-from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Generation, Span, Timeline, Unit, silent_monitor
 
@@ -67,8 +66,8 @@ def test_its_description_counts_units_and_names_stand_ins(model: SelectionModel,
 
 def test_options_out_of_their_range_are_refused() -> None:
     for option, value in (("window", 4), ("window", 13), ("invisible", "p"), ("overlap", "other"), ("most", 0.0)):
-        with pytest.raises(InputError, match=option):
-            engine_named("selection", {option: value})
+        with pytest.raises(errors.InputError, match=option):
+            engines.engine_named("selection", {option: value})
 
 
 def test_silence_longer_than_any_recorded_one_stands_still(model: SelectionModel, engine: SelectionEngine) -> None:
@@ -125,7 +124,7 @@ def test_models_that_contradict_themselves_are_refused(model, engine, name, dama
         arrays["store_kept"] = arrays.pop(name)
     else:
         arrays[name] = damage(arrays[name])
-    with pytest.raises(ModelFormatError):
+    with pytest.raises(errors.ModelFormatError):
         engine.from_arrays(arrays)
 
 

@@ -88,15 +88,6 @@ def test_where_matches_are_excluded_the_next_shorter_ones_enter() -> None:
     assert index.candidates(wanted, 0, excluded).tolist() == [17]
 
 
-def test_excluded_units_are_not_found(model: SelectionModel, engine) -> None:
-    index = model.costs(engine.config).index
-    target = phone_windows([spoken("sil b aa t iy")]).contexts(engine.config.invisible_phones, 2)[2]
-    found = index.candidates(target, 5)
-    excluded = np.zeros(len(model.inventory.windows), bool)
-    excluded[found] = True
-    assert not np.isin(index.candidates(target, 5, excluded), found).any()
-
-
 def test_a_phone_without_units_has_a_similar_one_in_its_place(model: SelectionModel) -> None:
     stand_ins = standing_in(model.inventory.windows, model.inventory.usable)
     assert stand_ins["ao"] == "aa"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import costs_of, inventory, timeline
-from lipmotion.engines import engine_from_settings
+from lipmotion import engines, types
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.costs import MINNIS_2000, SelectionConfig, Target
 from lipmotion.engines.selection.engine import SelectionEngine
@@ -17,7 +17,6 @@ from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.engines.selection.windows import TABLE_1, phone_windows
 from lipmotion.testing.examples import examples, speech
 from lipmotion.testing.examples import timeline as spoken
-from lipmotion.types import silent_monitor
 from lipmotion.units import PHONES
 
 PRINTED = SelectionConfig.parsed(MINNIS_2000)
@@ -104,13 +103,13 @@ def test_a_suppressed_phone_is_an_invisible_neighbour_in_table_1() -> None:
 
 
 def test_the_preset_needs_nothing_but_phones() -> None:
-    engine = engine_from_settings(preset="minnis2000")
+    engine = engines.engine_from_settings(preset="minnis2000")
     assert isinstance(engine, SelectionEngine)
     needs = engine.inputs()
     assert (needs.prior, needs.posteriors, needs.conditions) == (False, False, 0)
     assert (engine.config.candidates, engine.config.beam) == (0, 0)
     assert engine.without_closures() == engine
-    changed = engine_from_settings(preset="minnis2000", settings=["candidates=300"])
+    changed = engines.engine_from_settings(preset="minnis2000", settings=["candidates=300"])
     assert changed.config == replace(engine.config, candidates=300)  # type: ignore[attr-defined]
 
 
@@ -131,7 +130,7 @@ def test_a_model_of_the_preset_knows_no_stand_ins_of_suppressed_phones_and_names
 def test_the_preset_is_the_default_without_its_additions() -> None:
     """So that all rows of the experiment may use one model."""
     default = SelectionConfig(guide=0.0, joint_recogniser=False, articulation=False)
-    own, model = (SelectionEngine(config).fit(examples(3), silent_monitor).model for config in (PRINTED, default))
+    own, model = (SelectionEngine(config).fit(examples(3), types.silent_monitor).model for config in (PRINTED, default))
     for sentence in (("b", "aa", "t", "iy", "m", "uw"), ("s", "t", "uw", "p", "iy", "t")):
         wanted = speech(spoken(sentence))
         of_both = [SelectionEngine(PRINTED).generate(each, wanted).motion.values for each in (own, model)]

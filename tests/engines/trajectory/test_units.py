@@ -4,12 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.engines import Engine, engine_named
-from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.motion.closure import find_closable_ranges
-from lipmotion.motion.frame_labels import StateLayout, label_full_context
+from lipmotion import engines, errors, types
+from lipmotion.motion import closure, frame_labels
 from lipmotion.testing.examples import examples, speech, timeline
-from lipmotion.types import Generation, silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, load_unit_set
 
 PLAIN = {"articulation": False, "acoustic_regression": False, "silent_states": 7}
@@ -19,11 +16,11 @@ named = pytest.mark.parametrize("name", UNIT_SETS)
 
 @cache
 def trained(units: str, acoustic_regression: bool = False):
-    engine = engine_named("trajectory", PLAIN | {"units": units, "acoustic_regression": acoustic_regression})
-    return engine, engine.fit(examples(), silent_monitor).model
+    engine = engines.engine_named("trajectory", PLAIN | {"units": units, "acoustic_regression": acoustic_regression})
+    return engine, engine.fit(examples(), types.silent_monitor).model
 
 
-def generated(units: str) -> Generation:
+def generated(units: str) -> types.Generation:
     engine, model = trained(units)
     return engine.generate(model, SPOKEN)
 
@@ -80,7 +77,7 @@ def test_phones_of_one_unit_move_alike():
 @named
 def test_lips_meet_on_p_b_m_whatever_their_unit(name):
     result, (_, model) = generated(name), trained(name)
-    spans = find_closable_ranges(SPOKEN.units, len(result.motion.values))
+    spans = closure.find_closable_ranges(SPOKEN.units, len(result.motion.values))
     assert len(spans) == sum(span.label.phone in LIP_CLOSING for span in SPOKEN.units) == 2
     for span in spans:
         assert result.motion["opening"][span].min() <= model.closure.closed + 1e-9
@@ -88,21 +85,21 @@ def test_lips_meet_on_p_b_m_whatever_their_unit(name):
 
 def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
     """Lips that meet between others do not rest, though their parts may have the number of silence's middle one."""
-    layout = StateLayout(3, 7, 0.1, load_unit_set("2vis"))
-    states = label_full_context(timeline(("p", "aa")), 141, layout)
+    layout = frame_labels.StateLayout(3, 7, 0.1, load_unit_set("2vis"))
+    states = frame_labels.label_full_context(timeline(("p", "aa")), 141, layout)
     assert {state.unit for state in states} == {"open", "closed"}
     assert {layout.name(state) for state in states if state != layout.rest} == {"speech.0", "speech.1", "speech.2"}
     assert states[0] == states[-1] == layout.rest
     assert layout.rest not in states[60:80]
-    layout = StateLayout(5, 5, 0.1, load_unit_set("2vis"))
-    assert layout.rest not in label_full_context(timeline(("p", "b", "m")), 150, layout)[60:90]
+    layout = frame_labels.StateLayout(5, 5, 0.1, load_unit_set("2vis"))
+    assert layout.rest not in frame_labels.label_full_context(timeline(("p", "b", "m")), 150, layout)[60:90]
 
 
-def table_model(folder: Path) -> tuple[Engine, dict]:
+def table_model(folder: Path) -> tuple[engines.Engine, dict]:
     """Train with a table file that is then removed."""
     path = Path(renamed_phones(folder))
-    engine = engine_named("trajectory", PLAIN | {"units": str(path)})
-    model = engine.fit(examples(4), silent_monitor).model
+    engine = engines.engine_named("trajectory", PLAIN | {"units": str(path)})
+    model = engine.fit(examples(4), types.silent_monitor).model
     path.unlink()
     return engine, engine.to_arrays(model)
 
@@ -112,12 +109,12 @@ def test_a_model_needs_its_table_no_more(tmp_path):
     model = engine.from_arrays(arrays)
     assert model.units.unit_of_phone == {phone: f"u{99 - number}{phone}" for number, phone in enumerate(PHONES)}
     assert np.isfinite(engine.generate(model, SPOKEN).motion.values).all()
-    with pytest.raises(InputError, match="no unit set"):
-        engine.fit(examples(1), silent_monitor)
-    with pytest.raises(InputError, match="units"):
-        engine_named("trajectory", {"units": ["eVis"]})
-    with pytest.raises(InputError, match="there are: 2vis"):
-        engine_named("trajectory", {"units": "evis"}).fit(examples(1), silent_monitor)
+    with pytest.raises(errors.InputError, match="no unit set"):
+        engine.fit(examples(1), types.silent_monitor)
+    with pytest.raises(errors.InputError, match="units"):
+        engines.engine_named("trajectory", {"units": ["eVis"]})
+    with pytest.raises(errors.InputError, match="there are: 2vis"):
+        engines.engine_named("trajectory", {"units": "evis"}).fit(examples(1), types.silent_monitor)
 
 
 def changed(pairs: np.ndarray, row: int, column: int, text: str) -> np.ndarray:
@@ -143,5 +140,5 @@ DAMAGES = {
 def test_a_damaged_table_is_refused(tmp_path):
     engine, arrays = table_model(tmp_path)
     for damage in DAMAGES.values():
-        with pytest.raises(ModelFormatError):
+        with pytest.raises(errors.ModelFormatError):
             engine.from_arrays(arrays | {"units": damage(arrays["units"])})

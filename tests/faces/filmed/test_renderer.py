@@ -6,12 +6,9 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.types import Motion
-from lipmotion_faces.appearance.candidates import STEADY
-from lipmotion_faces.appearance.lower_face import mouth_ellipse, mouth_part, moved_part, region_map, relight
+from lipmotion_faces.appearance import candidates, lower_face, placing
 from lipmotion_faces.appearance.person import Appearance, FaceCodes
-from lipmotion_faces.appearance.placing import cut
-from lipmotion_faces.filmed import renderer
-from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.filmed import face, renderer
 from lipmotion_faces.filmed.renderer import BATCH, Background, Stitcher, StitchingOptions
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
@@ -22,7 +19,7 @@ MOUTH_ALONE = StitchingOptions(jaw=False)
 
 
 @pytest.fixture(scope="module")
-def appearance(filmed_face: FilmedFace) -> Appearance:
+def appearance(filmed_face: face.FilmedFace) -> Appearance:
     return filmed_face.appearance
 
 
@@ -59,8 +56,8 @@ def closed(motion: Motion) -> Motion:
 
 def codes_in(appearance: Appearance, backgrounds: list[Background]) -> FaceCodes:
     """What the lower face is like in the footage itself."""
-    faces = [cut(each.frame, region_map(each.face_to_frame, 1), (128, 128)) for each in backgrounds]
-    mouths = np.clip(np.rint(np.stack(faces)), 0, 255).astype(np.uint8)[(slice(None), *mouth_part(1))]
+    faces = [placing.cut(each.frame, lower_face.region_map(each.face_to_frame, 1), (128, 128)) for each in backgrounds]
+    mouths = np.clip(np.rint(np.stack(faces)), 0, 255).astype(np.uint8)[(slice(None), *lower_face.mouth_part(1))]
     chins = np.array([each.chin_px for each in backgrounds], np.float32)
     return replace(appearance.measure_codes(mouths), chin_px=chins)
 
@@ -68,7 +65,7 @@ def codes_in(appearance: Appearance, backgrounds: list[Background]) -> FaceCodes
 def part_in_frame(part: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return which pixels of the frame look at a part of the lower face, or have a neighbour that does."""
     rows, columns = np.mgrid[:FRAME_HEIGHT, :FRAME_WIDTH]
-    to_frame = region_map(place, 1)
+    to_frame = lower_face.region_map(place, 1)
     position = np.linalg.solve(to_frame[:, :2], np.stack([columns.ravel(), rows.ravel()]) - to_frame[:, 2:])
     x, y = (np.floor(each).astype(int) for each in position)
     found = np.zeros(rows.size, bool)
@@ -91,7 +88,7 @@ def test_a_face_in_its_own_footage_is_that_footage(
 ) -> None:
     made = stitched(appearance, codes_in(appearance, backgrounds), backgrounds, jaw=jaw)
     footage = np.stack([each.frame for each in backgrounds]).astype(int)
-    part = moved_part(1) if jaw else mouth_ellipse(1)
+    part = lower_face.moved_part(1) if jaw else lower_face.mouth_ellipse(1)
     inside = np.stack([part_in_frame(part, each.face_to_frame) for each in backgrounds])
     difference = np.abs(made - footage)[inside]
     assert difference.mean() < 3
@@ -109,7 +106,7 @@ def test_outside_nothing_changes_and_a_frame_without_a_face_stays_as_it_is(
     assert np.array_equal(np.stack([each.frame for each in backgrounds]), footage)
     for n, each in enumerate(hidden):
         assert np.array_equal(alone[n], each.frame) == (not each.has_face)
-    for frames, part in ((made, moved_part(1)), (alone, mouth_ellipse(1))):
+    for frames, part in ((made, lower_face.moved_part(1)), (alone, lower_face.mouth_ellipse(1))):
         outside = ~np.stack([part_in_frame(part, each.face_to_frame) for each in backgrounds])
         assert np.array_equal(frames[outside], footage[outside])
         assert (frames[~outside] != footage[~outside]).mean() > 0.3
@@ -124,7 +121,7 @@ def test_a_silent_mouth_onto_a_talking_one(
     made = stitched(appearance, appearance.predict_codes(silent), backgrounds)
     wanted = np.stack([each.frame for each in footage_of(silent, noise=0.0)]).astype(int)
     footage = np.stack([each.frame for each in backgrounds]).astype(int)
-    inside = np.stack([part_in_frame(moved_part(1), each.face_to_frame) for each in backgrounds])
+    inside = np.stack([part_in_frame(lower_face.moved_part(1), each.face_to_frame) for each in backgrounds])
     talks = spoken["opening"] > 0.12
     assert talks.sum() >= 4
     errors = [np.square((each - wanted)[talks][inside[talks]]).mean() for each in (made, footage)]
@@ -137,7 +134,7 @@ def test_a_silent_mouth_onto_a_talking_one(
 def test_a_talking_mouth_onto_a_silent_one(appearance: Appearance, spoken: Motion) -> None:
     backgrounds = footage_of(closed(spoken))
     made = stitched(appearance, appearance.predict_codes(spoken), backgrounds)
-    inside = np.stack([part_in_frame(mouth_ellipse(1), each.face_to_frame) for each in backgrounds])
+    inside = np.stack([part_in_frame(lower_face.mouth_ellipse(1), each.face_to_frame) for each in backgrounds])
     dark = ((made < 90).all(axis=3) & inside).sum(axis=(1, 2))
     assert np.corrcoef(dark, spoken["opening"])[0, 1] > 0.85
 
@@ -145,10 +142,10 @@ def test_a_talking_mouth_onto_a_silent_one(appearance: Appearance, spoken: Motio
 def test_the_light_is_that_of_the_footage(appearance: Appearance, backgrounds: list[Background]) -> None:
     """Under another lamp the same frames are made, under that lamp."""
     lamp = np.array([(1.1, 0.9, 0.7)])
-    lit = [replace(each, frame=relight(each.frame[None], lamp)[0]) for each in backgrounds[:8]]
+    lit = [replace(each, frame=lower_face.relight(each.frame[None], lamp)[0]) for each in backgrounds[:8]]
     codes = appearance.predict_codes(Motion(np.tile([[0.2, 0.55, 0.42]], (8, 1)), 25.0, TOY))
     plain, made = (stitched(appearance, codes, each) for each in (backgrounds[:8], lit))
-    wanted = relight(plain.astype(np.uint8), np.repeat(lamp, 8, axis=0)).astype(int)
+    wanted = lower_face.relight(plain.astype(np.uint8), np.repeat(lamp, 8, axis=0)).astype(int)
     assert np.abs(made - wanted).mean() < 0.5
     assert np.abs(made - wanted).max() <= 12
 
@@ -198,7 +195,7 @@ def test_too_few_frames_of_background(appearance: Appearance, backgrounds: list[
 
 def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
     """The eigenlips of recorded mouths, far apart from one another, are these mouths."""
-    options = StitchingOptions(mouth=replace(STEADY, steadiness=0.0, neighbours=1), noise=False)
+    options = StitchingOptions(mouth=replace(candidates.STEADY, steadiness=0.0, neighbours=1), noise=False)
     chosen = np.arange(0, len(appearance.mouths), 6)
     zeros = np.zeros((len(chosen), appearance.jaw_codes.shape[1]), np.float32)
     codes = FaceCodes(appearance.mouth_codes[chosen], zeros, zeros[:, 0])

@@ -4,21 +4,18 @@ import numpy as np
 import pytest
 
 from faces.head.motions import NOTHING_SAID, opening, parts_seen
-from lipmotion import Staging
-from lipmotion.errors import InputError
-from lipmotion_faces import make_face
-from lipmotion_faces.head import Head
+from lipmotion import Staging, errors
+from lipmotion_faces import head, make_face, testing
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.stage import Stage, camera_for
 from lipmotion_faces.rendering.rasteriser import Camera
-from lipmotion_faces.testing import check_face
 
 
 def test_the_head_is_a_face_like_all_others_and_an_unusable_size_is_refused_at_once():
-    check_face(make_face("head"))
+    testing.check_face(make_face("head"))
     for size in ((63, 120), (160, 0), (129, 120)):
-        with pytest.raises(InputError, match="even number of at least 64"):
-            Head(size=size).render(opening(0), NOTHING_SAID)
+        with pytest.raises(errors.InputError, match="even number of at least 64"):
+            head.Head(size=size).render(opening(0), NOTHING_SAID)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +50,7 @@ def test_a_picture_of_the_moving_part_is_the_whole_picture():
 
 
 def first(motion=None, **settings: Any) -> np.ndarray:
-    face = Head(Staging(size=120, **settings))
+    face = head.Head(Staging(size=120, **settings))
     return next(iter(face.render(opening(*[0.1] * 5) if motion is None else motion, NOTHING_SAID)))
 
 
@@ -71,7 +68,7 @@ def test_a_transparent_picture_over_a_colour_is_the_picture_on_that_colour():
 def test_what_is_switched_off_does_not_move():
     moved = opening(*[0.0] * 60)
     still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)
-    frames = list(Head(still).render(moved, NOTHING_SAID))
+    frames = list(head.Head(still).render(moved, NOTHING_SAID))
     assert all(np.array_equal(frame, frames[0]) for frame in frames[1:])
-    lively = list(Head().with_staging(Staging(size=64)).render(moved, NOTHING_SAID))
+    lively = list(head.Head().with_staging(Staging(size=64)).render(moved, NOTHING_SAID))
     assert not np.array_equal(lively[0], lively[30])

@@ -7,7 +7,6 @@ from lipmotion_faces.head.inside import LOWER_EDGE, lower_drop, lower_teeth, upp
 from lipmotion_faces.head.lips import (
     ARCH,
     COLUMNS,
-    SIDE,
     TEETH_EDGE,
     TEETH_Z,
     VISIBLE_RINGS,
@@ -20,7 +19,6 @@ from lipmotion_faces.head.stage import figure
 
 MEET, FRONT = 4, 15
 """The point of the cross-section where the lips meet, and the rings before the wall of the mouth."""
-UPPER = np.flatnonzero(SIDE > 0)
 PAIRS = [(k, COLUMNS - k) for k in range(1, 40)]
 """Columns of the upper lip, and the column of the lower lip at the same place."""
 SHARES = st.floats(0, 1)

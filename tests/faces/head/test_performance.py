@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from faces.head.motions import NOTHING_SAID, opening, parts_seen, said, steady
+from lipmotion import errors, types
 from lipmotion.articulation.mouth import ROUND_GAP
-from lipmotion.errors import InputError
-from lipmotion.types import Channel, Motion, Prosody
 from lipmotion.units import LIP_CLOSING
 from lipmotion_faces.head.pose import CharacterPose, head_poses
 from lipmotion_faces.head.stage import Stage, camera_for
@@ -49,7 +48,7 @@ def test_each_sound_has_its_own_shape():
 
 def test_the_motion_alone_moves_the_corners():
     values = np.array([[0.05, width] for width in (0.57, 0.57, 0.57, 0.5, 0.5, 0.62, 0.62)])
-    motion = Motion(values, 25.0, (Channel("opening"), Channel("width")))
+    motion = types.Motion(values, 25.0, (types.Channel("opening"), types.Channel("width")))
     narrow, wide = (head_poses(motion, NOTHING_SAID, 25.0)[frame] for frame in (4, 6))
     assert narrow.width < 0.95
     assert wide.width > 1.05
@@ -59,7 +58,7 @@ def test_the_motion_alone_moves_the_corners():
 
 def test_tracked_jaws_are_followed_within_limits():
     values = np.array([[0.0, -1.0], [0.2, -1.05], [0.2, -1.15], [0.2, -9.0]])
-    motion = Motion(np.repeat(values, 3, axis=0), 25.0, (Channel("opening"), Channel("y_152")))
+    motion = types.Motion(np.repeat(values, 3, axis=0), 25.0, (types.Channel("opening"), types.Channel("y_152")))
     jaws = [head_poses(motion, NOTHING_SAID, 25.0)[frame].jaw for frame in (1, 4, 7, 10)]
     assert jaws[0] == pytest.approx(0, abs=0.011)
     assert jaws[1] < jaws[2] < jaws[3] < 0.25
@@ -67,16 +66,16 @@ def test_tracked_jaws_are_followed_within_limits():
 
 def test_articulatory_channels_of_the_motion_come_before_the_phones():
     names = ("opening", "tongue", "lip_tuck", "teeth", "lip_press")
-    motion = Motion(np.tile([0.08, 1.0, 0.0, 1.0, 0.0], (31, 1)), 25.0, tuple(map(Channel, names)))
+    motion = types.Motion(np.tile([0.08, 1.0, 0.0, 1.0, 0.0], (31, 1)), 25.0, tuple(map(types.Channel, names)))
     pose = head_poses(motion, said("f", "aa", "f"), 25.0)[15]
     assert pose.tongue_out > 0.99
     assert pose.bite > 0.99
     assert head_poses(motion, said("f", "f", "f"), 25.0)[15].tuck < 0.01
-    pressed = Motion(np.tile([0.0, 1.0], (41, 1)), 100.0, tuple(map(Channel, ("opening", "lip_press"))))
+    pressed = types.Motion(np.tile([0.0, 1.0], (41, 1)), 100.0, tuple(map(types.Channel, ("opening", "lip_press"))))
     assert head_poses(pressed, said("ah"), 25.0)[5].press == pytest.approx(1.0)
-    with pytest.raises(InputError, match="no channel 'opening'"):
-        head_poses(Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), NOTHING_SAID, 25.0)
-    with pytest.raises(InputError, match="frame rate"):
+    with pytest.raises(errors.InputError, match="no channel 'opening'"):
+        head_poses(types.Motion(np.zeros((3, 1)), 25.0, (types.Channel("width"),)), NOTHING_SAID, 25.0)
+    with pytest.raises(errors.InputError, match="frame rate"):
         head_poses(opening(0.0), NOTHING_SAID, 0.0)
 
 
@@ -84,14 +83,13 @@ def test_a_loud_high_voice_raises_the_brows():
     level, pitch = np.full(300, -30.0), np.full(300, np.log(150.0))
     level[150:170], pitch[150:170] = -10.0, np.log(260.0)
     motion = opening(*[0.05] * 75)
-    flat = Prosody(np.full(300, -10.0), np.full(300, np.log(150.0)))
-    voices, units = (Prosody(level, pitch), flat), said("aa", duration_s=3)
+    flat = types.Prosody(np.full(300, -10.0), np.full(300, np.log(150.0)))
+    voices, units = (types.Prosody(level, pitch), flat), said("aa", duration_s=3)
     with_voice, without = (head_poses(motion, units, 25.0, prosody=voice) for voice in voices)
     assert with_voice[35].brows > without[35].brows + 0.005
 
 
 STAGE_SIZE = (360, 300)
-UNIT = STAGE_SIZE[1] / 0.8
 REST_WIDTH = 0.57
 
 
@@ -113,7 +111,7 @@ def pose_of(phone: str, opening: float, wider: float = 0.0) -> CharacterPose:
     row = (opening, REST_WIDTH + wider)
     rest = (0.0, REST_WIDTH)
     values = np.array([rest] * 40 + [row] * 120 + [rest] * 40)
-    motion = Motion(values, 100.0, (Channel("opening"), Channel("width")))
+    motion = types.Motion(values, 100.0, (types.Channel("opening"), types.Channel("width")))
     pose = head_poses(motion, said("sil", "ah", phone, "ah", "sil"), 25.0)[25]
     return pose._replace(turn=(0.0, 0.0, 0.0), shut=0.0, gaze=(0.0, 0.0))
 

@@ -4,59 +4,37 @@ from itertools import product
 
 import numpy as np
 
-from lipmotion.hmm.multistream.densities import (
-    F0_STREAMS,
-    MOTION,
-    SPEECH,
-    STREAMS,
-    GaussianStatistics,
-    ObservedStream,
-    StreamObservations,
-    StreamScale,
-    TiedDensities,
-    stream_observations,
-)
-from lipmotion.hmm.multistream.model import (
-    JointConfig,
-    JointHmm,
-    StreamModel,
-    TreeCosts,
-    context_questions,
-    grow_forest,
-)
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance
-from lipmotion.hmm.multistream.unit_states import Inventory
-from lipmotion.stats.bigram import Bigram
-from lipmotion.stats.mixture import Mixtures
+from lipmotion.hmm.multistream import densities, model, multistream_training, unit_states
+from lipmotion.stats import bigram, mixture
 
 UNITS = ("a", "b", "c", "d")
 NAMES = ("sil", "sp", *UNITS, "x")
 """``x`` never occurs in utterances."""
 CLASSES = {"early": frozenset("ab"), "late": frozenset("cdx"), "silence": frozenset({"sil", "sp"})}
-DIMENSIONS = {SPEECH: 3, **dict.fromkeys(F0_STREAMS, 1), MOTION: 6}
+DIMENSIONS = {densities.SPEECH: 3, **dict.fromkeys(densities.F0_STREAMS, 1), densities.MOTION: 6}
 
 
-def inventory(states: int = 3, names=NAMES) -> Inventory:
-    return Inventory(tuple(names), tuple(name for name in names if name in ("sil", "sp")), states)
+def inventory(states: int = 3, names=NAMES) -> unit_states.Inventory:
+    return unit_states.Inventory(tuple(names), tuple(name for name in names if name in ("sil", "sp")), states)
 
 
-def config(**changes) -> JointConfig:
+def config(**changes) -> model.JointConfig:
     usual = {"mixtures": 2, "plain_iterations": 4, "iterations": 3, "least_frames": 8.0, "bigram_weight": 1.3}
-    return JointConfig(**(usual | {"insertion": -0.4} | changes))
+    return model.JointConfig(**(usual | {"insertion": -0.4} | changes))
 
 
-def observed(draw: np.random.Generator, frames: int, streams=STREAMS) -> StreamObservations:
+def observed(draw: np.random.Generator, frames: int, streams=densities.STREAMS) -> densities.StreamObservations:
     """Return noise in all streams, with some frames without a value."""
     found = {}
     for name in streams:
-        known = draw.random(frames) < (1.0 if name == SPEECH else 0.7)
-        found[name] = ObservedStream(draw.normal(0, 1.5, (frames, DIMENSIONS[name])) * known[:, None], known)
-    return StreamObservations(found)
+        known = draw.random(frames) < (1.0 if name == densities.SPEECH else 0.7)
+        found[name] = densities.ObservedStream(draw.normal(0, 1.5, (frames, DIMENSIONS[name])) * known[:, None], known)
+    return densities.StreamObservations(found)
 
 
 def random_joint(
-    seed: int, units=("a", "b"), states: int = 3, streams=STREAMS, components: int = 2, **changes
-) -> JointHmm:
+    seed: int, units=("a", "b"), states: int = 3, streams=densities.STREAMS, components: int = 2, **changes
+) -> model.JointHmm:
     """Return models with random densities, and trees with random questions."""
     draw = np.random.default_rng(seed)
     known = inventory(states, ("sil", "sp", *units))
@@ -66,50 +44,48 @@ def random_joint(
         for left, unit, right in product(sides, known.names, sides)
         for state in range(known.count(unit))
     ]
-    questions = context_questions(known, CLASSES)
+    questions = model.context_questions(known, CLASSES)
     parts = {}
     for name in streams:
-        D, has_spaces = DIMENSIONS[name], name in F0_STREAMS
-        sums = GaussianStatistics.zeros(len(seen), 1, D)
+        D, has_spaces = DIMENSIONS[name], name in densities.F0_STREAMS
+        sums = densities.GaussianStatistics.zeros(len(seen), 1, D)
         effects = {place: draw.normal(0, 3, D) for place in product(range(3), (*known.names, ""))}
         means = np.array([sum(effects[i, context[i]] for i in range(3)) for context, _ in seen])
         sums.add(np.arange(len(seen)), 9.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
-        costs = TreeCosts(1.0, 1.0, 0.02, changes.get("both_neighbours", False))
-        forest = grow_forest(name, known, questions, seen, sums, has_spaces=has_spaces, costs=costs)
+        costs = model.TreeCosts(1.0, 1.0, 0.02, changes.get("both_neighbours", False))
+        forest = model.grow_forest(name, known, questions, seen, sums, has_spaces=has_spaces, costs=costs)
         shape = (forest.size, components, D)
-        mixtures = Mixtures(
+        mixtures = mixture.Mixtures(
             np.log(draw.dirichlet(np.full(components, 2.0), forest.size)).astype(np.float32),
             draw.normal(0, 1.5, shape).astype(np.float32),
             draw.uniform(0.3, 2, shape).astype(np.float32),
         )
         voiced = draw.uniform(0.1, 0.9, forest.size) if has_spaces else None
-        parts[name] = StreamModel(
-            StreamScale(draw.normal(0, 1, D), draw.uniform(0.5, 2, D)), forest, TiedDensities(mixtures, voiced)
+        parts[name] = model.StreamModel(
+            densities.StreamScale(draw.normal(0, 1, D), draw.uniform(0.5, 2, D)),
+            forest,
+            densities.TiedDensities(mixtures, voiced),
         )
     count = len(known.names)
-    return JointHmm(
+    return model.JointHmm(
         config(states=states, **changes),
         known,
         parts,
         np.log(draw.uniform(0.2, 0.9, len(known.monophones))),
         np.stack([draw.uniform(1, 4, len(known.monophones)), draw.uniform(1, 3, len(known.monophones))], axis=1),
         known.names,
-        Bigram(known.names, np.log(draw.dirichlet(np.ones(count), count)).astype(np.float32)),
+        bigram.Bigram(known.names, np.log(draw.dirichlet(np.ones(count), count)).astype(np.float32)),
     )
 
 
 SOUNDS = {
-    "sil": (-3.0, 0.0, 0.0),
-    "a": (2.0, 1.5, 0.0),
-    "b": (2.0, -1.5, 1.5),
-    "c": (0.5, 1.5, -2.0),
-    "d": (1.0, -2.0, -1.5),
-}
+    "sil": (-3.0, 0.0, 0.0), "a": (2.0, 1.5, 0.0), "b": (2.0, -1.5, 1.5), "c": (0.5, 1.5, -2.0), "d": (1.0, -2.0, -1.5),
+}  # fmt: skip
 OPENINGS = {"sil": 0.0, "a": 1.0, "b": 0.1, "c": 0.6, "d": 0.3}
 VOICED = ("a", "b", "d")
 
 
-def say(draw: np.random.Generator, units, unseen: bool = True) -> TrainingUtterance:
+def say(draw: np.random.Generator, units, unseen: bool = True) -> multistream_training.TrainingUtterance:
     """Return an utterance of some units, with silence at both ends; each unit depends on its left neighbour."""
     said = ("sil", *units, "sil")
     speech, pitch, opening, edges = [], [], [], [0]
@@ -129,10 +105,10 @@ def say(draw: np.random.Generator, units, unseen: bool = True) -> TrainingUttera
     if unseen and draw.random() < 0.3:
         seen[10:16] = False
         motion[10:16] = np.nan
-    streams = stream_observations(np.concatenate(speech), np.concatenate(pitch), motion, seen)
-    return TrainingUtterance(streams, said, np.array(edges))
+    streams = densities.stream_observations(np.concatenate(speech), np.concatenate(pitch), motion, seen)
+    return multistream_training.TrainingUtterance(streams, said, np.array(edges))
 
 
-def utterances(count: int = 30, seed: int = 0, words: int = 6) -> list[TrainingUtterance]:
+def utterances(count: int = 30, seed: int = 0, words: int = 6) -> list[multistream_training.TrainingUtterance]:
     draw = np.random.default_rng(seed)
     return [say(draw, [UNITS[i] for i in draw.integers(0, 4, words)]) for _ in range(count)]

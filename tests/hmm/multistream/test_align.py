@@ -3,19 +3,16 @@ import pytest
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.hmm.multistream.densities import StreamWeights
-from lipmotion.hmm.multistream.multistream_training import train_joint
-from lipmotion.hmm.multistream.recognise import align, measure_durations
-from lipmotion.hmm.multistream.unit_states import expand_triphones
+from lipmotion.hmm.multistream import densities, multistream_training, recognise, unit_states
 from oracles import joint as slow
 from oracles.sequences import segmentations
 
-WEIGHTS = StreamWeights(1, 0.5, 0.2, 1, 0.7)
+WEIGHTS = densities.StreamWeights(1, 0.5, 0.2, 1, 0.7)
 
 
 def slow_scores(hmm, data, units, weights):
     """Give the score (emissions and transitions) and the durations of every segmentation."""
-    states = expand_triphones(hmm.inventory, units)
+    states = unit_states.expand_triphones(hmm.inventory, units)
     density = np.array(
         [[slow.log_density(hmm, data, state, t, weights) for state in states.triphones] for t in range(data.frames)]
     )
@@ -33,22 +30,22 @@ def test_no_other_path_is_more_probable(bounds):
         data, units = observed(np.random.default_rng([seed, 1]), 9), ("sil", "a", "b")
         scores = slow_scores(hmm, data, units, WEIGHTS)
         _, lengths = max(each for each in scores if bounds in (None, np.cumsum([0, *each[1]])[::2].tolist()))
-        path = align(hmm, data, units, None if bounds is None else np.array(bounds), WEIGHTS)
+        path = recognise.align(hmm, data, units, None if bounds is None else np.array(bounds), WEIGHTS)
         assert path.frames.tolist() == np.repeat(np.arange(6), lengths).tolist()
         assert path.bounds(3).tolist() == np.cumsum([0, *lengths])[::2].tolist()
 
 
 def test_short_units_have_some_of_their_states():
     hmm, data = random_joint(0), observed(np.random.default_rng(1), 10)
-    path = align(hmm, data, ("sil", "a", "b", "a", "sil"), np.array([0, 3, 5, 6, 6, 10]))
+    path = recognise.align(hmm, data, ("sil", "a", "b", "a", "sil"), np.array([0, 3, 5, 6, 6, 10]))
     assert path.frames.tolist()[:6] == [0, 1, 2, 3, 5, 7]
     assert path.bounds(5).tolist() == [0, 3, 5, 6, 6, 10]
 
 
 def test_durations_are_those_of_the_alignment():
     data = utterances(12)
-    hmm = train_joint(data, inventory(), CLASSES, config(mixtures=1))
-    durations = measure_durations(hmm, [(u.observed, u.units) for u in data])
+    hmm = multistream_training.train_joint(data, inventory(), CLASSES, config(mixtures=1))
+    durations = recognise.measure_durations(hmm, [(u.observed, u.units) for u in data])
     assert np.array_equal(durations, hmm.durations)
     rows = [hmm.inventory.monophones["a", state] for state in range(3)]
     assert 6 <= durations[rows, 0].sum() <= 12
@@ -58,9 +55,9 @@ def test_durations_are_those_of_the_alignment():
 def test_what_does_not_fit_is_refused():
     hmm, data = random_joint(6), observed(np.random.default_rng(7), 8)
     with pytest.raises(AlignmentError, match="at least 9 frames"):
-        align(hmm, data, ("a", "b", "a"))
+        recognise.align(hmm, data, ("a", "b", "a"))
     for bounds in ([0, 8], [0, 9, 8], [1, 4, 8], [0, 4, 9]):
         with pytest.raises(InputError, match="bounds"):
-            align(hmm, data, ("a", "b"), np.array(bounds))
+            recognise.align(hmm, data, ("a", "b"), np.array(bounds))
     with pytest.raises(InputError, match="unknown unit"):
-        align(hmm, data, ("q",))
+        recognise.align(hmm, data, ("q",))

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from hmm.multistream.synthetic import CLASSES, NAMES, inventory, random_joint
 from lipmotion.errors import InputError
-from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, GaussianStatistics
-from lipmotion.hmm.multistream.model import TreeCosts, choose_positions, context_questions, grow_forest, unit_forest
+from lipmotion.hmm.multistream import densities, model
 from lipmotion.hmm.multistream.unit_states import (
     Inventory,
     RecognisedUnit,
@@ -23,7 +22,7 @@ SIDES = [name for name in NAMES if name != "sp"]
 
 
 def test_every_unit_that_is_spoken_has_a_leaf_of_its_own():
-    forest = unit_forest(KNOWN, ("sil", "a", "c"))
+    forest = model.unit_forest(KNOWN, ("sil", "a", "c"))
     leaves = {unit: forest.leaf((("sil", unit, "a"), 1)) for unit in NAMES if unit != "sp"}
     assert leaves["b"] == leaves["x"] == leaves["d"]
     assert len({leaves["a"], leaves["c"], leaves["x"], leaves["sil"]}) == 4
@@ -37,10 +36,10 @@ def triphones():
 
 def tied(stream, mean_of, seen):
     means = np.array([mean_of(*state) for state in seen])[:, None]
-    sums = GaussianStatistics.zeros(len(seen), 1, 1)
+    sums = densities.GaussianStatistics.zeros(len(seen), 1, 1)
     sums.add(np.arange(len(seen)), 20.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
-    questions, costs = context_questions(KNOWN, CLASSES), TreeCosts(1.0, 10.0, 0.02)
-    return grow_forest(stream, KNOWN, questions, seen, sums, has_spaces=False, costs=costs)
+    questions, costs = model.context_questions(KNOWN, CLASSES), model.TreeCosts(1.0, 10.0, 0.02)
+    return model.grow_forest(stream, KNOWN, questions, seen, sums, has_spaces=False, costs=costs)
 
 
 def test_units_and_contexts_that_were_never_seen_resolve_by_class():
@@ -71,7 +70,7 @@ def test_acoustic_streams_depend_on_one_neighbour_unless_both_are_asked_about(st
     )
     silent = any(depends("sil", state, position) for state in range(3) for position in (0, 2))
     one, everywhere = ({0}, {2}, False), ({0, 1, 2}, {0, 1, 2}, stream == "motion")
-    assert (left, right, silent) == (one if stream in ACOUSTIC_STREAMS and not both else everywhere)
+    assert (left, right, silent) == (one if stream in densities.ACOUSTIC_STREAMS and not both else everywhere)
 
 
 def test_the_grid_of_leaves_is_the_leaf_beside_each_pair_of_neighbours():
@@ -84,7 +83,7 @@ def test_the_grid_of_leaves_is_the_leaf_beside_each_pair_of_neighbours():
 
 def test_an_even_count_has_no_middle():
     known = inventory(4)
-    assert [choose_positions("f0", known, "a", state) for state in range(4)] == [(0, 1), (0, 1), (1, 2), (1, 2)]
+    assert [model.choose_positions("f0", known, "a", state) for state in range(4)] == [(0, 1), (0, 1), (1, 2), (1, 2)]
 
 
 def test_silence_stands_for_pauses_beside_other_units():
@@ -104,7 +103,7 @@ def test_an_inventory_that_is_none_and_an_unknown_unit_are_refused():
 
 
 def test_classes_of_other_units_are_left_out():
-    names = {question.name for question in context_questions(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
+    names = {question.name for question in model.context_questions(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
     assert names == {*CLASSES, *NAMES}
 
 

@@ -7,12 +7,8 @@ from hypothesis import strategies as st
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.errors import InputError
+from lipmotion.hmm.multistream import generate
 from lipmotion.hmm.multistream.densities import MOTION, SPEECH
-from lipmotion.hmm.multistream.generate import (
-    FrameDensities,
-    select_densities,
-    solve_trajectory,
-)
 from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
 from lipmotion.hmm.multistream.multistream_training import train_joint
 from lipmotion.hmm.multistream.recognise import align
@@ -24,7 +20,7 @@ def random_densities(seed, frames, components, dimensions=2):
     draw = np.random.default_rng(seed)
     precisions = draw.uniform(0.2, 9, (frames, components, 3, dimensions))
     precisions[[0, -1], :, 1:] = 0
-    return FrameDensities(
+    return generate.FrameDensities(
         np.log(draw.dirichlet(np.full(components, 2.0), frames)),
         draw.normal(0, 2, (frames, components, 3, dimensions)),
         precisions,
@@ -36,7 +32,7 @@ def random_densities(seed, frames, components, dimensions=2):
 def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
     densities = random_densities(seed, frames, 1)
     pins = {(frames // 2, 0): 1.5, (frames // 2, 1): -0.5, (0, 1): 0.25} if pinned else {}
-    found = solve_trajectory(densities, pins)
+    found = generate.solve_trajectory(densities, pins)
     for channel in range(2):
         mine = [(frame, value) for (frame, c), value in pins.items() if c == channel]
         mean, precision = densities.means[:, 0, :, channel], densities.precisions[:, 0, :, channel]
@@ -48,8 +44,10 @@ def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
 
 def test_many_steps_over_one_gaussian_change_nothing():
     one = random_densities(1, 15, 1)
-    twins = FrameDensities(np.full((15, 2), np.log(0.5)), one.means.repeat(2, axis=1), one.precisions.repeat(2, axis=1))
-    found, wanted = solve_trajectory(twins), solve_trajectory(one)
+    twins = generate.FrameDensities(
+        np.full((15, 2), np.log(0.5)), one.means.repeat(2, axis=1), one.precisions.repeat(2, axis=1)
+    )
+    found, wanted = generate.solve_trajectory(twins), generate.solve_trajectory(one)
     assert found.values == pytest.approx(wanted.values, abs=1e-9)
     assert found.log_likelihoods[-1] == pytest.approx(wanted.log_likelihoods[0], abs=1e-9)
 
@@ -59,7 +57,7 @@ def test_many_steps_over_one_gaussian_change_nothing():
 def test_the_likelihood_of_the_trajectory_never_falls(frames, components, seed, pinned):
     densities = random_densities(seed, frames, components)
     pins = {(frames - 1, 0): 0.3} if pinned else {}
-    found = solve_trajectory(densities, pins, iterations=50)
+    found = generate.solve_trajectory(densities, pins, iterations=50)
     assert (np.diff(found.log_likelihoods) > -1e-9 * frames).all()
     assert found.log_likelihoods[-1] == pytest.approx(slow_log_likelihood(densities, found.values), abs=1e-8)
     for (frame, channel), value in pins.items():
@@ -81,16 +79,16 @@ def slow_log_likelihood(densities, values):
 def test_mixtures_take_sides():
     means = np.zeros((30, 2, 3, 1))
     means[:, 0, 0], means[:, 1, 0] = 1.0, -1.0
-    densities = FrameDensities(np.log(np.tile([0.6, 0.4], (30, 1))), means, np.full((30, 2, 3, 1), 50.0))
-    assert solve_trajectory(densities).values == pytest.approx(np.ones((30, 1)), abs=0.05)
-    assert solve_trajectory(densities, iterations=1).values == pytest.approx(0.2, abs=0.05)
+    densities = generate.FrameDensities(np.log(np.tile([0.6, 0.4], (30, 1))), means, np.full((30, 2, 3, 1), 50.0))
+    assert generate.solve_trajectory(densities).values == pytest.approx(np.ones((30, 1)), abs=0.05)
+    assert generate.solve_trajectory(densities, iterations=1).values == pytest.approx(0.2, abs=0.05)
 
 
 def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion():
     components = 3
     hmm = random_joint(1, components=components, states=2)
     path = align(hmm, observed(np.random.default_rng(2), 9), ("sil", "a", "b"))
-    found, model = select_densities(hmm, path), hmm.models[MOTION]
+    found, model = generate.select_densities(hmm, path), hmm.models[MOTION]
     leaves = model.forest.leaves(path.states.triphones)[path.frames]
     middle = 4
     wanted = model.tied.mixtures.means[leaves[middle]] * model.scale.deviation + model.scale.mean
@@ -104,7 +102,7 @@ def test_what_was_learned_comes_back():
     hmm = train_joint(utterances(30), inventory(), CLASSES, config())
     for each in utterances(4, seed=9):
         motion, path = each.observed.streams[MOTION], align(hmm, each.observed, each.units, each.bounds)
-        off = solve_trajectory(select_densities(hmm, path)).values - motion.values[:, :2]
+        off = generate.solve_trajectory(generate.select_densities(hmm, path)).values - motion.values[:, :2]
         assert np.sqrt((off[motion.known] ** 2).mean(axis=0)) == pytest.approx([0.06, 0.03], abs=0.05)
 
 
@@ -113,7 +111,7 @@ def test_what_cannot_be_generated():
     data = observed(np.random.default_rng(9), 9)
     for model in (deaf, hmm):
         with pytest.raises(InputError, match="no motion, or it is switched off"):
-            select_densities(model, align(model, data, ("a",)))
+            generate.select_densities(model, align(model, data, ("a",)))
     hmm = replace(hmm, config=config())
     with pytest.raises(InputError, match="a pin at"):
-        solve_trajectory(random_densities(0, 5, 1), {(5, 0): 1.0})
+        generate.solve_trajectory(random_densities(0, 5, 1), {(5, 0): 1.0})

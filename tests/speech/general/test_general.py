@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pocketsphinx import Decoder
 
-from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion import errors, types
 from lipmotion.speech.recognition import general as acoustic
 from lipmotion.speech.recognition.general import (
     PHONES,
@@ -13,13 +13,12 @@ from lipmotion.speech.recognition.general import (
     general_features,
     general_model,
 )
-from lipmotion.types import Audio
 from lipmotion.units import PHONES as OURS
 from testing.formant_synthesiser import synthesise
 from testing.toy import ToySentence
 
 
-def vowels() -> Audio:
+def vowels() -> types.Audio:
     return synthesise([("sil", 0.3), ("iy", 0.4), ("s", 0.3), ("aa", 0.4), ("sil", 0.3)])[0]
 
 
@@ -54,12 +53,12 @@ def test_every_phone_has_a_column() -> None:
 
 def test_features_are_those_of_the_recognised_sound_at_any_level() -> None:
     audio = vowels()
-    louder = Audio(audio.samples * np.float32(3), audio.rate_hz)
+    louder = types.Audio(audio.samples * np.float32(3), audio.rate_hz)
     assert general_features(louder) == pytest.approx(general_features(audio), abs=1e-3)
     assert general_features(audio).shape == (171, 39)
     assert np.abs(general_features(audio)[:, :13].mean(axis=0)).max() < 1e-3
-    with pytest.raises(InputError, match="16000 Hz"):
-        general_features(Audio(np.zeros(8000, np.float32), 8000))
+    with pytest.raises(errors.InputError, match="16000 Hz"):
+        general_features(types.Audio(np.zeros(8000, np.float32), 8000))
 
 
 def test_the_bigram_is_that_of_the_phone_model() -> None:
@@ -76,11 +75,11 @@ def test_another_pocketsphinx_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path
     (tmp_path / "en-us").mkdir()
     general_model.cache_clear()
     monkeypatch.setattr(acoustic, "find_english_data", lambda: tmp_path)
-    with pytest.raises(MissingDependencyError, match="not those of its version 5"):
+    with pytest.raises(errors.MissingDependencyError, match="not those of its version 5"):
         general_model()
     for name in ("means", "variances", "sendump"):
         (tmp_path / "en-us" / name).write_bytes(b"s3\nendhdr\n" + bytes(64))
-    with pytest.raises(MissingDependencyError, match="unexpected header"):
+    with pytest.raises(errors.MissingDependencyError, match="unexpected header"):
         general_model()
 
 

@@ -1,6 +1,7 @@
 """A machine with synthesisers that are none, and one without any."""
 
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -18,7 +19,7 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     programs.mkdir()
     temporary.mkdir()
     monkeypatch.setenv("PATH", str(programs))
-    monkeypatch.setattr(espeak, "wheel_folder", lambda: None)
+    monkeypatch.setitem(sys.modules, espeak.WHEEL, None)  # is not installed
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     return programs
 

@@ -2,7 +2,6 @@ import json
 import re
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,10 +9,8 @@ import pytest
 from children import Done, run_child
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech.voices import espeak
-from lipmotion.speech.voices.espeak import ESPEAK_NG, LanguageLexicon, corrected_phone_times
 from lipmotion.speech.voices.installed import speak_sentences, voice_named
-from lipmotion.types import Audio, Span, Timeline
-from lipmotion.types.languages import ENGLISH, LANGUAGES
+from lipmotion.types import Audio, Span, Timeline, languages
 from lipmotion.units import PHONES, is_silent
 
 from . import fakes
@@ -31,17 +28,17 @@ def wheel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A Python package with a library and data, which is not loaded."""
     folder = tmp_path / "espeakng_loader"
     fakes.install_data(folder / "espeak-ng-data")
-    (folder / "libespeak-ng.so").touch()
-    spec = SimpleNamespace(submodule_search_locations=[str(folder)])
-    monkeypatch.setattr(espeak, "find_spec", lambda _: spec)
+    for name in ("libespeak-ng.so", "__init__.py"):
+        (folder / name).touch()
+    monkeypatch.syspath_prepend(tmp_path)
     return folder
 
 
 def test_the_package_comes_before_the_system(wheel: Path) -> None:
     assert espeak.wheel_folder() == wheel
     assert espeak._library() == {"library": str(wheel / "libespeak-ng.so"), "data": str(wheel)}
-    assert [voice.name for voice in ESPEAK_NG.voices()] == ["en-us+f2"]
-    assert [voice.name for voice in ESPEAK_NG.others()] == ["de", "en", "en-gb", "en-us"]
+    assert [voice.name for voice in espeak.ESPEAK_NG.voices()] == ["en-us+f2"]
+    assert [voice.name for voice in espeak.ESPEAK_NG.others()] == ["de", "en", "en-gb", "en-us"]
     shutil.rmtree(wheel / "espeak-ng-data")
     assert espeak.wheel_folder() is None
 
@@ -49,12 +46,12 @@ def test_the_package_comes_before_the_system(wheel: Path) -> None:
 @pytest.mark.usefixtures("faked")
 def test_the_system_tells_where_its_data_are() -> None:
     assert espeak._library() == {}
-    assert [voice.name for voice in ESPEAK_NG.others()] == ["de", "en", "en-gb", "en-us"]
+    assert [voice.name for voice in espeak.ESPEAK_NG.others()] == ["de", "en", "en-gb", "en-us"]
 
 
 def test_a_library_without_data_has_no_voices(faked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(espeak, "PROGRAM", [str(faked.parent / "programs" / "flite"), "-lv"])
-    assert (ESPEAK_NG.voices(), ESPEAK_NG.others()) == ((), ())
+    assert (espeak.ESPEAK_NG.voices(), espeak.ESPEAK_NG.others()) == ((), ())
 
 
 @pytest.mark.usefixtures("faked")
@@ -135,7 +132,7 @@ def sound(*silences: tuple[float, float], duration_s: float = 1.0) -> Audio:
 
 
 def starts(labels: list[tuple[str, float]], audio: Audio) -> list[float]:
-    return [round(span.start_s, 4) for span in corrected_phone_times(labels, audio)]
+    return [round(span.start_s, 4) for span in espeak.corrected_phone_times(labels, audio)]
 
 
 def test_a_stop_begins_with_its_closure() -> None:
@@ -158,24 +155,20 @@ def test_an_l_that_is_late_gets_its_share_of_the_vowel() -> None:
 
 
 def test_the_last_lasts_to_the_end() -> None:
-    phones = corrected_phone_times([("a", 0.1), ("s", 0.5)], sound())
+    phones = espeak.corrected_phone_times([("a", 0.1), ("s", 0.5)], sound())
     assert [(span.label, span.end_s) for span in phones] == [("a", 0.5), ("s", 1.0)]
 
 
 WORDS = {
-    "es": {"lobo": "l ow v ow", "cigüeña": "th iy g uw eh n aa"},
-    "fr": {"rue": "hh uw", "l'œuf": "l ao f"},
-    "de": {"schöne": "sh ow n ax", "12": "t s v ao l f"},
-    "ja": {"ふゆ": "f uh y uh"},
-    "ko": {"밥을": "p aa p ix l"},
-    "zh": {"吗": "m aa", "个": "k ax"},
-    "ru": {"мир": "m iy r"},
-}
+    "es": {"lobo": "l ow v ow", "cigüeña": "th iy g uw eh n aa"}, "fr": {"rue": "hh uw", "l'œuf": "l ao f"},
+    "de": {"schöne": "sh ow n ax", "12": "t s v ao l f"}, "ja": {"ふゆ": "f uh y uh"}, "ko": {"밥을": "p aa p ix l"},
+    "zh": {"吗": "m aa", "个": "k ax"}, "ru": {"мир": "m iy r"},
+}  # fmt: skip
 
 
 @pytest.mark.usefixtures("bare")
 def test_without_rules_only_the_users_words_are_pronounced() -> None:
-    lexicon = LanguageLexicon({"perro": (("p", "eh", "r", "ow"),)}, "es")
+    lexicon = espeak.LanguageLexicon({"perro": (("p", "eh", "r", "ow"),)}, "es")
     assert lexicon.with_words(("perro", "perro")) is lexicon
     with pytest.raises(MissingDependencyError, match=re.escape("no pronunciation of 'gato' in Spanish: install")):
         lexicon.with_words(("perro", "gato"))
@@ -185,7 +178,7 @@ def test_without_rules_only_the_users_words_are_pronounced() -> None:
 def test_letters_of_another_script_are_refused() -> None:
     for language, word in (("ja", "東京"), ("es", "привет"), ("zh", "こ")):
         with pytest.raises(InputError, match="no rules say how"):
-            LanguageLexicon({}, language).pronunciations(word)
+            espeak.LanguageLexicon({}, language).pronunciations(word)
 
 
 @pytest.mark.skipif(not INSTALLED, reason="the package espeakng-loader is not installed")
@@ -195,12 +188,12 @@ class TestRules:
     @pytest.mark.parametrize("language", ["es", *(pytest.param(each, marks=pytest.mark.long) for each in [*WORDS][1:])])
     def test_rules_of_the_language(self, language: str) -> None:
         words = WORDS[language]
-        lexicon = LanguageLexicon({}, language).with_words(tuple(words))
+        lexicon = espeak.LanguageLexicon({}, language).with_words(tuple(words))
         assert {word: " ".join(lexicon.pronunciations(word)[0]) for word in words} == words
 
     @pytest.mark.long
     def test_every_language_has_a_voice(self) -> None:
-        for language in LANGUAGES.keys() - {ENGLISH}:
-            phones = LanguageLexicon({}, language).pronunciations("2")[0]
+        for language in languages.LANGUAGES.keys() - {languages.ENGLISH}:
+            phones = espeak.LanguageLexicon({}, language).pronunciations("2")[0]
             assert phones
             assert {*phones} <= {*PHONES}

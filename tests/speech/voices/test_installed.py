@@ -9,21 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion import Model
-from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
+from lipmotion import Model, errors
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.speech.voices import espeak_events, installed, synthesiser
-from lipmotion.speech.voices.synthesiser import SyntheticVoice, program_output
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 
 FAKED = [
-    SyntheticVoice("kal16", "flite", "kal"),
-    SyntheticVoice("slt", "flite", "slt"),
-    SyntheticVoice("cmu_us_slt_arctic_hts", "festival", "slt"),
-    SyntheticVoice("kal_diphone", "festival", "kal"),
-    SyntheticVoice("en-us+f2", "espeak-ng", "espeak-f2"),
+    synthesiser.SyntheticVoice("kal16", "flite", "kal"),
+    synthesiser.SyntheticVoice("slt", "flite", "slt"),
+    synthesiser.SyntheticVoice("cmu_us_slt_arctic_hts", "festival", "slt"),
+    synthesiser.SyntheticVoice("kal_diphone", "festival", "kal"),
+    synthesiser.SyntheticVoice("en-us+f2", "espeak-ng", "espeak-f2"),
 ]
 EACH = [FAKED[0], FAKED[2], FAKED[4]]
 HARD = ['"Hello" \\ (sil) %s', "Hello; `ls` $HOME", "Helló"]
@@ -50,28 +48,28 @@ def test_a_voice_says_phones_in_time() -> None:
 
 @pytest.mark.parametrize("voice", EACH)
 @pytest.mark.usefixtures("faked")
-def test_any_letters_reach_the_synthesiser(voice: SyntheticVoice) -> None:
+def test_any_letters_reach_the_synthesiser(voice: synthesiser.SyntheticVoice) -> None:
     lexicon = Lexicon({"helló": (("hh", "ax", "l", "ow"),)})
     assert len(list(installed.speak_sentences(HARD, voice, lexicon))) == len(HARD)
 
 
 @pytest.mark.parametrize("voice", EACH)
-def test_errors_are_clear_and_nothing_stays(faked: Path, voice: SyntheticVoice) -> None:
+def test_errors_are_clear_and_nothing_stays(faked: Path, voice: synthesiser.SyntheticVoice) -> None:
     for text, message in (("they crash", "failed with 1 .no such sound"), ("nonsense", "nonsense")):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             next(installed.speak_sentences([text], voice))
         assert list(faked.iterdir()) == []
 
 
 def test_bytes_that_are_no_text_and_texts_without_words_are_refused(faked: Path) -> None:
     for text, message in (("no bytes", "cannot be run|nonsense"), ("... ", "holds no word")):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             next(installed.speak_sentences([text], FAKED[0]))
     assert list(faked.iterdir()) == []
 
 
 def test_a_sentence_that_festival_leaves_out_is_missed(faked: Path) -> None:
-    with pytest.raises(InputError, match="1 of 2 sentences"):
+    with pytest.raises(errors.InputError, match="1 of 2 sentences"):
         list(installed.speak_sentences(["hello", "stop here"], FAKED[2]))
     assert list(faked.iterdir()) == []
 
@@ -100,22 +98,22 @@ def test_voices_by_name() -> None:
         ("flite:de", "no voice 'flite:de' is installed"),
         ("de+robosoft", "no voice 'de.robosoft' is installed"),
     ):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             installed.voice_named(name)
-    with pytest.raises(InputError, match="no voice 'rms' here; it has: kal16, slt"):
-        next(installed.speak_sentences(["Hello"], SyntheticVoice("rms", "flite", "rms")))
+    with pytest.raises(errors.InputError, match="no voice 'rms' here; it has: kal16, slt"):
+        next(installed.speak_sentences(["Hello"], synthesiser.SyntheticVoice("rms", "flite", "rms")))
 
 
 @pytest.mark.usefixtures("bare")
 def test_without_synthesisers_it_says_what_to_install() -> None:
     assert installed.installed_voices() == ()
     for voice in EACH:
-        with pytest.raises(MissingDependencyError, match=f"apt install {voice.synthesiser}"):
+        with pytest.raises(errors.MissingDependencyError, match=f"apt install {voice.synthesiser}"):
             next(installed.speak_sentences(["Hello"], voice))
     for find in (installed.default_voice, lambda: installed.voice_named("slt")):
-        with pytest.raises(MissingDependencyError, match=r'pip install ".*\[text\]", or: apt install flite'):
+        with pytest.raises(errors.MissingDependencyError, match=r'pip install ".*\[text\]", or: apt install flite'):
             find()
-    with pytest.raises(MissingDependencyError, match="flite is not installed: apt install flite"):
+    with pytest.raises(errors.MissingDependencyError, match="flite is not installed: apt install flite"):
         installed.voice_named("flite:slt")
 
 
@@ -132,7 +130,7 @@ def test_a_synthesiser_that_does_not_work_is_left_out(faked: Path, caplog: pytes
     assert [voice.synthesiser for voice in installed.all_voices()] == ["flite", "flite", *["espeak-ng"] * 5]
     assert installed.voice_named("slt").full_name == "flite:slt"
     assert "festival is left out: festival failed with 3" in caplog.text
-    with pytest.raises(InputError, match="festival failed with 3"):
+    with pytest.raises(errors.InputError, match="festival failed with 3"):
         installed.voice_named("festival:kal_diphone")
 
 
@@ -142,7 +140,7 @@ def test_a_sound_is_there_until_the_next() -> None:
         first = next(said)
         assert first.own_sound().rate_hz == 16_000
         list(said)
-    with pytest.raises(InputError, match="no sound that can be read"):
+    with pytest.raises(errors.InputError, match="no sound that can be read"):
         first.own_sound()
 
 
@@ -159,11 +157,11 @@ def test_without_the_library_the_program_says_what_to_install(monkeypatch: pytes
 
 
 @pytest.fixture(params=sorted(installed.SYNTHESISERS))
-def real(request: pytest.FixtureRequest) -> SyntheticVoice:
+def real(request: pytest.FixtureRequest) -> synthesiser.SyntheticVoice:
     """The last voice of each synthesiser that is installed."""
     try:
         voices = installed.SYNTHESISERS[request.param].voices()
-    except LipMotionError:
+    except errors.LipMotionError:
         voices = ()
     if not voices:
         pytest.skip(f"{request.param} is not installed")
@@ -173,7 +171,7 @@ def real(request: pytest.FixtureRequest) -> SyntheticVoice:
 TEXTS = ["Please put both blue bowls on the table.", "The judge measured the beige garage.", "They enjoy a good thing."]
 
 
-def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
+def test_real_voices_say_what_the_dictionary_says(real: synthesiser.SyntheticVoice) -> None:
     lexicon = Lexicon()
     for text, (audio, units) in zip(TEXTS[:2], installed.speak_sentences(TEXTS[:2], real), strict=True):
         words = split_words(text)
@@ -188,7 +186,7 @@ def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
 
 
 @pytest.mark.long
-def test_the_times_of_real_voices_are_those_of_the_aligner(real: SyntheticVoice, toy_model: Model) -> None:
+def test_the_times_of_real_voices_are_those_of_the_aligner(real: synthesiser.SyntheticVoice, toy_model: Model) -> None:
     recogniser, late_s = Recogniser(toy_model.phones, "general"), []
     for audio, units in installed.speak_sentences(TEXTS, real):
         room = noisy_audio(audio, "white", 50)
@@ -227,13 +225,13 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_a_program_is_stopped(script: str, message: str, tmp_path: Path) -> None:
     program = _program(tmp_path, script)
-    with pytest.raises(InputError, match=message):
-        program_output([str(program)], "a-package", folder=tmp_path / "say.d")
+    with pytest.raises(errors.InputError, match=message):
+        synthesiser.program_output([str(program)], "a-package", folder=tmp_path / "say.d")
 
 
 @needs_scripts
 def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
-    child = int(program_output([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
+    child = int(synthesiser.program_output([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
     for _ in range(100):
         if not _is_running(child):
             return
@@ -244,7 +242,7 @@ def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
 
 @needs_scripts
 def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
-    assert program_output([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
+    assert synthesiser.program_output([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
 
 
 def _program(folder: Path, script: str) -> Path:

@@ -4,11 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.errors import InputError
+from lipmotion import errors, types
 from lipmotion.speech.voices import inventory_phones as module
 from lipmotion.speech.voices.inventory_phones import inventory_timeline, matches, with_words
 from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, ESPEAK_PHONES, complete_map
-from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from oracles.edits import least_cost
 
@@ -16,8 +15,8 @@ LEXICON = Lexicon({"butter": (("b", "ah", "t", "axr"),), "is": (("ix", "z"),), "
 SOUNDS = [phone for phone in PHONES if phone not in ("sil", "sp")]
 
 
-def timeline(*labels: tuple[str, float, float]) -> Timeline[str]:
-    return Timeline(tuple(Span(start, end, label) for label, start, end in labels))
+def timeline(*labels: tuple[str, float, float]) -> types.Timeline[str]:
+    return types.Timeline(tuple(types.Span(start, end, label) for label, start, end in labels))
 
 
 def cost_of(found: Sequence[str], wanted: Sequence[str]) -> float:
@@ -38,7 +37,7 @@ def test_matches_are_the_cheapest(found: list[str], wanted: list[str]) -> None:
 def test_unstressed_vowels_are_reduced_and_words_known() -> None:
     said = "b ah dh t er ih z ih t".split()  # dh: nobody's
     wanted = {"butter": "b ah dh t axr", "is": "ix z", "it": "ih t"}
-    units = [Unit(phone, word=word) for word, phones in wanted.items() for phone in phones.split()]
+    units = [types.Unit(phone, word=word) for word, phones in wanted.items() for phone in phones.split()]
     assert with_words(said, [*wanted], LEXICON) == units
 
 
@@ -76,7 +75,7 @@ def test_several_phones_share_a_label_and_parts_join() -> None:
 
 def test_it_says_what_is_wrong() -> None:
     for label, message in (("xx", "'xx', which is no phone"), ("pau", "no phone; give")):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(errors.InputError, match=message):
             inventory_timeline(timeline((label, 0.0, 0.1)), ARPABET_PHONES, ["it"], LEXICON, 0.2)
 
 

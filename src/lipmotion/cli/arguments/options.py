@@ -97,7 +97,7 @@ def report_figures(
         figures = compute(Lexicon.from_file(file) if file else None, report.receive)
         if options.output:
             with atomic_file(options.output) as unfinished:
-                unfinished.write_text(as_json(nan_as_null(figures), indent=1) + "\n")
+                unfinished.write_text(as_json(nan_as_null(figures), indent=1) + "\n", encoding="utf-8")
         report.finish(table(figures), figures=figures)
 
 

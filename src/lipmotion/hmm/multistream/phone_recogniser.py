@@ -27,11 +27,9 @@ LONGEST_S = 120.0
 """Longer recordings are left to the shared recogniser, which works block by block."""
 SIMILARITY_MARGIN = -6.0
 """A speaker counts as one of the training if the speaker similarity score exceeds that of the training data plus this.
-Scores minus that of the training data, measured: GRID's s1 in other recordings -6 to 2; five other speakers of the same
-studio -9 to -7."""
+Minus that, measured: GRID's s1 in other recordings -6 to 2; five other speakers of the same studio -9 to -7."""
 SIMILARITY_FRAMES = 400
 """Frames, spread evenly over a recording, from which the speaker similarity score is computed."""
-_CHECKPOINT = "joint"
 JOINT_PREFIX = "joint_"
 SCORE = {"typical": ArraySpec(np.float64, "1", -1e6, 1e6)}
 
@@ -62,16 +60,20 @@ class OwnPhoneRecogniser:
 
 
 def fit_phone_recogniser(
-    examples: Sequence[Example], values: Sequence[NDArray[np.float64]], monitor: Monitor, checkpoint: Checkpoint
+    examples: Sequence[Example],
+    values: Sequence[NDArray[np.float64]],
+    monitor: Monitor,
+    checkpoint: Checkpoint,
+    min_minutes: float = LEAST_MINUTES,
 ) -> OwnPhoneRecogniser | None:
     """Return a recogniser of phones that is trained on sound and motion, or None if there is too little speech.
 
     Source: Hofer 2008, §4 to §6: all streams are trained together; those of speech and F0 are used in recognition.
     """
     spoken_s = sum(s.duration_s for e in examples for s in e.speech.units if not is_silent(s.label.phone))
-    if spoken_s < 60 * LEAST_MINUTES:
+    if spoken_s < 60 * min_minutes:
         return None
-    arrays = checkpoint.load(_CHECKPOINT)
+    arrays = checkpoint.load("joint")
     if arrays is None:
         from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
 
@@ -84,7 +86,7 @@ def fit_phone_recogniser(
         inventory = Inventory(PHONES.units, PHONES.silence, CONFIG.states)
         hmm = train_joint(utterances, inventory, PHONES.classes(), CONFIG, monitor, checkpoint)
         arrays = joint_to_arrays(hmm, np.float32)
-        checkpoint.save(_CHECKPOINT, arrays)
+        checkpoint.save("joint", arrays)
     hmm = joint_from_arrays(arrays, CONFIG)
     scores = [_similarity_score(hmm, _observations(example.speech)) for example in examples]
     return OwnPhoneRecogniser(hmm, float(np.mean(scores)))
@@ -97,9 +99,7 @@ def recogniser_to_arrays(recogniser: OwnPhoneRecogniser) -> dict[str, NDArray[An
 
 
 def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
-    """Deserialise a recogniser; None: the arrays have none. Raises ModelFormatError, KeyError, ValueError: a wrong
-    array.
-    """
+    """Deserialise a recogniser; None: there is none. Raises ModelFormatError, KeyError, ValueError: a wrong array."""
     own = arrays_under(arrays, JOINT_PREFIX)
     if not own:
         return None
@@ -119,5 +119,5 @@ def _similarity_score(hmm: JointHmm, observations: StreamObservations) -> float:
     part = hmm.models[SPEECH]
     rows = hmm.standardise(observations, hmm.config.recognition)[SPEECH]
     chosen = rows[np.linspace(0, len(rows) - 1, min(len(rows), SIMILARITY_FRAMES)).astype(int)]
-    leaves = np.arange(part.forest.size)
-    return float(part.tied.log_density(chosen, leaves, part.scale.log_determinant).max(axis=1).mean())
+    density = part.tied.log_density(chosen, np.arange(part.forest.size), part.scale.log_determinant)
+    return float(density.max(axis=1).mean())

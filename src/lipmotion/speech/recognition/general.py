@@ -115,7 +115,7 @@ def general_model() -> GeneralModel:
         weights = _weights((folder / "sendump").read_bytes())
     except (OSError, ValueError) as error:
         raise MissingDependencyError(
-            f"pocketsphinx's phone models are not those of its version 5 ({error}): pip install 'pocketsphinx>=5.1'"
+            f"pocketsphinx's phone models are not those of its version 5 ({error}): pip install 'pocketsphinx>=5.0.4'"
         ) from error
     forms, constants = [], []
     for stream in STREAMS:

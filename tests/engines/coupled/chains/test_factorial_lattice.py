@@ -6,10 +6,8 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from engines.coupled.training.test_training import sentences
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
+from lipmotion.engines.coupled.chains import densities, model, structures
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
-from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.structures import FACTORIAL, UNSEEN_LOSS
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert
 from lipmotion.engines.coupled.training.chain_training import (
     LEAST_FRAMES,
@@ -19,9 +17,9 @@ from lipmotion.engines.coupled.training.chain_training import (
 )
 
 
-def both(seed=0) -> tuple[Chains, Chains]:
+def both(seed=0) -> tuple[model.Chains, model.Chains]:
     """The same factorial HMM with a listed product and without; three joint states have densities of their own."""
-    listed = chains(structure(FACTORIAL, (THREE, TWO), limit=None), seed=seed)
+    listed = chains(structure(structures.FACTORIAL, (THREE, TWO), limit=None), seed=seed)
     product = listed.transitions.product
     visits = np.zeros(len(product.joint_states))
     visits[[0, 5, 17]] = 100
@@ -37,10 +35,10 @@ def both(seed=0) -> tuple[Chains, Chains]:
     return penalised(listed, groups), free
 
 
-def penalised(listed: Chains, groups) -> Chains:
+def penalised(listed: model.Chains, groups) -> model.Chains:
     """Listed chains with the same penalty for joint states without densities of their own."""
     speech = groups[0].mixtures.copy()
-    speech.log_weights[:-3] -= UNSEEN_LOSS
+    speech.log_weights[:-3] -= structures.UNSEEN_LOSS
     return replace(listed, groups=(replace(groups[0], mixtures=speech), *groups[1:]))
 
 
@@ -73,16 +71,16 @@ def test_conversion_is_the_same():
         np.testing.assert_allclose(results[0].streams[1], results[1].streams[1], rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.parametrize("loss", [0.0, UNSEEN_LOSS])
+@pytest.mark.parametrize("loss", [0.0, structures.UNSEEN_LOSS])
 def test_densities_integrate_to_1_without_a_loss(loss):
     """As printed, those of every joint state; with the option, rare ones lose that share, and frequent ones nothing."""
-    of = replace(structure(FACTORIAL, (THREE, TWO), limit=None), unseen_loss=loss)
+    of = replace(structure(structures.FACTORIAL, (THREE, TWO), limit=None), unseen_loss=loss)
     listed = chains(of, sizes=(1, 1))
     visits = np.where(np.arange(len(listed.transitions.product.joint_states)) < 4, LEAST_FRAMES, LEAST_FRAMES - 1)
     free = with_joint_state_densities(listed, listed.transitions, visits, of)
     assert len(free.transitions.own_density_states) == 4
     grid = np.linspace(-15, 15, 3001, dtype=np.float32)[:, None]
-    logs = free.emission_log_densities(AudioVisualObservations((grid, grid), (None, None)), free.full_lattice)
+    logs = free.emission_log_densities(densities.AudioVisualObservations((grid, grid), (None, None)), free.full_lattice)
     first, second = (np.exp(log.astype(float)).sum(axis=0) * 0.01 for log in logs.log_densities)
     np.testing.assert_allclose(first[-4:] * second[-4:], 1, rtol=1e-3)
     np.testing.assert_allclose(np.outer(first[:-4], second[:-4]), np.exp(-loss), rtol=1e-3)
@@ -118,7 +116,7 @@ def test_only_allowed_units_are_in_the_lattice_and_visual_ones_a_little_before_a
 
 def test_training_without_a_limit_rises_at_every_step():
     steps = []
-    of = structure(FACTORIAL, (THREE, TWO), states=3, limit=None)
+    of = structure(structures.FACTORIAL, (THREE, TWO), states=3, limit=None)
     *_, grown = growing_chains(
         of, ("speech", "seen"), sentences(), MixtureSchedule((2, 2), (1.0, 1.0), most_steps=6), steps.append
     )
@@ -131,7 +129,7 @@ def test_training_without_a_limit_rises_at_every_step():
 
 
 def test_joint_states_have_names():
-    of = structure(FACTORIAL, (THREE, TWO), limit=None)
+    of = structure(structures.FACTORIAL, (THREE, TWO), limit=None)
     free = FactorialProduct(of, chains(of).transitions.product.grammar)
     assert free.name(0) == f"{of.units[0][0]}.1 | {of.units[1][0]}.1"
     assert free.name(of.state_counts[1] + 1) == f"{of.units[0][0]}.2 | {of.units[1][0]}.2"

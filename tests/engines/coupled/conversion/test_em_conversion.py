@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import KINDS, TWO, chains, observations, structure
+from lipmotion.engines.coupled.conversion import mean_regression
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     PRINTED,
@@ -11,15 +12,6 @@ from lipmotion.engines.coupled.conversion.em_conversion import (
     convert,
     path_means,
     without_visual_streams,
-)
-from lipmotion.engines.coupled.conversion.mean_regression import (
-    OWN_RIDGE,
-    SHARED_RIDGE,
-    RegressionUtterance,
-    VisualRegression,
-    fit_regression_inputs,
-    fit_visual_regression,
-    regression_weights,
 )
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
@@ -111,7 +103,7 @@ def test_the_printed_update_weighs_by_components_and_partners():
     np.testing.assert_allclose(printed, expected, rtol=1e-3, atol=1e-4)
 
 
-def utterances(count=3, frames=60, states=4, seed=0) -> list[RegressionUtterance]:
+def utterances(count=3, frames=60, states=4, seed=0) -> list[mean_regression.RegressionUtterance]:
     draw = np.random.default_rng(seed)
     result = []
     for _ in range(count):
@@ -121,35 +113,40 @@ def utterances(count=3, frames=60, states=4, seed=0) -> list[RegressionUtterance
         observed = draw.random(frames) < 0.8
         target = (features[:, :2] + visual[:, :2] * 3).astype(np.float32)
         target = np.where(observed[:, None], target, 99).astype(np.float32)
-        result.append(RegressionUtterance(features, first, [visual], [target], observed))
+        result.append(mean_regression.RegressionUtterance(features, first, [visual], [target], observed))
     return result
 
 
 def test_the_regressions_are_ridges_one_towards_the_other():
     """By normal equations over explicitly weighted rows: all, then families, then regressions."""
     data = utterances()
-    inputs = fit_regression_inputs(np.eye(4, dtype=np.float32), data)
+    inputs = mean_regression.fit_regression_inputs(np.eye(4, dtype=np.float32), data)
     regression_of_state, family = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 0, 1])
-    found = fit_visual_regression(inputs, data, 0, regression_of_state, family)
+    found = mean_regression.fit_visual_regression(inputs, data, 0, regression_of_state, family)
     z = np.concatenate([inputs(one.features, one.reduced_posteriors)[one.observed] for one in data]).astype(float)
     target = np.concatenate([one.targets[0][one.observed] for one in data]).astype(float)
     weight = np.concatenate(
-        [regression_weights(one.chain_posteriors[0], regression_of_state, 3)[one.observed] for one in data]
+        [
+            mean_regression.regression_weights(one.chain_posteriors[0], regression_of_state, 3)[one.observed]
+            for one in data
+        ]
     ).astype(float)
 
     def solved(rows, prior, strength):
         system = z.T @ (rows[:, None] * z) + strength * np.eye(z.shape[1])
         return np.linalg.solve(system, z.T @ (rows[:, None] * target) + strength * prior)
 
-    shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), SHARED_RIDGE * len(z))
+    shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), mean_regression.SHARED_RIDGE * len(z))
     for number in range(3):
-        above = solved(weight[:, family == family[number]].sum(axis=1), shared, OWN_RIDGE)
-        np.testing.assert_allclose(found.coefficients[number], solved(weight[:, number], above, OWN_RIDGE), atol=2e-3)
+        above = solved(weight[:, family == family[number]].sum(axis=1), shared, mean_regression.OWN_RIDGE)
+        np.testing.assert_allclose(
+            found.coefficients[number], solved(weight[:, number], above, mean_regression.OWN_RIDGE), atol=2e-3
+        )
 
 
 def test_expected_means_and_precisions_are_sums_over_states():
     draw = np.random.default_rng(0)
-    regression = VisualRegression(
+    regression = mean_regression.VisualRegression(
         np.array([0, 1, 1]),
         draw.normal(0, 1, (2, 5, 3)).astype(np.float32),
         draw.uniform(0.5, 2, (3, 3)).astype(np.float32),

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
-from lipmotion.engines.coupled.chains.model import Chains
+from lipmotion.engines.coupled.chains import densities, model
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, MULTISTREAM, Structure
 from lipmotion.engines.coupled.conversion.em_conversion import EXACT, VITERBI, ConversionSettings, convert
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
@@ -37,12 +36,12 @@ def sentences(count: int, lag: int, seed: int) -> list[AlignedUtterance]:
         speech = 3 * np.stack([np.cos(state * 2 * np.pi / 9), np.sin(state * 2 * np.pi / 9)], axis=1)
         noisy = (values + draw.normal(0, size, values.shape) for values, size in ((speech, 0.6), (lips, 0.3)))
         streams = tuple(values.astype(np.float32) for values in noisy)
-        made.append(AlignedUtterance(AudioVisualObservations(streams, (None, None)), Timeline(tuple(spans))))
+        made.append(AlignedUtterance(densities.AudioVisualObservations(streams, (None, None)), Timeline(tuple(spans))))
     return made
 
 
 @cache
-def trained(lag: int, kind: str, limit: int | None = 1, **more: object) -> tuple[Chains, float]:
+def trained(lag: int, kind: str, limit: int | None = 1, **more: object) -> tuple[model.Chains, float]:
     """Return chains, and the correlation of the lips that they make from speech alone, as the paper converts."""
     of = Structure(kind, (THREE,) if kind == MULTISTREAM else (THREE, THREE), STATES, limit, **more)
     *_, grown = growing_chains(of, ("speech", "seen"), sentences(20, lag, 0), MixtureSchedule((1, 1), (1.0, 1.0)))
@@ -52,7 +51,7 @@ def trained(lag: int, kind: str, limit: int | None = 1, **more: object) -> tuple
     return grown.model, float(pooled_correlation(lips, recorded).mean())
 
 
-def lead_shares(chains: Chains, lag: int) -> np.ndarray:
+def lead_shares(chains: model.Chains, lag: int) -> np.ndarray:
     """Return the shares of frames in which the lips are a state behind, in step and a state ahead, by both streams."""
     shares = np.zeros(3)
     for one in sentences(20, lag, 0):

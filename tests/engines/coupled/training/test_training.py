@@ -5,17 +5,14 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
-from lipmotion.engines import engine_from_settings
+from lipmotion import engines, errors
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, reestimated_group
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
-from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units, uniform_path
+from lipmotion.engines.coupled.training import alignment, coupled_training, em_steps
 from lipmotion.engines.coupled.training.chain_training import CONVERGENCE_GAIN, MixtureSchedule, growing_chains
-from lipmotion.engines.coupled.training.coupled_training import fit_coupled, frames_away_from_speech
-from lipmotion.engines.coupled.training.em_steps import LatticeUtterance, e_step, m_step, variance_floors
-from lipmotion.errors import InputError
 from lipmotion.testing.examples import examples
 from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit, silent_monitor
 from oracles import coupled as oracle
@@ -24,7 +21,7 @@ FLOORS = (np.full(2, 1e-3, np.float32), np.full(1, 1e-3, np.float32))
 PHONES = ("p", "uw", "aa", "b", "aa", "uw")
 
 
-def sentences(count=6, frames_each=9, seed=0) -> list[AlignedUtterance]:
+def sentences(count=6, frames_each=9, seed=0) -> list[alignment.AlignedUtterance]:
     """Speech and motion for the phones, motion a little ahead."""
     made = []
     for number in range(count):
@@ -37,7 +34,7 @@ def sentences(count=6, frames_each=9, seed=0) -> list[AlignedUtterance]:
         speech = draw.normal(0, 0.4, (len(index), 2)) + np.stack([index == 0, index == 1], axis=1) * 2
         seen = draw.normal(0, 0.3, (len(index), 1)) + (early == THREE.units.index("closed"))[:, None] * 2
         streams = AudioVisualObservations((speech.astype(np.float32), seen.astype(np.float32)), (None, None))
-        made.append(AlignedUtterance(streams, Timeline(spans)))
+        made.append(alignment.AlignedUtterance(streams, Timeline(spans)))
     return made
 
 
@@ -61,7 +58,7 @@ def test_densities_are_weighted_means_and_variances():
     """Eqs. A.12 to A.15 of Xie & Liu 2007, by enumeration of paths and components."""
     model = chains()
     data = [observations(4, seed=1), observations(4, seed=2)]
-    statistics = e_step(model, [LatticeUtterance(one, model.full_lattice) for one in data])
+    statistics = em_steps.e_step(model, [em_steps.LatticeUtterance(one, model.full_lattice) for one in data])
     joints = [oracle.posteriors(model, one)[0] for one in data]
     compared = 0
     for stream, (group, own) in enumerate(zip(model.groups, statistics.emissions, strict=True)):
@@ -91,9 +88,9 @@ def test_densities_are_weighted_means_and_variances():
 def test_a_stream_that_was_not_observed_is_not_reestimated():
     model = chains()
     blind = observations(8, seen=False)
-    statistics = e_step(model, [LatticeUtterance(blind, model.full_lattice)])
+    statistics = em_steps.e_step(model, [em_steps.LatticeUtterance(blind, model.full_lattice)])
     assert not statistics.emissions[1].products[0].any()
-    better = m_step(model, statistics, FLOORS, streams=(0, 1))
+    better = em_steps.m_step(model, statistics, FLOORS, streams=(0, 1))
     np.testing.assert_array_equal(better.groups[1].mixtures.means, model.groups[1].mixtures.means)
     assert not np.array_equal(better.groups[0].mixtures.means, model.groups[0].mixtures.means)
 
@@ -101,17 +98,17 @@ def test_a_stream_that_was_not_observed_is_not_reestimated():
 def test_no_recording_has_a_path_and_options_that_cannot_be():
     model = chains()
     lattice = replace(model.full_lattice, allowed_units=np.zeros((3, 3), bool))
-    with pytest.raises(InputError, match="labels"):
-        e_step(model, [LatticeUtterance(observations(3), lattice)])
+    with pytest.raises(errors.InputError, match="labels"):
+        em_steps.e_step(model, [em_steps.LatticeUtterance(observations(3), lattice)])
     for options in ({"mixtures": 3}, {"asynchrony": -2}, {"structure": "ring"}, {"audio_weight": -1.0}):
-        with pytest.raises(InputError):
+        with pytest.raises(errors.InputError):
             CoupledConfig(**options)
 
 
 def test_allowed_units_are_those_of_labels_near_a_frame():
     of = structure()
     phones = Timeline((Span(0.0, 0.2, Unit("p")), Span(0.2, 0.4, Unit("aa"))))
-    allowed = allowed_units(of, phones, 60)
+    allowed = alignment.allowed_units(of, phones, 60)
     closed, opened = of.units[0].index("closed"), of.units[0].index("open")
     assert allowed[:25, closed].all()
     assert not allowed[26:34, closed].any()
@@ -124,7 +121,7 @@ def test_allowed_units_are_those_of_labels_near_a_frame():
 def test_labels_are_divided_into_equal_parts():
     of = structure(states=3)
     product = chains(of).transitions.product
-    path = uniform_path(product, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
+    path = alignment.uniform_path(product, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
     states = [product.joint_states[s].states for s in path]
     assert states == [(0, 0), (0, 0), (1, 1), (1, 1), (2, 2), (2, 2), (0, 0), (1, 1), (2, 2)]
 
@@ -133,12 +130,12 @@ def test_floors_are_of_observed_frames():
     seen = np.arange(40) < 20
     values = np.where(seen, np.tile([0.0, 2.0], 20), 1e6)[:, None].astype(np.float32)
     data = AudioVisualObservations((np.zeros((40, 2), np.float32), values), (None, seen))
-    assert variance_floors([data])[1] == pytest.approx(0.01)
+    assert em_steps.variance_floors([data])[1] == pytest.approx(0.01)
 
 
 def test_frames_away_from_speech_are_silence():
     units = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 0.7, Unit("aa")), Span(0.7, 1.5, Unit("sil"))))
-    away = frames_away_from_speech(units, 151)
+    away = coupled_training.frames_away_from_speech(units, 151)
     assert away[:4].all()
     assert not away[6:114].any()
     assert away[116:].all()
@@ -159,7 +156,7 @@ def test_every_stream_has_a_chain_and_a_weight_of_its_own():
     """Speech, points and pictures on three chains."""
     data = [with_pictures(number) for number in range(5)]
     config = CoupledConfig(chains="phone viseme viseme", states=2, mixtures=1, visual_weight=0.5, eigenlips_weight=0.25)
-    model = fit_coupled(data, config, silent_monitor).model
+    model = coupled_training.fit_coupled(data, config, silent_monitor).model
     assert model.chains.streams == ("speech", "geometry", "eigenlips")
     assert [group.weights for group in model.chains.groups] == [(1.0,), (0.5,), (0.25,)]
     assert [stream.name for stream in model.visual] == ["geometry", "eigenlips"]
@@ -174,7 +171,7 @@ def test_a_preset_is_the_system_of_the_paper(name):
     """Table 2: 47 phones, or 13 visemes, of five states; 39 features of speech; eigenlips; streams of equal weight."""
     data = [with_pictures(number) for number in range(2)]
     lips = [replace(one, motion=one.motion.selected(["lips_r_01"])) for one in data]
-    chains = engine_from_settings(preset=f"xieliu2007 {name}").fit(lips, silent_monitor).model.chains
+    chains = engines.engine_from_settings(preset=f"xieliu2007 {name}").fit(lips, silent_monitor).model.chains
     of, streams = chains.structure, [group.streams for group in chains.groups]
     visual = {"HMM": [], "MSHMM": []}.get(name[3:], [13 if "-vi-" in name else 47])
     assert [len(units) for units in of.units] == [47, *visual]

@@ -11,10 +11,9 @@ from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import Structure, unit_sets
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
+from lipmotion.engines.coupled.training import chain_training, em_steps
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
-from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, TrainingStep, growing_chains
 from lipmotion.engines.coupled.training.coupled_training import SpeechOnlySchedule, train_on_speech
-from lipmotion.engines.coupled.training.em_steps import e_step, lattice_utterance, variance_floors
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.testing.examples import RATE_HZ, examples
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor
@@ -40,8 +39,8 @@ def aligned(sentences: Sequence[Example]) -> list[AlignedUtterance]:
 def trained(kind: str = "coupled", mixtures: int = 2) -> Chains:
     structure = Structure(kind, unit_sets(STRUCTURES[kind]), 2, 1)
     groups = 1 if kind == "hmm" else 2
-    how = MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
-    *_, grown = growing_chains(structure, ("speech", "lips"), aligned(examples(4)), how)
+    how = chain_training.MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
+    *_, grown = chain_training.growing_chains(structure, ("speech", "lips"), aligned(examples(4)), how)
     return grown.model
 
 
@@ -77,7 +76,7 @@ def speech_posteriors(chains: Chains, one: AlignedUtterance) -> np.ndarray:
 
     Its states are the joint ones, its emissions those of speech, its moves the coupled ones.
     """
-    lattice, mixtures = lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
+    lattice, mixtures = em_steps.lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
     x, product = one.observations.streams[0], chains.transitions.product
     log = np.full((len(x), len(mixtures.means)), -np.inf)
     for frame, density in np.ndindex(log.shape):
@@ -122,7 +121,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
     other = replace(own, observations=own.observations.without_stream(1))
     found = train_on_speech(chains, [own], [other], SpeechOnlySchedule(2, 1, 49.0)).groups[0].mixtures
     gamma, x = 50 * speech_posteriors(chains, own), own.observations.streams[0]
-    before, (floor, _) = chains.groups[0].mixtures, variance_floors([own.observations])
+    before, (floor, _) = chains.groups[0].mixtures, em_steps.variance_floors([own.observations])
     visited = np.flatnonzero(gamma.sum(axis=0) >= 3)
     assert len(visited) >= 3
     for density in visited:
@@ -137,7 +136,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["hmm", "coupled"])
 def test_every_step_raises_the_likelihood(kind: str) -> None:
-    steps: list[TrainingStep] = []
+    steps: list[chain_training.TrainingStep] = []
     own, others = aligned(examples(4)), speech_alone(examples(4, seed=9))
     train_on_speech(trained(kind), own, others, SpeechOnlySchedule(4, 6, 0.5), steps.append)
     for _, run in groupby(steps, lambda step: step.mixtures):
@@ -165,8 +164,8 @@ def test_visual_densities_and_transitions_stay(kind: str) -> None:
 
 def test_a_weight_is_how_often_an_utterance_counts() -> None:
     chains, (one,) = trained(), aligned(examples(1))
-    twice = e_step(chains, [lattice_utterance(chains, one)] * 2)
-    heavy = e_step(chains, [lattice_utterance(chains, one, 2.0)])
+    twice = em_steps.e_step(chains, [em_steps.lattice_utterance(chains, one)] * 2)
+    heavy = em_steps.e_step(chains, [em_steps.lattice_utterance(chains, one, 2.0)])
     assert heavy.frames == twice.frames
     assert heavy.log_likelihood == pytest.approx(twice.log_likelihood)
     assert heavy.transition_counts == pytest.approx(twice.transition_counts, abs=1e-5)

@@ -1,0 +1,679 @@
+"""``lipmotion league``: rivals and our engines on the same recordings, in one table (docs/results/league.md).
+
+A rival is a program outside the package: an adapter takes ``JOB.json ANSWER.json`` (extras/league/README.md).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import os
+import subprocess
+import sys
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import CorpusError, InputError, MissingDependencyError, shorten
+from lipmotion.formats.sound import write_sound
+from lipmotion.measures import curves
+from lipmotion.measures.closures import REACH, closed_threshold, find_closings, match_closings
+from lipmotion.motion.rest import is_away_from_speech
+from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.training.train import label_phones
+from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.storage.files import atomic_file, make_folder
+from lipmotion.storage.json_text import as_json, from_json, nan_as_null
+from lipmotion.types import (
+    Audio,
+    Channel,
+    Monitor,
+    Motion,
+    Span,
+    Timeline,
+    Unit,
+    Utterance,
+    silent_monitor,
+    sub_monitor,
+    with_progress,
+)
+from lipmotion.types.motion import interpolate_rows
+from lipmotion.units import Lexicon, is_silent
+from lipmotion_faces import stage_face
+from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic
+from lipmotion_lab.report.page import FPS, LOWER_FACE, RECORDED, STAGING, FinishedPart, report_html
+from lipmotion_lab.report.section import Column, Section, Table, warn_of_few
+
+Array = NDArray[np.float64]
+CHANNELS = ("opening", "width")
+TABLE = "rivals.json"
+SOUND_HZ, GRID_HZ = 48_000, 100.0
+"""Rate of the sound that rivals hear, and that at which their weights are compared."""
+LEVEL, LEVEL_SHARE, LEVEL_WINDOW = 0.1, 95, SOUND_HZ // 50
+"""Rivals have thresholds: the root mean square of the loudest twentieth of each recording is brought to this."""
+LAGS_S, SMOOTHINGS_S = np.arange(-0.08, 0.33, 0.04), (0.0, 0.03, 0.06, 0.1)
+SHUT_SHARES = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
+"""What is tried of every rival: lags, smoothing (σ), and the share of its 95th percentile under which it is shut."""
+SYNC_STEP_S, RIDGE = 0.01, 1e-3
+FOLDS = 5
+ONSET_REACH_S = 0.2
+"""A movement that begins nowhere within this time counts as an error of it."""
+ABSENT = MissingDependencyError.exit_code
+"""Exit code of an adapter whose rival is not installed."""
+
+
+class RivalError(InputError):
+    """A rival crashed, took too long, or answered nonsense."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A row of the table of adapters.
+
+    run      : program and file of the adapter; ``{NAME:default}`` is the program in a variable of the environment
+    settings : values that are tried, all with all, by name; the choice among them is made where nothing is reported
+    given    : what it hears: ``sound``, or also ``phones``
+    """
+
+    name: str
+    title: str
+    run: tuple[str, ...]
+    needs: str
+    given: str = "sound"
+    ours: bool = False
+    settings: Mapping[str, Sequence[Any]] | None = None
+
+    def command(self, folder: Path) -> list[str]:
+        """Return the command, whose files are in a folder."""
+        program, *files = self.run
+        if program.startswith("{"):
+            variable, _, default = program.strip("{}").partition(":")
+            program = os.environ.get(variable) or (sys.executable if default == "python" else default)
+        return [program, *(str(folder / file) for file in files)]
+
+    def list_settings(self) -> list[dict[str, Any]]:
+        """Return all settings that are tried. Raises MissingDependencyError: a variable in them is not set."""
+        names, values = list(self.settings or {}), list((self.settings or {}).values())
+        tried = []
+        for row in itertools.product(*values):
+            expanded = [os.path.expandvars(each) if isinstance(each, str) else each for each in row]
+            if unset := [each for each in expanded if isinstance(each, str) and "$" in each]:
+                raise MissingDependencyError(f"{unset[0]}: not set; {self.needs}")
+            tried.append(dict(zip(names, expanded, strict=True)))
+        return tried
+
+
+def read_rivals(folder: Path, only: Sequence[str] = ()) -> list[Rival]:
+    """Return the rivals of a folder of adapters. Raises InputError: no such folder or rival, or a damaged table."""
+    path = folder / TABLE
+    try:
+        table = from_json(path.read_bytes())
+        rivals = [Rival(name, **row | {"run": tuple(row["run"])}) for name, row in table.items()]
+    except FileNotFoundError as error:
+        raise InputError(
+            f"{path}: no such file; give the folder extras/league of the sources (--adapters, or LIPMOTION_LEAGUE)"
+        ) from error
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(f"{path}: not a table of rivals ({error}); see the README.md in extras/league") from error
+    if unknown := sorted(set(only) - {rival.name for rival in rivals}):
+        raise InputError(f"no rival {unknown[0]!r}; there are: {', '.join(rival.name for rival in rivals)}")
+    return [rival for rival in rivals if not only or rival.name in only]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording with what was measured of its speaker's lips.
+
+    time_s, original : time, opening and width of the N frames with a face [shape=(N,), (N, 2)]
+    phones           : start and end in seconds, and phone; silence is ""
+    """
+
+    utterance: Utterance
+    sound: Path
+    time_s: Array
+    original: Array
+    phones: list[tuple[float, float, str]]
+
+    @property
+    def name(self) -> str:
+        """The name of the utterance."""
+        return self.utterance.name
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds of sound."""
+        return self.utterance.audio.duration_s
+
+    def spoken(self, *, lips: bool) -> list[tuple[float, float]]:
+        """Return the times of p, b and m, or of all other phones."""
+        return [(start, end) for start, end, phone in self.phones if phone and (phone in BILABIAL) == lips]
+
+
+def load_recordings(corpus: Corpus, names: Sequence[str], work: Path, monitor: Monitor) -> list[Recording]:
+    """Return recordings, their sound as a file in ``work``. Raises CorpusError: no lips were measured in one."""
+    from scipy.signal import resample_poly
+
+    phones, recordings = cached_recogniser(load_model().phones), []
+    make_folder(work / "sound")
+    for utterance in with_progress([corpus.utterance(name) for name in names], "recordings", monitor):
+        motion, seen = utterance.track.motion, np.asarray(utterance.track.seen)
+        if missing := [name for name in CHANNELS if name not in motion.names] or seen.sum() < 2 * REACH:
+            what = f"no {', '.join(missing)}" if isinstance(missing, list) else f"a face in {seen.sum()} frames"
+            raise CorpusError(
+                f"{corpus.path}: {utterance.name} has {what}, required the lips of a filmed face; prepare videos, or "
+                "leave the recording out"
+            )
+        content = np.asarray(utterance.audio.samples).tobytes() + repr((utterance.words, utterance.phones)).encode()
+        sound, timed = (
+            work / "sound" / f"{utterance.name}-{zlib.crc32(content):08x}.{kind}" for kind in ("wav", "json")
+        )
+        if not sound.exists():
+            samples = resample_poly(np.asarray(utterance.audio.samples, float), SOUND_HZ, utterance.audio.rate_hz)
+            powers = np.square(samples[: len(samples) // LEVEL_WINDOW * LEVEL_WINDOW]).reshape(-1, LEVEL_WINDOW)
+            loudest = np.sqrt(np.percentile(powers.mean(axis=1), LEVEL_SHARE))
+            write_sound(sound, Audio((samples * LEVEL / max(loudest, 1e-9)).astype(np.float32), SOUND_HZ))
+        if not timed.exists():
+            units = label_phones(utterance, phones, Lexicon())
+            rows = [(s.start_s, s.end_s, "" if is_silent(s.label.phone) else s.label.phone) for s in units]
+            _write_json(timed, rows)
+        time_s = motion.time_s[seen]
+        original = np.stack([motion[name][seen] for name in CHANNELS], axis=1).astype(float)
+        spoken = [(start, end, phone) for start, end, phone in from_json(timed.read_bytes())]
+        recordings.append(Recording(utterance, sound, time_s, original, spoken))
+    return recordings
+
+
+@dataclass(frozen=True, eq=False)
+class RivalAnswer:
+    """What a rival made of a recording: its weights [shape=(T, W)], 100 rows a second; processor seconds, or NaN."""
+
+    names: tuple[str, ...]
+    weights: Array
+    seconds: float
+
+
+def ask(
+    rival: Rival, recordings: Sequence[Recording], adapters: Path, work: Path, limit_s: float
+) -> list[list[RivalAnswer]]:
+    """Return the answers of a rival by settings and recording; kept in ``work``, a file for each recording.
+
+    limit_s : seconds after which the job is ended
+    Raises MissingDependencyError: it is not installed. Raises RivalError: it crashed, or answered nonsense.
+    """
+    command, settings = rival.command(adapters), rival.list_settings()
+    scripts = [Path(word).read_bytes() for word in command if Path(word).parent == adapters]
+    key = hashlib.sha256(b"".join([*scripts, json.dumps(settings, sort_keys=True).encode()])).hexdigest()[:8]
+    folder = work / "answers" / f"{rival.name}-{key}"
+    make_folder(folder)
+    files = [folder / f"{each.sound.stem}.json" for each in recordings]
+    missing = [(each, file) for each, file in zip(recordings, files, strict=True) if not file.exists()]
+    if missing:
+        rows = [{"name": each.name, "sound": str(each.sound), "duration_s": each.duration_s} for each, _ in missing]
+        if rival.given == "phones":
+            for row, (each, _) in zip(rows, missing, strict=True):
+                row["phones"] = [[phone, start_s, end_s] for start_s, end_s, phone in each.phones]
+        job, answered = folder / "job.part", folder / "answer.part"
+        _write_json(job, {"rate_hz": SOUND_HZ, "recordings": rows, "settings": settings})
+        answered.unlink(missing_ok=True)
+        _run(rival, [*command, str(job), str(answered)], folder, limit_s)
+        try:
+            content = from_json(answered.read_bytes())
+        except (OSError, ValueError) as error:
+            raise RivalError(f"{rival.title}: no readable answer ({error}); see {folder / 'log.txt'}") from error
+        for each, _ in missing:
+            _read_answers(rival, each, content.get(each.name), len(settings))  # nothing is kept before it is checked
+        for each, file in missing:
+            _write_json(file, content[each.name])
+    by_recording = [
+        _read_answers(rival, each, from_json(file.read_bytes()), len(settings))
+        for each, file in zip(recordings, files, strict=True)
+    ]
+    tried = [list(answers) for answers in zip(*by_recording, strict=True)]
+    if any(answer.names != answers[0].names for answers in tried for answer in answers):
+        raise RivalError(f"{rival.title}: recordings have weights of different names, required the same in all")
+    return tried
+
+
+def _read_answers(rival: Rival, recording: Recording, content: Any, count: int) -> list[RivalAnswer]:
+    if not isinstance(content, list) or len(content) != count:
+        raise RivalError(f"{rival.title}, {recording.name}: no list of {count} answers, one for each settings")
+    return [read_answer(rival, recording, each) for each in content]
+
+
+def _run(rival: Rival, command: Sequence[str], folder: Path, limit_s: float) -> None:
+    """Run an adapter; what it prints goes to a file. Raises as ``ask``."""
+    with (folder / "log.txt").open("wb") as log:  # not a pipe, which a program of the rival's could hold open
+        try:
+            code = subprocess.run(command, stdout=log, stderr=log, timeout=limit_s, check=False).returncode
+        except (FileNotFoundError, PermissionError) as error:
+            raise MissingDependencyError(f"{command[0]} cannot be run; {rival.needs}") from error
+        except subprocess.TimeoutExpired as error:
+            raise RivalError(
+                f"{rival.title}: not finished after {limit_s:g} s and ended; allow more with --limit, or leave it out"
+            ) from error
+    if code == ABSENT:
+        raise MissingDependencyError(rival.needs)
+    if code:
+        lines = (folder / "log.txt").read_text("utf-8", errors="replace").strip().splitlines() or ["it printed nothing"]
+        raise RivalError(f"{rival.title}: exit code {code} ({shorten(lines[-1])}); see {folder / 'log.txt'}")
+
+
+def read_answer(rival: Rival, recording: Recording, content: Any) -> RivalAnswer:
+    """Return an answer, checked. Raises RivalError."""
+    about = f"{rival.title}, {recording.name}"
+    try:
+        time_s, names = np.array(content["times"], float), tuple(sorted(content["weights"]))
+        weights = np.stack([np.array(content["weights"][name], float) for name in names], axis=1)
+        seconds = float(content.get("seconds", np.nan))
+    except (TypeError, KeyError, ValueError, AttributeError) as error:
+        raise RivalError(
+            f"{about}: not an answer ({type(error).__name__}: {error}); required times, weights"
+        ) from error
+    if len(time_s) != len(weights) or len(time_s) < 2:
+        raise RivalError(f"{about}: {len(time_s)} times and {len(weights)} values, required as many, two or more")
+    if not (np.isfinite(time_s).all() and np.isfinite(weights).all()):
+        raise RivalError(f"{about}: values that are not finite, required numbers")
+    last_s, needed_s = float(time_s[-1]), recording.duration_s
+    if (np.diff(time_s) < 0).any() or not -1 <= time_s[0] <= needed_s / 2 <= last_s <= needed_s + 1:
+        raise RivalError(
+            f"{about}: times from {time_s[0]:.2f} to {last_s:.2f} s, required rising from about 0 to {needed_s:.2f} s"
+        )
+    at_s = np.arange(int(needed_s * GRID_HZ) + 1) / GRID_HZ
+    return RivalAnswer(names, np.stack([np.interp(at_s, time_s, column) for column in weights.T], axis=1), seconds)
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """How the weights of a rival become opening and width, chosen on other recordings than those reported.
+
+    setting      : number of the settings;  lag_s : by which the rival is late;  smoothing_s : σ of a Gaussian
+    coefficients : of the weights and of a constant [shape=(W + 1, 2)];  shut : the opening under which it is closed
+    """
+
+    setting: int
+    lag_s: float
+    smoothing_s: float
+    coefficients: Array
+    shut: float = 0.0
+    score: float = -2.0
+
+
+def prepare_weights(answer: RivalAnswer, smoothing_s: float) -> Array:
+    """Return the smoothed weights of an answer, with a constant."""
+    from scipy.ndimage import gaussian_filter1d
+
+    weights = answer.weights
+    if smoothing_s:
+        weights = gaussian_filter1d(weights, smoothing_s * GRID_HZ, axis=0, mode="nearest")
+    return np.concatenate([weights, np.ones((len(weights), 1))], axis=1)
+
+
+def fit_map(rows: Array, original: Array) -> Array:
+    """Return the coefficients by ridge regression, which move as widely as the speakers do [shape=(W + 1, 2)]."""
+    square = rows.T @ rows
+    penalty = RIDGE * np.trace(square) / len(square) * np.eye(len(square))
+    coefficients: Array = np.linalg.solve(square + penalty, rows.T @ original)
+    made = rows @ coefficients
+    gain = original.std(axis=0) / np.maximum(made.std(axis=0), 1e-6 + 0.1 * original.std(axis=0))
+    coefficients *= gain
+    coefficients[-1] += original.mean(axis=0) - gain * made.mean(axis=0)
+    return coefficients
+
+
+def at_best_sync(recording: Recording, motion: Array, lag_s: float, limit_s: float) -> Array:
+    """Return motion [shape=(T, 2)] in the frames of a recording, moved by up to ``limit_s`` to fit its opening best."""
+    shifts = np.arange(-limit_s, limit_s + 1e-9, SYNC_STEP_S) if limit_s else np.zeros(1)
+    moved = [interpolate_rows(motion[:, :1], GRID_HZ, recording.time_s + lag_s + shift) for shift in shifts]
+    scores = [curves.correlation(each, recording.original[:, :1])[0] for each in moved]
+    return interpolate_rows(motion, GRID_HZ, recording.time_s + lag_s + shifts[int(np.argmax(scores))])
+
+
+def choose(
+    tried: Sequence[Sequence[RivalAnswer]], recordings: Sequence[Recording], numbers: Sequence[int], limit_s: float
+) -> Choice:
+    """Return the choice with the highest mean correlation of opening on recordings of some numbers.
+
+    tried : answers to all recordings, by settings. Answers that have opening and width are taken as they are
+    """
+    chosen, best = [recordings[n] for n in numbers], (Choice(0, 0.0, 0.0, np.zeros((1, 2))), list[Array]())
+    original = np.concatenate([each.original for each in chosen])
+    own = set(CHANNELS) <= set(tried[0][0].names)
+    for setting, answers in enumerate(tried):
+        for smoothing_s in (0.0,) if own else SMOOTHINGS_S:
+            rows = [prepare_weights(answers[n], smoothing_s) for n in numbers]
+            for lag_s in (0.0,) if own else LAGS_S.tolist():
+                if own:
+                    coefficients = np.zeros((rows[0].shape[1], len(CHANNELS)))
+                    for column, name in enumerate(CHANNELS):
+                        coefficients[answers[0].names.index(name), column] = 1
+                else:
+                    placed = [
+                        interpolate_rows(r, GRID_HZ, each.time_s + lag_s) for r, each in zip(rows, chosen, strict=True)
+                    ]
+                    coefficients = fit_map(np.concatenate(placed), original)
+                made = [
+                    at_best_sync(each, r @ coefficients, lag_s, limit_s) for r, each in zip(rows, chosen, strict=True)
+                ]
+                opened = [each.original[:, :1] for each in chosen]
+                score = float(curves.per_clip_correlation([each[:, :1] for each in made], opened)[0])
+                if score > best[0].score + 1e-4:
+                    best = Choice(setting, lag_s, smoothing_s, coefficients, score=score), made
+    choice, made = best
+    level = float(np.percentile(np.concatenate([each[:, 0] for each in made]), 95))
+    counts = {
+        share: np.sum([closing_counts(each, m, share * level)[0] for each, m in zip(chosen, made, strict=True)], axis=0)
+        for share in SHUT_SHARES
+    }
+    return replace(choice, shut=level * max(counts, key=lambda share: np.nan_to_num(_f1(counts[share]))))
+
+
+def closing_counts(recording: Recording, made: Array, shut: float) -> tuple[Array, Array]:
+    """Return matched, missed and false closings, of all and of p, b and m [each shape=(3,)].
+
+    Of p, b and m: missed are the speaker's closings there, false are generated ones in other phones, where the speaker
+    does not close.
+    """
+    opening, own = recording.original[:, 0], closed_threshold([recording.original[:, 0]])
+    original, generated = find_closings(opening, own), find_closings(made[:, 0], shut)
+    pairs = match_closings(generated, original)
+    matched = [o for _, o in pairs]
+    frame_s = float(np.median(np.diff(recording.time_s)))
+
+    def inside(frames: NDArray[np.intp], spans: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
+        return ~is_away_from_speech(recording.time_s[frames], spans, margin_s)
+
+    lips, other = recording.spoken(lips=True), recording.spoken(lips=False)
+    wanted = original[inside(original, lips, frame_s)]
+    false = np.setdiff1d(generated, [g for g, _ in pairs]).astype(int)
+    false = false[inside(false, other, 0.0) & ~inside(false, lips, frame_s)]
+    hits = int(np.isin(wanted, matched).sum())
+    everything = np.array([len(pairs), len(original) - len(pairs), len(generated) - len(pairs)], float)
+    return everything, np.array([hits, len(wanted) - hits, len(false)], float)
+
+
+def _f1(counts: Array) -> float:
+    matched, missed, false = counts
+    total = 2 * matched + missed + false
+    return float(2 * matched / total) if total else float("nan")
+
+
+def _ratio(total: Array) -> float:
+    return float(total[0] / total[1]) if total[1] > 0 else float("nan")
+
+
+def onset_errors(recording: Recording, made: Array, shut: float) -> Array:
+    """Return the sum of errors, in ms, with which movements of the mouth begin, and their number [shape=(2,)]."""
+    own, frame_s = closed_threshold([recording.original[:, 0]]), float(np.median(np.diff(recording.time_s)))
+    original = find_closings(-recording.original[:, 0], -own)  # the first open frame after a closed one
+    generated = find_closings(-made[:, 0], -shut)
+    pairs = match_closings(generated, original, round(ONSET_REACH_S / frame_s))
+    errors = sum(abs(recording.time_s[g] - recording.time_s[o]) for g, o in pairs)
+    return 1000 * np.array([errors + ONSET_REACH_S * (len(original) - len(pairs)), len(original) / 1000])
+
+
+def measure(recordings: Sequence[Recording], made: Sequence[tuple[Array, float, float]]) -> dict[str, ClipStatistic]:
+    """Return the figures of one rival by name, each a sum over recordings; made: motion, threshold, seconds."""
+    sums: dict[str, list[Array]] = {name: [] for name in ("acc", "width", "f1", "lips", "strength", "jerk", "onset")}
+    for recording, (motion, shut, _) in zip(recordings, made, strict=True):
+        both = curves.correlation(motion, recording.original)
+        everything, lips = closing_counts(recording, motion, shut)
+        speech = ~is_away_from_speech(recording.time_s, [s[:2] for s in recording.phones if s[2]], 0.0)
+        speech |= ~speech.any()  # nothing is spoken: all of it
+        pair = (motion[:, 0], recording.original[:, 0])
+        sums["acc"].append(np.array([both[0], 1]))
+        sums["width"].append(np.array([both[1], 1]))
+        sums["f1"].append(everything)
+        sums["lips"].append(lips)
+        sums["strength"].append(np.array([np.percentile(each[speech], 98) for each in pair]))
+        sums["jerk"].append(np.array([np.abs(np.diff(each, 3)).sum() for each in pair]))
+        sums["onset"].append(onset_errors(recording, motion, shut))
+    sums["seconds"] = [np.array([s, r.duration_s]) for (_, _, s), r in zip(made, recordings, strict=True)]
+    return {name: ClipStatistic(rows, _f1 if name in ("f1", "lips") else _ratio) for name, rows in sums.items()}
+
+
+def split_choices(reported: int, choosing: int) -> Iterator[tuple[list[int], list[int]]]:
+    """Yield numbers of recordings to choose on, and to report; those to choose on stand after the others, if any.
+
+    Without recordings to choose on: folds of those reported. Raises InputError: a single recording.
+    """
+    everything = list(range(reported))
+    if choosing:
+        yield list(range(reported, reported + choosing)), everything
+        return
+    if reported < 2:
+        raise InputError("1 recording, required two or more, to choose on one and to report the other; or --choose")
+    for fold in range(min(FOLDS, reported)):
+        held = everything[fold::FOLDS]
+        yield [n for n in everything if n not in held], held
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What one rival did: its motion of each recording, its figures, and what was chosen of it in every fold."""
+
+    rival: Rival
+    made: Sequence[Array]
+    figures: Mapping[str, ClipStatistic]
+    chosen: Sequence[Mapping[str, Any]]
+
+
+def play(
+    rival: Rival,
+    recordings: Sequence[Recording],
+    reported: int,
+    adapters: Path,
+    work: Path,
+    sync_s: float,
+    limit_s: float,
+) -> Standing:
+    """Return what a rival does on the first ``reported`` recordings. Raises as ``ask``."""
+    settings = rival.list_settings()
+    tried = ask(rival, recordings, adapters, work, limit_s)
+    done, chosen = dict[int, tuple[Array, float, float]](), []
+    for numbers, held in split_choices(reported, len(recordings) - reported):
+        choice = choose(tried, recordings, numbers, sync_s)
+        shown = {k: Path(v).name if isinstance(v, str) else v for k, v in settings[choice.setting].items()}
+        about = {"settings": shown, "lag_ms": round(1000 * choice.lag_s)}
+        chosen.append(about | {"smoothing_ms": round(1000 * choice.smoothing_s), "acc_there": round(choice.score, 3)})
+        for n in held:
+            answer = tried[choice.setting][n]
+            motion = prepare_weights(answer, choice.smoothing_s) @ choice.coefficients
+            done[n] = at_best_sync(recordings[n], motion, choice.lag_s, sync_s), choice.shut, answer.seconds
+    made = [done[n] for n in range(reported)]
+    return Standing(rival, [motion for motion, *_ in made], measure(recordings[:reported], made), chosen)
+
+
+@dataclass(frozen=True, eq=False)
+class League:
+    """The standings, best first; why rivals are absent, or failed, by title; the recordings, and texts on them."""
+
+    standings: Sequence[Standing]
+    absent: Mapping[str, str]
+    failed: Mapping[str, str]
+    recordings: Sequence[Recording]
+    about: Mapping[str, str]
+
+    @property
+    def best_rival(self) -> Standing | None:
+        """The best that is not ours and hears sound alone; None: there is none."""
+        others = [each for each in self.standings if not each.rival.ours and each.rival.given == "sound"]
+        return others[0] if others else None
+
+
+def league(  # noqa: PLR0913
+    corpus: Corpus,
+    adapters: Path,
+    work: Path,
+    *,
+    choosing: Corpus | None = None,
+    only: Sequence[str] = (),
+    sync_s: float = 0.06,
+    limit_s: float = 600.0,
+    monitor: Monitor = silent_monitor,
+) -> League:
+    """Return how rivals, and our engines, move the lips of the same recordings.
+
+    adapters : the folder ``extras/league``, with a table of rivals
+    work     : answers are kept there: a run that was stopped goes on
+    choosing : another corpus, on whose list ``val`` (without one: on all) settings are chosen. None: the corpus's own
+               ``val``, and its ``test`` is reported; without both lists, in folds over its recordings
+    sync_s   : each recording may be moved by so much to fit best, alike for all; limit_s: longest time of a job
+    Raises InputError: no adapters, or too few recordings. Raises CorpusError: no lips in a recording.
+    """
+    rivals, work = read_rivals(adapters, only), work.resolve()
+    lists = corpus.splits
+    own = choosing is None and lists["val"] and lists["test"]
+    reported = corpus.names("test" if own else None)
+    loading = sub_monitor(monitor, 0, 0.3)
+    recordings = load_recordings(corpus, reported, work, loading)
+    other, names = (corpus, corpus.names("val")) if own else (choosing, ())
+    if other is not None:
+        names = names or other.names("val") or other.names()
+        recordings += load_recordings(other, names, work / "choosing", loading)
+    next(split_choices(len(reported), len(names)))
+    stems = [each.sound.stem for each in recordings]
+    if both := sorted({*stems[: len(reported)]} & {*stems[len(reported) :]}):
+        raise InputError(f"{both[0]} is to choose on and is reported, required others; give another corpus to --choose")
+    standings, absent, failed = [], {}, {}
+    for rival in with_progress(rivals, "rivals", sub_monitor(monitor, 0.3, 1)):
+        try:
+            standings.append(play(rival, recordings, len(reported), adapters.resolve(), work, sync_s, limit_s))
+        except MissingDependencyError as error:
+            absent[rival.title] = str(error)
+        except RivalError as error:
+            failed[rival.title] = str(error)
+    standings.sort(key=lambda each: -each.figures["acc"].value)
+    chosen = f"{len(names)} other recordings" if names else "folds of these recordings"
+    about = {"recordings": f"{len(reported)} of {corpus.path.resolve().name}", "settings chosen on": chosen}
+    about |= {"moved to fit best, all alike": f"by up to {1000 * sync_s:g} ms"}
+    return League(standings, absent, failed, recordings[: len(reported)], about)
+
+
+COLUMNS = (
+    Column("given", "given"),
+    Column("acc", "opening", ".3f", "mean correlation of a recording's opening with its speaker's"),
+    Column("width", "width", ".3f", "the same of the width of the mouth"),
+    Column("lips", "p b m", ".2f", "closings in p, b and m: F1; false are those in other phones"),
+    Column("f1", "closings", ".2f", "all closings: F1 of pairs within two frames"),
+    Column("strength", "strength", ".2f", "98th percentile of the opening in speech, by the speaker's"),
+    Column("jerk", "jerk", ".2f", "mean third difference of the opening, by the speaker's"),
+    Column("onset", "onset", ".0f", "mean error, in ms, with which the mouth begins to open; 200 where it never does"),
+    Column("seconds", "processor", ".3f", "processor seconds for a second of sound"),
+)
+HOW_TO_READ = (
+    "Weights of a rival become opening and width by a linear map that moves as widely as the speakers do. The map, its "
+    "lag, its smoothing, when lips count as closed, and the rival's settings are those with which it did best on "
+    "recordings that are not reported here. What answers in opening and width is taken as it is. Small: 95 % "
+    "bootstrap intervals over recordings."
+)
+PART, INSTANTS, SHOWN_S = "league", 6, 6.0
+"""Folder of the report; pictures of each system, and the length of what is shown."""
+
+
+def describe_league(found: League) -> Section:
+    """Return what is said of a league: its table, against the best rival, and what was found."""
+    rows: dict[str, dict[str, Any]] = {}
+    best = found.best_rival
+    for each in found.standings:
+        row: dict[str, Any] = {"given": each.rival.given}
+        for name, figure in each.figures.items():
+            row |= {name: figure.value, f"{name}_95": figure.interval(0)}
+            if best is not None and best is not each:
+                row[f"{name}_gain_95"] = figure.gain(best.figures[name], 0)
+        rows[each.rival.title] = nan_as_null(row)
+    verdict = "nothing could be compared"
+    if found.standings:
+        first = found.standings[0]
+        verdict = f"Best: {first.rival.title}, opening {first.figures['acc'].value:.3f}"
+        if best is not None and best is not first:
+            low, high = first.figures["acc"].gain(best.figures["acc"], 0)
+            verdict += f"; {low:+.3f} to {high:+.3f} more than the best rival, {best.rival.title}"
+    lips = int(sum(counts[:2].sum() for counts in found.standings[0].figures["lips"].sums)) if found.standings else 0
+    about = f"{', '.join(f'{key}: {value}' for key, value in found.about.items())}; {lips} p b m close"
+    table = Table("standings", about, COLUMNS, rows, best.rival.title if best else "")
+    words = warn_of_few(len(found.recordings))
+    for title, reasons in (("Not installed", found.absent), ("Failed", found.failed)):
+        words |= {title: [f"{name}: {reason}" for name, reason in reasons.items()]} if reasons else {}
+    return Section("The league", about, verdict, words, (), table, shown=list(rows))
+
+
+def write_league(found: League, folder: Path) -> dict[str, Any]:
+    """Write the page of a league, with its pictures and all figures, to a folder; return the figures."""
+    section, motion, part = describe_league(found), _shown(found), folder / PART
+    figures: dict[str, Any] = {
+        "about": found.about,
+        "best_rival": section.table.reference or None,
+        "rivals": section.table.rows,
+    }
+    figures |= {"chosen": {each.rival.title: each.chosen for each in found.standings}}
+    each_acc = {
+        each.rival.title: {r.name: s[0] for r, s in zip(found.recordings, each.figures["acc"].sums, strict=True)}
+        for each in found.standings
+    }
+    figures = nan_as_null(figures | {"each": each_acc, "absent": found.absent, "failed": found.failed})
+    make_folder(part / "tables")
+    for name, text in (("csv", section.table.as_csv()), ("json", as_json(section.table.as_content(), indent=1))):
+        with atomic_file(part / "tables" / f"{section.table.name}.{name}") as unfinished:
+            unfinished.write_text(text, encoding="utf-8", newline="")
+    _write_json(part / "figures.json", figures)
+    record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": found.about}
+    finished = [FinishedPart(PART, record, motion, section)]
+    page = report_html(
+        "The league", found.about, finished, found.absent, found.failed,
+        subtitle="Rivals and our engines on the same filmed recordings.", how_to_read=HOW_TO_READ,
+    )  # fmt: skip
+    with atomic_file(folder / "index.html") as unfinished:
+        unfinished.write_text(page, encoding="utf-8")
+    return dict(figures)
+
+
+def _shown(found: League) -> dict[str, Any]:
+    """Return what systems do in the seconds that have most p, b and m, as the page of a report shows it."""
+    if not found.standings:
+        return {}
+
+    def lips(n: int, start_s: float) -> int:
+        spans = found.recordings[n].spoken(lips=True)
+        return sum(start_s <= start and end <= start_s + SHOWN_S for start, end in spans)
+
+    begins = [(n, s) for n, r in enumerate(found.recordings) for s in [0.0, *(span[0] for span in r.spoken(lips=True))]]
+    number, begin_s = max(begins, key=lambda each: lips(*each))
+    recording = found.recordings[number]
+    seen = (recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S)
+    spoken = [s for s in recording.phones if s[2] and s[1] > begin_s and s[0] < begin_s + SHOWN_S]
+    systems = {each.rival.title: each.made[number][seen] for each in found.standings}
+    content: dict[str, Any] = {
+        "name": recording.name,
+        "words": list(recording.utterance.words or ()),
+        "channels": list(CHANNELS),
+    }
+    content |= {"spoken": spoken, "time_s": recording.time_s[seen], RECORDED: recording.original[seen]}
+    return content | {"systems": systems}
+
+
+def _draw_mouths(motion: Mapping[str, Any], folder: Path) -> Iterator[dict[str, str]]:
+    """Write a strip of mouths for the speaker and for each system, at instants of wide and of closed lips."""
+    parts = np.array_split(np.arange(len(motion["time_s"])), INSTANTS)
+    extremes = (np.argmax, np.argmin)
+    frames = [p[extremes[n % 2](motion[RECORDED][p, 0])] for n, p in enumerate(parts) if len(p)]
+    silence = Timeline((Span(0.0, len(frames) / FPS, Unit("sil")),))
+    for number, (name, values) in enumerate({RECORDED: motion[RECORDED], **motion["systems"]}.items()):
+        made = Motion(values[frames], FPS, tuple(map(Channel, CHANNELS)))
+        pictures = list(stage_face("woman", STAGING).render(made, silence, fps=FPS))[: len(frames)]
+        with atomic_file(folder / f"{number}.png") as unfinished:
+            strip = Image.fromarray(np.concatenate([each[LOWER_FACE] for each in pictures], axis=1))
+            strip.reduce(2).save(unfinished, format="png")
+        yield {"file": f"{number}.png", "caption": name}
+
+
+def _write_json(path: Path, content: Any) -> None:
+    with atomic_file(path) as unfinished:
+        unfinished.write_text(as_json(content) + "\n", encoding="utf-8")

@@ -1,0 +1,113 @@
+"""``lipmotion compare``, ``evaluate`` and ``league``: figures of motion, of a model, of rivals."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, list_or_all, report_figures
+from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.pipeline.request import Request
+
+ADAPTERS = "LIPMOTION_LEAGUE"
+"""Variable of the environment: the folder of adapters."""
+
+
+def add_compare(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("compare", help="compare motion files or videos with a reference")
+    what = "motion file (.json .csv .npz, or another that can be read), or video of a face"
+    add_input(parser, "reference", what="recording", help=what)
+    add_input(parser, "others", what="recording", nargs="+", metavar="OTHER", help="the same, compared with it")
+    add_figures_arguments(parser, lexicon=False)
+    parser.set_defaults(run=run_compare)
+
+
+def run_compare(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.compare`` and print its figures."""
+    from lipmotion.measures.evaluation_table import comparison_table
+    from lipmotion_lab.compare import compare
+
+    report_figures(
+        options, lambda _, monitor: compare(options.reference, *options.others, monitor=monitor), comparison_table
+    )
+
+
+def add_evaluate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("evaluate", help="compare generated with recorded motion")
+    add_input(parser, "model", what="model", replaceable=True)
+    add_input(parser, "corpus", what="corpus")
+    parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
+    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
+    add_options(parser, Request, "recogniser")
+    add_figures_arguments(parser)
+    parser.set_defaults(run=run_evaluate)
+
+
+def run_evaluate(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.evaluate`` and print its figures."""
+    from lipmotion.corpora.store import Corpus, Selection
+    from lipmotion.measures.evaluation_table import figures_table
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.types import Monitor
+    from lipmotion.units import Lexicon
+    from lipmotion_lab.evaluation.evaluate import evaluate
+
+    selection = Selection(list_or_all(options.split), tuple(options.speaker))
+
+    def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
+        return evaluate(
+            load_model(options.model),
+            Corpus.open(options.corpus),
+            selection=selection,
+            lexicon=lexicon,
+            recogniser=options.recogniser,
+            monitor=monitor,
+        )
+
+    report_figures(options, compute, figures_table)
+
+
+def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("league", help="compare rivals and our engines on the same filmed recordings")
+    add_input(parser, "recordings", what="corpus")
+    add_output(parser, "-o", "--output", is_folder=True, required=True, metavar="REPORT", help="folder of the page")
+    where = f"folder of adapters, extras/league of the sources (default: that of {ADAPTERS})"
+    parser.add_argument("--adapters", type=Path, default=os.environ.get(ADAPTERS, "extras/league"), help=where)
+    choice = "corpus on whose list val settings are chosen (default: lists or folds of the recordings)"
+    add_input(parser, "--choose", what="corpus", metavar="CORPUS", help=choice)
+    parser.add_argument("--only", action="append", default=[], metavar="RIVAL", help="only this one (repeatable)")
+    sync = "each recording may be moved by so much to fit best, alike for all (default: 60)"
+    parser.add_argument("--sync", type=float, default=60.0, metavar="MS", help=sync)
+    limit = "longest time of a rival with all recordings (default: 600)"
+    parser.add_argument("--limit", type=float, default=600.0, metavar="SECONDS", help=limit)
+    add_machine_readable(parser)
+    parser.set_defaults(run=run_league)
+
+
+def run_league(options: argparse.Namespace) -> None:
+    """Call ``league``, write its page, and print its table."""
+    from lipmotion.cli.terminal.progress import report_progress
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.storage.locks import lock_folder
+    from lipmotion_lab.league import describe_league, league, write_league
+
+    corpus, choosing = Corpus.open(options.recordings), options.choose and Corpus.open(options.choose)
+    with report_progress(options) as report, lock_folder(options.output):
+        found = league(
+            corpus,
+            Path(options.adapters),
+            options.output / "work",
+            choosing=choosing,
+            only=options.only,
+            sync_s=options.sync / 1000,
+            limit_s=options.limit,
+            monitor=report.receive,
+        )
+        figures = write_league(found, options.output)
+        report.finish(describe_league(found).as_text(), figures=figures)
