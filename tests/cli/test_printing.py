@@ -30,7 +30,7 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
-from lipmotion_lab.verbs import evaluate
+from lipmotion_lab.verbs import measure
 from robustness.case import changed_model
 
 EVIL = "q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
@@ -317,7 +317,7 @@ def test_why_it_failed(capsys, monkeypatch):
         (ZeroDivisionError("what"), 1, "ZeroDivisionError: what"),
     ]
     for error, code, reason in errors:
-        monkeypatch.setattr(evaluate, "run", partial(fail, error))
+        monkeypatch.setattr(measure, "run_evaluate", partial(fail, error))
         with suppress(ZeroDivisionError):  # a bug is not hidden
             assert main(["evaluate", "m", "c", "--machine-readable"]) == code
         said = capsys.readouterr()
@@ -390,5 +390,5 @@ def test_what_is_swallowed_stops_at_the_next_event(monkeypatch, run):
             report.receive(EVENTS[0])
             raise AssertionError
 
-    monkeypatch.setattr(evaluate, "run", swallows)
+    monkeypatch.setattr(measure, "run_evaluate", swallows)
     assert run("evaluate", "m", "c") == (143, [], ["lipmotion: stopped; run the same command again to go on"])

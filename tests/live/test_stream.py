@@ -251,9 +251,9 @@ def test_what_is_told_wrongly_is_refused_and_forgotten_at_an_interruption(sound:
     for wrong in ([("a", 0.8, 1.0)], [("a", 1.5, 1.2)], [("a", 1000, 1400)], [("a", 1.0, np.nan)]):
         with pytest.raises(InputError, match="required seconds"):
             stream.add_words(wrong)
-    for wrong in ([("a", "b", 0.3)], [("a", None, 0.3)], [("a", 0.3)], [("a", 1, 10**400)], [("b", 1.0, 2.0), 5]):
+    for other in (("a", "b", 0.3), ("a", None, 0.3), ("a", 0.3), ("a", 1, 10**400), 5):
         with pytest.raises(InputError, match="a text with its start and end"):
-            stream.add_words(wrong)
+            stream.add_words([("b", 1.0, 2.0), other])  # type: ignore[list-item]
     for time_s in (np.nan, np.inf):
         with pytest.raises(InputError, match="a time of the stream"):
             stream.interrupt(time_s)

@@ -80,6 +80,9 @@ def edits_of_all_kinds(chance: Random, state: dict[str, Any]) -> list[str]:
     start_s = round(chance.uniform(0, phones[-1]["end_s"] - 0.5), 2)
     part = f"from {start_s} to {start_s + chance.uniform(0.05, 0.3):.2f}"
     words = f"say {chance.choice(WORDS)} from {start_s} to {start_s + 0.4:.2f}"
+    pinned = f"pin {chance.choice(('opening', 'width'))} {chance.uniform(0, 0.3):.3f} at {start_s}"
+    pins = [step.split() for step in state["steps"] if step.startswith("pin ")] or [pinned.split()]
+    _, curve, _, _, pinned_s, *_ = chance.choice(pins)
     locked = [step for step in state["steps"] if step.startswith("lock ")] or [f"lock {part}"]
     return [
         f"word {word} is {chance.choice(WORDS).split()[0]}",
@@ -92,7 +95,9 @@ def edits_of_all_kinds(chance: Random, state: dict[str, Any]) -> list[str]:
         f"split phone {number + 1} at {(phone['start_s'] + phone['end_s']) / 2:.3f}",
         f"remove phone {number + 1}",
         f"insert {said} {part}",
-        f"pin {chance.choice(('opening', 'width'))} {chance.uniform(0, 0.3):.3f} at {start_s}",
+        pinned,
+        f"{pinned} slope {chance.uniform(-1, 1):.2f}",
+        f"unpin {curve} at {pinned_s}",
         f"pin jawOpen {chance.uniform(0, 1):.3f} at {start_s}",
         f"gain {chance.uniform(0.5, 1.5):.2f} {part}",
         f"gain mouthPucker {chance.uniform(0.5, 1.5):.2f} {part}",

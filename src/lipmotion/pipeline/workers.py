@@ -42,16 +42,6 @@ def process_count(count: int | None) -> int:
     return count or os.cpu_count() or 1
 
 
-def _in_order(numbered: Iterator[tuple[int, ResultT]]) -> Iterator[ResultT]:
-    waiting: dict[int, ResultT] = {}
-    following = 0
-    for number, result in numbered:
-        waiting[number] = result
-        while following in waiting:
-            yield waiting.pop(following)
-            following += 1
-
-
 class Workers:
     """Applies functions to items in worker processes, or in this process if there are none.
 
@@ -68,7 +58,17 @@ class Workers:
         Raises WorkerDiedError: a process died.
         """
         numbered = self._numbered(function, items)
-        return _in_order(numbered)
+
+        def in_order() -> Iterator[ResultT]:
+            waiting: dict[int, ResultT] = {}
+            following = 0
+            for number, result in numbered:
+                waiting[number] = result
+                while following in waiting:
+                    yield waiting.pop(following)
+                    following += 1
+
+        return in_order()
 
     def unordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[ResultT]:
         """Yield the results in the order in which they are ready. Raises WorkerDiedError: a process died."""
@@ -266,13 +266,22 @@ def training_pool(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
         with worker_pool(min(process_count(workers), utterances // UTTERANCES_PER_WORKER)) as team:
             yield team.ordered_map
         return
-    with cluster_pool(workers, ordered=True) as pool:
-        yield lambda function, items: pool(partial(_work_alone, function), items)
+    with cluster_pool(workers) as pool:
+
+        def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+            waiting, following = dict[int, ResultT](), 0
+            for number, result in pool(partial(_work_alone, function), enumerate(items)):
+                waiting[number] = result
+                while following in waiting:
+                    yield waiting.pop(following)
+                    following += 1
+
+        yield each
 
 
-def _work_alone(function: Callable[[ItemT], ResultT], item: ItemT) -> ResultT:
+def _work_alone(function: Callable[[ItemT], ResultT], numbered: tuple[int, ItemT]) -> tuple[int, ResultT]:
     with one_thread():
-        return function(item)
+        return numbered[0], function(numbered[1])
 
 
 LOG = logging.getLogger("lipmotion")
@@ -294,12 +303,12 @@ class Pool(Protocol):
 
 
 @contextmanager
-def cluster_pool(address: str, out: Path | None = None, *, ordered: bool = False) -> Iterator[Pool]:
+def cluster_pool(address: str, out: str | Path = ".") -> Iterator[Pool]:
     """Give the workers of a Dask cluster as a pool.
 
     address : of its scheduler, as ``tcp://HOST:8786``
-    out     : the folder of the outputs, which every worker must see under the same path; None: there is none
-    ordered : results come in the order of the items; a warning says where the last bits of results may differ
+    out     : the folder of the outputs, which every worker must see under the same path
+    A warning says where the last bits of results may differ.
     Raises MissingDependencyError: the package distributed is not installed.
     Raises InputError: no cluster answers, it has no workers, or they lack lipmotion, its version or the folder.
     """
@@ -314,54 +323,44 @@ def cluster_pool(address: str, out: Path | None = None, *, ordered: bool = False
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
         except (OSError, TimeoutError, ValueError) as error:
             raise InputError(f"{address}: no Dask scheduler answers ({error}); start one: dask scheduler") from error
-        _check_workers(client, address, out, ordered=ordered)
-
-        def numbered(function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[tuple[int, ResultT]]:
-            remaining, numbers = enumerate(items), dict[str, int]()
-
-            def submit(count: int) -> Iterator[Any]:
-                for number, item in islice(remaining, count):
-                    future = client.submit(function, item, pure=False)
-                    numbers[future.key] = number
-                    yield future
-
-            running = as_completed(list(submit(ITEMS_AHEAD * sum(client.ncores().values()))), loop=client.loop)
-            try:
-                for future in running:
-                    yield numbers.pop(future.key), future.result()
-                    running.update(list(submit(1)))
-            except KilledWorker as error:
-                raise WorkerDiedError(DIED) from error
-            finally:
-                client.cancel(list(running.futures))
+        try:
+            answers = client.run(describe_worker, str(out), on_error="return")
+        except Exception as error:  # what the scheduler could not send
+            raise InputError(f"{address}: the workers cannot be asked ({error})") from error
+        if not answers:
+            raise InputError(f"{address}: the cluster has no workers; start some: dask worker {address} --nthreads 1")
+        for worker, answer in answers.items():
+            _check_worker(worker, answer, out)
 
         def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-            results = numbered(function, items)
-            return _in_order(results) if ordered else (result for _, result in results)
+            remaining = iter(items)
+            first = list(islice(remaining, ITEMS_AHEAD * sum(client.ncores().values())))
+            running = as_completed(client.map(function, first, pure=False), loop=client.loop)
+            try:
+                for future in running:
+                    yield future.result()
+                    running.update(client.submit(function, item, pure=False) for item in islice(remaining, 1))
+            except KilledWorker as error:
+                raise WorkerDiedError(str(error)) from error
+            finally:
+                client.cancel(list(running.futures))
 
         yield each
 
 
-def _check_workers(client: Any, address: str, out: Path | None, *, ordered: bool) -> None:
-    """Raise InputError unless there are workers that can do the work."""
-    try:
-        answers = client.run(describe_worker, str(out), on_error="return")
-    except Exception as error:  # what the scheduler could not send
-        raise InputError(f"{address}: the workers cannot be asked ({error})") from error
-    if not answers:
-        raise InputError(f"{address}: the cluster has no workers; start some: dask worker {address} --nthreads 1")
-    for worker, answer in answers.items():
-        if isinstance(answer, BaseException):
-            raise InputError(
-                f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
-            ) from answer
-        version, sees_folder, processor = answer
-        if version != installed_version():
-            raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
-        if ordered and processor != describe_worker("")[2]:
-            LOG.warning("%s: has another processor (%s): the last bits of the model may differ", worker, processor)
-        if out is not None and not sees_folder:
-            raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
+def _check_worker(worker: str, answer: Any, out: str | Path) -> None:
+    """Raise InputError where a worker cannot do the work; warn where its processor is another kind."""
+    if isinstance(answer, BaseException):
+        raise InputError(
+            f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
+        ) from answer
+    version, sees_folder, processor = answer
+    if version != installed_version():
+        raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
+    if processor != describe_worker("")[2]:
+        LOG.warning("%s: has another processor (%s): the last bits of results may differ", worker, processor)
+    if not sees_folder:
+        raise InputError(f"{worker}: does not see the folder {out}; use one that all machines share")
 
 
 def describe_worker(out: str) -> tuple[str, bool, str]:

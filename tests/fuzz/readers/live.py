@@ -25,7 +25,7 @@ from lipmotion.storage.json_text import from_json
 from lipmotion_studio.live.servers import Server, open_server
 from lipmotion_studio.live.vtube import VTubeStudio
 
-REPLIES = {
+REPLIES: dict[str, dict[str, Any]] = {
     "AuthenticationRequest": {"data": {"authenticated": True}},
     "AuthenticationTokenRequest": {"data": {"authenticationToken": "token"}},
     "InputParameterListRequest": {"data": {"defaultParameters": [{"name": "MouthOpen"}], "customParameters": []}},
@@ -45,7 +45,7 @@ def seeds(good: Good) -> list[Files]:
             np.save(Path(folder) / f"{name}.npy", samples)
         arrays = [{path.name: path.read_bytes()} for path in sorted(Path(folder).iterdir())]
     raw = (sound * 32767).astype("<i2").tobytes()
-    replies = {kind: {"requestID": "ID", "messageType": kind, **reply} for kind, reply in REPLIES.items()}
+    replies = {kind: {"requestID": "ID", "messageType": kind} | reply for kind, reply in REPLIES.items()}
     texts = {"words.json": WORDS, "phones.json": [["b", 0.1, 0.2], ["ey1", 0.2, 0.4]], "replies.json": replies}
     found = [{name: json.dumps(content).encode()} for name, content in texts.items()]
     return [*found, *arrays, {"sound.raw": raw}, {"client.http": REQUEST.encode() + FRAME}]
