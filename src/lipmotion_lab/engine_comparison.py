@@ -8,29 +8,21 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, describe_training, train
-from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.files import make_folder
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.locks import unfinished_work
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
+from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
-from lipmotion_lab.evaluation.held_out import (
-    OPENING,
-    ComparedClip,
-    HeldOutRecordings,
-    generate_compared,
-    load_held_out,
-    make_speech,
-)
+from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings, generate_compared, make_speech
 from lipmotion_lab.learning_curve import check_training_names
-from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, check_opening, opening_row_with_rates
 
 ENGINES_COMPARED = ("trajectory", "coupled", "selection")
 SUFFIX = ".lipmotion"
@@ -47,7 +39,7 @@ class EngineModel:
 
 
 def engine_models(
-    corpus: Corpus, folder: Path | None, settings: ExperimentSettings, names: Sequence[str] = ENGINES_COMPARED
+    corpus: Corpus, folder: Path | None, settings: runner.ExperimentSettings, names: Sequence[str] = ENGINES_COMPARED
 ) -> dict[str, EngineModel]:
     """Return models of the corpus's training list, each engine by its defaults.
 
@@ -70,9 +62,8 @@ def engine_models(
             for name, kept in models.items():
                 _check_model(paths[name], name, kept.model, required)
     missing = [name for name in names if name not in models]
-    for number, name in enumerate(missing):
-        part = sub_monitor(settings.monitor, number / len(missing), (number + 1) / len(missing), f"{name}: ")
-        start_s, engine, here = perf_counter(), engine_named(name, {}), replace(settings, monitor=part)
+    for name, here in zip(missing, runner.share_out(settings, missing), strict=True):
+        start_s, engine = perf_counter(), engine_named(name, {})
         if folder is None:
             model = train_engine(corpus, engine, here)
         else:
@@ -83,7 +74,9 @@ def engine_models(
     return {name: models[name] for name in names}
 
 
-def train_engine(corpus: Corpus, engine: Engine[Any], settings: ExperimentSettings, work: Path | None = None) -> Model:
+def train_engine(
+    corpus: Corpus, engine: Engine[Any], settings: runner.ExperimentSettings, work: Path | None = None
+) -> Model:
     """Return a model of the training list; ``work``: a folder from which training that was stopped goes on."""
     run = Run(settings.monitor, work, settings.workers)
     return train(corpus, engine=engine, recogniser=settings.recogniser, lexicon=settings.lexicon, run=run)[0]
@@ -109,7 +102,7 @@ def _check_model(path: Path, name: str, model: Model, required: Mapping[str, obj
 
 REFERENCE_ENGINE = "trajectory"
 """The engine that every other system is compared with; its phone models give the phones in time."""
-WIDTH = "width"
+WIDTH, WIDTH_FIGURES = "width", ("acc", "nrmse", "global_variance")
 
 
 @one_thread()
@@ -118,7 +111,7 @@ def engines(
     *,
     split: str | None = "val",
     models: Path | None = None,
-    settings: ExperimentSettings = DEFAULT_SETTINGS,
+    settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Return the figures of all engines on ``split``.
 
@@ -130,29 +123,23 @@ def engines(
     """
     held_out = corpus.required(split)
     check_training_names(corpus, corpus.required("train"), held_out)
-    channels = check_opening(corpus, held_out)
+    channels = runner.check_opening(corpus, held_out)
     monitor = settings.monitor
     trained = engine_models(corpus, models, replace(settings, monitor=sub_monitor(monitor, 0, 0.6)))
-    recordings = load_held_out(
-        corpus,
-        cached_recogniser(trained[REFERENCE_ENGINE].model.phones),
-        selection=Selection(names=held_out),
-        channels=channels,
-        lexicon=settings.lexicon,
-        monitor=sub_monitor(monitor, 0.6, 0.7),
-    )
+    phones, reading = trained[REFERENCE_ENGINE].model.phones, replace(settings, monitor=sub_monitor(monitor, 0.6, 0.7))
+    recordings = runner.recognise_held_out(corpus, phones, held_out, reading, channels=channels)
     steps = [(condition, name) for condition in recordings.conditions for name in trained]
-    pinned: dict[str, dict[str, Sequence[ComparedClip]]] = {condition: {} for condition in recordings.conditions}
-    unpinned: dict[str, dict[str, Sequence[ComparedClip]]] = {condition: {} for condition in recordings.conditions}
+    made: dict[str, dict[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]]] = {
+        condition: {} for condition in recordings.conditions
+    }
     for condition, name in with_progress(steps, "comparing", sub_monitor(monitor, 0.7, 1)):
         system = trained[name].model
         known = replace(recordings, speakers=system.speakers)
         speech = make_speech(known, condition, system.engine, system.learned)
         clips = generate_compared(known, speech, system.engine, system.learned)
         free = system.engine.without_closures()
-        pinned[condition][name], unpinned[condition][name] = clips, clips
-        if free != system.engine:
-            unpinned[condition][name] = generate_compared(known, speech, free, system.learned)
+        unpinned = clips if free == system.engine else generate_compared(known, speech, free, system.learned)
+        made[condition][name] = clips, unpinned
         settings.receive(name, condition, recordings, clips)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed}
     about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
@@ -165,34 +152,23 @@ def engines(
         }
         for name, each in trained.items()
     }
-    conditions = {
-        condition: {
-            "systems": {
-                name: _row(recordings, clips, unpinned[condition][name], found, settings.seed)
-                for name, clips in found.items()
-            }
-        }
-        for condition, found in pinned.items()
-    }
+    conditions = {name: {"systems": _rows(recordings, found, settings.seed)} for name, found in made.items()}
     return nan_as_null(about | {"conditions": conditions})
 
 
-def _row(
+def _rows(
     recordings: HeldOutRecordings,
-    pinned: Sequence[ComparedClip],
-    free: Sequence[ComparedClip],
-    systems: Mapping[str, Sequence[ComparedClip]],
+    made: Mapping[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]],
     seed: int,
-) -> dict[str, Any]:
-    """Return the figures of one system, with ACC gains over each system; ``unpinned``: without forced closures."""
-    acc = correlation_statistic(*opening_curves(recordings, pinned))
-    gains = {
-        name: acc.gain(correlation_statistic(*opening_curves(recordings, clips)), seed)
-        for name, clips in systems.items()
-    }
-    figures = figures_of(pinned, recordings, seed)
-    width = figures["channels"].get(WIDTH, {})
-    row = opening_row_with_rates(figures) | {"acc_gain_95": gains}
-    row |= {f"{WIDTH}_{name}": width.get(name) for name in ("acc", "nrmse", "global_variance")}
-    row |= {"jerk": figures["channels"][OPENING]["jerk"], "lag_ms": figures["lag_ms"]}
-    return row | {"unpinned": opening_row_with_rates(figures_of(free, recordings, seed))}
+) -> dict[str, dict[str, Any]]:
+    """Return the figures of systems, with ACC gains over each system; ``unpinned``: without forced closures."""
+    acc = {name: correlation_statistic(*opening_curves(recordings, clips)) for name, (clips, _) in made.items()}
+    rows = {}
+    for name, (clips, free) in made.items():
+        figures = figures_of(clips, recordings, seed)
+        width = figures["channels"].get(WIDTH, {})
+        row = runner.opening_row(figures) | {f"{WIDTH}_{key}": width.get(key) for key in WIDTH_FIGURES}
+        row |= {"acc_gain_95": {other: acc[name].gain(statistic, seed) for other, statistic in acc.items()}}
+        row |= {"jerk": figures["channels"][OPENING]["jerk"], "lag_ms": figures["lag_ms"]}
+        rows[name] = row | {"unpinned": runner.opening_row(figures_of(free, recordings, seed))}
+    return rows

@@ -22,7 +22,6 @@ from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.measures.curves import pooled_correlation
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import sub_monitor
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import clip_statistics, figures_of
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings, choose_channels
@@ -94,16 +93,15 @@ def folds(
     mixed = runner.shuffled(groups, settings.seed)
     key = runner.PartKey(engine_named("trajectory"), names, others=f"{count} {by_speaker}")
     kept, results = runner.open_parts(work, corpus, settings, key), []
-    for fold in range(count):
+    for fold, part in enumerate(runner.share_out(settings, [f"fold {fold + 1}" for fold in range(count)])):
         stage = f"fold-{fold}"
         arrays = kept.load(stage)
         if arrays is not None:
             results.append(_fold_from_arrays(arrays))
             continue
-        held_out = [name for part in mixed[fold::count] for name in part]
-        monitor = sub_monitor(settings.monitor, fold / count, (fold + 1) / count, f"fold {fold + 1}: ")
+        held_out = [name for group in mixed[fold::count] for name in group]
         others = [name for name in names if name not in held_out]
-        made = runner.train_and_generate(corpus, others, held_out, (OPENING,), replace(settings, monitor=monitor), work)
+        made = runner.train_and_generate(corpus, others, held_out, (OPENING,), part, work)
         speakers = [utterance.speaker for utterance in made.recordings.utterances]
         results.append(_GeneratedFold(made.clips, speakers, len(made.used), made.recordings.closed_under))
         if work is not None:
@@ -119,7 +117,7 @@ def _row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, by_spe
     """Return the figures of the clips of all folds in one condition, and the correlation of each speaker's opening."""
     pooled = [clip for result in results for clip in result.clips[condition]]
     figures = figures_of(pooled, results[0], seed)
-    row = runner.opening_row_with_rates(figures)
+    row = runner.opening_row(figures)
     if not by_speaker:
         return row
     clips: dict[str, list[ComparedClip]] = {}
@@ -163,14 +161,14 @@ def in_blocks(
         threshold = closed_threshold([np.asarray(each.motion[OPENING])[np.asarray(each.seen)] for each in tracks])
     parts = runner.PartKey(engine_named("trajectory"), names, others=f"{count} {key}")
     kept, results = runner.open_parts(work, corpus, settings, parts), []
-    for number, test in enumerate(blocks):
+    shares = runner.share_out(settings, [f"block {number + 1}" for number in range(count)])
+    for number, (test, part) in enumerate(zip(blocks, shares, strict=True)):
         arrays = kept.load(f"block-{number}")
         if arrays is None:
             validation = blocks[(number + 1) % count]
             training = [name for name in names if name not in {*test, *validation}]
-            monitor = sub_monitor(settings.monitor, number / count, (number + 1) / count, f"block {number + 1}: ")
             lists = {"train": training, "val": validation, "test": test}
-            block = _run_block(experiment, corpus, lists, replace(settings, monitor=monitor))
+            block = _run_block(experiment, corpus, lists, part)
             arrays = replace(block, closed_under=threshold).as_arrays()
             kept.save(f"block-{number}", arrays)
         results.append(_fold_from_arrays(arrays))
@@ -218,6 +216,6 @@ def _block_rows(
             others = [each for each in references if each in systems]
             row[f"{name}_gain_95"] = {each: own.gain(statistics[each][name], seed) for each in others}
         if compared.closed_under is not None:
-            row["opening"] = runner.opening_row_with_rates(figures_of(clips, compared, seed))
+            row["opening"] = runner.opening_row(figures_of(clips, compared, seed))
         rows[system] = row
     return rows

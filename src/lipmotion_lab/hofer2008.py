@@ -4,37 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora.store import Corpus
 from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
 from lipmotion.errors import InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream.densities import MOTION, SPEECH
 from lipmotion.kernels.compiler import one_thread
-from lipmotion.pipeline.training.train import phones_and_examples
-from lipmotion.pipeline.workers import training_pool
-from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
-from lipmotion.units import UNIT_SETS, Lexicon
-from lipmotion_lab.evaluation import evaluate
-from lipmotion_lab.evaluation.held_out import (
-    AUDIO_ONLY,
-    OPENING,
-    ComparedClip,
-    HeldOutRecordings,
-    generate_clips,
-    generate_compared,
-    load_held_out,
-    make_speech,
-)
-from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, PartKey, check_opening, open_parts, opening_row
+from lipmotion.units import UNIT_SETS
+from lipmotion_lab import runner
+from lipmotion_lab.evaluation import evaluate, held_out
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, ComparedClip, HeldOutRecordings
 
 PAPER_SCORES: dict[str, float] = {"eVis": 68.8, "pbVis": 67.7, "sVis": 67.4, "2vis": 66.5, "phone": 65.2}
 """Closure scores of Table 1, the best first."""
@@ -72,16 +59,6 @@ class _System:
     model: JointModel
     acc: dict[tuple[int, int], float]
 
-    def generate(self, recordings: HeldOutRecordings) -> dict[tuple[str, str], Sequence[ComparedClip]]:
-        """Return what it makes of held-out recordings, by condition and name of ``PINS``."""
-        clips: dict[tuple[str, str], Sequence[ComparedClip]] = {}
-        for condition in recordings.conditions:
-            speech = make_speech(recordings, condition, self.engine, self.model)
-            for pins, closures in PINS.items():
-                engine = JointEngine(replace(self.engine.config, closures=closures))
-                clips[condition, pins] = generate_compared(recordings, speech, engine, self.model)
-        return clips
-
 
 @one_thread()
 def hofer2008(
@@ -90,7 +67,7 @@ def hofer2008(
     *,
     split: str | None = "test",
     work: Path | None = None,
-    settings: ExperimentSettings = DEFAULT_SETTINGS,
+    settings: runner.ExperimentSettings = runner.DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Train the system of the paper on ``train`` with each unit set; return figures of each model on ``split``.
 
@@ -100,60 +77,41 @@ def hofer2008(
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
     Source: Hofer 2008, §6 and Table 1.
     """
-    check_opening(corpus, held_out := corpus.required(split))  # before the long work
+    runner.check_opening(corpus, compared := corpus.required(split))  # before the long work
     validation, names = corpus.required("val"), tuple(sorted(corpus.required("train")))
-    lexicon, config, monitor = settings.lexicon or Lexicon(), settings.recogniser or HmmConfig(), settings.monitor
-    checkpoint = open_parts(
-        work, corpus, settings, PartKey(_engine(channels=options.channels), (*names, *validation, *held_out))
+    key = runner.PartKey(_engine(channels=options.channels), (*names, *validation, *compared))
+    checkpoint, monitor = runner.open_parts(work, corpus, settings, key), settings.monitor
+    learning = replace(settings, monitor=sub_monitor(monitor, 0, 0.1))
+    phones, examples = runner.train_phones([corpus.utterance(name) for name in names], learning, checkpoint)
+    choosing, recordings = (
+        runner.recognise_held_out(corpus, phones, listed, replace(settings, monitor=part), channels=(OPENING,))
+        for listed, part in (
+            (validation, sub_monitor(monitor, 0.1, 0.12)),
+            (compared, sub_monitor(monitor, 0.12, 0.15)),
+        )
     )
-    with training_pool(settings.workers, len(names)) as each:
-        phones, examples, _ = phones_and_examples(
-            [corpus.utterance(name) for name in names],
-            config,
-            lexicon,
-            sub_monitor(monitor, 0, 0.1),
-            replace(checkpoint, parallel_map=each),
-        )
-
-    def list_recordings(chosen: Sequence[str], part: Monitor) -> HeldOutRecordings:
-        return load_held_out(
-            corpus,
-            cached_recogniser(phones),
-            selection=Selection(names=chosen),
-            channels=(OPENING,),
-            lexicon=lexicon,
-            monitor=part,
-        )
-
-    choosing = list_recordings(validation, sub_monitor(monitor, 0.1, 0.12))
-    recordings = list_recordings(held_out, sub_monitor(monitor, 0.12, 0.15))
     cells = [(states, units) for states in options.states for units in PAPER_SCORES]
-    systems: dict[int, dict[str, _System]] = {states: {} for states in options.states}
-    generated: dict[tuple[int, str], dict[tuple[str, str], Sequence[ComparedClip]]] = {}
-    for number, (states, units) in enumerate(cells):
-        start, end = (0.15 + 0.85 * (number + step) / len(cells) for step in (0, 1))
-        part = sub_monitor(monitor, start, end, f"{units}, {states} states: ")
+    made: dict[tuple[int, str, str], dict[str, tuple[_System, Sequence[ComparedClip]]]] = {
+        case: {} for case in product(options.states, recordings.conditions, PINS)
+    }
+    parts = runner.share_out(settings, [f"{units}, {states} states" for states, units in cells], 0.15)
+    for (states, units), part in zip(cells, parts, strict=True):
         engine = _engine(units=units, states=states, channels=options.channels)
-        system = _train_system(engine, options, examples, choosing, checkpoint, part)
-        systems[states][units], generated[states, units] = system, system.generate(recordings)
-        for (condition, pins), clips in generated[states, units].items():
-            if not PINS[pins]:
-                settings.receive(f"{units}, {states} states", condition, recordings, clips)
+        system = _train_system(engine, options, examples, choosing, checkpoint, part.monitor)
+        for condition in recordings.conditions:
+            speech = held_out.make_speech(recordings, condition, system.engine, system.model)
+            for pins, closures in PINS.items():
+                pinned = JointEngine(replace(system.engine.config, closures=closures))
+                clips = held_out.generate_compared(recordings, speech, pinned, system.model)
+                made[states, condition, pins][units] = system, clips
+                if not closures:
+                    settings.receive(f"{units}, {states} states", condition, recordings, clips)
     about = {"split": split or "all", "clips": len(recordings.utterances), "trained_on": len(examples)}
     about |= {"closed_under": recordings.closed_under, "mixtures": list(options.mixtures), "seed": settings.seed}
     about |= {"channels": options.channels, "motion_mixtures": list(options.motion_mixtures)}
     tables = [
-        {"condition": condition, "pins": pins}
-        | _table(
-            recordings,
-            systems[states],
-            {units: generated[states, units][condition, pins] for units in PAPER_SCORES},
-            settings.seed,
-        )
-        | {"states": states}
-        for states in options.states
-        for condition in recordings.conditions
-        for pins in PINS
+        {"condition": condition, "pins": pins} | _table(recordings, rows, settings.seed) | {"states": states}
+        for (states, condition, pins), rows in made.items()
     ]
     return nan_as_null(about | {"tables": tables})
 
@@ -182,7 +140,7 @@ def _train_system(
             speech, motion = (1 << (size - 1).bit_length() for size in sizes)  # where data is short, not all are split
             if (speech, motion) in tried or speech not in options.mixtures or motion not in options.motion_mixtures:
                 continue
-            clips = generate_clips(choosing, AUDIO_ONLY, engine, model)
+            clips = held_out.generate_clips(choosing, AUDIO_ONLY, engine, model)
             tried[speech, motion] = evaluate.correlation_statistic(*evaluate.opening_curves(choosing, clips)).value
             if _best_count(tried) == (speech, motion):
                 arrays.update(engine.to_arrays(model))
@@ -210,20 +168,17 @@ def _best_count(acc: Mapping[tuple[int, int], float]) -> tuple[int, int]:
 
 
 def _table(
-    recordings: HeldOutRecordings,
-    systems: Mapping[str, _System],
-    clips: Mapping[str, Sequence[ComparedClip]],
-    seed: int,
+    recordings: HeldOutRecordings, made: Mapping[str, tuple[_System, Sequence[ComparedClip]]], seed: int
 ) -> dict[str, Any]:
     """Return the figures of all sets in one condition, and the intervals of the differences of every two of them."""
-    openings = {units: evaluate.opening_curves(recordings, own) for units, own in clips.items()}
+    openings = {units: evaluate.opening_curves(recordings, clips) for units, (_, clips) in made.items()}
     threshold = recordings.closed_under or 0.0
     scores = {units: evaluate.closing_score_statistic(*pair, threshold) for units, pair in openings.items()}
     acc = {units: evaluate.correlation_statistic(*pair) for units, pair in openings.items()}
     rows = {}
-    for units, system in systems.items():
-        figures = evaluate.figures_of(clips[units], recordings, seed)
-        rows[units] = opening_row(figures) | {
+    for units, (system, clips) in made.items():
+        figures = evaluate.figures_of(clips, recordings, seed)
+        rows[units] = runner.opening_row(figures) | {
             "units": UNIT_SETS[units].count,
             "paper": PAPER_SCORES[units],
             **dict(zip(("gaussians", "motion_gaussians"), _best_count(system.acc), strict=True)),

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,25 +32,12 @@ from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.storage.json_text import as_json, from_json, nan_as_null
-from lipmotion.types import (
-    Audio,
-    Channel,
-    Monitor,
-    Motion,
-    Span,
-    Timeline,
-    Unit,
-    Utterance,
-    silent_monitor,
-    sub_monitor,
-    with_progress,
-)
+from lipmotion.types import Audio, Monitor, Span, Timeline, Unit, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import Lexicon, is_silent
-from lipmotion_faces import stage_face
-from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic
-from lipmotion_lab.report.page import FPS, LOWER_FACE, RECORDED, STAGING, FinishedPart, report_html
-from lipmotion_lab.report.section import Column, Section, Table, warn_of_few
+from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic, ratio
+from lipmotion_lab.report.page import FPS, RECORDED, FinishedPart, draw_mouths, report_html
+from lipmotion_lab.report.section import Column, Section, Table, warn_of_few, write_text
 
 Array = NDArray[np.float64]
 CHANNELS = ("opening", "width")
@@ -89,7 +76,7 @@ class Rival:
     needs: str
     given: str = "sound"
     ours: bool = False
-    settings: Mapping[str, Sequence[Any]] | None = None
+    settings: Mapping[str, Sequence[Any]] = field(default_factory=dict)
 
     def command(self, folder: Path) -> list[str]:
         """Return the command, whose files are in a folder."""
@@ -101,13 +88,12 @@ class Rival:
 
     def list_settings(self) -> list[dict[str, Any]]:
         """Return all settings that are tried. Raises MissingDependencyError: a variable in them is not set."""
-        names, values = list(self.settings or {}), list((self.settings or {}).values())
         tried = []
-        for row in itertools.product(*values):
+        for row in itertools.product(*self.settings.values()):
             expanded = [os.path.expandvars(each) if isinstance(each, str) else each for each in row]
             if unset := [each for each in expanded if isinstance(each, str) and "$" in each]:
                 raise MissingDependencyError(f"{unset[0]}: not set; {self.needs}")
-            tried.append(dict(zip(names, expanded, strict=True)))
+            tried.append(dict(zip(self.settings, expanded, strict=True)))
         return tried
 
 
@@ -142,16 +128,6 @@ class Recording:
     original: Array
     phones: list[tuple[float, float, str]]
 
-    @property
-    def name(self) -> str:
-        """The name of the utterance."""
-        return self.utterance.name
-
-    @property
-    def duration_s(self) -> float:
-        """Seconds of sound."""
-        return self.utterance.audio.duration_s
-
     def spoken(self, *, lips: bool) -> list[tuple[float, float]]:
         """Return the times of p, b and m, or of all other phones."""
         return [(start, end) for start, end, phone in self.phones if phone and (phone in BILABIAL) == lips]
@@ -183,7 +159,7 @@ def load_recordings(corpus: Corpus, names: Sequence[str], work: Path, monitor: M
         if not timed.exists():
             units = label_phones(utterance, phones, Lexicon())
             rows = [(s.start_s, s.end_s, "" if is_silent(s.label.phone) else s.label.phone) for s in units]
-            _write_json(timed, rows)
+            write_text(timed, as_json(rows))
         time_s = motion.time_s[seen]
         original = np.stack([motion[name][seen] for name in CHANNELS], axis=1).astype(float)
         spoken = [(start, end, phone) for start, end, phone in from_json(timed.read_bytes())]
@@ -216,25 +192,13 @@ def ask(
     files = [folder / f"{each.sound.stem}.json" for each in recordings]
     missing = [(each, file) for each, file in zip(recordings, files, strict=True) if not file.exists()]
     if missing:
-        rows = [{"name": each.name, "sound": str(each.sound), "duration_s": each.duration_s} for each, _ in missing]
-        if rival.given == "phones":
-            for row, (each, _) in zip(rows, missing, strict=True):
-                row["phones"] = [[phone, start_s, end_s] for start_s, end_s, phone in each.phones]
-        job, answered = folder / "job.part", folder / "answer.part"
-        _write_json(job, {"rate_hz": SOUND_HZ, "recordings": rows, "settings": settings})
-        answered.unlink(missing_ok=True)
-        _run(rival, [*command, str(job), str(answered)], folder, limit_s)
-        try:
-            content = from_json(answered.read_bytes())
-        except (OSError, ValueError) as error:
-            raise RivalError(f"{rival.title}: no readable answer ({error}); see {folder / 'log.txt'}") from error
+        content = _run(rival, command, [each for each, _ in missing], folder, limit_s)
         for each, _ in missing:
-            _read_answers(rival, each, content.get(each.name), len(settings))  # nothing is kept before it is checked
+            read_answers(rival, each, content.get(each.utterance.name))  # nothing is kept before it is checked
         for each, file in missing:
-            _write_json(file, content[each.name])
+            write_text(file, as_json(content[each.utterance.name]))
     by_recording = [
-        _read_answers(rival, each, from_json(file.read_bytes()), len(settings))
-        for each, file in zip(recordings, files, strict=True)
+        read_answers(rival, each, from_json(file.read_bytes())) for each, file in zip(recordings, files, strict=True)
     ]
     tried = [list(answers) for answers in zip(*by_recording, strict=True)]
     if any(answer.names != answers[0].names for answers in tried for answer in answers):
@@ -242,14 +206,20 @@ def ask(
     return tried
 
 
-def _read_answers(rival: Rival, recording: Recording, content: Any, count: int) -> list[RivalAnswer]:
-    if not isinstance(content, list) or len(content) != count:
-        raise RivalError(f"{rival.title}, {recording.name}: no list of {count} answers, one for each settings")
-    return [read_answer(rival, recording, each) for each in content]
-
-
-def _run(rival: Rival, command: Sequence[str], folder: Path, limit_s: float) -> None:
-    """Run an adapter; what it prints goes to a file. Raises as ``ask``."""
+def _run(
+    rival: Rival, command: Sequence[str], recordings: Sequence[Recording], folder: Path, limit_s: float
+) -> dict[str, Any]:
+    """Return what an adapter answers, by recording; what it prints goes to a file. Raises as ``ask``."""
+    rows: list[dict[str, Any]] = []
+    for each in recordings:
+        audio = each.utterance.audio
+        rows.append({"name": each.utterance.name, "sound": str(each.sound), "duration_s": audio.duration_s})
+        if rival.given == "phones":
+            rows[-1]["phones"] = [[phone, start_s, end_s] for start_s, end_s, phone in each.phones]
+    job, answered = folder / "job.part", folder / "answer.part"
+    write_text(job, as_json({"rate_hz": SOUND_HZ, "recordings": rows, "settings": rival.list_settings()}))
+    answered.unlink(missing_ok=True)
+    command = [*command, str(job), str(answered)]
     with (folder / "log.txt").open("wb") as log:  # not a pipe, which a program of the rival's could hold open
         try:
             code = subprocess.run(command, stdout=log, stderr=log, timeout=limit_s, check=False).returncode
@@ -264,11 +234,21 @@ def _run(rival: Rival, command: Sequence[str], folder: Path, limit_s: float) -> 
     if code:
         lines = (folder / "log.txt").read_text("utf-8", errors="replace").strip().splitlines() or ["it printed nothing"]
         raise RivalError(f"{rival.title}: exit code {code} ({shorten(lines[-1])}); see {folder / 'log.txt'}")
+    try:
+        return dict(from_json(answered.read_bytes()))
+    except (OSError, ValueError, TypeError) as error:
+        raise RivalError(f"{rival.title}: no readable answer ({error}); see {folder / 'log.txt'}") from error
 
 
-def read_answer(rival: Rival, recording: Recording, content: Any) -> RivalAnswer:
-    """Return an answer, checked. Raises RivalError."""
-    about = f"{rival.title}, {recording.name}"
+def read_answers(rival: Rival, recording: Recording, content: Any) -> list[RivalAnswer]:
+    """Return the answers to a recording by settings, checked. Raises RivalError."""
+    about, count = f"{rival.title}, {recording.utterance.name}", len(rival.list_settings())
+    if not isinstance(content, list) or len(content) != count:
+        raise RivalError(f"{about}: no list of {count} answers, one for each settings")
+    return [_read_answer(about, each, recording.utterance.audio.duration_s) for each in content]
+
+
+def _read_answer(about: str, content: Any, needed_s: float) -> RivalAnswer:
     try:
         time_s, names = np.array(content["times"], float), tuple(sorted(content["weights"]))
         weights = np.stack([np.array(content["weights"][name], float) for name in names], axis=1)
@@ -281,11 +261,10 @@ def read_answer(rival: Rival, recording: Recording, content: Any) -> RivalAnswer
         raise RivalError(f"{about}: {len(time_s)} times and {len(weights)} values, required as many, two or more")
     if not (np.isfinite(time_s).all() and np.isfinite(weights).all()):
         raise RivalError(f"{about}: values that are not finite, required numbers")
-    last_s, needed_s = float(time_s[-1]), recording.duration_s
-    if (np.diff(time_s) < 0).any() or not -1 <= time_s[0] <= needed_s / 2 <= last_s <= needed_s + 1:
-        raise RivalError(
-            f"{about}: times from {time_s[0]:.2f} to {last_s:.2f} s, required rising from about 0 to {needed_s:.2f} s"
-        )
+    first_s, last_s = float(time_s[0]), float(time_s[-1])
+    if (np.diff(time_s) < 0).any() or not -1 <= first_s <= needed_s / 2 <= last_s <= needed_s + 1:
+        required = f"required rising from about 0 to {needed_s:.2f} s"
+        raise RivalError(f"{about}: times from {first_s:.2f} to {last_s:.2f} s, {required}")
     at_s = np.arange(int(needed_s * GRID_HZ) + 1) / GRID_HZ
     return RivalAnswer(names, np.stack([np.interp(at_s, time_s, column) for column in weights.T], axis=1), seconds)
 
@@ -343,30 +322,25 @@ def choose(
 
     tried : answers to all recordings, by settings. Answers that have opening and width are taken as they are
     """
-    chosen, best = [recordings[n] for n in numbers], (Choice(0, 0.0, 0.0, np.zeros((1, 2))), list[Array]())
+    chosen, choice, made = [recordings[n] for n in numbers], Choice(0, 0.0, 0.0, np.zeros((1, 2))), list[Array]()
     original = np.concatenate([each.original for each in chosen])
+    opened = [each.original[:, :1] for each in chosen]
     own = set(CHANNELS) <= set(tried[0][0].names)
-    for setting, answers in enumerate(tried):
-        for smoothing_s in (0.0,) if own else SMOOTHINGS_S:
-            rows = [prepare_weights(answers[n], smoothing_s) for n in numbers]
-            for lag_s in (0.0,) if own else LAGS_S.tolist():
-                if own:
-                    coefficients = np.zeros((rows[0].shape[1], len(CHANNELS)))
-                    for column, name in enumerate(CHANNELS):
-                        coefficients[answers[0].names.index(name), column] = 1
-                else:
-                    placed = [
-                        interpolate_rows(r, GRID_HZ, each.time_s + lag_s) for r, each in zip(rows, chosen, strict=True)
-                    ]
-                    coefficients = fit_map(np.concatenate(placed), original)
-                made = [
-                    at_best_sync(each, r @ coefficients, lag_s, limit_s) for r, each in zip(rows, chosen, strict=True)
-                ]
-                opened = [each.original[:, :1] for each in chosen]
-                score = float(curves.per_clip_correlation([each[:, :1] for each in made], opened)[0])
-                if score > best[0].score + 1e-4:
-                    best = Choice(setting, lag_s, smoothing_s, coefficients, score=score), made
-    choice, made = best
+    lags_s, smoothings_s = ([0.0], [0.0]) if own else (LAGS_S.tolist(), SMOOTHINGS_S)
+    for (setting, answers), smoothing_s in itertools.product(enumerate(tried), smoothings_s):
+        weights = [prepare_weights(answers[n], smoothing_s) for n in numbers]
+        for lag_s in lags_s:
+            if own:
+                coefficients = np.array(
+                    [[name == each for each in CHANNELS] for name in (*answers[0].names, "")], float
+                )
+            else:
+                placed = (interpolate_rows(w, GRID_HZ, r.time_s + lag_s) for w, r in zip(weights, chosen, strict=True))
+                coefficients = fit_map(np.concatenate(list(placed)), original)
+            moved = [at_best_sync(r, w @ coefficients, lag_s, limit_s) for w, r in zip(weights, chosen, strict=True)]
+            score = float(curves.per_clip_correlation([each[:, :1] for each in moved], opened)[0])
+            if score > choice.score + 1e-4:
+                choice, made = Choice(setting, lag_s, smoothing_s, coefficients, score=score), moved
     level = float(np.percentile(np.concatenate([each[:, 0] for each in made]), 95))
     counts = {
         share: np.sum([closing_counts(each, m, share * level)[0] for each, m in zip(chosen, made, strict=True)], axis=0)
@@ -401,12 +375,7 @@ def closing_counts(recording: Recording, made: Array, shut: float) -> tuple[Arra
 
 def _f1(counts: Array) -> float:
     matched, missed, false = counts
-    total = 2 * matched + missed + false
-    return float(2 * matched / total) if total else float("nan")
-
-
-def _ratio(total: Array) -> float:
-    return float(total[0] / total[1]) if total[1] > 0 else float("nan")
+    return ratio(np.array([2 * matched, 2 * matched + missed + false]))
 
 
 def onset_errors(recording: Recording, made: Array, shut: float) -> Array:
@@ -421,22 +390,21 @@ def onset_errors(recording: Recording, made: Array, shut: float) -> Array:
 
 def measure(recordings: Sequence[Recording], made: Sequence[tuple[Array, float, float]]) -> dict[str, ClipStatistic]:
     """Return the figures of one rival by name, each a sum over recordings; made: motion, threshold, seconds."""
-    sums: dict[str, list[Array]] = {name: [] for name in ("acc", "width", "f1", "lips", "strength", "jerk", "onset")}
-    for recording, (motion, shut, _) in zip(recordings, made, strict=True):
-        both = curves.correlation(motion, recording.original)
+    sums = []
+    for recording, (motion, shut, seconds) in zip(recordings, made, strict=True):
+        acc, width = curves.correlation(motion, recording.original)
         everything, lips = closing_counts(recording, motion, shut)
         speech = ~is_away_from_speech(recording.time_s, [s[:2] for s in recording.phones if s[2]], 0.0)
         speech |= ~speech.any()  # nothing is spoken: all of it
-        pair = (motion[:, 0], recording.original[:, 0])
-        sums["acc"].append(np.array([both[0], 1]))
-        sums["width"].append(np.array([both[1], 1]))
-        sums["f1"].append(everything)
-        sums["lips"].append(lips)
-        sums["strength"].append(np.array([np.percentile(each[speech], 98) for each in pair]))
-        sums["jerk"].append(np.array([np.abs(np.diff(each, 3)).sum() for each in pair]))
-        sums["onset"].append(onset_errors(recording, motion, shut))
-    sums["seconds"] = [np.array([s, r.duration_s]) for (_, _, s), r in zip(made, recordings, strict=True)]
-    return {name: ClipStatistic(rows, _f1 if name in ("f1", "lips") else _ratio) for name, rows in sums.items()}
+        both = (motion[:, 0], recording.original[:, 0])
+        row: dict[str, Any] = {"acc": [acc, 1], "width": [width, 1], "f1": everything, "lips": lips}
+        row["strength"] = [np.percentile(each[speech], 98) for each in both]
+        row["jerk"] = [np.abs(np.diff(each, 3)).sum() for each in both]
+        row["onset"] = onset_errors(recording, motion, shut)
+        row["seconds"] = [seconds, recording.utterance.audio.duration_s]
+        sums.append({name: np.array(each) for name, each in row.items()})
+    counted = {"f1": _f1, "lips": _f1}
+    return {name: ClipStatistic([row[name] for row in sums], counted.get(name, ratio)) for name in sums[0]}
 
 
 def split_choices(reported: int, choosing: int) -> Iterator[tuple[list[int], list[int]]]:
@@ -608,31 +576,25 @@ def describe_league(found: League) -> Section:
 def write_league(found: League, folder: Path) -> dict[str, Any]:
     """Write the page of a league, with its pictures and all figures, to a folder; return the figures."""
     section, motion, part = describe_league(found), _shown(found), folder / PART
-    figures: dict[str, Any] = {
-        "about": found.about,
-        "best_rival": section.table.reference or None,
-        "rivals": section.table.rows,
-    }
-    figures |= {"chosen": {each.rival.title: each.chosen for each in found.standings}}
-    each_acc = {
-        each.rival.title: {r.name: s[0] for r, s in zip(found.recordings, each.figures["acc"].sums, strict=True)}
+    figures: dict[str, Any] = {"about": found.about, "best_rival": section.table.reference or None}
+    figures |= {"rivals": section.table.rows, "absent": found.absent, "failed": found.failed}
+    figures["chosen"] = {each.rival.title: each.chosen for each in found.standings}
+    names = [each.utterance.name for each in found.recordings]
+    figures["each"] = {
+        each.rival.title: dict(zip(names, (acc for acc, _ in each.figures["acc"].sums), strict=True))
         for each in found.standings
     }
-    figures = nan_as_null(figures | {"each": each_acc, "absent": found.absent, "failed": found.failed})
-    make_folder(part / "tables")
-    for name, text in (("csv", section.table.as_csv()), ("json", as_json(section.table.as_content(), indent=1))):
-        with atomic_file(part / "tables" / f"{section.table.name}.{name}") as unfinished:
-            unfinished.write_text(text, encoding="utf-8", newline="")
-    _write_json(part / "figures.json", figures)
+    figures = nan_as_null(figures)
+    section.write_tables(part / "tables")
+    write_text(part / "figures.json", as_json(figures) + "\n")
     record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": found.about}
     finished = [FinishedPart(PART, record, motion, section)]
     page = report_html(
         "The league", found.about, finished, found.absent, found.failed,
         subtitle="Rivals and our engines on the same filmed recordings.", how_to_read=HOW_TO_READ,
     )  # fmt: skip
-    with atomic_file(folder / "index.html") as unfinished:
-        unfinished.write_text(page, encoding="utf-8")
-    return dict(figures)
+    write_text(folder / "index.html", page)
+    return figures
 
 
 def _shown(found: League) -> dict[str, Any]:
@@ -650,13 +612,10 @@ def _shown(found: League) -> dict[str, Any]:
     seen = (recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S)
     spoken = [s for s in recording.phones if s[2] and s[1] > begin_s and s[0] < begin_s + SHOWN_S]
     systems = {each.rival.title: each.made[number][seen] for each in found.standings}
-    content: dict[str, Any] = {
-        "name": recording.name,
-        "words": list(recording.utterance.words or ()),
-        "channels": list(CHANNELS),
-    }
-    content |= {"spoken": spoken, "time_s": recording.time_s[seen], RECORDED: recording.original[seen]}
-    return content | {"systems": systems}
+    utterance = recording.utterance
+    about = {"name": utterance.name, "words": list(utterance.words or ()), "channels": list(CHANNELS)}
+    recorded = {"spoken": spoken, "time_s": recording.time_s[seen], RECORDED: recording.original[seen]}
+    return about | recorded | {"systems": systems}
 
 
 def _draw_mouths(motion: Mapping[str, Any], folder: Path) -> Iterator[dict[str, str]]:
@@ -666,14 +625,7 @@ def _draw_mouths(motion: Mapping[str, Any], folder: Path) -> Iterator[dict[str, 
     frames = [p[extremes[n % 2](motion[RECORDED][p, 0])] for n, p in enumerate(parts) if len(p)]
     silence = Timeline((Span(0.0, len(frames) / FPS, Unit("sil")),))
     for number, (name, values) in enumerate({RECORDED: motion[RECORDED], **motion["systems"]}.items()):
-        made = Motion(values[frames], FPS, tuple(map(Channel, CHANNELS)))
-        pictures = list(stage_face("woman", STAGING).render(made, silence, fps=FPS))[: len(frames)]
+        pictures = list(draw_mouths(values[frames], CHANNELS, silence))[: len(frames)]
         with atomic_file(folder / f"{number}.png") as unfinished:
-            strip = Image.fromarray(np.concatenate([each[LOWER_FACE] for each in pictures], axis=1))
-            strip.reduce(2).save(unfinished, format="png")
+            Image.fromarray(np.concatenate(pictures, axis=1)).reduce(2).save(unfinished, format="png")
         yield {"file": f"{number}.png", "caption": name}
-
-
-def _write_json(path: Path, content: Any) -> None:
-    with atomic_file(path) as unfinished:
-        unfinished.write_text(as_json(content) + "\n", encoding="utf-8")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +15,7 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.motion.space import resample_track
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import Example, Speech, Timeline, sub_monitor
+from lipmotion.types import Example, Speech, Timeline
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, generate_clips, load_held_out
@@ -56,15 +54,12 @@ def learning_curve(
     steps = choose_sizes(sizes, len(listed))
     check_training_names(corpus, listed, (*held_out, *validation))
     channels = runner.check_opening(corpus, held_out)
-    shares = np.cumsum([0, *steps]) / sum(steps)
     key = runner.PartKey(engine_named("trajectory"), (*listed, *held_out, *validation), others=BLSTM * rival)
     kept = runner.open_parts(work, corpus, settings, key)
-    rows = []
-    for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
+    rows, parts = [], runner.share_out(settings, [f"{count} clips" for count in steps], sizes=steps)
+    for count, part in zip(steps, parts, strict=True):
         found = kept.load(str(count))
         if found is None:
-            monitor = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
-            part = replace(settings, monitor=monitor)
             result = runner.train_and_generate(corpus, listed[:count], held_out, channels, part, work)
             row = {"names": count} | _row(corpus, result, settings.seed)
             if rival:

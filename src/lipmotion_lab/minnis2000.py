@@ -16,42 +16,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.engines.selection.concatenation import Piece, pieces_of
-from lipmotion.engines.selection.costs import (
-    ABUTTING_JOIN,
-    JOIN_BEFORE,
-    MINNIS_2000,
-    Costs,
-    SelectionConfig,
-    Target,
-)
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_BEFORE, MINNIS_2000, Costs, SelectionConfig, Target
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab import runner
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
-from lipmotion_lab.evaluation.evaluate import (
-    correlation_statistic,
-    distance_statistic,
-    figures_of,
-    opening_curves,
-)
-from lipmotion_lab.evaluation.held_out import (
-    AUDIO_ONLY,
-    OPENING,
-    generate_compared,
-    load_held_out,
-    make_speech,
-)
+from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic, figures_of, opening_curves
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, generate_compared, make_speech
 from lipmotion_lab.learning_curve import check_training_names
 
 Array = NDArray[np.float64]
@@ -149,8 +130,7 @@ def rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
     guided : with the rows whose models learn from the sound, a guide or phones of the speaker's own
     """
     printed = SelectionConfig.parsed(MINNIS_2000)
-    found = {PRINTED: printed}
-    found |= {
+    found = {PRINTED: printed} | {
         name: replace(printed, **{key: getattr(SelectionConfig(), key) for key in keys})
         for name, keys in ADDITIONS.items()
     }
@@ -187,8 +167,7 @@ def minnis2000(
     lists = {split: corpus.required(split) for split in splits}
     for held_out in lists.values():
         check_training_names(corpus, corpus.required("train"), held_out)
-    monitor = settings.monitor
-    training = replace(settings, monitor=sub_monitor(monitor, 0, 0.6))
+    training = replace(settings, monitor=sub_monitor(settings.monitor, 0, 0.6))
     kept_in = models or (work and work / "model")
     if quick or not guided:
         options = ({} if guided else {"guide": 0.0, "joint_recogniser": False}) | ({"epochs": 20} if quick else {})
@@ -198,20 +177,16 @@ def minnis2000(
     else:
         trained = engine_models(corpus, kept_in, training, [ENGINE])[ENGINE]
     found = {}
-    for number, (split, names) in enumerate(lists.items()):
-        start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))
-        part = replace(settings, monitor=sub_monitor(monitor, start, stop, f"{split}: "))
+    for (split, names), part in zip(lists.items(), runner.share_out(settings, [*lists], 0.6), strict=True):
         key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(rows(guided=guided)))
         kept = runner.open_parts(work and work / split, corpus, settings, key)
         found[split] = _on_list(corpus, names, trained.model, rows(guided=guided), kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
     printed = vars(SelectionConfig.parsed(MINNIS_2000))
-    about |= {
-        "rows": {
-            name: {key: value for key, value in vars(config).items() if value != printed[key]}
-            for name, config in rows(guided=guided).items()
-        }
+    about["rows"] = {
+        name: {key: value for key, value in vars(config).items() if value != printed[key]}
+        for name, config in rows(guided=guided).items()
     }
     return nan_as_null(about | {"lists": found})
 
@@ -226,14 +201,8 @@ def _on_list(
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
     monitor = settings.monitor
-    recordings = load_held_out(
-        corpus,
-        cached_recogniser(model.phones),
-        selection=Selection(names=names),
-        channels=runner.check_opening(corpus, names),
-        lexicon=settings.lexicon,
-        monitor=sub_monitor(monitor, 0, 0.4),
-    )
+    channels, reading = runner.check_opening(corpus, names), replace(settings, monitor=sub_monitor(monitor, 0, 0.4))
+    recordings = runner.recognise_held_out(corpus, model.phones, names, reading, channels=channels)
     conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
     reference: dict[str, tuple[Array, Array]] = {}
 
@@ -264,7 +233,7 @@ def _on_list(
                 clips = generate_compared(recordings, speech, engine, learned)
                 settings.receive(name, condition, recordings, clips)
                 figures = figures_of(clips, recordings, settings.seed)
-                row = runner.opening_row_with_rates(figures)
+                row = runner.opening_row(figures)
                 row["channels"] = {
                     channel: {figure: values[figure] for figure in WHAT_IS_SHOWN}
                     for channel, values in figures["channels"].items()

@@ -10,9 +10,10 @@ import shlex
 import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from importlib import metadata
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
@@ -24,15 +25,16 @@ from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.errors import CorpusError
-from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.compiler import blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.pipeline.training.labels import digest_corpus, fingerprint_training
-from lipmotion.pipeline.training.train import Run, train
+from lipmotion.pipeline.training.train import Run, phones_and_examples, train
+from lipmotion.pipeline.workers import training_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.files import make_folder
-from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
+from lipmotion.types import Example, Monitor, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation.held_out import (
     OPENING,
@@ -56,13 +58,14 @@ _CURVES, _ABOUT = ("original", "generated", "time_s"), "about"
 class ExperimentSettings:
     """Settings that all experiments have in common.
 
+    recogniser : what phone models are made as
     lexicon    : pronunciations; None: those of the dictionary
     seed       : of the shuffled training list, and of the bootstrap intervals
     workers    : number of processes, as in ``train``
     receive    : receives the motion that every system generates, once, before its figures are kept
     """
 
-    recogniser: HmmConfig | None = None
+    recogniser: HmmConfig = field(default_factory=HmmConfig)
     lexicon: Lexicon | None = None
     seed: int = 0
     workers: int = 1
@@ -97,31 +100,55 @@ def train_and_generate(
     The names are sorted, so their order does not matter: all names of a list give the model of ``lipmotion train``.
     Raises as ``train`` and ``evaluate``.
     """
-    monitor, lexicon = settings.monitor, settings.lexicon
-    start_s = perf_counter()
+    monitor, start_s = settings.monitor, perf_counter()
     model, report = train(
         corpus,
         selection=Selection(names=sorted(names)),
         recogniser=settings.recogniser,
-        lexicon=lexicon,
+        lexicon=settings.lexicon,
         run=Run(sub_monitor(monitor, 0, 0.8), work, settings.workers),
     )
-    seconds = perf_counter() - start_s
-    phones, recognising = cached_recogniser(model.phones), sub_monitor(monitor, 0.8, 0.95)
-    recordings = load_held_out(
-        corpus,
-        phones,
-        selection=Selection(names=sorted(held_out)),
-        channels=channels,
-        lexicon=lexicon,
-        monitor=recognising,
-        speakers=model.speakers,
+    seconds, recognising = perf_counter() - start_s, replace(settings, monitor=sub_monitor(monitor, 0.8, 0.95))
+    recordings = recognise_held_out(
+        corpus, model.phones, sorted(held_out), recognising, channels=channels, speakers=model.speakers
     )
     conditions = with_progress(list(recordings.conditions), "comparing", sub_monitor(monitor, 0.95, 1))
     generated = {
         condition: generate_clips(recordings, condition, model.engine, model.learned) for condition in conditions
     }
     return HeldOutResult(model, recordings, generated, report.used, seconds)
+
+
+def share_out(
+    settings: ExperimentSettings, labels: Sequence[str], start: float = 0.0, sizes: Sequence[float] = ()
+) -> list[ExperimentSettings]:
+    """Return the settings for each part of the work after ``start``: their monitors share what is left by ``sizes``."""
+    ends = np.cumsum([0.0, *(sizes or [1.0] * len(labels))])
+    shares = (start + (1 - start) * ends / max(ends[-1], 1e-9)).tolist()
+    return [
+        replace(settings, monitor=sub_monitor(settings.monitor, *share, f"{label}: "))
+        for label, share in zip(labels, pairwise(shares), strict=True)
+    ]
+
+
+def recognise_held_out(
+    corpus: Corpus, phones: UnitHmm, names: Sequence[str], settings: ExperimentSettings, **of_model: Any
+) -> HeldOutRecordings:
+    """Return the recordings of some names, as ``load_held_out``, with phones in time by given phone models."""
+    recogniser, chosen = cached_recogniser(phones), Selection(names=names)
+    lexicon, monitor = settings.lexicon, settings.monitor
+    return load_held_out(corpus, recogniser, selection=chosen, lexicon=lexicon, monitor=monitor, **of_model)
+
+
+def train_phones(
+    utterances: Sequence[Utterance], settings: ExperimentSettings, checkpoint: Checkpoint
+) -> tuple[UnitHmm, list[Example]]:
+    """Return phone models of some utterances, and these as examples for an engine."""
+    lexicon = settings.lexicon or Lexicon()
+    with training_pool(settings.workers, len(utterances)) as each:
+        kept = replace(checkpoint, parallel_map=each)
+        phones, examples, _ = phones_and_examples(utterances, settings.recogniser, lexicon, settings.monitor, kept)
+    return phones, examples
 
 
 def check_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:
@@ -158,8 +185,8 @@ def open_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSettings
     if folder is None:
         return NO_CHECKPOINT
     make_folder(folder)
-    config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
-    of_input = fingerprint_training(corpus, key.names, key.engine, config, lexicon, key.visual, key.model)
+    lexicon = settings.lexicon or Lexicon()
+    of_input = fingerprint_training(corpus, key.names, key.engine, settings.recogniser, lexicon, key.visual, key.model)
     return Checkpoint(folder, f"{of_input} {settings.seed} {key.others}")
 
 
@@ -179,12 +206,6 @@ def clips_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[ComparedClip]:
     return list(map(ComparedClip, original, generated, time_s, spoken))
 
 
-def opening_row_with_rates(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the figures of ``opening_row``, and how many closings there are outside p, b and m a minute of speech."""
-    lips = figures["closures_p_b_m"]
-    return opening_row(figures) | {name: lips[name] for name in ("false_per_minute", "original_per_minute")}
-
-
 def opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return the figures of the opening that all tables show, from the figures of a condition; shares in %."""
     opening, closing, lips = figures["channels"][OPENING], figures["closures"], figures["closures_p_b_m"]
@@ -196,6 +217,8 @@ def opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:
         "generated_closings": closing["generated"],
         "recall_p_b_m": 100 * lips["recall"],
         "p_b_m": lips["intervals"],
+        "false_per_minute": lips["false_per_minute"],
+        "original_per_minute": lips["original_per_minute"],
         "acc": opening["acc"],
         "acc_95": figures["opening_acc_95"],
         "nrmse": opening["nrmse"],

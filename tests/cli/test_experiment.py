@@ -10,14 +10,13 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab import runner
 from lipmotion_lab.report import sections
-from lipmotion_lab.xie_liu2007 import six_systems
 
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small phone models, and only two of the paper's unit sets."""
-    for module in (runner, table1, six_systems):
-        monkeypatch.setattr(module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
+    phones = HmmConfig(mixtures=1, iterations=1)
+    monkeypatch.setattr(runner, "ExperimentSettings", partial(runner.ExperimentSettings, recogniser=phones))
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})
 
 

@@ -92,7 +92,7 @@ def replace_training(
     """Let functions stand for training with generation, for the figures of clips, and for the row of figures."""
     monkeypatch.setattr(runner, "train_and_generate", result)
     monkeypatch.setattr(module, "figures_of", lambda clips, *_: figures_of(clips))
-    monkeypatch.setattr(runner, "opening_row_with_rates", row_of)
+    monkeypatch.setattr(runner, "opening_row", row_of)
 
 
 def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch) -> None:

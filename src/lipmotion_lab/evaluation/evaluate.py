@@ -52,38 +52,31 @@ def figures_of(clips: Sequence[held_out.ComparedClip], recordings: Compared, see
     compared, threshold = recordings.channels, recordings.closed_under
     generated, original = [clip.generated for clip in clips], [clip.original for clip in clips]
     rate_hz = float(1 / np.median(np.diff(clips[0].time_s)))
-    acc, clip_acc = curves.pooled_correlation(generated, original), curves.per_clip_correlation(generated, original)
-    error, variance = curves.normalised_rmse(generated, original), curves.global_variance_ratio(generated, original)
-    jerk = curves.jerk_ratio(generated, original)
-    per_channel = {
-        name: {
-            "acc": float(acc[i]),
-            "acc_per_clip": float(clip_acc[i]),
-            "nrmse": float(error[i]),
-            "global_variance": float(variance[i]),
-            "jerk": float(jerk[i]),
-        }
-        for i, name in enumerate(compared)
+    measured = {
+        "acc": curves.pooled_correlation(generated, original),
+        "acc_per_clip": curves.per_clip_correlation(generated, original),
+        "nrmse": curves.normalised_rmse(generated, original),
+        "global_variance": curves.global_variance_ratio(generated, original),
+        "jerk": curves.jerk_ratio(generated, original),
     }
+    per_channel = {name: {key: float(of[i]) for key, of in measured.items()} for i, name in enumerate(compared)}
     eigenlips = {name: per_channel[name] for name in recordings.eigenlips_channels}
     is_eigenlips = np.array([name in eigenlips for name in compared])
     overall = ~is_eigenlips if not is_eigenlips.all() else is_eigenlips
     spread = np.where(overall, np.concatenate(original).std(axis=0), 0)
     leading = compared.index(held_out.OPENING) if held_out.OPENING in compared else int(spread.argmax())
+    column = slice(leading, leading + 1)
+    led = [clip[:, column] for clip in generated], [clip[:, column] for clip in original]
 
     def distance(columns: NDArray[np.bool_]) -> float:
         return curves.mean_distance([clip[:, columns] for clip in generated], [clip[:, columns] for clip in original])
 
     figures = {
         "channels": {name: row for name, row in per_channel.items() if name not in eigenlips},
-        "acc": float(acc[overall].mean()),
+        "acc": float(measured["acc"][overall].mean()),
         "amse": distance(overall),
         "leading": compared[leading],
-        "lag_ms": curves.lag_ms(
-            [clip[:, leading : leading + 1] for clip in generated],
-            [clip[:, leading : leading + 1] for clip in original],
-            rate_hz,
-        ),
+        "lag_ms": curves.lag_ms(*led, rate_hz),
     }
     if eigenlips:  # means over channels: Xie & Liu 2007, Eq. 21, for the correlation
         rows = list(eigenlips.values())
@@ -119,16 +112,8 @@ def _opening_figures(
 
 def _silence(clips: Sequence[held_out.ComparedClip], values: curves.Clips) -> dict[str, float]:
     """Return mean and standard deviation of the opening in silence away from speech, and the number of its frames."""
-    quiet = np.concatenate(
-        [
-            v[
-                is_away_from_speech(
-                    clip.time_s, [(start_s, end_s) for start_s, end_s, _ in clip.spoken], SILENCE_MARGIN_S
-                )
-            ]
-            for clip, v in zip(clips, values, strict=True)
-        ]
-    )
+    away = (is_away_from_speech(each.time_s, [span[:2] for span in each.spoken], SILENCE_MARGIN_S) for each in clips)
+    quiet = np.concatenate([curve[frames] for curve, frames in zip(values, away, strict=True)])
     mean, deviation = (float(quiet.mean()), float(quiet.std())) if len(quiet) else (float("nan"), float("nan"))
     return {"mean": mean, "std": deviation, "frames": len(quiet)}
 
@@ -252,6 +237,11 @@ class ClipStatistic:
         return self.from_total(np.sum(sums, axis=0))
 
 
+def ratio(total: Array) -> float:
+    """Return the first of two sums by the second; NaN where there is none."""
+    return float(total[0] / total[1]) if total[1] else float("nan")
+
+
 def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
     """Return the mean over channels of ``curves.pooled_correlation`` of clips [each shape=(T_i, P)]."""
     middle, everything = np.concatenate(original).mean(axis=0), np.concatenate(generated)
@@ -274,14 +264,13 @@ def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
     """Return ``curves.mean_distance`` of clips [each shape=(T_i, P)]."""
     errors = [np.linalg.norm(g - o, axis=1) for g, o in zip(generated, original, strict=True)]
     sums = [np.array([error.sum(), len(error)]) for error in errors]
-    return ClipStatistic(sums, lambda total: float(total[0] / total[1]) if total[1] else float("nan"))
+    return ClipStatistic(sums, ratio)
 
 
 def closing_score_statistic(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
     """Return the share, in %, of original closings found in generated openings; NaN where there are none."""
     hits, count = clip_closure_counts(generated, original, threshold)
-    sums = [np.concatenate(pair) for pair in zip(hits, count, strict=True)]
-    return ClipStatistic(sums, lambda total: float(100 * total[0] / total[1]) if total[1] else float("nan"))
+    return ClipStatistic([np.concatenate([100 * hit, of]) for hit, of in zip(hits, count, strict=True)], ratio)
 
 
 def opening_curves(
@@ -296,14 +285,11 @@ def clip_statistics(recordings: Compared, made: Sequence[held_out.ComparedClip])
     """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; ACC and score of the opening."""
     pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
     parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
-    statistics = {}
+    statistics: dict[str, ClipStatistic] = {}
     for part, columns in parts.items():
         if columns.any():
             both = [clip.generated[:, columns] for clip in made], [clip.original[:, columns] for clip in made]
-            statistics[f"{part}amse"], statistics[f"{part}acc"] = (
-                distance_statistic(*both),
-                correlation_statistic(*both),
-            )
+            statistics |= {f"{part}amse": distance_statistic(*both), f"{part}acc": correlation_statistic(*both)}
     if recordings.closed_under is not None:
         opening = opening_curves(recordings, made)
         statistics["opening_acc"] = correlation_statistic(*opening)

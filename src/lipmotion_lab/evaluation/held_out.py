@@ -24,17 +24,7 @@ from lipmotion.pipeline.training.channels import with_visual_channels
 from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.types import (
-    GREY,
-    Monitor,
-    Speech,
-    Timeline,
-    Unit,
-    Utterance,
-    silent_monitor,
-    sub_monitor,
-    with_progress,
-)
+from lipmotion.types import GREY, Monitor, Speech, Timeline, Unit, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon, is_silent
 
 ModelT = TypeVar("ModelT")

@@ -147,7 +147,12 @@ def _figure(title: str, spoken: str, height: int, parts: Sequence[Html], caption
         aria_label=spoken,
         class_="chart",
     )
-    return element("figure", drawing, element("figcaption", caption))
+    return captioned(drawing, caption)
+
+
+def captioned(content: Html, caption: str) -> Html:
+    """Return a figure with its caption."""
+    return element("figure", content, element("figcaption", caption))
 
 
 def _line(x1: float, y1: float, x2: float, y2: float, kind: str) -> Html:

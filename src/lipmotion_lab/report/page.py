@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -16,15 +16,14 @@ from PIL.Image import Resampling
 from lipmotion.corpora.store import Corpus
 from lipmotion.formats.web_page import Html, element, joined, whole_page
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
-from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
 from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
-from lipmotion_lab.report.charts import draw_curve
-from lipmotion_lab.report.section import Section
+from lipmotion_lab.report.charts import captioned, draw_curve
+from lipmotion_lab.report.section import Section, write_text
 
 FPS = 25.0
 MOUTH_SCALE = 4
@@ -69,8 +68,7 @@ class ClipKeeper:
             content |= {"channels": [recordings.channels[column] for column in columns], "spoken": clip.spoken}
             content |= {"time_s": rounded(clip.time_s), RECORDED: rounded(clip.original[:, columns])}
         content["systems"][system] = rounded(clip.generated[:, columns])
-        with atomic_file(self.path) as unfinished:
-            unfinished.write_text(as_json(content) + "\n", encoding="utf-8")
+        write_text(self.path, as_json(content) + "\n")
 
     def content(self) -> dict[str, Any]:
         """Return what is kept; empty: nothing of this run."""
@@ -123,12 +121,19 @@ def write_videos(
         values = np.array(shown[name])
         time_s = np.arange(int(utterance.audio.duration_s * FPS) + 1) / FPS
         columns = [np.interp(time_s, content["time_s"], column) for column in values.T]
-        motion = Motion(np.stack(columns, axis=1), FPS, tuple(map(Channel, content["channels"])))
         file = f"{number}.mp4"
-        frames = (picture[LOWER_FACE] for picture in stage_face("woman", STAGING).render(motion, silence, fps=FPS))
+        frames = draw_mouths(np.stack(columns, axis=1), content["channels"], silence)
         write_mp4(folder / file, frames, fps=FPS, audio=sound)
         found.append({"file": file, "caption": "a drawn face, recorded motion" if name == RECORDED else name})
     return found
+
+
+def draw_mouths(
+    values: NDArray[np.float64], channels: Sequence[str], silence: Timeline[Unit]
+) -> Iterator[NDArray[np.uint8]]:
+    """Yield pictures of a drawn face's mouth, ``FPS`` a second, for values of some channels [shape=(T, P)]."""
+    motion = Motion(values, FPS, tuple(map(Channel, channels)))
+    return (picture[LOWER_FACE] for picture in stage_face("woman", STAGING).render(motion, silence, fps=FPS))
 
 
 SCRIPT = """"use strict";
@@ -201,17 +206,16 @@ def _section(part: FinishedPart) -> Html:
         if sentences
     ]
     more = [
-        element("details", element("summary", sentence), table.as_html(part.name)) for sentence, table in section.more
+        element("details", element("summary", table.heading or table.caption), table.as_html(part.name))
+        for table in section.more
     ]
     if len(more) > FOLDED:
         more = [element("details", element("summary", f"{len(more)} more tables"), *more)]
     pictures = [
-        element(
-            "figure",
-            element("img", src=f"{part.name}/{picture['file']}", alt=picture["caption"], loading="lazy"),
-            element("figcaption", picture["caption"]),
+        captioned(
+            element("img", src=f"{part.name}/{each['file']}", alt=each["caption"], loading="lazy"), each["caption"]
         )
-        for picture in part.record["pictures"]
+        for each in part.record["pictures"]
     ]
     made_with = {
         key: ", ".join(f"{name} {value}" for name, value in content.items() if value is not None)
@@ -248,21 +252,11 @@ def _clip(part: FinishedPart) -> list[Html]:
     if not part.motion:
         return []
     name, words = part.motion["name"], " ".join(part.motion["words"])
-    videos = [
-        element(
-            "figure",
-            element(
-                "video",
-                src=f"{part.name}/{video['file']}",
-                controls=True,
-                preload="metadata",
-                playsinline=True,
-                aria_label=f"{name}: {video['caption']}",
-            ),
-            element("figcaption", video["caption"]),
-        )
-        for video in part.record["videos"]
-    ]
+    videos = []
+    for each in part.record["videos"]:
+        about = {"src": f"{part.name}/{each['file']}", "aria_label": f"{name}: {each['caption']}"}
+        video = element("video", controls=True, preload="metadata", playsinline=True, **about)
+        videos.append(captioned(video, each["caption"]))
     together = [element("button", "Play all together", type="button", class_="together", hidden=True)] if videos else []
     said = f", “{words}”" if words else ""
     return [

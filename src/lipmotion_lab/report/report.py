@@ -16,7 +16,6 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
 from lipmotion.formats.web_page import GENERATOR
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import GEOMETRY
 from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.storage import files, locks
@@ -30,7 +29,7 @@ from lipmotion_lab.folds import FOLDS, folds
 from lipmotion_lab.learning_curve import learning_curve
 from lipmotion_lab.minnis2000 import minnis2000
 from lipmotion_lab.report.page import ClipKeeper, FinishedPart, report_html, write_videos
-from lipmotion_lab.report.section import Section
+from lipmotion_lab.report.section import Section, write_text
 from lipmotion_lab.report.sections import (
     engines_section,
     folds_section,
@@ -39,7 +38,7 @@ from lipmotion_lab.report.sections import (
     minnis_section,
     xie_liu_section,
 )
-from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, take_quick_part
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, share_out, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_CAPTIONS
 from lipmotion_lab.xie_liu2007.systems import COMPARED_SYSTEMS, select_systems
@@ -186,23 +185,18 @@ def experiment_report(
     _check_folder(folder)
     with locks.lock_folder(folder):
         locks.remove_unfinished(folder)
-        config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
-        of_input = fingerprint_training(
-            corpus, corpus.names(), engine_named("trajectory"), config, lexicon, GEOMETRY, None
-        )
+        engine, phones, lexicon = engine_named("trajectory"), settings.recogniser, settings.lexicon or Lexicon()
+        of_input = fingerprint_training(corpus, corpus.names(), engine, phones, lexicon, GEOMETRY, None)
         lists = [[split, *corpus.names(split)] for split in SPLITS]
         writer = _Writer(
             corpus, folder, quick, settings, lacking, f"{of_input} {lists} {quick} {settings.seed} {can_draw()}"
         )
         writer.write_page(wanted)
         missing = [name for name in wanted if name not in lacking and writer.record(name) is None]
-        total, done = sum(PARTS[name].share for name in missing), 0.0
-        for name in missing:
-            share = PARTS[name].share
-            part = sub_monitor(settings.monitor, done / total, (done + share) / total, f"{name}: ")
-            writer.run(name, replace(settings, monitor=part))
+        parts = share_out(settings, missing, sizes=[PARTS[name].share for name in missing])
+        for name, part in zip(missing, parts, strict=True):
+            writer.run(name, part)
             writer.write_page(wanted)
-            done += share
         finished = writer.finished()
     verdicts = {part.name: part.section.verdict for part in finished}
     made = [name for name in missing if name not in writer.failed]
@@ -272,8 +266,7 @@ class _Writer:
         text = report_html(f"Experiments on {corpus}", about, finished, left_open, failed, quick=self.quick)
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
-            with files.atomic_file(page) as unfinished:
-                unfinished.write_text(text, encoding="utf-8")
+            write_text(page, text)
 
     def run(self, name: str, settings: ExperimentSettings) -> None:
         """Run an experiment with its settings, and write its folder, or keep its error. Raises ExportError."""
@@ -308,14 +301,9 @@ class _Writer:
                 pictures = [{"file": file, "caption": caption} for file, caption in captions.items()]
                 record: dict[str, Any] = {"experiment": name, "key": self.key(name), "stamp": made_with}
                 record |= {"figures": figures, "videos": videos, "pictures": pictures}
-                folder = made / "tables"
-                folder.mkdir()
-                for table in section.tables:
-                    with files.atomic_file(folder / f"{table.name}.csv") as unfinished:
-                        unfinished.write_text(table.as_csv(), encoding="utf-8", newline="")
-                    _write_json(folder / f"{table.name}.json", table.as_content())
-                _write_json(made / MOTION, motion)
-                _write_json(made / FIGURES, record)
+                section.write_tables(made / "tables")
+                for file, content in ((MOTION, motion), (FIGURES, record)):
+                    write_text(made / file, as_json(content, indent=1) + "\n")
 
     def _command(self, wanted: Sequence[str]) -> list[str]:
         words = ["lipmotion", "experiment", "all", self.corpus.path.resolve().name, "-o", self.folder.resolve().name]
@@ -327,8 +315,3 @@ class _Writer:
 def describe_error(error: Exception) -> str:
     """Return what an error says; of one that is not raised on purpose its kind, too."""
     return str(error) if isinstance(error, LipMotionError) else f"{type(error).__name__}: {error}"
-
-
-def _write_json(path: Path, content: Any) -> None:
-    with files.atomic_file(path) as unfinished:
-        unfinished.write_text(as_json(content, indent=1) + "\n", encoding="utf-8")

@@ -6,11 +6,14 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from lipmotion.formats.web_page import Html, element, joined
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.printable import printable
+from lipmotion.storage.files import atomic_file, make_folder
+from lipmotion.storage.json_text import as_json
 from lipmotion.storage.text_table import as_field
 from lipmotion_lab.evaluation.evaluate import sign_of_difference, significance_mark
 
@@ -34,18 +37,6 @@ class Column:
     note: str = ""
 
 
-ACC = Column("acc", "ACC", ".3f", "correlation of the opening with the recording")
-NRMSE = Column("nrmse", "nRMSE", ".3f")
-SCORE = Column("score", "score", ".1f", "closings of the recording that the motion makes within two frames, in %")
-PRECISION = Column("precision", "precision", ".1f", "generated closings that are of the recording, in %")
-RECALL = Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, in %")
-VARIANCE = Column("global_variance", "variance", ".2f", "of the opening, by that of the recording")
-JERK = Column("jerk", "jerk", ".2f", "of the opening, by that of the recording")
-ELSEWHERE = Column("false_per_minute", "elsewhere", ".1f", "closings outside p, b and m, a minute of speech")
-OPENING = (ACC, NRMSE, SCORE, PRECISION, RECALL, VARIANCE)
-"""What the experiments that no paper printed say of the opening."""
-
-
 @dataclass(frozen=True)
 class Table:
     """A table of a report.
@@ -53,6 +44,7 @@ class Table:
     columns   : after the names of the rows
     reference : the row that differences are from; empty: there are no differences
     head      : what the rows are
+    heading   : a sentence that stands above it, where it is not the first; empty: its caption
     """
 
     name: str
@@ -61,6 +53,7 @@ class Table:
     rows: Mapping[str, Row]
     reference: str = ""
     head: str = "system"
+    heading: str = ""
 
     def records(self) -> list[dict[str, Any]]:
         """Return the rows as flat records with the same keys in each; intervals as two figures."""
@@ -172,24 +165,37 @@ class Section:
     words: Mapping[str, Sequence[str]]
     charts: Sequence[Html]
     table: Table
-    more: Sequence[tuple[str, Table]] = ()
+    more: Sequence[Table] = ()
     shown: Sequence[str] = ()
 
     @property
     def tables(self) -> list[Table]:
         """All tables."""
-        return [self.table, *(table for _, table in self.more)]
+        return [self.table, *self.more]
+
+    def write_tables(self, folder: Path) -> None:
+        """Write all tables to a folder, as CSV and as JSON."""
+        make_folder(folder)
+        for table in self.tables:
+            write_text(folder / f"{table.name}.csv", table.as_csv())
+            write_text(folder / f"{table.name}.json", as_json(table.as_content(), indent=1) + "\n")
 
     def as_text(self) -> str:
         """Return what a terminal shows: what was compared, the tables, what their columns are, and what was found."""
         lines = [self.about]
-        for about, table in ((self.table.caption, self.table), *self.more):
-            lines += ["", about, *table.as_lines()]
+        for table in self.tables:
+            lines += ["", table.heading or table.caption, *table.as_lines()]
         notes = {f"{column.title}: {column.note}" for table in self.tables for column in table.columns if column.note}
         lines += ["", *dict.fromkeys(table.star for table in self.tables if table.star), *sorted(notes)]
         for title, sentences in self.words.items():
             lines += ["", title, *sentences]
         return "\n".join(printable(line).rstrip() for line in [*lines, "", self.verdict])
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file as it is, whole or not at all."""
+    with atomic_file(path) as unfinished:
+        unfinished.write_text(text, encoding="utf-8", newline="")
 
 
 def warn_of_few(clips: int) -> dict[str, list[str]]:
@@ -202,11 +208,6 @@ def warn_of_few(clips: int) -> dict[str, list[str]]:
             "here tells systems apart for sure."
         ]
     }
-
-
-def difference(one: float | None, other: float | None) -> float | None:
-    """Return by how much a figure is above another one; None where one of them is not defined."""
-    return None if one is None or other is None else one - other
 
 
 CHANCE = 0.05

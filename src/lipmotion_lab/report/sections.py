@@ -4,35 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
+from lipmotion.formats.web_page import Html
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion_lab.evaluation.evaluate import sign_of_difference
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET
 from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
 from lipmotion_lab.report.charts import Dot, draw_dots, draw_rising
-from lipmotion_lab.report.section import (
-    ACC,
-    ELSEWHERE,
-    JERK,
-    NRMSE,
-    OPENING,
-    PRECISION,
-    RECALL,
-    SCORE,
-    VARIANCE,
-    Column,
-    PaperOrder,
-    PaperPair,
-    Row,
-    Section,
-    Table,
-    difference,
-    warn_of_few,
-)
+from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Row, Section, Table, warn_of_few
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, SPLIT
 
+ACC = Column("acc", "ACC", ".3f", "correlation of the opening with the recording")
+NRMSE = Column("nrmse", "nRMSE", ".3f")
+SCORE = Column("score", "score", ".1f", "closings of the recording that the motion makes within two frames, in %")
+PRECISION = Column("precision", "precision", ".1f", "generated closings that are of the recording, in %")
+RECALL = Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, in %")
+VARIANCE = Column("global_variance", "variance", ".2f", "of the opening, by that of the recording")
+JERK = Column("jerk", "jerk", ".2f", "of the opening, by that of the recording")
+ELSEWHERE = Column("false_per_minute", "elsewhere", ".1f", "closings outside p, b and m, a minute of speech")
+OPENING = (ACC, NRMSE, SCORE, PRECISION, RECALL, VARIANCE)
+"""What the experiments that no paper printed say of the opening."""
 TIMING = Column("timing_ms", "timing", "+.0f", "by how much closings are late, in ms")
 AS_PRINTED, SETS = next(iter(PINS)), "Unit sets, "
 HOFER_COLUMNS = (
@@ -51,27 +45,43 @@ HOFER_COLUMNS = (
 )
 
 
+def difference(one: float | None, other: float | None) -> float | None:
+    """Return by how much a figure is above another one; None where one of them is not defined."""
+    return None if one is None or other is None else one - other
+
+
+def _tables(
+    name: str,
+    caption: str,
+    columns: Sequence[Column],
+    conditions: Mapping[str, Mapping[str, Row]],
+    reference: str = "",
+    head: str = "system",
+) -> list[Table]:
+    """Return a table for each condition, that of sound alone first."""
+    return [
+        Table(f"{name}-{each}".replace(" ", "-"), f"{caption}, {each}", columns, conditions[each], reference, head)
+        for each in sorted(conditions, key=lambda each: not each.endswith(AUDIO_ONLY))
+    ]
+
+
+def _draw_acc(title: str, table: Table) -> Html:
+    """Return a chart of the correlation of every row, and the paper's own where a row has it."""
+    dots = [Dot(name, row["acc"], row["acc_95"], row.get("paper_acc")) for name, row in table.rows.items()]
+    return draw_dots(title, "ACC", dots)
+
+
 def hofer_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``hofer2008`` say; the paper's own case is audio alone, as printed, most states."""
     blocks = list(figures["tables"])
     most = max(block["states"] for block in blocks)
-    main = next(
-        block
-        for block in blocks
-        if (block["states"], block["condition"], block["pins"]) == (most, AUDIO_ONLY, AS_PRINTED)
-    )
+    case = (most, AUDIO_ONLY, AS_PRINTED)
+    main = next(each for each in blocks if (each["states"], each["condition"], each["pins"]) == case)
     table, rows = _hofer_table(main), main["rows"]
     order = _hofer_order(main)
-    charts = [
-        draw_dots(
-            "Score of closings",
-            "% of the recording's closings",
-            [
-                Dot(name, row["score"], row["score_95"], row["paper"])
-                for name, row in sorted(table.rows.items(), key=lambda item: -item[1]["paper"])
-            ],
-        )
-    ]
+    ranked = sorted(table.rows.items(), key=lambda item: -item[1]["paper"])
+    dots = [Dot(name, row["score"], row["score_95"], row["paper"]) for name, row in ranked]
+    charts = [draw_dots("Score of closings", "% of the recording's closings", dots)]
     about = (
         f"Which set of units predicts closings of the mouth best: the system of the paper, trained on "
         f"{figures['trained_on']} recordings with each of {len(rows)} sets, compared on {figures['clips']} of "
@@ -79,8 +89,10 @@ def hofer_section(figures: Mapping[str, Any]) -> Section:
         f"Channels of motion: {figures['channels'] or 'all'}. Shown first: sound alone, {AS_PRINTED}, {most} states."
     )
     words = warn_of_few(figures["clips"]) | {"The paper's order": order.sentences()}
-    others = [(block, _hofer_table(block)) for block in blocks if block is not main]
-    more = [(f"{other.caption.removeprefix(SETS)}: {_hofer_order(block).verdict()}", other) for block, other in others]
+    more = [
+        replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_hofer_order(block).verdict()}")
+        for block, other in [(block, _hofer_table(block)) for block in blocks if block is not main]
+    ]
     shown = [f"{units}, {most} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
     return Section(title, about, order.verdict(), words, charts, table, more, shown)
@@ -145,11 +157,9 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
             name, caption = f"minnis2000-{split}-{condition}", f"Unit selection, {split}, {condition}"
             with_joins = {}
             for system, row in rows.items():
-                joins = row["joins"]
-                shares = {key: None if joins[key] is None else 100 * joins[key] for key in ("hard", "smooth")}
+                joins, overlap = row["joins"], row.get("overlap", {"error": None})
                 own = {f"joins_{key}": joins.get(key) for key in ("per_clip", "candidates")}
-                own |= {f"joins_{key}": share for key, share in shares.items()}
-                overlap = row.get("overlap", {"error": None})
+                own |= {f"joins_{key}": joins[key] and 100 * joins[key] for key in ("hard", "smooth")}
                 own |= {f"overlap_{key}": each for key, each in overlap.items()}
                 for channel, each in row["channels"].items():
                     own |= {f"{channel}_{ratio.key}": each[ratio.key] for ratio in RATIOS}
@@ -186,9 +196,8 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
         f"recordings of {split}, sound alone."
         f"{' Quick: few epochs, only to see that it runs.' if figures['quick'] else ''}"
     )
-    shown = [Dot(name, row["acc"], row["acc_95"]) for name, row in rows.items()]
-    charts = [draw_dots("ACC of the opening", "ACC", shown)]
-    more = [(table.caption, table) for table in tables.values() if table is not main]
+    charts = [_draw_acc("ACC of the opening", main)]
+    more = [table for table in tables.values() if table is not main]
     title, compared = "Minnis & Breen 2000: unit selection", (PRINTED, UNGUIDED, EVERYTHING)
     return Section(title, about, verdict, words, charts, main, more, compared)
 
@@ -198,10 +207,15 @@ def _effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
     signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names if name in rows}
     printed = rows[PRINTED]["acc"]
     described = {name: f"{name} ({figure_text(difference(rows[name]['acc'], printed), '+.3f')})" for name in signs}
-    outcomes = ((1, "ACC is higher"), (-1, "ACC is lower"), (0, "The interval of the difference contains 0"))
+    outcomes = ("ACC is higher", "ACC is lower", "The interval of the difference contains 0")
+    return _by_sign(signs, described, outcomes)
+
+
+def _by_sign(signs: Mapping[str, int], described: Mapping[str, str], outcomes: Sequence[str]) -> list[str]:
+    """Return which differences are positive, negative, and neither for sure, each in a sentence."""
     return [
         f"{what}: {', '.join(described[name] for name, each in signs.items() if each == sign) or 'none'}."
-        for sign, what in outcomes
+        for sign, what in zip((1, -1, 0), outcomes, strict=True)
     ]
 
 
@@ -230,7 +244,8 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     cases = [(condition, rows, size) for condition, rows in size["conditions"].items()]
     for each in smaller:
         cases += [(f"{name}, {each['names']} recordings", rows, each) for name, rows in each["conditions"].items()]
-    (_, main), *more = ((caption, _systems_table(caption, *case)) for caption, *case in cases)
+    main, *others = (_systems_table(*case) for case in cases)
+    more = [replace(table, heading=case) for table, (case, *_) in zip(others, cases[1:], strict=True)]
     words, verdict, by_amse = warn_of_few(figures["clips"]), "", []
     for ending, called in (("", "as printed"), (SPLIT, "with Gaussians chosen on val")):
         names = {name + ending for name in PAPER_FIGURES}
@@ -246,7 +261,7 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     if size["pairs"]:
         rows = {f"{pair['better']} over {pair['worse']}": pair for pair in size["pairs"]}
         columns = [Column(key, f"difference of {title}", form) for key, title, form in MEASURES]
-        more.append(("Pairs of the paper", Table("xieliu2007-pairs", "Pairs of the paper", columns, rows, head="pair")))
+        more.append(Table("xieliu2007-pairs", "Pairs of the paper", columns, rows, head="pair"))
     channels = figures["channels"]
     about = (
         f"Which structure of chains predicts lips best: {len(main.rows)} systems trained on {size['used']} recordings, "
@@ -256,8 +271,7 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     )
     if changed:
         about += " K on val: with the number of Gaussians that was best there; nothing was chosen on test."
-    shown = [Dot(name, row["acc"], row["acc_95"], row["paper_acc"]) for name, row in main.rows.items()]
-    charts = [draw_dots("ACC of every system", "ACC", shown)]
+    charts = [_draw_acc("ACC of every system", main)]
     title = "Xie & Liu 2007, Table 3: structures of chains"
     return Section(
         title, about, verdict, words, charts, main, more, [name for name in PAPER_FIGURES if name in main.rows]
@@ -312,37 +326,34 @@ ENGINES_COLUMNS = (
 )
 
 
+ENGINES_OUTCOMES = ("Higher than that", "Lower than that", "Not different for sure from that")
+
+
 def engines_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``engines`` say."""
-    reference, tables = figures["reference"], {}
-    for condition, found in figures["conditions"].items():
-        rows = {
+    reference = figures["reference"]
+    conditions = {
+        condition: {
             name: {**row, "acc_gain_95": row["acc_gain_95"].get(reference)}
             | {f"unpinned_{key}": value for key, value in row["unpinned"].items()}
             for name, row in found["systems"].items()
         }
-        name, columns = f"engines-{condition}".replace(" ", "-"), ENGINES_COLUMNS
-        tables[condition] = Table(name, f"Engines, {condition}", columns, rows, reference)
-    main = tables.pop(AUDIO_ONLY)
+        for condition, found in figures["conditions"].items()
+    }
+    main, *more = _tables("engines", "Engines", ENGINES_COLUMNS, conditions, reference)
     signs = {name: sign_of_difference(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}
     best = max(main.rows, key=lambda name: main.rows[name]["acc"] or 0.0)
     acc = figure_text(main.rows[best]["acc"], ".3f")
     verdict = f"Most alike to the recordings: {best} (ACC {acc}); nothing is in print to compare."
-    outcomes = ((1, "Higher than that"), (-1, "Lower than that"), (0, "Not different for sure from that"))
-    words = warn_of_few(figures["clips"]) | {
-        "ACC of the opening": [
-            f"{what} of the engine {reference}: {', '.join(n for n, each in signs.items() if each == sign) or 'none'}."
-            for sign, what in outcomes
-        ]
-    }
+    outcomes = [f"{what} of the engine {reference}" for what in ENGINES_OUTCOMES]
+    words = warn_of_few(figures["clips"]) | {"ACC of the opening": _by_sign(signs, {n: n for n in signs}, outcomes)}
     minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
     about = (
         f"All engines with their defaults, trained on {minutes} minutes, on {figures['clips']} "
         f"recordings of {figures['split']}, with closed lips forced in p, b and m."
         f"{_closings(figures, main.rows[best])}"
     )
-    charts = [draw_dots("ACC of the opening", "ACC", [Dot(n, r["acc"], r["acc_95"]) for n, r in main.rows.items()])]
-    more = [(table.caption, table) for table in tables.values()]
+    charts = [_draw_acc("ACC of the opening", main)]
     return Section("The engines of this project", about, verdict, words, charts, main, more, list(main.rows))
 
 
@@ -356,23 +367,16 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
         *OPENING,
         *(Column(f"acc_{name}", name, ".3f", f"correlation of the {name}") for name in DISTANCES[1:]),
     )
-    conditions = list(figures["rows"][0]["conditions"])
-    tables = {
-        condition: Table(
-            f"learning-curve-{condition}".replace(" ", "-"),
-            f"Learning curve, {condition}",
-            columns,
-            {size: {**row, **row["conditions"][condition]} for size, row in sizes.items()},
-            head="recordings",
-        )
-        for condition in conditions
+    conditions = {
+        condition: {size: {**row, **row["conditions"][condition]} for size, row in sizes.items()}
+        for condition in figures["rows"][0]["conditions"]
     }
-    main = tables.pop(AUDIO_ONLY)
+    main, *more = _tables("learning-curve", "Learning curve", columns, conditions, head="recordings")
     first, last = next(iter(main.rows)), list(main.rows)[-1]
     low, high = (figure_text(main.rows[size]["acc"], ".3f") for size in (first, last))
     steps = [
         size
-        for size, before in zip(list(main.rows)[1:], main.rows, strict=False)
+        for before, size in pairwise(main.rows)
         if (difference(main.rows[size]["acc"], main.rows[before]["acc"]) or 0) < 0
     ]
     words = warn_of_few(figures["clips"]) | {
@@ -382,11 +386,8 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
         ]
     }
     lines = {
-        condition: [
-            (float(size), Dot(size, row["conditions"][condition]["acc"], row["conditions"][condition]["acc_95"]))
-            for size, row in sizes.items()
-        ]
-        for condition in conditions
+        condition: [(float(size), Dot(size, row["acc"], row["acc_95"])) for size, row in rows.items()]
+        for condition, rows in conditions.items()
     }
     about = (
         f"The default engine trained on the first recordings of "
@@ -395,7 +396,6 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
     )
     verdict = f"ACC {low} with {first} recordings, {high} with {last}."
     charts = [draw_rising("ACC of the opening over recordings", "recordings", lines)] if len(sizes) > 1 else []
-    more = [(table.caption, table) for table in tables.values()]
     shown = [f"{size} recordings" for size in dict.fromkeys((first, last))]
     return Section("Learning curve", about, verdict, words, charts, main, more, shown)
 

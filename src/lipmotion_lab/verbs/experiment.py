@@ -34,16 +34,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb and its experiments to the parser of the command line."""
     parser = verbs.add_parser("experiment", help="train and compare systems on a corpus, as in the papers")
     actions = parser.add_subparsers(title="experiments", required=True, metavar="EXPERIMENT")
-    for experiment in (
-        _add_hofer2008,
-        _add_learning_curve,
-        _add_folds,
-        _add_xieliu2007,
-        _add_minnis2000,
-        _add_engines,
-        _add_all,
-    ):
-        experiment(actions)
+    for add_printed in (_add_hofer2008, _add_learning_curve, _add_folds, _add_xieliu2007, _add_minnis2000):
+        add_printed(actions)
+    _add_engines(actions)
+    _add_all(actions)
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = "") -> None:
@@ -113,11 +107,10 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
     parser.add_argument("--states", type=numbers, metavar="N,N", help="states of a unit (default: 3,5; quick: 5)")
     add_experiment_arguments(parser, quick="one or two Gaussians")
     add_blocks(parser)
-    parser.set_defaults(run=run_hofer2008)
+    parser.set_defaults(run=_run_hofer2008)
 
 
-def run_hofer2008(options: argparse.Namespace) -> None:
-    """Call ``hofer2008`` and print its section."""
+def _run_hofer2008(options: argparse.Namespace) -> None:
     from lipmotion_lab.hofer2008 import FULL, QUICK, REFERENCE_SET, hofer2008
 
     usual = QUICK if options.quick else FULL
@@ -137,11 +130,10 @@ def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentPar
     rival = "train also a BLSTM on the same recordings, its settings chosen on val, and compare"
     parser.add_argument("--rival", action="store_true", help=rival)
     add_experiment_arguments(parser)
-    parser.set_defaults(run=run_learning_curve)
+    parser.set_defaults(run=_run_learning_curve)
 
 
-def run_learning_curve(options: argparse.Namespace) -> None:
-    """Call ``learning_curve`` and print its section."""
+def _run_learning_curve(options: argparse.Namespace) -> None:
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion_lab.learning_curve import learning_curve
 
@@ -161,11 +153,10 @@ def _add_folds(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     count = "number of parts (default: 5; by speaker: one each)"
     parser.add_argument("--folds", type=int, metavar="K", help=count)
     add_experiment_arguments(parser)
-    parser.set_defaults(run=run_folds)
+    parser.set_defaults(run=_run_folds)
 
 
-def run_folds(options: argparse.Namespace) -> None:
-    """Call ``folds`` and print its section."""
+def _run_folds(options: argparse.Namespace) -> None:
     from lipmotion_lab.folds import folds
 
     run_experiment(options, partial(folds, count=options.folds, by_speaker=options.by_speaker), "folds")
@@ -194,11 +185,10 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
         parser, quick="the paper's systems, four also with Gaussians chosen on val; not with --order"
     )
     add_blocks(parser)
-    parser.set_defaults(run=run_xieliu2007)
+    parser.set_defaults(run=_run_xieliu2007)
 
 
-def run_xieliu2007(options: argparse.Namespace) -> None:
-    """Call ``xieliu2007`` and print its section."""
+def _run_xieliu2007(options: argparse.Namespace) -> None:
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
     from lipmotion.pipeline.training.other_speakers import other_voices
@@ -236,11 +226,10 @@ def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]
     parser.add_argument("--no-guide", dest="guided", action="store_false", help=unguided)
     add_experiment_arguments(parser, quick="few epochs; the model is not kept")
     add_blocks(parser)
-    parser.set_defaults(run=run_minnis2000)
+    parser.set_defaults(run=_run_minnis2000)
 
 
-def run_minnis2000(options: argparse.Namespace) -> None:
-    """Call ``minnis2000`` and print its section."""
+def _run_minnis2000(options: argparse.Namespace) -> None:
     from lipmotion_lab.minnis2000 import PRINTED, minnis2000
 
     chosen = {"models": options.models, "quick": options.quick, "guided": options.guided}
@@ -253,11 +242,10 @@ def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -
     kept = "the engines' models: what is not there yet is trained and kept (default: train all, keep none)"
     add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=kept)
     add_experiment_arguments(parser)
-    parser.set_defaults(run=run_engines)
+    parser.set_defaults(run=_run_engines)
 
 
-def run_engines(options: argparse.Namespace) -> None:
-    """Call ``engines`` and print its section."""
+def _run_engines(options: argparse.Namespace) -> None:
     from lipmotion_lab.engine_comparison import engines
 
     def experiment(corpus: Corpus, *, settings: ExperimentSettings, work: None) -> dict[str, Any]:  # noqa: ARG001

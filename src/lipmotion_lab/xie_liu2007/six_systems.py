@@ -4,42 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import combinations, pairwise
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import InputError
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
-from lipmotion.pipeline.training.train import examples_without_motion, phones_and_examples
-from lipmotion.pipeline.workers import training_pool
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.pipeline.training.train import examples_without_motion
 from lipmotion.stats.curves import varies
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Example, Monitor, sub_monitor
-from lipmotion.units import Lexicon
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate
-from lipmotion_lab.evaluation.held_out import (
-    AUDIO_ONLY,
-    OPENING,
-    ComparedClip,
-    HeldOutRecordings,
-    generate_clips,
-    load_held_out,
-)
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, ComparedClip, HeldOutRecordings, generate_clips
 from lipmotion_lab.learning_curve import check_training_names, choose_sizes
 from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion_lab.xie_liu2007.systems import (
@@ -122,11 +110,10 @@ def xieliu2007(  # noqa: PLR0913
     if plots is not None:
         check_plot_folder(plots)
         check_apart([plots], [Source(corpus.path, "corpus")])
-    shares = np.cumsum([0, *steps]) / sum(steps)
     rows: list[dict[str, Any]] = []
-    for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
-        part = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
-        trained = setup.train(names, listed[:count], part)
+    parts = runner.share_out(settings, [f"{count} clips" for count in steps], sizes=steps)
+    for count, part in zip(steps, parts, strict=True):
+        trained = setup.train(names, listed[:count], part.monitor)
         kept = setup.checkpoint(listed[:count], held_out)
         rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
     recordings = trained.recordings
@@ -181,31 +168,26 @@ class _TrainingSetup:
         self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
     ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
         """Return the examples of some utterances, and recordings with the phones of models trained on these."""
-        lexicon, config = self.settings.lexicon or Lexicon(), self.settings.recogniser or HmmConfig()
-        visual = self.options.visual
+        settings, visual = self.settings, self.options.visual
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
         eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
-        with training_pool(self.settings.workers, len(utterances)) as each:
-            checkpoint = replace(self.checkpoint(names), parallel_map=each)
-            learning = sub_monitor(monitor, 0, 0.7)
-            phones, examples, _ = phones_and_examples(utterances, config, lexicon, learning, checkpoint)
-        read = partial(load_held_out, self.corpus, cached_recogniser(phones), lexicon=lexicon)
-        read = partial(read, visual=visual, eigenlips=eigenlips)
+        learning = replace(settings, monitor=sub_monitor(monitor, 0, 0.7))
+        phones, examples = runner.train_phones(utterances, learning, self.checkpoint(names))
         parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
         recordings: dict[str, HeldOutRecordings] = {}
         for number, (name, part) in enumerate(parts.items()):
-            reading = sub_monitor(monitor, 0.7 + 0.15 * number, 0.85 + 0.15 * number)
+            reading = replace(settings, monitor=sub_monitor(monitor, 0.7 + 0.15 * number, 0.85 + 0.15 * number))
             channels = recordings["held out"].channels if recordings else None
-            recordings[name] = read(selection=Selection(names=part), channels=channels, monitor=reading)
+            recordings[name] = runner.recognise_held_out(
+                self.corpus, phones, part, reading, channels=channels, visual=visual, eigenlips=eigenlips
+            )
         return examples, recordings
 
     def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
-        everything, others = (
-            (*names, *self.corpus.names("val")),
-            " ".join((str(self.options.mixtures), *(spoken.name for spoken in self.options.voices), *compared)),
-        )
+        others = " ".join((str(self.options.mixtures), *(spoken.name for spoken in self.options.voices), *compared))
+        everything = (*names, *self.corpus.names("val"))
         key = runner.PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
         return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
@@ -238,10 +220,7 @@ def _size(
 
 
 def _generate(
-    recordings: HeldOutRecordings,
-    condition: str,
-    systems: Mapping[str, TrainedSystem],
-    kept: Checkpoint,
+    recordings: HeldOutRecordings, condition: str, systems: Mapping[str, TrainedSystem], kept: Checkpoint
 ) -> dict[str, list[ComparedClip]]:
     made = {}
     for name, system in systems.items():
@@ -291,6 +270,6 @@ def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[Compared
         row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
         if OPENING in recordings.channels:
             rmse = float(curves.rmse(*evaluate.opening_curves(recordings, clips))[0])
-            row["opening"] = runner.opening_row_with_rates(figures) | {"rmse": rmse}
+            row["opening"] = runner.opening_row(figures) | {"rmse": rmse}
         rows[system] = row
     return rows

@@ -22,15 +22,9 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
 from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose
+from lipmotion_lab.evaluation import held_out
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
-from lipmotion_lab.evaluation.held_out import (
-    AUDIO_ONLY,
-    ComparedClip,
-    HeldOutRecordings,
-    generate_clips,
-    generate_compared,
-    make_speech,
-)
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings
 
 Options = Mapping[str, Any]
 TIED = {"unseen_loss": UNSEEN_LOSS, "start_asynchrony": 1}
@@ -64,18 +58,6 @@ class TrainedSystem:
     tried: Sequence[Trial] = field(default_factory=tuple)
 
 
-def search_settings(
-    options: Options, kinds: Sequence[Sequence[Options]], attempt: Callable[[Options], Sequence[Trial]]
-) -> list[Trial]:
-    """Return all trials of a search from some options that takes one kind of setting after another."""
-    tried: list[Trial] = []
-    for kind in kinds:
-        start = best_trial(tried).options if tried else options
-        for change in kind:
-            tried += attempt({**start, **change})
-    return tried
-
-
 def best_trial(trials: Sequence[Trial]) -> Trial:
     """Return the trial of the highest ACC; of equals the first."""
     return max(trials, key=lambda trial: trial.acc)
@@ -98,7 +80,7 @@ def judge_systems(
 ) -> Iterator[tuple[Trial, TrainedSystem]]:
     """Yield every system with its figures on validation recordings."""
     for system in systems:
-        made = generate_clips(validation, AUDIO_ONLY, system.engine, system.model)
+        made = held_out.generate_clips(validation, AUDIO_ONLY, system.engine, system.model)
         options, parameters = system.engine.config.as_mapping(), system.model.chains.parameters
         yield Trial(options, *measure_clips(made), parameters), system
 
@@ -112,18 +94,18 @@ def measure_clips(made: Sequence[ComparedClip]) -> tuple[float, float]:
 def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, monitor: Monitor) -> TrainedSystem:
     """Return the BLSTM whose learning rate, then cells, then steps are the best on validation recordings."""
     hearing: Animator[Any] = BlstmBaseline()
-    speech, found = make_speech(validation, AUDIO_ONLY, hearing, None), list[tuple[Trial, TrainedSystem]]()
-
-    def attempt(options: Options) -> list[Trial]:
-        start_s, engine = process_time(), BlstmBaseline(**options)
-        model = engine.fit(examples, monitor).model
-        size = sum(array.size for array in model.learned.network.parameters)
-        trial = Trial(options, *measure_clips(generate_compared(validation, speech, engine, model)), size)
-        found.append((trial, TrainedSystem(engine, model, process_time() - start_s)))
-        return [trial]
-
-    search_settings({}, NETWORK_SETTINGS, attempt)
-    return choose_by(lambda trial: trial.acc, found)
+    speech, found = held_out.make_speech(validation, AUDIO_ONLY, hearing, None), list[tuple[Trial, TrainedSystem]]()
+    for kind in NETWORK_SETTINGS:
+        best = best_trial([trial for trial, _ in found]).options if found else {}
+        for change in kind:
+            options = {**best, **change}
+            start_s, engine = process_time(), BlstmBaseline(**options)
+            model = engine.fit(examples, monitor).model
+            size = sum(array.size for array in model.learned.network.parameters)
+            made = held_out.generate_compared(validation, speech, engine, model)
+            trial = Trial(options, *measure_clips(made), size)
+            found.append((trial, TrainedSystem(engine, model, process_time() - start_s)))
+    return choose_best(found)
 
 
 def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
@@ -136,11 +118,10 @@ def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator
         best = trial.acc
 
 
-def choose_by(of: Callable[[Trial], float], found: Iterable[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
-    """Return the system of which something is highest, as the ACC of its trial; with all trials."""
-    pairs = list(found)
-    _, best = max(pairs, key=lambda pair: of(pair[0]))
-    return replace(best, tried=tuple(trial for trial, _ in pairs))
+def choose_best(found: Sequence[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
+    """Return the system of the highest ACC; of equals the first; with all trials."""
+    _, best = max(found, key=lambda pair: pair[0].acc)
+    return replace(best, tried=tuple(trial for trial, _ in found))
 
 
 def as_row(trial: Trial) -> dict[str, Any]:
@@ -281,7 +262,7 @@ def train_system(
         for more in [{"visual_mixtures": mixtures}, {}][: 1 if system.options["structure"] == HMM else 2]:
             grown = train_stages({**system.options, "mixtures": mixtures, **more}, examples, monitor)
             found += split_while_better(judge_systems(grown, validation))
-        return choose_by(lambda trial: trial.acc, found)
+        return choose_best(found)
     *_, last = train_stages(system.options, examples, monitor)
     return last
 
