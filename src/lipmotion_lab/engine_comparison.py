@@ -124,15 +124,14 @@ def engines(
     held_out = corpus.required(split)
     check_training_names(corpus, corpus.required("train"), held_out)
     channels = runner.check_opening(corpus, held_out)
-    monitor = settings.monitor
-    trained = engine_models(corpus, models, replace(settings, monitor=sub_monitor(monitor, 0, 0.6)))
-    phones, reading = trained[REFERENCE_ENGINE].model.phones, replace(settings, monitor=sub_monitor(monitor, 0.6, 0.7))
-    recordings = runner.recognise_held_out(corpus, phones, held_out, reading, channels=channels)
+    trained = engine_models(corpus, models, settings.part(0, 0.6))
+    phones = trained[REFERENCE_ENGINE].model.phones
+    recordings = runner.recognise_held_out(corpus, phones, held_out, settings.part(0.6, 0.7), channels=channels)
     steps = [(condition, name) for condition in recordings.conditions for name in trained]
     made: dict[str, dict[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]]] = {
         condition: {} for condition in recordings.conditions
     }
-    for condition, name in with_progress(steps, "comparing", sub_monitor(monitor, 0.7, 1)):
+    for condition, name in with_progress(steps, "comparing", sub_monitor(settings.monitor, 0.7, 1)):
         system = trained[name].model
         known = replace(recordings, speakers=system.speakers)
         speech = make_speech(known, condition, system.engine, system.learned)

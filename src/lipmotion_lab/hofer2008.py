@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, product
 from pathlib import Path
 from typing import Any
@@ -80,16 +81,11 @@ def hofer2008(
     runner.check_opening(corpus, compared := corpus.required(split))  # before the long work
     validation, names = corpus.required("val"), tuple(sorted(corpus.required("train")))
     key = runner.PartKey(_engine(channels=options.channels), (*names, *validation, *compared))
-    checkpoint, monitor = runner.open_parts(work, corpus, settings, key), settings.monitor
-    learning = replace(settings, monitor=sub_monitor(monitor, 0, 0.1))
-    phones, examples = runner.train_phones([corpus.utterance(name) for name in names], learning, checkpoint)
-    choosing, recordings = (
-        runner.recognise_held_out(corpus, phones, listed, replace(settings, monitor=part), channels=(OPENING,))
-        for listed, part in (
-            (validation, sub_monitor(monitor, 0.1, 0.12)),
-            (compared, sub_monitor(monitor, 0.12, 0.15)),
-        )
-    )
+    checkpoint, utterances = runner.open_parts(work, corpus, settings, key), [corpus.utterance(name) for name in names]
+    phones, examples = runner.train_phones(utterances, settings.part(0, 0.1), checkpoint)
+    read = partial(runner.recognise_held_out, corpus, phones, channels=(OPENING,))
+    choosing = read(names=validation, settings=settings.part(0.1, 0.12))
+    recordings = read(names=compared, settings=settings.part(0.12, 0.15))
     cells = [(states, units) for states in options.states for units in PAPER_SCORES]
     made: dict[tuple[int, str, str], dict[str, tuple[_System, Sequence[ComparedClip]]]] = {
         case: {} for case in product(options.states, recordings.conditions, PINS)

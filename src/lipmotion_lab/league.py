@@ -104,9 +104,8 @@ def read_rivals(folder: Path, only: Sequence[str] = ()) -> list[Rival]:
         table = from_json(path.read_bytes())
         rivals = [Rival(name, **row | {"run": tuple(row["run"])}) for name, row in table.items()]
     except FileNotFoundError as error:
-        raise InputError(
-            f"{path}: no such file; give the folder extras/league of the sources (--adapters, or LIPMOTION_LEAGUE)"
-        ) from error
+        way_out = "give the folder extras/league of the sources (--adapters, or LIPMOTION_LEAGUE)"
+        raise InputError(f"{path}: no such file; {way_out}") from error
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(f"{path}: not a table of rivals ({error}); see the README.md in extras/league") from error
     if unknown := sorted(set(only) - {rival.name for rival in rivals}):
@@ -435,16 +434,13 @@ class Standing:
 
 def play(
     rival: Rival,
+    tried: Sequence[Sequence[RivalAnswer]],
     recordings: Sequence[Recording],
     reported: int,
-    adapters: Path,
-    work: Path,
     sync_s: float,
-    limit_s: float,
 ) -> Standing:
-    """Return what a rival does on the first ``reported`` recordings. Raises as ``ask``."""
+    """Return what a rival does on the first ``reported`` recordings, of its answers by settings and recording."""
     settings = rival.list_settings()
-    tried = ask(rival, recordings, adapters, work, limit_s)
     done, chosen = dict[int, tuple[Array, float, float]](), []
     for numbers, held in split_choices(reported, len(recordings) - reported):
         choice = choose(tried, recordings, numbers, sync_s)
@@ -496,15 +492,12 @@ def league(  # noqa: PLR0913
     sync_s   : each recording may be moved by so much to fit best, alike for all; limit_s: longest time of a job
     Raises InputError: no adapters, or too few recordings. Raises CorpusError: no lips in a recording.
     """
-    rivals, work = read_rivals(adapters, only), work.resolve()
-    lists = corpus.splits
-    own = choosing is None and lists["val"] and lists["test"]
-    reported = corpus.names("test" if own else None)
-    loading = sub_monitor(monitor, 0, 0.3)
+    rivals, work, loading = read_rivals(adapters, only), work.resolve(), sub_monitor(monitor, 0, 0.3)
+    own = choosing is None and corpus.names("val") and corpus.names("test")
+    reported, other = corpus.names("test" if own else None), corpus if own else choosing
+    names = () if other is None else other.names("val") or other.names()
     recordings = load_recordings(corpus, reported, work, loading)
-    other, names = (corpus, corpus.names("val")) if own else (choosing, ())
     if other is not None:
-        names = names or other.names("val") or other.names()
         recordings += load_recordings(other, names, work / "choosing", loading)
     next(split_choices(len(reported), len(names)))
     stems = [each.sound.stem for each in recordings]
@@ -513,7 +506,8 @@ def league(  # noqa: PLR0913
     standings, absent, failed = [], {}, {}
     for rival in with_progress(rivals, "rivals", sub_monitor(monitor, 0.3, 1)):
         try:
-            standings.append(play(rival, recordings, len(reported), adapters.resolve(), work, sync_s, limit_s))
+            tried = ask(rival, recordings, adapters.resolve(), work, limit_s)
+            standings.append(play(rival, tried, recordings, len(reported), sync_s))
         except MissingDependencyError as error:
             absent[rival.title] = str(error)
         except RivalError as error:
@@ -536,6 +530,7 @@ COLUMNS = (
     Column("onset", "onset", ".0f", "mean error, in ms, with which the mouth begins to open; 200 where it never does"),
     Column("seconds", "processor", ".3f", "processor seconds for a second of sound"),
 )
+SUBTITLE = "Rivals and our engines on the same filmed recordings."
 HOW_TO_READ = (
     "Weights of a rival become opening and width by a linear map that moves as widely as the speakers do. The map, its "
     "lag, its smoothing, when lips count as closed, and the rival's settings are those with which it did best on "
@@ -576,23 +571,20 @@ def describe_league(found: League) -> Section:
 def write_league(found: League, folder: Path) -> dict[str, Any]:
     """Write the page of a league, with its pictures and all figures, to a folder; return the figures."""
     section, motion, part = describe_league(found), _shown(found), folder / PART
+    names = [each.utterance.name for each in found.recordings]
+    accs = {each.rival.title: [acc for acc, _ in each.figures["acc"].sums] for each in found.standings}
     figures: dict[str, Any] = {"about": found.about, "best_rival": section.table.reference or None}
     figures |= {"rivals": section.table.rows, "absent": found.absent, "failed": found.failed}
     figures["chosen"] = {each.rival.title: each.chosen for each in found.standings}
-    names = [each.utterance.name for each in found.recordings]
-    figures["each"] = {
-        each.rival.title: dict(zip(names, (acc for acc, _ in each.figures["acc"].sums), strict=True))
-        for each in found.standings
-    }
+    figures["each"] = {title: dict(zip(names, of, strict=True)) for title, of in accs.items()}
     figures = nan_as_null(figures)
     section.write_tables(part / "tables")
     write_text(part / "figures.json", as_json(figures) + "\n")
     record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": found.about}
     finished = [FinishedPart(PART, record, motion, section)]
     page = report_html(
-        "The league", found.about, finished, found.absent, found.failed,
-        subtitle="Rivals and our engines on the same filmed recordings.", how_to_read=HOW_TO_READ,
-    )  # fmt: skip
+        "The league", found.about, finished, found.absent, found.failed, subtitle=SUBTITLE, how_to_read=HOW_TO_READ
+    )
     write_text(folder / "index.html", page)
     return figures
 

@@ -167,7 +167,7 @@ def minnis2000(
     lists = {split: corpus.required(split) for split in splits}
     for held_out in lists.values():
         check_training_names(corpus, corpus.required("train"), held_out)
-    training = replace(settings, monitor=sub_monitor(settings.monitor, 0, 0.6))
+    training = settings.part(0, 0.6)
     kept_in = models or (work and work / "model")
     if quick or not guided:
         options = ({} if guided else {"guide": 0.0, "joint_recogniser": False}) | ({"epochs": 20} if quick else {})
@@ -200,9 +200,8 @@ def _on_list(
     settings: runner.ExperimentSettings,
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
-    monitor = settings.monitor
-    channels, reading = runner.check_opening(corpus, names), replace(settings, monitor=sub_monitor(monitor, 0, 0.4))
-    recordings = runner.recognise_held_out(corpus, model.phones, names, reading, channels=channels)
+    channels = runner.check_opening(corpus, names)
+    recordings = runner.recognise_held_out(corpus, model.phones, names, settings.part(0, 0.4), channels=channels)
     conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
     reference: dict[str, tuple[Array, Array]] = {}
 
@@ -222,7 +221,7 @@ def _on_list(
             masks.append(((time_s >= start_s) & (time_s < end_s)).any(axis=0))
         return masks
 
-    for name, config in with_progress(list(systems.items()), "comparing", sub_monitor(monitor, 0.4, 1)):
+    for name, config in with_progress(list(systems.items()), "comparing", sub_monitor(settings.monitor, 0.4, 1)):
         learned = _of_the_row(model.learned, config)
         for condition, found in conditions.items():
             stage = f"{len(found)} {condition}"

@@ -72,6 +72,10 @@ class ExperimentSettings:
     monitor: Monitor = silent_monitor
     receive: MotionReceiver = lambda *_: None
 
+    def part(self, start: float, stop: float, label: str = "") -> ExperimentSettings:
+        """Return the settings of a part of the work, between two shares of the whole."""
+        return replace(self, monitor=sub_monitor(self.monitor, start, stop, label))
+
 
 DEFAULT_SETTINGS = ExperimentSettings()
 
@@ -108,10 +112,8 @@ def train_and_generate(
         lexicon=settings.lexicon,
         run=Run(sub_monitor(monitor, 0, 0.8), work, settings.workers),
     )
-    seconds, recognising = perf_counter() - start_s, replace(settings, monitor=sub_monitor(monitor, 0.8, 0.95))
-    recordings = recognise_held_out(
-        corpus, model.phones, sorted(held_out), recognising, channels=channels, speakers=model.speakers
-    )
+    seconds, of_model = perf_counter() - start_s, {"channels": channels, "speakers": model.speakers}
+    recordings = recognise_held_out(corpus, model.phones, sorted(held_out), settings.part(0.8, 0.95), **of_model)
     conditions = with_progress(list(recordings.conditions), "comparing", sub_monitor(monitor, 0.95, 1))
     generated = {
         condition: generate_clips(recordings, condition, model.engine, model.learned) for condition in conditions
@@ -125,10 +127,7 @@ def share_out(
     """Return the settings for each part of the work after ``start``: their monitors share what is left by ``sizes``."""
     ends = np.cumsum([0.0, *(sizes or [1.0] * len(labels))])
     shares = (start + (1 - start) * ends / max(ends[-1], 1e-9)).tolist()
-    return [
-        replace(settings, monitor=sub_monitor(settings.monitor, *share, f"{label}: "))
-        for label, share in zip(labels, pairwise(shares), strict=True)
-    ]
+    return [settings.part(*share, f"{label}: ") for label, share in zip(labels, pairwise(shares), strict=True)]
 
 
 def recognise_held_out(

@@ -15,10 +15,7 @@ from lipmotion.measures import curves
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
-from lipmotion_lab.evaluation.held_out import (
-    generate_clips,
-    load_held_out,
-)
+from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.report.sections import xie_liu_section
 from lipmotion_lab.xie_liu2007 import six_systems, systems
 from lipmotion_lab.xie_liu2007.plots import PLOT_FILES

@@ -284,7 +284,7 @@ class _Writer:
         with locks.unfinished_work(self.folder / f"{name}.json") as work:
             stamp = Stamp()
             keeper = ClipKeeper(work / MOTION, self.key(name))
-            running = replace(settings, monitor=sub_monitor(settings.monitor, 0, 0.95), receive=keeper)
+            running = replace(settings.part(0, 0.95), receive=keeper)
             plots = work / "plots" if part.draws and can_draw() else None
             figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
             section, motion = part.section(figures), keeper.content()

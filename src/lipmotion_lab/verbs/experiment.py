@@ -34,8 +34,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb and its experiments to the parser of the command line."""
     parser = verbs.add_parser("experiment", help="train and compare systems on a corpus, as in the papers")
     actions = parser.add_subparsers(title="experiments", required=True, metavar="EXPERIMENT")
-    for add_printed in (_add_hofer2008, _add_learning_curve, _add_folds, _add_xieliu2007, _add_minnis2000):
-        add_printed(actions)
+    for add_one in (_add_hofer2008, _add_learning_curve, _add_folds, _add_xieliu2007, _add_minnis2000):
+        add_one(actions)
     _add_engines(actions)
     _add_all(actions)
 

@@ -168,16 +168,15 @@ class _TrainingSetup:
         self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
     ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
         """Return the examples of some utterances, and recordings with the phones of models trained on these."""
-        settings, visual = self.settings, self.options.visual
+        settings, visual = replace(self.settings, monitor=monitor), self.options.visual
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
         eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
-        learning = replace(settings, monitor=sub_monitor(monitor, 0, 0.7))
-        phones, examples = runner.train_phones(utterances, learning, self.checkpoint(names))
+        phones, examples = runner.train_phones(utterances, settings.part(0, 0.7), self.checkpoint(names))
         parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
         recordings: dict[str, HeldOutRecordings] = {}
         for number, (name, part) in enumerate(parts.items()):
-            reading = replace(settings, monitor=sub_monitor(monitor, 0.7 + 0.15 * number, 0.85 + 0.15 * number))
+            reading = settings.part(0.7 + 0.15 * number, 0.85 + 0.15 * number)
             channels = recordings["held out"].channels if recordings else None
             recordings[name] = runner.recognise_held_out(
                 self.corpus, phones, part, reading, channels=channels, visual=visual, eigenlips=eigenlips
