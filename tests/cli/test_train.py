@@ -9,7 +9,7 @@ import pytest
 
 from cli.conftest import check_refused, is_one_error
 from lipmotion import Corpus, Model, adapt, load_model, read_motion, save_model
-from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
+from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.training.train import TrainReport
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
@@ -112,7 +112,7 @@ def test_other_voices_are_learned_from_but_those_for_judging(run, toy_model, toy
         sentence = toy_sentences(3)[0]
         return (SpokenSentence(v.name, v.speaker, sentence.audio, sentence.units) for v in voices)
 
-    def learn(*_: object, voices: Iterator[VoiceExample], **__: object) -> tuple[Model, TrainReport]:
+    def learn(*_: object, voices: Iterator[SpokenSentence], **__: object) -> tuple[Model, TrainReport]:
         speakers.append([one.speaker for one in voices])
         return toy_model, TrainReport((), {}, {})
 

@@ -12,6 +12,7 @@ from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.measures import curves
+from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
 from lipmotion_lab.evaluation.held_out import (
@@ -30,10 +31,11 @@ from lipmotion_lab.xie_liu2007.systems import (
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     SPLIT,
+    TWO_STAGES,
     select_systems,
     system_from_arrays,
 )
-from testing.toy import SMALL
+from testing.toy import SMALL, toy_sentences
 
 LONG = pytest.mark.long
 
@@ -187,6 +189,18 @@ def test_eigenlips(visual, toy_corpus):
     assert ("ACC, eigenlips" in xie_liu_section(made).table.as_lines()[0]) == (visual == "both")
 
 
+@LONG
+def test_two_stages_beside_one(toy_corpus):
+    others = tuple(SpokenSentence(s.name, "anna", s.audio, s.units) for s in toy_sentences(3))
+    options = ComparisonOptions(systems=[REFERENCE_SYSTEM + TWO_STAGES], voices=others)
+    (row,) = xieliu2007(toy_corpus, options, sizes=[4], settings=SMALL)["rows"]
+    assert [(each["better"], each["worse"]) for each in row["pairs"]] == [(options.systems[0], REFERENCE_SYSTEM)]
+    one, two = row["training"].values()
+    assert two["parameters"] > one["parameters"]
+    with pytest.raises(InputError, match="two stages needs speech of others; give it by --recordings or --voices"):
+        xieliu2007(toy_corpus, replace(options, voices=()), settings=SMALL)
+
+
 def test_systems_in_the_order_of_the_table():
     assert select_systems(["mean pose", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "mean pose"]
     assert select_systems(["ph-CHMM" + ALL_PATHS]) == ["ph-CHMM", REFERENCE_SYSTEM, "ph-CHMM" + ALL_PATHS]
@@ -197,7 +211,8 @@ def test_systems_in_the_order_of_the_table():
 
 def test_other_engines_are_compared_when_named():
     left_out = COMPARED_SYSTEMS.keys() - select_systems(None)
-    assert left_out == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", BLSTM}
+    twice = {name for name in COMPARED_SYSTEMS if TWO_STAGES in name}
+    assert left_out - twice == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", BLSTM}
     assert set(PAPER_FIGURES) | {name + SPLIT for name in PAPER_FIGURES} <= set(select_systems(None))
 
 

@@ -57,6 +57,8 @@ MASTER = "#!MLF!#"
 """The start of HTK's master label files, which hold the labels of many recordings."""
 MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
 """The start of RTF, HTML, XML and JSON."""
+CHAPTER = ".trans.txt"
+"""Ends the name of the transcripts of a chapter in LibriSpeech: in each line the name of a recording, and its words."""
 JUDGED_LINES = 1000
 """Lines of a text that are judged for whether they hold times."""
 NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
@@ -91,9 +93,10 @@ def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> R
     """Return the labels from the files beside a recording that have its name, with a suffix of ``FOR_WORDS``.
 
     Those of ``RECOGNISED`` may have a language as well (``take.en.vtt``), or the whole name (``take.mp4.srt``); JSON
-    that is no transcript, as motion, is passed over.
+    that is no transcript, as motion, is passed over. Without any, those of its chapter, as in LibriSpeech: of
+    ``19-198-0004.flac`` its line in ``19-198.trans.txt``.
     ignored : files that are no labels (the lists of the splits)
-    Raises InputError: one of them cannot be read.
+    Raises InputError: one of them cannot be read, or the recording is not in its chapter.
     """
     seen: list[Path] = []
     read: list[tuple[Path, RecordingLabels]] = []
@@ -102,6 +105,12 @@ def find_labels(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> R
             labels = _read(path, unknown_json=path.suffix == ".json")
             read += [(path, labels)] if labels is not None else []
             seen.append(path)
+    chapter = recording.with_name(recording.stem.rpartition("-")[0] + CHAPTER)
+    if not seen and chapter.is_file():
+        lines = dict(line.strip().partition(" ")[::2] for line in _read_text(chapter).splitlines())
+        if recording.stem not in lines:
+            raise InputError(f"{chapter}: has no line of {recording.stem}; required this name, a blank and its words")
+        read.append((chapter, _read_plain(lines[recording.stem], chapter)))
     in_order = sorted(read, key=lambda item: (*FOR_PHONES, item[0].suffix).index(item[0].suffix))
     transcripts = (labels.transcript for _, labels in read if labels.transcript)
     return RecordingLabels(next(transcripts, None), next((each.phones for _, each in in_order if each.phones), None))
@@ -208,6 +217,11 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     tiers = _read_tiers(text, str(path)) if is_json(text) or not unknown_json else None
     if tiers is not None or unknown_json:
         return None if tiers is None else _choose_labels(tiers, str(path))
+    return _read_plain(text, path)
+
+
+def _read_plain(text: str, path: Path) -> RecordingLabels:
+    """Return the words of a plain text. Raises InputError: it is another one."""
     _check_plain(text, path)
     text, tags = parse_tagged_text(text)
     tokens = text.split()

@@ -186,6 +186,9 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
     parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
+    others = "recordings of others, for systems named with two stages, as in train"
+    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=others)
+    parser.add_argument("--voices", action="store_true", help="as --recordings, synthetic voices")
     add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
     add_experiment_arguments(
         parser, quick="the paper's systems, four also with Gaussians chosen on val; not with --order"
@@ -198,6 +201,7 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
     """Call ``xieliu2007`` and print its section."""
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
+    from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
     from lipmotion_lab.xie_liu2007.systems import BLSTM, REFERENCE_SYSTEM
 
@@ -213,6 +217,7 @@ def run_xieliu2007(options: argparse.Namespace) -> None:
             systems=options.systems or usual.systems,
             visual=options.visual,
             transcripts=options.transcripts,
+            voices=tuple(other_voices(synthetic=options.voices, recordings=options.recordings)),
         )
         order = read_names(options.order) if options.order else None
         split, sizes, plots = list_or_all(options.split), options.sizes, options.plots

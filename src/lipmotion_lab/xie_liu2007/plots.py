@@ -6,14 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from lipmotion.engines.coupled.conversion.em_conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.storage.files import atomic_file, make_folder
-from lipmotion.types import GREY
+from lipmotion.types import GREY, Speech, Timeline
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, generate_clips
 from lipmotion_lab.xie_liu2007.systems import TrainedSystem
 
@@ -69,7 +67,7 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     picture = figure(figsize=(7, 4.6), layout="constrained")
     axes, model = picture.subplots(), chains.model
     for utterance in some.utterances:
-        observations = model.speech_observations(np.asarray(utterance.features.values))
+        observations = model.speech_observations(Speech(utterance.features, Timeline(())))
         steps = convert(model.chains, observations, model.chains.full_lattice, chains.engine.config.em).log_likelihood
         axes.plot(range(len(steps)), steps, "o-", markersize=3, label=utterance.name)
     axes.set_xlabel("step of EM (0: means along the best path)")

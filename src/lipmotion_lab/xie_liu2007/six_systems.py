@@ -14,12 +14,14 @@ import numpy as np
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
-from lipmotion.pipeline.training.train import phones_and_examples
+from lipmotion.pipeline.training.other_speakers import SpokenSentence
+from lipmotion.pipeline.training.train import examples_without_motion, phones_and_examples
 from lipmotion.pipeline.workers import training_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies
@@ -47,6 +49,7 @@ from lipmotion_lab.xie_liu2007.systems import (
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     SPLIT,
+    TWO_STAGES,
     TrainedSystem,
     as_row,
     best_trial,
@@ -66,12 +69,14 @@ class ComparisonOptions:
     mixtures    : most Gaussians a state where their number is chosen, on the list ``val``
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
+    voices      : speech of others, on which systems of two stages are trained as well
     """
 
     systems: Sequence[str] | None = None
     mixtures: int = 8
     visual: str = GEOMETRY
     transcripts: bool = False
+    voices: Sequence[SpokenSentence] = ()
 
 
 DEFAULT_OPTIONS = ComparisonOptions()
@@ -103,6 +108,8 @@ def xieliu2007(  # noqa: PLR0913
     Raises ExportError: the pictures cannot be written.
     """
     names, seed = select_systems(options.systems), settings.seed
+    if not options.voices and (without := [name for name in names if COMPARED_SYSTEMS[name].second_stage]):
+        raise InputError(f"{without[0]} needs speech of others; give it by --recordings or --voices")
     check_visual(options.visual)
     listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), seed)
     chosen_on_val = any(COMPARED_SYSTEMS[name].splits for name in names)
@@ -153,6 +160,7 @@ class _TrainingSetup:
         """Return systems, trained on the same phones of the utterances ``names``."""
         examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
         kept, trained = self.checkpoint(names), dict[str, TrainedSystem]()
+        others = [*examples_without_motion(engine_named("coupled"), self.options.voices)]
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
             part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here
@@ -160,7 +168,8 @@ class _TrainingSetup:
             if found is not None:
                 trained[name] = system_from_arrays(found)
                 continue
-            known = with_inputs_of(name, examples, self.corpus)
+            known = [*with_inputs_of(name, examples, self.corpus)]
+            known += others if COMPARED_SYSTEMS[name].second_stage else []
             trained[name] = train_system(name, known, recordings.get("val"), trained, self.options.mixtures, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 found = system_to_arrays(trained[name])
@@ -193,7 +202,10 @@ class _TrainingSetup:
 
     def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
-        everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.mixtures), *compared))
+        everything, others = (
+            (*names, *self.corpus.names("val")),
+            " ".join((str(self.options.mixtures), *(spoken.name for spoken in self.options.voices), *compared)),
+        )
         key = runner.PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
         return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
@@ -254,6 +266,7 @@ def _paper_pairs(
         if not ending:
             pairs += [(name + more, name) for name in compared for more in (", tied", ", together", ALL_PATHS)]
             pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
+            pairs += [(name, name.replace(TWO_STAGES, "")) for name in made if TWO_STAGES in name]
         pairs = [pair for pair in pairs if {*pair} <= made.keys()]
         statistics = {name: evaluate.clip_statistics(recordings, made[name]) for pair in pairs for name in pair}
         for better, worse in pairs:

@@ -171,7 +171,7 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
 """AMSE and ACC of the paper's Table 3: eigenlips of another speaker, so only their order compares."""
 BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
-SPLIT, ALL_PATHS = ", K on val", ", all paths"
+SPLIT, ALL_PATHS, TWO_STAGES = ", K on val", ", all paths", ", two stages"
 SOFT = {"start": "soft", "steps": 0}
 ABOUT = "about"
 
@@ -184,6 +184,7 @@ class ComparedSystem:
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
     splits        : its number of Gaussians is chosen on validation recordings, as in the paper (§7.1), or settings of a
                     network, ``NETWORK_SETTINGS``
+    second_stage  : it is trained on speech of others without motion as well (§3.4)
     when_named    : it is compared only if it is asked for
     """
 
@@ -191,6 +192,7 @@ class ComparedSystem:
     options: Mapping[str, Any] = field(default_factory=dict)
     same_model_as: str = ""
     splits: bool = False
+    second_stage: bool = False
     when_named: bool = False
 
     @property
@@ -211,7 +213,11 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     **{name + ALL_PATHS: ComparedSystem(options=SOFT, same_model_as=name) for name in PAPER_FIGURES},
     BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
     "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
+    REFERENCE_SYSTEM + TWO_STAGES: ComparedSystem(
+        options=SYSTEMS[REFERENCE_SYSTEM], second_stage=True, when_named=True
+    ),
     "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
+    "trajectory CHMM" + TWO_STAGES: ComparedSystem(_engine("coupled"), second_stage=True, when_named=True),
     "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
     BLSTM: ComparedSystem(BlstmBaseline, splits=True, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),

@@ -84,7 +84,7 @@ def fitted(name):
     engine = engines.engine_named("coupled", coupled_options(name))
     model = engine.fit(examples(4), types.silent_monitor).model
     spoken = speech(timeline(SENTENCE))
-    inference = engine.inferred(model, spoken.features.values, engine.lattice(model, spoken, slice(None)))
+    inference = engine.infer(model, spoken, slice(None))
     return model, inference
 
 

@@ -10,20 +10,19 @@ import pytest
 
 from lipmotion import Model
 from lipmotion.errors import CorpusError, MissingDependencyError
+from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline.training import other_speakers as module
 from lipmotion.pipeline.training.other_speakers import (
     align_recordings,
     is_held_out_speaker,
-    make_voice_examples,
     synthesise_sentences,
 )
-from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.sound.acoustic_conditions import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import Audio, Item, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
-from pipeline.made import features_of, recogniser_of, write_sound
+from pipeline.made import recogniser_of, write_sound
 from testing.formant_synthesiser import synthesise
 from testing.toy import toy_sentences
 
@@ -80,11 +79,8 @@ def test_pauses_of_the_synthesiser_become_longer():
 
 
 @pytest.mark.usefixtures("spoken")
-def test_the_same_again_shared_or_not():
-    shared = synthesise_sentences(
-        TEXTS, VOICES, each=lambda function, items: iter([function(item) for item in list(items)])
-    )
-    for one, other in zip(synthesise_sentences(TEXTS, VOICES), shared, strict=True):
+def test_the_same_again():
+    for one, other in zip(synthesise_sentences(TEXTS, VOICES), synthesise_sentences(TEXTS, VOICES), strict=True):
         assert np.array_equal(one.audio.samples, other.audio.samples)
         assert one.phones == other.phones
 
@@ -97,16 +93,6 @@ def test_texts_by_default_say_every_phone_of_the_dictionary():
     assert len(sentences) == 60
     assert {"er", "hh", "ng", "oy", "sh", "uh", "zh"} <= said
     assert len(said) == 43  # 42 of the dictionary, and silence
-
-
-@pytest.mark.usefixtures("spoken")
-def test_sentences_become_training_data():
-    sentences = list(synthesise_sentences(TEXTS, VOICES))
-    for sentence, (features, units, speaker) in zip(sentences, make_voice_examples(sentences), strict=True):
-        assert features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, FEATURES)
-        assert features.values == pytest.approx(features_of(sentence.audio).values)
-        assert units == sentence.phones
-        assert speaker == sentence.speaker
 
 
 def test_without_voices_it_says_what_to_install():
@@ -153,9 +139,8 @@ def folder(tmp_path: Path) -> Path:
 
 def test_recordings_are_aligned(folder, own):
     items: list[Item] = []
-    given = {"anna-*": "Anna B."}
-    sentences = list(align_recordings(folder, own, speakers=given, monitor=items.append))  # type: ignore[arg-type]
-    assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "Anna B."), ("two", "two")]
+    sentences = list(align_recordings(folder, own, monitor=items.append))  # type: ignore[arg-type]
+    assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "anna"), ("two", "two")]
     for sentence, toy in zip(sentences, toy_sentences(3), strict=False):
         assert [span.label for span in sentence.phones] == [span.label for span in toy.units]
         late_s = [a.start_s - b.start_s for a, b in zip(sentence.phones, toy.units, strict=True)]
@@ -165,6 +150,32 @@ def test_recordings_are_aligned(folder, own):
         ("too long", "skipped"),
         ("unsayable", "skipped"),
     ]
+
+
+def test_librispeech_is_read_as_it_is_distributed(tmp_path, own):
+    chapter = tmp_path / "LibriSpeech" / "dev-clean" / "84" / "121123"
+    sentences = toy_sentences(3)
+    for number, sentence in enumerate(sentences):
+        write(chapter / f"84-121123-{number:04d}.flac", sentence.audio)
+    lines = [f"84-121123-{number:04d} {' '.join(s.words).upper()}\n" for number, s in enumerate(sentences[:2])]
+    (chapter / "84-121123.trans.txt").write_text("".join(lines))
+    items: list[Item] = []
+    for folder in (tmp_path, chapter.parent):
+        spoken = list(align_recordings(folder, own, monitor=items.append))  # type: ignore[arg-type]
+        assert [each.speaker for each in spoken] == ["84", "84"]
+        for each, sentence in zip(spoken, sentences, strict=False):
+            assert [span.label for span in each.phones] == [span.label for span in sentence.units]
+    assert {item.reason for item in items} == {
+        f"{chapter / '84-121123.trans.txt'}: has no line of 84-121123-0002; required this name, a blank and its words"
+    }
+
+
+def test_labelled_phones_are_used_as_they_are(tmp_path, own):
+    sentence, *_ = toy_sentences(3)
+    write(tmp_path / "one.wav", sentence.audio)
+    write_labels(tmp_path / "one.TextGrid", sentence.units)
+    (spoken,) = align_recordings(tmp_path, own)
+    assert [span.start_s for span in spoken.phones] == pytest.approx([span.start_s for span in sentence.units])
 
 
 def test_a_transcript_of_other_words_is_detected(folder, own):
@@ -190,9 +201,8 @@ def test_real_recordings(recordings, toy_model):
         pytest.skip("speech-open is not here")
     items: list[Item] = []
     general = recogniser_of(toy_model, "general")
-    sentences = list(align_recordings(folder, general, speakers={"sense_*": "reader"}, monitor=items.append))  # type: ignore[arg-type]
+    sentences = list(align_recordings(folder, general, monitor=items.append))  # type: ignore[arg-type]
     assert len(sentences) == 11
-    assert sum(s.speaker == "reader" for s in sentences) == 5
     assert sorted(item.name for item in items) == ["13697_11991_000000", "common_voice_ja_24511055"]
 
 

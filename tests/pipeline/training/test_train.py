@@ -21,14 +21,14 @@ from lipmotion.pipeline.training.labels import (
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
-from lipmotion.pipeline.training.other_speakers import VoiceExample
+from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.training.train import describe_training, label_phones
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from pipeline import made
-from pipeline.made import features_of, recogniser_of
+from pipeline.made import recogniser_of
 from testing.toy import SMALL, toy_sentences, toy_utterances
 
 JOINT = engine_named("joint", {})
@@ -171,10 +171,10 @@ def test_camera_frames_become_model_frames():
     assert not valid[103:].any()  # half a camera frame after the last one
 
 
-def others() -> Iterator[VoiceExample]:
+def others() -> Iterator[SpokenSentence]:
     """Two speakers of whom nothing was seen."""
     for number, sentence in enumerate(toy_sentences(4)):
-        yield VoiceExample(features_of(sentence.audio), sentence.units, ("bert", "anna")[number % 2])
+        yield SpokenSentence(sentence.name, ("bert", "anna")[number % 2], sentence.audio, sentence.units)
 
 
 def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus):

@@ -21,6 +21,8 @@ from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from_arrays
 from lipmotion.motion.limits import check_poses, check_rest
 from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
+from lipmotion.motion.predictors import predictor_to_arrays
+from lipmotion.motion.prior_regression import EncodingRegression
 from lipmotion.stats.bigram import check_sums_to_one
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.storage.schema import (
@@ -63,7 +65,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
             f"visual_{number}/columns": stream.columns,
             f"visual_{number}/scale": np.stack([stream.mean, stream.deviation]),
         }
-    return arrays | _regression_arrays(model) | filter_to_arrays(model.modulation)
+    return arrays | _regression_arrays(model) | filter_to_arrays(model.modulation) | predictor_to_arrays(model.encoding)
 
 
 def _group_arrays(group: StreamGroup) -> dict[str, NDArray[Any]]:
@@ -121,8 +123,10 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
         regression = _regression(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
         modulation = filter_from_arrays(arrays, space.dimensions, needed=config.filtered)
+        known = EncodingRegression.ARRAYS.keys() & arrays.keys()  # of a former model none
+        encoding = EncodingRegression.from_arrays(arrays, space.dimensions) if known else None
         model = CoupledModel(
-            chains, space, visual, regression, poses["gain"], poses["rest"], closure, prior, modulation
+            chains, space, visual, regression, poses["gain"], poses["rest"], closure, prior, modulation, encoding
         )
         check_rest(model.rest_pose, model.pose_limits)
         check_poses(model.pose_limits, space, closure)
@@ -180,6 +184,7 @@ def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
         MOTION_ARRAYS,
         POSES,
         MODULATION,
+        EncodingRegression.ARRAYS,
         PAIRS,
         chain,
         visual,

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
-from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Inference
 from lipmotion.engines.coupled.conversion.em_conversion import convert, path_means
@@ -21,6 +20,7 @@ from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, Cou
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
+from lipmotion.motion.articulation import slice_dynamics, unseen_share
 from lipmotion.motion.generation import Statistics, split_into_blocks
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import (
@@ -37,6 +37,9 @@ from lipmotion.types import (
     Unit,
 )
 
+ENCODING_SHARE = 0.8
+"""Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none."""
+
 
 @final
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class CoupledEngine(Engine[CoupledModel]):
     Config: ClassVar[type[Configuration]] = CoupledConfig
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102, ARG002
-        return Inputs(speech_alone=True)
+        return Inputs(speech_alone=True, encoding=self.config.uses_encoding)
 
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = THREADS
@@ -63,13 +66,11 @@ class CoupledEngine(Engine[CoupledModel]):
         return replace(self, config=replace(self.config, closures=False))
 
     def generate(self, model: CoupledModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
-        features = np.asarray(speech.features.values)
-        frames = len(features)
+        frames = len(speech.features.values)
         path = np.empty(frames, np.intp)
 
         def statistics(wanted: slice) -> Statistics:
-            lattice = self.lattice(model, speech, wanted)
-            motion_statistics, path[wanted] = self._statistics(model, features[wanted], lattice)
+            motion_statistics, path[wanted] = self._statistics(model, speech, wanted)
             return motion_statistics
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
@@ -99,26 +100,30 @@ class CoupledEngine(Engine[CoupledModel]):
         allowed = allowed_units(chains.structure, speech.units, frames)[wanted]
         return chains.lattice(allowed)
 
-    def _statistics(
-        self, model: CoupledModel, features: Single, lattice: Lattice
-    ) -> tuple[Statistics, NDArray[np.intp]]:
+    def _statistics(self, model: CoupledModel, speech: Speech, frames: slice) -> tuple[Statistics, NDArray[np.intp]]:
         """Return means and precisions [each shape=(T, 3, Q)], and the most probable joint state of every frame."""
-        chains, observations = model.chains, model.speech_observations(features)
+        chains = model.chains
         if self.config.conversion == PATH:
+            observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
             path, _ = chains.best_path(chains.emission_log_densities(observations, lattice), lattice)
             return model.frame_statistics([path_means(chains, path, s + 1) for s in range(len(model.visual))]), path
-        inference = self.inferred(model, features, lattice)
+        inference = self.infer(model, speech, frames)
         if self.config.conversion != TRAJECTORY:
-            streams = convert(chains, observations, lattice, self.config.em, inference).streams[1:]
+            streams = convert(chains, inference.observations, inference.lattice, self.config.em, inference).streams[1:]
             return model.frame_statistics(streams), inference.posteriors.most_probable
-        return model.motion_statistics(inference), inference.posteriors.most_probable
+        means, precisions = model.motion_statistics(inference)
+        share = ENCODING_SHARE * min(2 * unseen_share(speech.voice), 1.0)
+        if share and model.encoding is not None and speech.encoding is not None:
+            means += share * (slice_dynamics(model.encoding.predict(speech)[0], frames) - means)
+            precisions += share * (1 / model.encoding.variances - precisions)
+        return (means, precisions), inference.posteriors.most_probable
 
-    def inferred(self, model: CoupledModel, features: Single, lattice: Lattice) -> Inference:
-        """Return the posteriors of the chains given some frames of speech [shape=(T, 39)].
+    def infer(self, model: CoupledModel, speech: Speech, frames: slice) -> Inference:
+        """Return the posteriors of the chains given some frames of speech.
 
         With ``trajectory`` conversion, each of its steps infers again, with the generated motion as observed motion.
         """
-        observations = model.speech_observations(features)
+        observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
         inference = model.chains.infer(observations, lattice)
         for _ in range(self.config.steps if self.config.conversion == TRAJECTORY else 0):
             values = solve_mlpg(*model.motion_statistics(inference))[0]
@@ -126,21 +131,20 @@ class CoupledEngine(Engine[CoupledModel]):
         return inference
 
     def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
-        result = self.generate(model, speech)
-        features, explanations = np.asarray(speech.features.values), dict[int, Explanation]()
-        for inner, outer in split_into_blocks(len(features)):
+        result, explanations = self.generate(model, speech), dict[int, Explanation]()
+        for inner, outer in split_into_blocks(len(speech.features.values)):
             inside = [frame for frame in frames if inner.start <= frame < inner.stop]
             if inside:
-                inference = self.inferred(model, features[outer], self.lattice(model, speech, outer))
+                inference = self.infer(model, speech, outer)
                 by_trace = [explain_by_trace(result, frame) for frame in inside]
                 rows = [frame - outer.start for frame in inside]
                 explanations.update(zip(inside, explain_frames(by_trace, model, inference, rows), strict=True))
         return tuple(explanations[frame] for frame in frames)
 
     def posteriors(self, model: CoupledModel, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: D102
-        features, blocks = np.asarray(speech.features.values), []
-        for inner, outer in split_into_blocks(len(features)):
-            inference = self.inferred(model, features[outer], self.lattice(model, speech, outer))
+        blocks = []
+        for inner, outer in split_into_blocks(len(speech.features.values)):
+            inference = self.infer(model, speech, outer)
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
             blocks.append(unit_posteriors(model.chains, inference.posteriors, kept))
         return tuple(concatenated(parts) for parts in zip(*blocks, strict=True))

@@ -28,9 +28,10 @@ from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, measure_limits
 from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
+from lipmotion.motion.prior_regression import EncodingRegression
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
-from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, option
+from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, Speech, option
 from lipmotion.units import UnitSet
 
 TRAJECTORY, FRAMES, PATH = "trajectory", "em", "viterbi"
@@ -133,6 +134,11 @@ class CoupledConfig(Configuration):
         return self.dynamic and self.modulation_filter > 0
 
     @property
+    def uses_encoding(self) -> bool:
+        """Whether voices that training does not know follow their encoding."""
+        return self.dynamic and self.acoustic_regression and self.conversion == TRAJECTORY
+
+    @property
     def em(self) -> ConversionSettings:
         """The conversion by EM."""
         return ConversionSettings(self.start, self.update, self.steps)
@@ -160,6 +166,7 @@ class CoupledModel:
     closure    : how the lips close; None: the motion has no opening
     prior      : the table of articulation in the speaker's range (None: there is none)
     modulation : restores fast movement (None: the motion stays as it is)
+    encoding   : of voices that training does not know, the motion by their encoding (None: there was none)
     """
 
     chains: Chains
@@ -171,6 +178,7 @@ class CoupledModel:
     closure: Closure | None
     prior: ArticulationPrior | None = None
     modulation: ModulationFilter | None = None
+    encoding: EncodingRegression | None = None
 
     def __repr__(self) -> str:
         size = f"{self.chains.parameters} parameters, {self.space.dimensions} dimensions"
@@ -203,9 +211,9 @@ class CoupledModel:
             low[stream.columns], high[stream.columns] = measure_limits(poses)
         return MotionLimits(low, high)
 
-    def speech_observations(self, features: Single) -> AudioVisualObservations:
-        """Return observations of speech [shape=(T, 39)] in which no visual stream was observed."""
-        return speech_observations(features, self.visual)
+    def speech_observations(self, speech: Speech, frames: slice = slice(None)) -> AudioVisualObservations:
+        """Return observations of some frames of speech in which no visual stream was observed."""
+        return speech_observations(speech, self.visual, frames)
 
     def with_motion(self, observations: AudioVisualObservations, values: Array) -> AudioVisualObservations:
         """Return the observations with motion in the space [shape=(T, Q)] as the visual streams."""

@@ -6,18 +6,15 @@ Source: Xie & Liu 2007, §3.4: the first stage of the training uses audio of man
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
-from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shorten
-from lipmotion.formats.label_files import find_labels
+from lipmotion.formats.label_files import CHAPTER, find_labels
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
@@ -29,7 +26,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.sources import check_listable
-from lipmotion.types import Audio, Features, Item, Monitor, ParallelMap, Span, Timeline, Unit, silent_monitor
+from lipmotion.types import Audio, Item, Monitor, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import SILENCE, Lexicon, is_silent
 
 SENTENCES = 60
@@ -57,19 +54,6 @@ class SpokenSentence:
     phones: Timeline[Unit]
 
 
-class VoiceExample(NamedTuple):
-    """A sentence of a speaker as training data: acoustic features and phones in time.
-
-    features : 39 coefficients a frame at 100 Hz, normalised over its passage
-    units    : phones in time
-    speaker  : name of the speaker
-    """
-
-    features: Features
-    units: Timeline[Unit]
-    speaker: str
-
-
 def is_held_out_speaker(speaker: str) -> bool:
     """Return whether the speech of a speaker is held out to evaluate models; about a quarter of all speakers are.
 
@@ -83,13 +67,11 @@ def synthesise_sentences(
     voices: Sequence[SyntheticVoice] | None = None,
     *,
     lexicon: Lexicon | None = None,
-    each: ParallelMap = map,
 ) -> Iterator[SpokenSentence]:
     """Yield every text in every synthetic voice, voice by voice: of flite, festival and espeak-ng, if installed.
 
     texts   : None: the first 60 of ``prompts``, which contain every phone of the dictionary
     voices  : None: all that are installed
-    each    : applies a function to many items, here voices, perhaps in several processes
     Every sentence gets 0.25 s of silence before and after it, and white noise 50 dB under the speech. The same
     arguments give the same samples.
     Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speech.voices.speak_sentences``.
@@ -99,27 +81,21 @@ def synthesise_sentences(
         packages = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
         raise MissingDependencyError(f"no speech synthesiser is installed; install one or more: apt install {packages}")
     spoken = [prompt.text for prompt in prompts(count=SENTENCES).chosen] if texts is None else list(texts)
-    for sentences in each(partial(_synthesise_voice, texts=spoken, lexicon=lexicon), chosen):
-        yield from sentences
+    for voice in chosen:
+        yield from _synthesise_voice(voice, spoken, lexicon)
 
 
 def align_recordings(
-    folder: str | Path,
-    phones: Recogniser,
-    *,
-    speakers: Mapping[str, str] | None = None,
-    lexicon: Lexicon | None = None,
-    monitor: Monitor = silent_monitor,
+    folder: str | Path, phones: Recogniser, *, lexicon: Lexicon | None = None, monitor: Monitor = silent_monitor
 ) -> Iterator[SpokenSentence]:
-    """Yield the transcribed recordings of a folder and of its sub-folders, with aligned phones.
+    """Yield the recordings of a folder and of its sub-folders that have a transcript or phones in time.
 
-    phones   : the recogniser that aligns; of the kind ``general`` for speakers on whom its own models were not trained
-    speakers : name of the speaker, by pattern of the name of a recording (``*`` stands for any text); the first that
-               fits counts. For other recordings, the speaker is the name of the sub-folder, or of the recording if it
-               is in no sub-folder. Name the speaker of several such recordings, or some of them may be held out
-               (``is_held_out_speaker``) and others not
-    monitor  : called with the recordings that cannot be used: damaged, or with a transcript that does not agree with
-               the sound
+    phones  : the recogniser that aligns transcripts; of the kind ``general`` for speakers on whom its own models were
+              not trained. Labelled phones are used as they are
+    monitor : called with the recordings that cannot be used: damaged, or with a transcript that does not agree with
+              the sound
+    The speaker is the name of the sub-folder, or of the recording if it is in none; with the transcripts of a chapter,
+    as in LibriSpeech, the reader, with whose number the name begins.
     Raises CorpusError: no such folder, or no recording with a transcript in it.
     """
     root, lexicon = Path(folder), lexicon or Lexicon()
@@ -130,21 +106,27 @@ def align_recordings(
     for path in sorted(path for path in root.rglob("*") if path.suffix.lower() in AUDIO_SUFFIXES):
         inner = path.relative_to(root)
         name = "-".join(inner.with_suffix("").parts)
-        named = (speaker for pattern, speaker in (speakers or {}).items() if fnmatchcase(name, pattern))
-        speaker = next(named, inner.parts[0] if len(inner.parts) > 1 else name)
+        speaker = inner.parts[0] if len(inner.parts) > 1 else name
+        reader, _, rest = path.stem.partition("-")
+        if path.with_name(f"{reader}-{rest.partition('-')[0]}{CHAPTER}").is_file():
+            speaker = reader
         try:
-            words = find_labels(path).words
-            if words is None:
+            labels = find_labels(path)
+            words = labels.words
+            if words is None and labels.phones is None:
                 continue
             is_any_transcribed = True
-            foreign = [word for word in words if not word.isascii() and not lexicon.known(word)]
-            if foreign:  # what other languages do with their letters is no guide to English
+            foreign = [word for word in words or () if not word.isascii() and not lexicon.known(word)]
+            if foreign and labels.phones is None:  # what other languages do with their letters is no guide to English
                 raise InputError(
                     f"no pronunciation of {shorten(foreign[0])!r}; required English words, or a lexicon file with the "
                     "others"
                 )
             audio = read_audio(path)
-            units = align_or_recognise(phones, audio, analysed(audio).mfcc(), words, lexicon)
+            if labels.phones is None:
+                units = align_or_recognise(phones, audio, analysed(audio).mfcc(), words, lexicon)
+            else:
+                units = labels.phones.between(0, audio.duration_s)
             score = agreement_score(audio, units)
             if score < DOUBTFUL_SCORE:
                 raise InputError(
@@ -158,19 +140,14 @@ def align_recordings(
         raise CorpusError(f"{root}: no recording with a transcript; put what is said in x.wav into x.txt beside it")
 
 
-def make_voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
-    """Yield sentences as training data; features are computed when an item is taken, and not kept."""
-    return (VoiceExample(analysed(sentence.audio).mfcc(), sentence.phones, sentence.speaker) for sentence in sentences)
-
-
 def other_voices(
     *,
     synthetic: bool = False,
     recordings: str | Path | None = None,
     lexicon: Lexicon | None = None,
     monitor: Monitor = silent_monitor,
-) -> Iterator[VoiceExample]:
-    """Yield the training data of ``lipmotion train --voices --recordings``, besides the corpus.
+) -> Iterator[SpokenSentence]:
+    """Yield the sentences of ``lipmotion train --voices --recordings``, besides the corpus.
 
     synthetic  : include sentences of all installed synthetic voices but those of held-out speakers
     recordings : a folder of transcribed recordings, which are aligned by the general phone models
@@ -178,15 +155,14 @@ def other_voices(
     """
     if recordings is not None:
         general = Recogniser(load_model().phones, "general")
-        yield from make_voice_examples(align_recordings(recordings, general, lexicon=lexicon, monitor=monitor))
+        yield from align_recordings(recordings, general, lexicon=lexicon, monitor=monitor)
     if synthetic:
         chosen = [voice for voice in installed_voices() if not is_held_out_speaker(voice.speaker)]
-        yield from make_voice_examples(synthesise_sentences(voices=chosen, lexicon=lexicon))
+        yield from synthesise_sentences(voices=chosen, lexicon=lexicon)
 
 
-def _synthesise_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> list[SpokenSentence]:
-    """Return texts in a voice, with silence before and after each of them, and with white noise."""
-    sentences = []
+def _synthesise_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> Iterator[SpokenSentence]:
+    """Yield texts in a voice, with silence before and after each of them, and with white noise."""
     for number, (audio, units) in enumerate(speak_sentences(texts, voice, lexicon), start=1):
         pause = np.zeros(round(PAUSE_S * audio.rate_hz), np.float32)
         longer = Audio(np.concatenate([pause, audio.samples, pause]), audio.rate_hz)
@@ -199,5 +175,4 @@ def _synthesise_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexi
         after = Span(spoken[-1].end_s, longer.duration_s, Unit(SILENCE))
         noisy = noisy_audio(longer, "white", FLOOR_DB, seed=number)
         name = f"{voice.synthesiser}-{voice.name}-{number:03d}"
-        sentences.append(SpokenSentence(name, voice.speaker, noisy, Timeline((before, *spoken, after))))
-    return sentences
+        yield SpokenSentence(name, voice.speaker, noisy, Timeline((before, *spoken, after)))

@@ -38,7 +38,7 @@ from lipmotion.pipeline.training.labels import (
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
-from lipmotion.pipeline.training.other_speakers import VoiceExample
+from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.workers import training_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
@@ -143,7 +143,7 @@ def train(  # noqa: PLR0913
     recogniser: HmmConfig | None = None,
     lexicon: Lexicon | None = None,
     visual: str = GEOMETRY,
-    voices: Iterable[VoiceExample] = (),
+    voices: Iterable[SpokenSentence] = (),
     prior: Model | None = None,
     run: Run = DEFAULT_RUN,
 ) -> tuple[Model, TrainReport]:
@@ -265,22 +265,23 @@ def phones_and_examples(
 
 
 def examples_without_motion(
-    engine: Engine[Any], voices: Iterable[VoiceExample], monitor: Monitor = silent_monitor
+    engine: Engine[Any], voices: Iterable[SpokenSentence], monitor: Monitor = silent_monitor
 ) -> Iterator[Example]:
     """Yield speech without motion as examples without valid frames; their names are those of the speakers.
 
     Raises InputError: the engine is not trained on speech alone.
     """
-    for number, (features, units, speaker) in enumerate(voices, start=1):
+    for number, spoken in enumerate(voices, start=1):
         if not engine.inputs().speech_alone:
             raise InputError(
                 f"the engine {engine.name!r} does not learn from other voices without motion; use one that does "
                 "(--engine coupled), or leave the voices out"
             )
         monitor(Progress("aligning other voices", number, number, 0.0))
+        features = analysed(spoken.audio).mfcc()
         frames = len(features.values)
         no_motion = Motion(np.zeros((frames, 0)), FRAME_RATE_HZ, ())
-        yield Example(speaker, Speech(features, units), no_motion, np.zeros(frames, bool))
+        yield Example(spoken.speaker, Speech(features, spoken.phones), no_motion, np.zeros(frames, bool))
 
 
 def label_phones(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from lipmotion.engines.coupled.conversion.em_conversion import (
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import _state_regressions, fit_coupled
+from lipmotion.stats.curves import with_dynamics
 from lipmotion.testing.examples import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
 from oracles import coupled as oracle
@@ -189,3 +192,25 @@ def test_the_mouth_rests_in_long_silence():
     opening = model.rest_pose[model.space.direct_names.index("opening")]
     assert np.abs(generated[:30] - opening).max() < 2e-3
     assert generated[30:].max() > 0.15
+
+
+def test_unknown_voices_follow_their_encoding():
+    draw, config = np.random.default_rng(0), CoupledConfig(mixtures=1, closures=False, articulation=False)
+    heard = [
+        replace(each, speech=replace(each.speech, encoding=draw.normal(size=(len(each.valid), 64)).astype(np.float16)))
+        for each in examples(4)
+    ]
+    engine = CoupledEngine(config)
+    model = engine.from_arrays(engine.to_arrays(engine.fit(heard, silent_monitor).model))
+    known, unknown = (replace(heard[0].speech, voice=voice) for voice in (1.0, 0.5))
+    assert np.array_equal(
+        engine.generate(model, known).motion.values,
+        engine.generate(model, replace(known, encoding=None)).motion.values,
+    )
+    whole = slice(0, len(heard[0].valid))
+    means, precisions = model.motion_statistics(engine.infer(model, unknown, whole))
+    (found, sharp), _ = engine._statistics(model, unknown, whole)
+    predicted = with_dynamics(model.encoding.predict(unknown)[0])
+    np.testing.assert_allclose(found, 0.2 * means + 0.8 * predicted)
+    np.testing.assert_allclose(sharp, 0.2 * precisions + 0.8 / model.encoding.variances)
+    assert engine.fit(examples(4), silent_monitor).model.encoding is None

@@ -13,7 +13,7 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training import chain_training, em_steps
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
-from lipmotion.engines.coupled.training.coupled_training import SpeechOnlySchedule, train_on_speech
+from lipmotion.engines.coupled.training.coupled_training import train_on_speech
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.testing.examples import RATE_HZ, examples
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor
@@ -33,6 +33,10 @@ def aligned(sentences: Sequence[Example]) -> list[AlignedUtterance]:
         streams = each.speech.features.values, seen.astype(np.float32)
         found.append(AlignedUtterance(AudioVisualObservations(streams, (None, each.valid)), each.speech.units))
     return found
+
+
+def second_stage(mixtures: int, steps: int, weight: float) -> CoupledConfig:
+    return CoupledConfig(speech_only_mixtures=mixtures, speech_only_steps=steps, speech_only_weight=weight)
 
 
 @cache
@@ -119,7 +123,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
     """Speech of the first stage and of other speakers: the same utterance, with weights 1 and 49."""
     chains, own = trained(), three_frames()
     other = replace(own, observations=own.observations.without_stream(1))
-    found = train_on_speech(chains, [own], [other], SpeechOnlySchedule(2, 1, 49.0)).groups[0].mixtures
+    found = train_on_speech(chains, [own], [other], second_stage(2, 1, 49.0)).groups[0].mixtures
     gamma, x = 50 * speech_posteriors(chains, own), own.observations.streams[0]
     before, (floor, _) = chains.groups[0].mixtures, em_steps.variance_floors([own.observations])
     visited = np.flatnonzero(gamma.sum(axis=0) >= 3)
@@ -138,7 +142,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
 def test_every_step_raises_the_likelihood(kind: str) -> None:
     steps: list[chain_training.TrainingStep] = []
     own, others = aligned(examples(4)), speech_alone(examples(4, seed=9))
-    train_on_speech(trained(kind), own, others, SpeechOnlySchedule(4, 6, 0.5), steps.append)
+    train_on_speech(trained(kind), own, others, second_stage(4, 6, 0.5), steps.append)
     for _, run in groupby(steps, lambda step: step.mixtures):
         figures = [step.log_likelihood for step in run]
         assert len(figures) > 2
@@ -150,9 +154,7 @@ def test_every_step_raises_the_likelihood(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["coupled", pytest.param("multistream", marks=pytest.mark.long)])
 def test_visual_densities_and_transitions_stay(kind: str) -> None:
     chains = trained(kind)
-    found = train_on_speech(
-        chains, aligned(examples(3)), speech_alone(examples(3, seed=9)), SpeechOnlySchedule(4, 2, 1.0)
-    )
+    found = train_on_speech(chains, aligned(examples(3)), speech_alone(examples(3, seed=9)), second_stage(4, 2, 1.0))
     assert found.transitions is chains.transitions
     before, after = chains.groups[-1].stream_mixtures(1), found.groups[-1].stream_mixtures(1)
     assert after.means.tobytes() == before.means.tobytes()
@@ -201,7 +203,7 @@ def right(engine: CoupledEngine, model: CoupledModel, sentence: Example) -> tupl
     """Return the correlation of the opening with the original's, of unknown words, and of speech frames right."""
     spoken = replace(sentence.speech, units_known=False)
     generated = engine.generate(model, spoken).motion["opening"]
-    observations = model.speech_observations(np.asarray(spoken.features.values))
+    observations = model.speech_observations(spoken)
     chains = model.chains
     found = chains.posteriors(chains.emission_log_densities(observations, chains.full_lattice), chains.full_lattice)
     states = found.chains[0].argmax(axis=1) // chains.structure.states

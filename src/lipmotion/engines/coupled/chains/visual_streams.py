@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import with_dynamics
-from lipmotion.types import EYE_DISTANCE, GREY
+from lipmotion.types import EYE_DISTANCE, GREY, Speech
 
 Array = NDArray[np.float64]
 LEAST_DEVIATION = 1e-6
@@ -77,7 +77,10 @@ def fit_visual_streams(
     return tuple(streams)
 
 
-def speech_observations(features: NDArray[np.float32], visual: Sequence[VisualStream]) -> AudioVisualObservations:
-    """Return observations of speech [shape=(T, 39)] in which no visual stream was observed."""
+def speech_observations(
+    speech: Speech, visual: Sequence[VisualStream], frames: slice = slice(None)
+) -> AudioVisualObservations:
+    """Return observations of some frames of speech in which no visual stream was observed."""
+    features = np.asarray(speech.features.values)[frames]
     empty = tuple(np.zeros((len(features), len(stream.mean)), np.float32) for stream in visual)
     return AudioVisualObservations((features, *empty), (None, *(np.zeros(len(features), bool) for _ in empty)))

@@ -7,9 +7,9 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,8 @@ from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.modulation_filter import learn_filter
+from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.motion.prior_regression import EncodingRegression
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
@@ -62,24 +64,11 @@ from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline,
 from lipmotion.units import VISEME_OF, is_silent
 
 
-@dataclass(frozen=True)
-class SpeechOnlySchedule:
-    """How many Gaussians the densities of speech get in the second stage, and how many steps of EM.
-
-    mixtures   : Gaussians per density of speech in the end, a power of two; never fewer than before
-    weight     : of a frame of the other speakers, relative to a frame of the first stage
-    """
-
-    mixtures: int
-    most_steps: int
-    weight: float
-
-
 def train_on_speech(
     chains: Chains,
     data: Sequence[AlignedUtterance],
     speech_only: Sequence[AlignedUtterance],
-    schedule: SpeechOnlySchedule,
+    config: CoupledConfig,
     report: Report = no_report,
     work: Checkpoint = NO_CHECKPOINT,
 ) -> Chains:
@@ -87,6 +76,7 @@ def train_on_speech(
 
     data        : what the chains were trained on; its speech is used here too, without its motion
     speech_only : utterances of other speakers; the values of their visual streams are ignored
+    config      : its ``speech_only`` options count; densities never get fewer Gaussians than they have
     report      : is called after every step; while the number of components stays, the weighted log likelihood never
                   falls
     Where speech and motion share their components (``hmm``), these stay as many, but their weights are re-estimated.
@@ -96,13 +86,15 @@ def train_on_speech(
         lattice_utterance(
             chains, replace(utterance, observations=without_visual_streams(utterance.observations)), weight
         )
-        for group, weight in ((data, 1.0), (speech_only, schedule.weight))
+        for group, weight in ((data, 1.0), (speech_only, config.speech_only_weight))
         for utterance in group
     ]
     present = component_counts(chains)
-    most = present if chains.structure.kind == HMM else (max(schedule.mixtures, present[0]), *present[1:])
+    most = present if chains.structure.kind == HMM else (max(config.speech_only_mixtures, present[0]), *present[1:])
     while True:
-        result = train_to_convergence(chains, utterances, floors, schedule.most_steps, report, work, speech_only=True)
+        result = train_to_convergence(
+            chains, utterances, floors, config.speech_only_steps, report, work, speech_only=True
+        )
         if component_counts(result.model) == most:
             return result.model
         chains = with_split_components(result.model, most, result.statistics)
@@ -158,25 +150,27 @@ def growing_models(
         for example, x, mask in zip(moving, values, valid, strict=True)
     ]
     speech_only = [
-        AlignedUtterance(speech_observations(_features(example), visual), example.speech.units)
+        AlignedUtterance(speech_observations(example.speech, visual), example.speech.units)
         for example in examples
         if not mark_known_dynamics(example.valid).any()
     ]
     rest_pose, closure = _rest_pose(moving, values, valid), fit_closure(space.direct_names, values, moving)
     prior = fit_articulation_prior(space, values, moving) if config.articulation else None
+    encoding: Any = None
+    if config.uses_encoding and all(example.speech.encoding is not None for example in moving):
+        encoding = EncodingRegression.fit(PredictorTraining(moving, values, len(space.direct))).predictor
     first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
     def finished(grown: EmResult[Chains, ChainStatistics]) -> Fit[CoupledModel]:
         chains = grown.model
         if speech_only:
             second_monitor = sub_monitor(monitor, first_share, second_share)
-            schedule = SpeechOnlySchedule(
-                config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight
-            )
-            most_steps = schedule.most_steps * max(schedule.mixtures // config.mixtures, 1).bit_length()
+            doublings = max(config.speech_only_mixtures // config.mixtures, 1).bit_length()
+            most_steps = config.speech_only_steps * doublings
             report = _reporter("more speech", most_steps, second_monitor)
-            chains = train_on_speech(chains, data, speech_only, schedule, report, work)
+            chains = train_on_speech(chains, data, speech_only, config, report, work)
         model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
+        model = replace(model, encoding=encoding)
         if config.dynamic and config.acoustic_regression:
             monitor(Progress("regression of visual means", 1, 1, 0.75))
             model = replace(model, regression=_fitted_regression(model, data))
@@ -209,12 +203,10 @@ def _observations(
     example: Example, values: Array, valid: NDArray[np.bool_], visual: Sequence[VisualStream]
 ) -> AudioVisualObservations:
     """Return the speech of an example with its visual streams, from motion in the space [shape=(T, Q)]."""
-    streams = (_features(example), *(stream.standardised(values) for stream in visual))
-    return AudioVisualObservations(streams, (None, *(valid for _ in visual)))
-
-
-def _features(example: Example) -> NDArray[np.float32]:
-    return np.asarray(example.speech.features.values)
+    observations = speech_observations(example.speech, visual)
+    for number, stream in enumerate(visual, start=1):
+        observations = observations.with_stream(number, stream.standardised(values), valid)
+    return observations
 
 
 def _schedule(structure: Structure, visual: Sequence[VisualStream], config: CoupledConfig) -> MixtureSchedule:
