@@ -1,4 +1,4 @@
-"""OpenFaceFX (PyPI ``openfacefx``): curves of loudness, or of phones that it is told.
+"""OpenFaceFX (package ``openfacefx``): curves of loudness, or of phones that it is told.
 
 Settings for sound: ``gate``, ``window``. For phones: ``smooth``, ``intensity``, ``stream`` (look-ahead of its
 ``StreamingGenerator``; 0: ``build_viseme_curves``).

@@ -1,4 +1,4 @@
-"""uLipSync in Python (PyPI ``pylipsync``): vowels and silence. Settings: ``method``, ``silence``, ``window_ms``."""
+"""uLipSync in Python (package ``pylipsync``): vowels and silence. Settings: ``method``, ``silence``, ``window_ms``."""
 
 import wave
 

@@ -64,7 +64,7 @@ seed = 3
 OTHERS = {
     "corpus --channels",
     "experiment --channels",
-    *("cues --fps", "evaluate --speaker", "train --units", "train --speaker", "face --speaker"),
+    *("cues --fps", "measure --speaker", "train --units", "train --speaker", "face --speaker"),
     *("corpus --offset-ms", "studio --model", "studio --character", "studio --face"),
     *("live --model", "live --pauses", "live --rate", "live --to", "live --character"),
 }

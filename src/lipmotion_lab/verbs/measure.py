@@ -78,7 +78,9 @@ def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     add_input(parser, "recordings", what="corpus")
     add_output(parser, "-o", "--output", is_folder=True, required=True, metavar="REPORT", help="folder of the page")
     where = f"folder of adapters, extras/league of the sources (default: that of {ADAPTERS})"
-    parser.add_argument("--adapters", type=Path, default=os.environ.get(ADAPTERS, "extras/league"), help=where)
+    add_input(
+        parser, "--adapters", what="folder of adapters", default=os.environ.get(ADAPTERS, "extras/league"), help=where
+    )
     choice = "corpus on whose list val settings are chosen (default: lists or folds of the recordings)"
     add_input(parser, "--choose", what="corpus", metavar="CORPUS", help=choice)
     parser.add_argument("--only", action="append", default=[], metavar="RIVAL", help="only this one (repeatable)")

@@ -96,23 +96,17 @@ def _stream() -> Stream:
     return Stream(look_ahead_ms=80)
 
 
-@cache
-def _server() -> Server:
-    """Return a server that greets each client, as long as this process lasts."""
-    server = Server("hello")
-    ExitStack().enter_context(open_server("websocket:127.0.0.1:0", 0, server))
-    return server
-
-
 def _send(content: bytes) -> None:
-    host, _, port = _server().address.rpartition(":")
-    with socket.create_connection((host, int(port)), timeout=5) as client, suppress(OSError):
-        client.sendall(content)
-        client.shutdown(socket.SHUT_WR)
-        while client.recv(1 << 16):
-            pass
-    with connect(f"ws://{host}:{port}/", proxy=None) as other:
-        require(other.recv(timeout=10) == "hello", "a server that no longer greets")
+    server = Server("hello")
+    with open_server("websocket:127.0.0.1:0", 0, server):
+        host, _, port = server.address.rpartition(":")
+        with socket.create_connection((host, int(port)), timeout=5) as client, suppress(OSError):
+            client.sendall(content)
+            client.shutdown(socket.SHUT_WR)
+            while client.recv(1 << 16):
+                pass
+        with connect(f"ws://{host}:{port}/", proxy=None) as other:
+            require(other.recv(timeout=10) == "hello", "a server that no longer greets")
 
 
 class _Studio:

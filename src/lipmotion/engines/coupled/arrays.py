@@ -21,8 +21,7 @@ from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from_arrays
 from lipmotion.motion.limits import check_poses, check_rest
 from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
-from lipmotion.motion.predictors import predictor_to_arrays
-from lipmotion.motion.prior_regression import EncodingRegression
+from lipmotion.motion.predictors import list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
 from lipmotion.stats.bigram import check_sums_to_one
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.storage.schema import (
@@ -123,8 +122,7 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
         regression = _regression(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
         modulation = filter_from_arrays(arrays, space.dimensions, needed=config.filtered)
-        known = EncodingRegression.ARRAYS.keys() & arrays.keys()  # of a former model none
-        encoding = EncodingRegression.from_arrays(arrays, space.dimensions) if known else None
+        encoding = predictor_from_arrays(arrays, space.dimensions)
         model = CoupledModel(
             chains, space, visual, regression, poses["gain"], poses["rest"], closure, prior, modulation, encoding
         )
@@ -184,7 +182,7 @@ def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
         MOTION_ARRAYS,
         POSES,
         MODULATION,
-        EncodingRegression.ARRAYS,
+        list_predictor_arrays(arrays),
         PAIRS,
         chain,
         visual,

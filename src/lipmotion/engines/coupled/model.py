@@ -28,7 +28,7 @@ from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, measure_limits
 from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
-from lipmotion.motion.prior_regression import EncodingRegression
+from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, Speech, option
@@ -178,7 +178,7 @@ class CoupledModel:
     closure: Closure | None
     prior: ArticulationPrior | None = None
     modulation: ModulationFilter | None = None
-    encoding: EncodingRegression | None = None
+    encoding: Predictor | None = None
 
     def __repr__(self) -> str:
         size = f"{self.chains.parameters} parameters, {self.space.dimensions} dimensions"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,7 @@ from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import PredictorTraining
-from lipmotion.motion.prior_regression import EncodingRegression
+from lipmotion.motion.predictors import Predictor, PredictorTraining, load_predictor
 from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import fit_scaling_factors
@@ -156,9 +155,9 @@ def growing_models(
     ]
     rest_pose, closure = _rest_pose(moving, values, valid), fit_closure(space.direct_names, values, moving)
     prior = fit_articulation_prior(space, values, moving) if config.articulation else None
-    encoding: Any = None
+    encoding: Predictor | None = None
     if config.uses_encoding and all(example.speech.encoding is not None for example in moving):
-        encoding = EncodingRegression.fit(PredictorTraining(moving, values, len(space.direct))).predictor
+        encoding = load_predictor("encoding").fit(PredictorTraining(moving, values, len(space.direct))).predictor
     first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
     def finished(grown: EmResult[Chains, ChainStatistics]) -> Fit[CoupledModel]:
