@@ -190,12 +190,12 @@ def test_eigenlips(visual, toy_corpus):
 def test_two_stages_beside_one(toy_corpus):
     others = tuple(SpokenSentence(s.name, "anna", s.audio, s.units) for s in toy_sentences(3))
     options = ComparisonOptions(systems=[REFERENCE_SYSTEM + TWO_STAGES], voices=others)
-    (row,) = xieliu2007(toy_corpus, options, sizes=[4], settings=SMALL)["rows"]
+    (row,) = xieliu2007(toy_corpus, options, sizes=[4], settings=SETTINGS)["rows"]
     assert [(each["better"], each["worse"]) for each in row["pairs"]] == [(options.systems[0], REFERENCE_SYSTEM)]
     one, two = row["training"].values()
     assert two["parameters"] > one["parameters"]
     with pytest.raises(InputError, match="two stages needs speech of others; give it by --recordings or --voices"):
-        xieliu2007(toy_corpus, replace(options, voices=()), settings=SMALL)
+        xieliu2007(toy_corpus, replace(options, voices=()), settings=SETTINGS)
 
 
 def test_systems_in_the_order_of_the_table():
