@@ -331,9 +331,9 @@ def fit_map(rows: Array, original: Array) -> Array:
 def at_best_sync(recording: Recording, motion: Array, lag_s: float, limit_s: float) -> Array:
     """Return motion [shape=(T, 2)] in the frames of a recording, moved by up to ``limit_s`` to fit its opening best."""
     shifts = np.arange(-limit_s, limit_s + 1e-9, SYNC_STEP_S) if limit_s else np.zeros(1)
-    moved = [interpolate_rows(motion[:, :1], GRID_HZ, recording.time_s + lag_s + shift) for shift in shifts]
-    scores = [curves.correlation(each, recording.original[:, :1])[0] for each in moved]
-    return interpolate_rows(motion, GRID_HZ, recording.time_s + lag_s + shifts[int(np.argmax(scores))])
+    times = recording.time_s[:, None] + lag_s + shifts
+    moved = interpolate_rows(motion[:, :1], GRID_HZ, times.ravel()).reshape(times.shape)
+    return interpolate_rows(motion, GRID_HZ, times[:, np.argmax(curves.correlation(moved, recording.original[:, :1]))])
 
 
 def choose(
