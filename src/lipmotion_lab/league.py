@@ -597,8 +597,8 @@ def describe_league(found: League) -> Section:
             low, high = first.figures["acc"].gain(best.figures["acc"], 0)
             verdict += f"; {low:+.3f} to {high:+.3f} more than the best rival, {best.rival.title}"
     lips = int(sum(counts[:2].sum() for counts in found.standings[0].figures["lips"].sums)) if found.standings else 0
-    about = f"{', '.join(f'{key}: {value}' for key, value in found.about.items())}; {lips} p b m close"
-    table = Table("standings", about, COLUMNS, rows, best.rival.title if best else "")
+    about = ", ".join(f"{key}: {value}" for key, value in found.about.items())
+    table = Table("standings", f"recorded closings in p, b, m: {lips}", COLUMNS, rows, best.rival.title if best else "")
     words = warn_of_few(len(found.recordings))
     for title, reasons in (("Not installed", found.absent), ("Failed", found.failed)):
         words |= {title: [f"{name}: {reason}" for name, reason in reasons.items()]} if reasons else {}
