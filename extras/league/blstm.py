@@ -1,4 +1,4 @@
-"""The recurrent baseline of the experiments, trained on the list ``train`` of a corpus; in an environment with PyTorch.
+"""The recurrent baseline of the experiments, trained on the list ``train`` of a corpus.
 
 Settings: ``corpus``. It trains for many minutes, every time.
 """
@@ -10,8 +10,6 @@ from jobs import run
 
 def begin(settings):
     """Return a function of a recording."""
-    import torch  # noqa: F401 - without it the rival is absent
-
     from lipmotion import Corpus, animate
     from lipmotion.pipeline.request import Request
     from lipmotion_lab.baselines import BlstmBaseline

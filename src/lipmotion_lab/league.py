@@ -309,9 +309,9 @@ def fit_map(rows: Array, original: Array) -> Array:
 def at_best_sync(recording: Recording, motion: Array, lag_s: float, limit_s: float) -> Array:
     """Return motion [shape=(T, 2)] in the frames of a recording, moved by up to ``limit_s`` to fit its opening best."""
     shifts = np.arange(-limit_s, limit_s + 1e-9, SYNC_STEP_S) if limit_s else np.zeros(1)
-    moved = [interpolate_rows(motion[:, :1], GRID_HZ, recording.time_s + lag_s + shift) for shift in shifts]
-    scores = [curves.correlation(each, recording.original[:, :1])[0] for each in moved]
-    return interpolate_rows(motion, GRID_HZ, recording.time_s + lag_s + shifts[int(np.argmax(scores))])
+    times = recording.time_s[:, None] + lag_s + shifts
+    moved = interpolate_rows(motion[:, :1], GRID_HZ, times.ravel()).reshape(times.shape)
+    return interpolate_rows(motion, GRID_HZ, times[:, np.argmax(curves.correlation(moved, recording.original[:, :1]))])
 
 
 def choose(
@@ -560,8 +560,8 @@ def describe_league(found: League) -> Section:
             low, high = first.figures["acc"].gain(best.figures["acc"], 0)
             verdict += f"; {low:+.3f} to {high:+.3f} more than the best rival, {best.rival.title}"
     lips = int(sum(counts[:2].sum() for counts in found.standings[0].figures["lips"].sums)) if found.standings else 0
-    about = f"{', '.join(f'{key}: {value}' for key, value in found.about.items())}; {lips} p b m close"
-    table = Table("standings", about, COLUMNS, rows, best.rival.title if best else "")
+    about = ", ".join(f"{key}: {value}" for key, value in found.about.items())
+    table = Table("standings", f"recorded closings in p, b, m: {lips}", COLUMNS, rows, best.rival.title if best else "")
     words = warn_of_few(len(found.recordings))
     for title, reasons in (("Not installed", found.absent), ("Failed", found.failed)):
         words |= {title: [f"{name}: {reason}" for name, reason in reasons.items()]} if reasons else {}
