@@ -137,12 +137,12 @@ class Hearing:
     """How a network hears speech: acoustic features, and posteriors and encoding where the training has them.
 
     mean, basis : of the logarithms of the posteriors, as of ``PosteriorNetwork`` (None: there are none)
-    scale       : standard deviation of the encoding in training
+    scale       : standard deviation of the encoding in training (None: it had none)
     """
 
     mean: Float32Array | None
     basis: Float32Array | None
-    scale: float
+    scale: float | None
 
     @classmethod
     def of(cls, recordings: Sequence[Speech]) -> Hearing:
@@ -150,7 +150,8 @@ class Hearing:
         said = [limit_logarithms(each.posteriors) for each in recordings if each.posteriors is not None]
         heard = [np.asarray(each.encoding, np.float32) for each in recordings if each.encoding is not None]
         mean, basis = fit_components(said) if len(said) == len(recordings) else (None, None)
-        return cls(mean, basis, float(np.concatenate(heard).std()) if heard else 1.0)
+        scale = float(np.concatenate(heard).std()) if len(heard) == len(recordings) else None
+        return cls(mean, basis, scale)
 
     def time_steps(self, speech: Speech) -> Float32Array:
         """Return what the network hears in every time step of 40 ms [shape=(ceil(T / 4), I)]."""
@@ -159,7 +160,7 @@ class Hearing:
             rows = (limit_logarithms(speech.posteriors) - self.mean) @ self.basis
             at = np.minimum(ROWS * np.arange(len(parts[0]))[:, None] + np.arange(ROWS), len(rows) - 1)
             parts.append(rows[at].reshape(len(at), -1))
-        if speech.encoding is not None:
+        if self.scale is not None:
             parts.append(np.asarray(speech.encoding, np.float32)[::STEP] / self.scale)
         return np.concatenate(parts, axis=1, dtype=np.float32)
 

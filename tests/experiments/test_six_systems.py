@@ -66,7 +66,7 @@ def test_every_size_condition_and_system(figures):
         assert list(row["conditions"]) == ["audio only", "with transcript"]
         assert all(list(rows) == SYSTEMS for rows in row["conditions"].values())
         assert list(row["training"]) == SYSTEMS
-    assert (figures["split"], figures["clips"], figures["validation"]) == ("test", 2, 1)
+    assert (figures["split"], figures["clips"], figures["validation"]) == ("test", 2, 2)
     assert json.loads(json.dumps(figures, allow_nan=False))
 
 

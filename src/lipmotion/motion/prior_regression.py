@@ -13,6 +13,7 @@ from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps, measure_error_variances
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
+from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, Speech
@@ -28,7 +29,7 @@ RIDGE = 0.01
 class EncodingRegression(Predictor):
     """Linear regression of motion on the encoding of the sound from 200 ms before a frame to 200 ms after it.
 
-    coefficients : float32 array [shape=(R, Q)]
+    coefficients : float32 array [shape=(704, Q)]
     centre       : the motion where all regressors are 0 [shape=(Q,)]
     variances    : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
     """
@@ -39,7 +40,7 @@ class EncodingRegression(Predictor):
     name: ClassVar[str] = "encoding"
     needs: ClassVar[str] = "encoding"
     ARRAYS: ClassVar[Mapping[str, ArraySpec]] = {
-        "encoding_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
+        "encoding_coefficients": ArraySpec(np.float32, f"{(2 * REACH + 1) * COMPONENTS} Q", -1e4, 1e4),
         "encoding_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
         "encoding_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
     }
@@ -147,7 +148,7 @@ class PriorRegression(Predictor):
 
     sizes        : number of regressors of each of ``KINDS``
     mean, scale  : of the regressors [each shape=(R,)]
-    coefficients : float32 array [shape=(R, Q)]
+    coefficients : float32 array [shape=(704, Q)]
     centre       : mean of the motion [shape=(Q,)]
     variances    : of the error of static value, Δ and Δ², in cross-validation [shape=(3, Q)]
     """

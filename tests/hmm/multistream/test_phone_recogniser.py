@@ -81,7 +81,7 @@ def test_a_trained_recogniser_is_kept_in_the_checkpoint(corpus, recogniser, tmp_
 
 @pytest.mark.long
 def test_the_engine_recognises_phones_if_there_is_enough_speech(monkeypatch):
-    monkeypatch.setattr(module, "LEAST_MINUTES", 0.1)
+    monkeypatch.setattr(module.fit_phone_recogniser, "__defaults__", (0.1,))
     engine = engine_named("trajectory", {"components": 2, "acoustic_components": 20})
     corpus = examples(10)
     model = engine.fit(corpus, types.silent_monitor).model
