@@ -13,13 +13,12 @@ from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion.articulation import ARTICULATORS, trace_articulators
 from lipmotion.motion.network_steps import STEP, check_scale, interpolate_steps, measure_error_variances
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, split_folds
-from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, Speech
 
-REACH = 5
-"""Time steps of 40 ms before and after a frame whose encoding is used: 200 ms."""
+REACH, COMPONENTS = 5, 64
+"""Time steps of 40 ms before and after a frame whose encoding is used, 200 ms; and components of the encoding."""
 RIDGE = 0.01
 """Ridge parameter, as a share of the regressors' mean variance; 0.001 to 0.03 are alike (docs/results/voices.md)."""
 
