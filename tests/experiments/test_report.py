@@ -243,9 +243,8 @@ TABLES: dict[str, tuple[str, str, Callable[..., list[tuple[str, str]]]]] = {
     "engines.test": ("engines", "engines-test", lambda title, name: [(f"Engines, {title}", name)]),
     "folds.folds": ("folds", "folds", lambda name: [("Cross-validation, 5 folds", name)]),
     "hofer2008.all": ("hofer2008", "hofer2008", lambda name: [("Unit sets, 5 states, audio only, as printed", name)]),
-    "xieliu2007.all": ("xieliu2007", "xieliu2007", lambda *names: [*product(CHAINS, filter(None, names))]),
-    "xieliu2007.eigenlips": (
-        *("xieliu2007", "xieliu2007-eigenlips-452"),
+    "xieliu2007.paper": (
+        *("xieliu2007", "xieliu2007-eigenlips-150"),
         lambda *names: [*product(CHAINS, filter(None, names))],
     ),
     "selection.printed": ("minnis2000", "minnis2000", lambda name: [*product(LISTS, [name])]),
@@ -357,6 +356,8 @@ def test_a_table_on_a_page_has_what_the_verb_prints(region: str) -> None:
     typed, section = len(source["columns"]) - len(source["cells"]), PARTS[experiment].section(stored(name))
     printed = {table.caption: table.as_lines() for table in section.tables}
     for row, keys in zip(shown.splitlines()[2:], source["rows"], strict=True):
+        if keys[-1].isdigit():
+            continue  # a difference of two systems has other marks there
         found = numbers(row.split("|", 2)[2])
         assert found
         own = [
