@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion import FilmedFace
 from lipmotion.motion.mouth_region import CORNER as MOUTH_CORNER
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
@@ -19,7 +18,7 @@ from lipmotion_faces.appearance.lower_face import CORNER, HEIGHT, WIDTH, FaceSha
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import inverse_map
 from lipmotion_faces.coded_video import encode_video
-from lipmotion_faces.filmed.face import SpokenTake, StoredBackground
+from lipmotion_faces.filmed.face import FilmedFace, SpokenTake, StoredBackground
 from testing.toy import CAMERA_HZ, INNER_WIDTH, INSIDE, LIPS, SKIN, ToySentence, toy_motion, toy_sentences
 
 Array = NDArray[np.float64]
