@@ -358,8 +358,7 @@ def test_a_table_on_a_page_has_what_the_verb_prints(region: str) -> None:
     for row, keys in zip(shown.splitlines()[2:], source["rows"], strict=True):
         if keys[-1].isdigit():
             continue  # a difference of two systems has other marks there
-        found = numbers(row.split("|", 2)[2])
-        assert found
+        assert (found := numbers(row.split("|", 2)[2]))
         own = [
             each.partition("  ")[2]
             for title, head in lines(*keys[typed:])
