@@ -75,7 +75,7 @@ def run_evaluate(options: argparse.Namespace) -> None:
 def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("league", help="compare rivals and our engines on the same filmed recordings")
-    add_input(parser, "recordings", what="corpus")
+    add_input(parser, "recordings", what="corpus", help="filmed recordings, as corpus prepare made them")
     add_output(parser, "-o", "--output", is_folder=True, required=True, metavar="REPORT", help="folder of the page")
     where = f"folder of adapters, extras/league of the sources (default: that of {ADAPTERS})"
     add_input(
