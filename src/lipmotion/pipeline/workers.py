@@ -42,6 +42,17 @@ def process_count(count: int | None) -> int:
     return count or os.cpu_count() or 1
 
 
+def _in_order(numbered: Iterator[tuple[int, ResultT]]) -> Iterator[ResultT]:
+    """Yield results in the order of their numbers, from 0 on."""
+    waiting: dict[int, ResultT] = {}
+    following = 0
+    for number, result in numbered:
+        waiting[number] = result
+        while following in waiting:
+            yield waiting.pop(following)
+            following += 1
+
+
 class Workers:
     """Applies functions to items in worker processes, or in this process if there are none.
 
@@ -57,18 +68,7 @@ class Workers:
 
         Raises WorkerDiedError: a process died.
         """
-        numbered = self._numbered(function, items)
-
-        def in_order() -> Iterator[ResultT]:
-            waiting: dict[int, ResultT] = {}
-            following = 0
-            for number, result in numbered:
-                waiting[number] = result
-                while following in waiting:
-                    yield waiting.pop(following)
-                    following += 1
-
-        return in_order()
+        return _in_order(self._numbered(function, items))
 
     def unordered_map(self, function: Callable[[ItemT], ResultT], items: Iterable[ItemT]) -> Iterator[ResultT]:
         """Yield the results in the order in which they are ready. Raises WorkerDiedError: a process died."""
@@ -269,12 +269,7 @@ def training_pool(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
     with cluster_pool(workers) as pool:
 
         def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-            waiting, following = dict[int, ResultT](), 0
-            for number, result in pool(partial(_work_alone, function), enumerate(items)):
-                waiting[number] = result
-                while following in waiting:
-                    yield waiting.pop(following)
-                    following += 1
+            return _in_order(pool(partial(_work_alone, function), enumerate(items)))
 
         yield each
 

@@ -83,10 +83,10 @@ export class CurveTracks {
     this.trace(pen, row, frames, place, (frame) => motion.value(frame, column), isSelected ? colour.main : colour.curve, comparing ? 1 : 1.5);
     pen.fillStyle = colour.main;
     for (const pin of pins) {
-      const { time_s, value } = pin.time_s === this.grip?.pin.time_s && name === this.grip.pin.channel ? this.grip : pin;
-      this.dot(pen, timeline.x(time_s), this.y(row, value), isSelected && selected.pin_s === pin.time_s ? 5 : 3);
+      const { time_s, value } = this.placeOf(pin), isChosen = isSelected && selected.pin_s === pin.time_s;
+      this.dot(pen, timeline.x(time_s), this.y(row, value), isChosen ? 5 : 3);
+      if (isChosen) this.handles(pen, row, pin);
     }
-    for (const pin of pins) if (isSelected && selected.pin_s === pin.time_s) this.handles(pen, row, pin);
     if (this.stroke?.channel === name) {
       pen.strokeStyle = pen.fillStyle = colour.pen;
       pen.lineWidth = 2;
@@ -159,9 +159,15 @@ export class CurveTracks {
     pen.fill();
   }
 
+  /** Return a pin, where it is while it is being moved. */
+  placeOf(pin) {
+    const of = this.grip?.pin;
+    return of?.channel === pin.channel && of.time_s === pin.time_s ? this.grip : pin;
+  }
+
   /** The handles of a pin, which show the slope of the curve there: its ends [pixels]. */
   ends(row, pin) {
-    const { slope, time_s, value } = this.grip?.pin.time_s === pin.time_s ? this.grip : pin, { timeline, store } = this;
+    const { slope, time_s, value } = this.placeOf(pin), { timeline, store } = this;
     const curve = store.curvesOf(pin.channel), step_s = 1 / curve.rate_hz, [before, after] = [-step_s, step_s].map((step) => curve.at(time_s + step, curve.column(pin.channel)));
     const rise = slope ?? (after - before) / (2 * step_s);
     const x = timeline.x(time_s), y = this.y(row, value), across = 1 / timeline.px_s, up = this.y(row, value + rise * across) - y;
@@ -181,7 +187,7 @@ export class CurveTracks {
 
   /** Return what of a pin is under the pointer: the pin, or a handle of the selected one. */
   gripAt(name, event) {
-    const box = this.rows.get(name).element.getBoundingClientRect(), { selected, recording } = this.store, row = this.rows.get(name);
+    const row = this.rows.get(name), box = row.element.getBoundingClientRect(), { selected, recording } = this.store;
     const near = ([x, y]) => Math.hypot(event.clientX - box.left - x, event.clientY - box.top - y) <= NEAR_PX;
     const pins = placed(recording.steps).pins.filter(({ channel }) => channel === name);
     const turned = pins.find((pin) => selected?.channel === name && pin.time_s === selected.pin_s && this.ends(row, pin).some(near));
