@@ -31,6 +31,8 @@ from lipmotion_faces.filmed.face import FilmedFace, save_face
 from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
 
+if sys.platform == "linux":  # arrays of a megabyte go back to the system when they are freed: a worker runs 2,000 tests
+    ctypes.CDLL(None).mallopt(-3, 1 << 20)  # M_MMAP_THRESHOLD
 SENTENCES = 12
 MAX_HEARD = 40
 """Sounds whose posteriors are kept: those of the toy, and some before."""

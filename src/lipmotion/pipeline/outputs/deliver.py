@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from lipmotion.articulation.curve_edits import apply_gain
+from lipmotion.articulation.curve_edits import GAIN_EDGE_S, span_weight
 from lipmotion.articulation.delivery import (
     Delivery,
     close_on_frame_grid,
@@ -24,7 +24,7 @@ from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_m
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import show_edited_curves, with_curves
-from lipmotion.types import Gain, Generation, Prosody, VoiceEvent
+from lipmotion.types import Generation, Prosody, VoiceEvent
 from lipmotion.types.audio import LAUGHTER, SHOUT, WHISPER
 from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, Staging, sort_moods
 from lipmotion.types.motion import RADIAN
@@ -59,13 +59,15 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
 
     keys : in the order of their times; moods do not count. Each holds until the next manner
     """
-    manners = [key for key in keys if key.is_manner]
-    last = MoodKey(len(generation.motion.values) / generation.motion.rate_hz, PLAIN)
+    manners, rate_hz = [key for key in keys if key.is_manner], generation.motion.rate_hz
+    last, intensity = MoodKey(len(generation.motion.values) / rate_hz, PLAIN), np.ones(len(generation.motion.values))
     for key, stop_s in ((key, later.time_s) for key, later in pairwise((*manners, last))):
-        factor = 1 + key.strength * (FACTORS[key.mood] - 1)
-        if factor != 1 and key.time_s < stop_s:
-            generation = apply_gain(generation, Gain(key.time_s, stop_s, factor))
-    return generation
+        if key.time_s < stop_s:
+            first, end = (round(time_s * rate_hz) for time_s in (key.time_s - GAIN_EDGE_S, stop_s + GAIN_EDGE_S))
+            frames = np.arange(max(first, 0), min(end + 1, len(intensity)))
+            share = span_weight(frames / rate_hz, key.time_s, stop_s, GAIN_EDGE_S)
+            intensity[frames] *= 1 + share * key.strength * (FACTORS[key.mood] - 1)
+    return intensify(generation, intensity)
 
 
 def deliver(generation: Generation, delivery: Delivery) -> Generation:
@@ -83,9 +85,9 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
         opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
         generation = intensify(generation, delivery.intensity, opening)
     if not all(key.is_manner for key in keys):
-        moods = with_moods(generation.motion, keys)
         names = tuple(name for name in generation.motion.names if not is_mood(name))
-        generation = generation.selected(names).with_motion(moods)
+        generation = generation.selected(names)
+        generation = generation.with_motion(with_moods(generation.motion, keys))
     return shift_in_time(generation, delivery)
 
 
