@@ -166,7 +166,7 @@ def intensify(generation: Generation, intensity: float | Curve, opening: Curve |
         wanted = np.maximum(intensity * further, 0)
         limited = np.where(wanted > widest, widest + widest * np.tanh((wanted - widest) / widest), wanted)
         change = np.divide(limited, further, out=np.ones_like(further), where=further > 0) - 1
-        factor = 1 + np.where(intensity == 1, 0, smooth_step((further - touching) / UNSCALED_GAP) * change)
+        factor = 1 + smooth_step((further - touching) / UNSCALED_GAP) * change
     values = motion.values.copy()
     for column, channel in enumerate(motion.channels):  # by columns: hours of all channels would not fit twice
         curve = values[:, column].astype(np.float64)

@@ -59,14 +59,13 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
 
     keys : in the order of their times; moods do not count. Each holds until the next manner
     """
-    manners, rate_hz = [key for key in keys if key.is_manner], generation.motion.rate_hz
-    last, intensity = MoodKey(len(generation.motion.values) / rate_hz, PLAIN), np.ones(len(generation.motion.values))
-    for key, stop_s in ((key, later.time_s) for key, later in pairwise((*manners, last))):
-        if key.time_s < stop_s:
-            first, end = (round(time_s * rate_hz) for time_s in (key.time_s - GAIN_EDGE_S, stop_s + GAIN_EDGE_S))
-            frames = np.arange(max(first, 0), min(end + 1, len(intensity)))
-            share = span_weight(frames / rate_hz, key.time_s, stop_s, GAIN_EDGE_S)
-            intensity[frames] *= 1 + share * key.strength * (FACTORS[key.mood] - 1)
+    manners, time_s = [key for key in keys if key.is_manner], generation.motion.time_s
+    last, intensity = MoodKey(len(time_s) / generation.motion.rate_hz, PLAIN), np.ones(len(time_s))
+    for key, later in pairwise((*manners, last)):
+        if key.time_s < later.time_s:
+            near = slice(*np.searchsorted(time_s, (key.time_s - GAIN_EDGE_S, later.time_s + GAIN_EDGE_S)))
+            share = span_weight(time_s[near], key.time_s, later.time_s, GAIN_EDGE_S)
+            intensity[near] *= 1 + share * key.strength * (FACTORS[key.mood] - 1)
     return intensify(generation, intensity)
 
 
@@ -85,8 +84,7 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
         opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
         generation = intensify(generation, delivery.intensity, opening)
     if not all(key.is_manner for key in keys):
-        names = tuple(name for name in generation.motion.names if not is_mood(name))
-        generation = generation.selected(names)
+        generation = generation.selected([name for name in generation.motion.names if not is_mood(name)])
         generation = generation.with_motion(with_moods(generation.motion, keys))
     return shift_in_time(generation, delivery)
 

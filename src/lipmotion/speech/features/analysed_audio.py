@@ -36,7 +36,6 @@ from lipmotion.speech.sound.voice_activity import (
 from lipmotion.types import Audio, Features, JoinedRows
 
 MadeT = TypeVar("MadeT")
-FloatT = TypeVar("FloatT", bound=np.floating[Any])
 SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
 QUIETEST = 0.1
@@ -177,8 +176,7 @@ class AnalysedAudio(Audio):
 
     def mfcc(self, warp: float = 1.0) -> Features:
         """Return the features of ``speech.features.mfcc.mfcc`` at one warp of the frequencies."""
-        (features,) = self.mfcc_of_warps((warp,))
-        return features
+        return self.mfcc_of_warps((warp,))[0]
 
     def joined_mfcc(self) -> Features:
         """Return ``mfcc`` with values that are ``JoinedRows``."""
@@ -198,8 +196,6 @@ class AnalysedAudio(Audio):
             del self._mfcc[warp]
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        for passage in self.passages:
-            passage.audio.mfcc_of_warps(warps)  # the spectra are computed once for all
         return [Features(self.joined(partial(_mfcc_values, warp=warp)), self.duration_s) for warp in warps]
 
     @cached_property
@@ -374,26 +370,11 @@ class _Stretch(AnalysedAudio):
         return (Passage(0, slice(0, self.frames), self),)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
-        return [Features(self._rows(each.values), self.duration_s) for each in self.whole.mfcc_of_warps(warps)]
+        self.whole.mfcc_of_warps(warps)  # the spectra are computed once for all
+        return super().mfcc_of_warps(warps)
 
-    @cached_property
-    def log_energy(self) -> NDArray[np.float32]:
-        return self._rows(self.whole.log_energy)
-
-    @cached_property
-    def general_features(self) -> NDArray[np.float32]:
-        return self._rows(self.whole.general_features)
-
-    @cached_property
-    def spectrum(self) -> NDArray[np.float32]:
-        return self._rows(self.whole.spectrum)
-
-    @cached_property
-    def encoding(self) -> NDArray[np.float16]:
-        return self._rows(self.whole.encoding)
-
-    def _rows(self, rows: NDArray[FloatT]) -> NDArray[FloatT]:
-        return rows[self.first : self.first + len(self.samples) // HOP + 1]
+    def joined(self, of_passage: Callable[[AnalysedAudio], NDArray[Any]], _: float | None = None) -> NDArray[Any]:
+        return of_passage(self.whole)[self.first : self.first + len(self.samples) // HOP + 1]
 
 
 def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
