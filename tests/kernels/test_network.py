@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import network_posteriors, phone_loop, random_network
-from lipmotion.kernels.arcs import arc_layout
+from lipmotion.kernels.arcs import lay_out_arcs
 from lipmotion.kernels.network import ForwardBackwardNetwork
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -142,7 +142,7 @@ def arcs_in(layout):
 
 
 def all_are_there(arrays) -> None:
-    layout = arc_layout(arrays["arc_from"], arrays["arc_start"])
+    layout = lay_out_arcs(arrays["arc_from"], arrays["arc_start"])
     counts = np.diff(arrays["arc_start"], append=len(arrays["arc_from"]))
     targets = np.repeat(np.arange(len(counts)), counts)
     assert sorted(arcs_in(layout)) == list(zip(range(len(targets)), arrays["arc_from"], targets, strict=True))
@@ -159,6 +159,6 @@ def test_a_loop_of_phones_is_one_block_and_few_runs():
     for units, states in ((11, 3), (9, 1), (4, 2)):
         all_are_there(phone_loop(1, units, states)[0])
     arrays, _ = phone_loop(1, units=21, states=5)
-    layout = arc_layout(arrays["arc_from"], arrays["arc_start"])
+    layout = lay_out_arcs(arrays["arc_from"], arrays["arc_start"])
     assert [tuple(block[[1, 3]]) for block in layout.blocks] == [(20, 21)]
     assert len(layout.runs) == 5

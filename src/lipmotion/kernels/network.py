@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, arc_layout, arc_weights
+from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, arrange_weights, lay_out_arcs
 from lipmotion.kernels.compiler import compiled_to_rounding
 from lipmotion.kernels.forward_backward import log_forward_backward
 
@@ -131,7 +131,7 @@ class ForwardBackwardNetwork(NamedTuple):
         log_final: NDArray[np.floating[Any]],
     ) -> ForwardBackwardNetwork:
         """Return a network prepared for forward–backward; parameters as in ``kernels.paths.NetworkArrays``."""
-        layout = arc_layout(arc_from, arc_start)
+        layout = lay_out_arcs(arc_from, arc_start)
         logs, initial, final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
         return cls(arc_from, logs, arc_start, initial, final, layout, *_weighted(layout, logs))
 
@@ -270,7 +270,7 @@ def _weighted(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Arr
     that the kernels take.
     """
     relative, best = _probabilities(arc_log)
-    weights = arc_weights(layout, relative, 0.0)
+    weights = arrange_weights(layout, relative, 0.0)
     return best, weights, _transposed(layout, weights), Chunks.of(layout, weights)
 
 

@@ -1,4 +1,4 @@
-"""Faces as outputs show them: drawn faces, characters and filmed people answer the same questions."""
+"""Faces as outputs show them: one interface for drawn faces, characters, cut-outs and filmed people."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ AnyFace = str | Path | Face | FilmedFace | CutOut | DrivenCharacter
 
 
 class _WithHead(ShownFace):
-    """A face of which files for 3D programs show the 3D head."""
+    """A face that is no 3D character: files for 3D programs show the 3D head instead."""
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
         drawn_video.check_drawable(path, generation.motion)
@@ -90,7 +90,7 @@ class ShownCharacter(ShownDrawing):
 
 
 class ShownCutOut(_WithHead):
-    """A character of pictures, one for each mouth shape: they are shown as cues are chosen."""
+    """Pictures, one for each mouth shape: each is shown as long as its cue."""
 
     def __init__(self, face: CutOut) -> None:
         self.face = face
@@ -178,7 +178,7 @@ class ShownPerson(_WithHead):
 
 
 def shown_face(face: AnyFace | ShownFace) -> ShownFace:
-    """Return a face as outputs show it, of a name, a path or a value. Raises InputError, ModelFormatError: none."""
+    """Return a face as outputs show it, by name, path or value. Raises InputError, ModelFormatError: no such face."""
     if isinstance(face, ShownFace):
         return face
     if isinstance(face, DrivenCharacter):
