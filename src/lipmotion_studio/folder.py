@@ -46,7 +46,7 @@ from lipmotion_studio.project import (
     parse_project,
     project_document,
 )
-from lipmotion_studio.votes import Vote, format_votes, read_votes
+from lipmotion_studio.votes import Vote, read_votes, votes_text
 
 LOG = logging.getLogger("lipmotion")
 PROJECT, SOUNDS, EDITS, EXPORTS, LEXICON = "project.json", "sounds", "edits", "exports", "lexicon.txt"
@@ -388,7 +388,7 @@ class ProjectFolder:
         with self.lock:
             votes = (*read_votes(self.path / VOTES), vote)
             with atomic_file(self.path / VOTES) as temporary:
-                temporary.write_text(format_votes(votes), encoding="utf-8")
+                temporary.write_text(votes_text(votes), encoding="utf-8")
             return votes
 
     @property

@@ -61,7 +61,7 @@ times = st.one_of(st.none(), st.floats(-5, 40))
 def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames):
     found = anchors.anchors_of(transcript(*(line("a b", start_s, end_s) for start_s, end_s in spans)))
     least = np.full(len(found.start_s), 3, np.intp)
-    windows, tolerance_s = anchors.find_feasible_windows(found, found.tolerance_s, least, 3, frames)
+    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, least, 3, frames)
     assert np.all(np.diff(windows.first) >= 0)
     assert np.all(np.diff(windows.end) >= 0)
     assert np.all(tolerance_s >= found.tolerance_s)
@@ -78,7 +78,7 @@ def test_windows_without_room_are_widened_where_it_lacks():
     crowded = [line("a", 1.0, 2.0), line(" ".join("b" * 100), 20.0, 20.5), line("c", 60.0, 61.0)]
     found = anchors.anchors_of(transcript(*crowded))
     least = np.full(102, 9, np.intp)
-    windows, tolerance_s = anchors.find_feasible_windows(found, found.tolerance_s, least, 3, 10_000)
+    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, least, 3, 10_000)
     assert tolerance_s[50] > 4
     assert tolerance_s[0] <= tolerance_s[50]
     assert windows.end[100] - windows.first[1] >= 900
@@ -229,6 +229,6 @@ def test_lines_after_the_end_are_left_out(caplog):
 
 def test_widening_ends():
     found = anchors.anchors_of(transcript(line(" ".join("a" * 50), 1.0, 1.1)))
-    windows, tolerance_s = anchors.find_feasible_windows(found, found.tolerance_s, np.full(50, 90, np.intp), 3, 3000)
+    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, np.full(50, 90, np.intp), 3, 3000)
     assert np.all(np.isinf(tolerance_s))
     assert (windows.first.max(), windows.end.min()) == (0, 3000)

@@ -10,7 +10,7 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.storage.files import portable_name
 from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, project_path
 from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, parse_project, project_document
-from lipmotion_studio.votes import Side, Vote, format_votes, read_votes, tally
+from lipmotion_studio.votes import Side, Vote, read_votes, tally, votes_text
 from testing.toy import ToySentence
 
 LINE = {"number": 1, "name": "a", "sound": "a.wav", "sha256": "0"}
@@ -158,7 +158,7 @@ def test_votes_are_read_as_they_were_written_and_old_ones_by_their_names(tmp_pat
     assert [vote.better for vote in old] == [0, None]
     assert tally(old, old[0]) == {"better": [1, 0], "neither": 1}
     votes = (*old, Vote("one", (A, KEPT), 1))
-    path.write_text(format_votes(votes), encoding="utf-8")
+    path.write_text(votes_text(votes), encoding="utf-8")
     assert read_votes(path) == votes
 
 

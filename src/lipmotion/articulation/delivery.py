@@ -67,7 +67,7 @@ Curve = NDArray[np.float64]
 
 UNSCALED_GAP = 0.03
 """Lips that have just parted by less than this, in eye distances, move less than in proportion to the intensity."""
-INTENSIFIED = ("protrusion", "spread")
+GROWING = ("protrusion", "spread")
 """The articulatory channels that grow with the intensity; the others state what touches what."""
 POSE_CHANNELS = ("opening", "width", "outer")
 """The channels that decide where held poses begin, where the motion has them."""
@@ -141,7 +141,7 @@ def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Un
 
 
 def intensify(generation: Generation, intensity: float, opening: Curve | None = None) -> Generation:
-    """Return a generation with movements away from the rest pose scaled by ``intensity``.
+    """Return a generation with movements away from the rest pose so many times as large.
 
     opening : how far the lips are apart in every frame [shape=(T,)]; None: the channel ``opening``
     In every frame the whole face moves by one factor, so that distances and points agree. It is 1 where the lips touch,
@@ -172,13 +172,13 @@ def intensify(generation: Generation, intensity: float, opening: Curve | None = 
             larger[:, column] = np.clip(larger[:, column], 0, 1)
         if channel.name in ARTICULATORY or is_mood(channel.name):
             larger[:, column] = values[:, column]
-        if channel.name in INTENSIFIED:
+        if channel.name in GROWING:
             larger[:, column] = 1 - np.clip(1 - values[:, column], 0, 1) ** np.sqrt(intensity)
     spread = generation.change_frames(lambda rows: rows * factor[:, None] ** 2)
     return replace(generation, motion=replace(motion, values=larger), spread=spread)
 
 
-ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", "oval", *INTENSIFIED, *EDITED.values())
+ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", "oval", *GROWING, *EDITED.values())
 """Channels that are not movements away from a rest pose (docs/articulation.md)."""
 
 

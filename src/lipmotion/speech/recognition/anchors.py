@@ -145,7 +145,7 @@ def make_windows(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int
     """Return the frames in which each word may lie.
 
     A word without a time has those between the words with times around it. No word may begin before those ahead of it
-    may, nor end after those behind it may; out of order, times leave no room (``find_feasible_windows``).
+    may, nor end after those behind it may; out of order, times leave no room (``feasible_windows``).
     """
     first = np.floor((anchors.start_s - tolerance_s) * FRAME_RATE_HZ)
     end = np.ceil((anchors.end_s + tolerance_s) * FRAME_RATE_HZ) + 1
@@ -161,7 +161,7 @@ def _carry_forward(values: NDArray[np.float64], before: float) -> NDArray[np.flo
     return np.append(before, values)[latest][1:]
 
 
-def find_feasible_windows(
+def feasible_windows(
     anchors: Anchors, tolerance_s: NDArray[np.float64], min_frames: NDArray[np.intp], edge: int, frames: int
 ) -> tuple[Windows, NDArray[np.float64]]:
     """Return windows in which all words have room, and the tolerances, doubled around words that had none.
@@ -223,7 +223,7 @@ def align_within(
 ) -> tuple[list[PlacedWord], Windows]:
     """Return words aligned within their windows, and these.
 
-    min_frames, edge : as of ``find_feasible_windows``
+    min_frames, edge : as of ``feasible_windows``
     search      : aligns within windows, with the fit of each word
     Where words press against their windows, or fit badly, these are widened step by step, and stay so if the words then
     fit better by ``MIN_IMPROVEMENT``: words also press where speech beside them is not in the transcript. If all fit
@@ -271,7 +271,7 @@ def _place_words(
     search: Callable[[Windows], list[PlacedWord]],
 ) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
     """Return words aligned within windows that have room, these windows, and their tolerances."""
-    windows, tolerance_s = find_feasible_windows(anchors, tolerance_s, min_frames, edge, frames)
+    windows, tolerance_s = feasible_windows(anchors, tolerance_s, min_frames, edge, frames)
     return search(windows), windows, tolerance_s
 
 
