@@ -15,7 +15,7 @@ from portable.settings import BEFORE_AVX, CORES, different_cores, environment, k
 
 TESTS = Path(__file__).parents[1]
 NUMERIC = (
-    *("stats", "kernels/test_threads.py", "engines/trajectory/test_engine.py", "pipeline/test_animate.py"),
+    *("stats", "kernels/test_compiler.py", "engines/trajectory/test_engine.py", "pipeline/test_animate.py"),
     *(f"hmm/test_{name}.py" for name in ("align", "baum_welch", "decode", "model", "unit_training")),
     *(
         f"hmm/multistream/test_{name}.py"

@@ -1,22 +1,37 @@
 from collections.abc import Sequence
+from dataclasses import replace
 from difflib import SequenceMatcher
 from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
-from lipmotion import Model, errors, load_model
+from lipmotion import Model, errors, load_model, types
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.pipeline.training.train import train_phone_models
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition import recogniser
+from lipmotion.speech.recognition import adaptation, recogniser
 from lipmotion.speech.recognition import recogniser as module
+from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
 from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
+from lipmotion.speech.recognition.recognised_speech import (
+    SLIVER_FRAMES,
+    AlignedWords,
+    LabelledFrames,
+    RecognisedWord,
+    labels_of_words,
+    recognition_of,
+    spliced,
+)
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Timeline, Unit, silent_monitor
+from lipmotion.speech.sound.voice_activity import Stretch
+from lipmotion.stats.constrained_mllr import log_determinant
+from lipmotion.types import Audio, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
-from lipmotion.units.phones import SHORT_PAUSE_S
+from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
 from testing.formant_synthesiser import synthesise
 from testing.toy import WORDS, ToySentence, toy_sentences
 
@@ -247,3 +262,201 @@ def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) 
     assert np.array_equal(hmm.mixtures.means, train_phone_models(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
     with pytest.raises(errors.CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
         train_phone_models([bad], Lexicon(), SMALL, silent_monitor)
+
+
+BASE = [LabelledFrames(0, "sil"), LabelledFrames(20, "aa"), LabelledFrames(50, "t"), LabelledFrames(70, "sil")]
+ALIGNED = AlignedWords(
+    words=("a", "boat"),
+    phones=("sil", "ax", "sp", "b", "ow", "t", "sil"),
+    of_word=np.array([-1, 0, -1, 1, 1, 1, -1]),
+    bounds=np.array([0, 10, 20, 22, 30, 50, 60, 80]),
+    densities=np.zeros(80, np.intp),
+)
+
+
+def test_a_stretch_nothing_or_all_is_replaced() -> None:
+    part = (Stretch(30, 60), [LabelledFrames(30, "b", 0), LabelledFrames(45, "iy", 0)])
+    assert spliced(BASE, [part], 100) == [*BASE[:2], *part[1], LabelledFrames(60, "t"), BASE[3]]
+    assert spliced(BASE, [], 100) == BASE
+    whole = [LabelledFrames(0, "b", 0)]
+    assert spliced(BASE, [(Stretch(0, 100), whole)], 100) == whole
+    sliver = (Stretch(22, 69), [LabelledFrames(22, "b", 0)])
+    assert SLIVER_FRAMES > 2
+    assert [label.phone for label in spliced(BASE, [sliver], 100)] == ["sil", "b", "sil"]
+
+
+def test_every_frame_has_one_label() -> None:
+    for seed in range(5):
+        draw = np.random.default_rng(seed)
+        frames = 200
+        base = [LabelledFrames(int(first), "aa") for first in [0, *np.unique(draw.integers(1, frames, 15))]]
+        bounds = np.unique(draw.integers(0, frames + 1, 8))
+        parts = [
+            (Stretch(int(first), int(end)), [LabelledFrames(int(first), "b", number)])
+            for number, (first, end) in enumerate(zip(bounds[::2], bounds[1::2], strict=False))
+        ]
+        firsts = [label.first for label in spliced(base, parts, frames)]
+        assert firsts[0] == 0
+        assert firsts == sorted(set(firsts))
+        assert {number for _, ((_, _, number),) in parts} == {
+            label.word for label in spliced(base, parts, frames) if label.word >= 0
+        }
+
+
+def test_labels_are_those_of_the_words_that_are_believed() -> None:
+    ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([True, True]), 5)
+    assert frames == Stretch(100, 180)  # all
+    assert [label.word for label in labels] == [-1, 5, -1, 6, 6, 6, -1]
+    assert [label.first for label in labels] == [100, 110, 120, 122, 130, 150, 160]
+    ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, True]), 0)
+    assert frames == Stretch(122, 160)
+    assert [label.phone for label in labels] == ["b", "ow", "t"]
+    assert not list(labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, False]), 0))
+
+
+def test_fits_are_means_over_the_frames_of_each_word() -> None:
+    values = np.zeros((80, 2), np.float32)
+    values[:, 1] = 1.0
+    values[22:60, 1] = 3.0
+    fits, fit = ALIGNED.fits(values, np.ones(80, np.intp))
+    assert fits == pytest.approx([-1.0, -3.0])
+    assert fit == pytest.approx(-(42 + 38 * 3) / 80)
+
+
+def test_what_was_recognised() -> None:
+    labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
+    spans = ((0.0, 0.1, "sil", ""), (0.1, 0.2, "b", "bee"), (0.2, 0.4, "iy", "bee"), (0.4, 0.5, "z", ""))
+    units = Timeline(tuple(Span(start, end, Unit(phone, word=word)) for start, end, phone, word in spans))
+    found = recognition_of(units, labels, [RecognisedWord("bee", 0.8)], -7.0)
+    (word,) = found.words
+    assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
+    assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.1))
+    assert found.confidence == pytest.approx(0.8)
+    assert found.reliability == pytest.approx(1)
+    doubtful = recognition_of(units, labels, [RecognisedWord("bee", 0.3)], -7.0)
+    assert doubtful.reliability == pytest.approx(0)
+    shares = [replace(found, posterior=posterior).reliability for posterior in (0.6, 0.8, 0.95)]
+    assert shares == pytest.approx([0, 0.5, 1])
+    wordless = recognition_of(units, [LabelledFrames(0, "sil")], [], -7.0)
+    assert replace(wordless, posterior=0.575).reliability == pytest.approx(0.5)
+
+
+@pytest.fixture(scope="module")
+def audio() -> types.Audio:
+    return toy_sentences(3)[0].audio
+
+
+def some() -> adaptation.Adaptation:
+    draw = np.random.default_rng(0)
+    return adaptation.Adaptation(1.06, 0.25, draw.normal(size=(39, 40)), draw.normal(size=(3, 13, 14)))
+
+
+def test_own_features_are_warped_then_transformed_and_general_ones_stream_by_stream(audio: types.Audio) -> None:
+    heard, nothing, one = analysed(audio), adaptation.identity_adaptation(1.0, 0.5), some()
+    plain = heard.general_features
+    assert np.array_equal(nothing.own_features(heard), heard.mfcc().values)
+    assert np.array_equal(nothing.general_features(heard), plain)
+    expected = heard.mfcc(1.06).values @ one.own[:, :-1].T + one.own[:, -1]
+    np.testing.assert_allclose(one.own_features(heard), expected, rtol=1e-4, atol=1e-3)
+    found = one.general_features(heard)
+    for number, transform in enumerate(one.general):
+        columns = slice(13 * number, 13 * number + 13)
+        expected = plain[:, columns] @ transform[:, :-1].T + transform[:, -1]
+        np.testing.assert_allclose(found[:, columns], expected, rtol=1e-3, atol=1e-3)
+
+
+def test_arrays_and_back_and_damaged_arrays() -> None:
+    one, broken = some(), np.eye(39, 40)
+    again = adaptation.adaptation_from_arrays(adaptation.adaptation_arrays(one))
+    assert (again.warp, again.own_weight) == (one.warp, one.own_weight)
+    assert np.array_equal(again.own, one.own)
+    assert np.array_equal(again.general, one.general)
+    broken.flat[3] = np.nan
+    for damage, says in (
+        ({"own": None}, "own"),
+        ({"general": np.zeros((13, 14))}, "general of shape"),
+        ({"numbers": np.array([1.0, 1.5])}, "a warp of 1.0 and a weight of the own models of 1.5"),
+        ({"numbers": np.array([0.0, 0.5])}, "a warp of 0.0"),
+        ({"numbers": np.array(["a", "b"])}, "numbers holds <U1, required fractions"),
+        ({"own": broken}, "own holds values that are not finite"),
+    ):
+        arrays = {
+            key: value for key, value in (adaptation.adaptation_arrays(one) | damage).items() if value is not None
+        }
+        with pytest.raises(errors.ModelFormatError, match=f"{says}.*adapt the model again"):
+            adaptation.adaptation_from_arrays(arrays)
+
+
+def test_a_warp_of_one_takes_the_features_that_are_known(audio: types.Audio) -> None:
+    features, one = replace(analysed(audio).mfcc(), values=np.ones((300, 39), np.float32)), replace(some(), warp=1.0)
+    np.testing.assert_allclose(one.own_features(analysed(audio, features))[7], one.own.sum(axis=1), rtol=1e-4)
+
+
+@pytest.fixture(scope="module")
+def voice() -> list[types.Audio]:
+    """Not those that the toy model was trained on, but of the same voice."""
+    return [sentence.audio for sentence in toy_sentences(12)[8:]]
+
+
+@pytest.fixture(scope="module")
+def same_speaker(toy_model: Model, voice: list[types.Audio]) -> EstimatedAdaptation:
+    return estimate_adaptation(toy_model.phones, voice)
+
+
+def through_a_telephone(audio: types.Audio) -> types.Audio:
+    samples = lfilter(*butter(2, [300 / 8000, 3000 / 8000], "band"), audio.samples)
+    return types.Audio(np.asarray(samples, np.float32), audio.rate_hz)
+
+
+def fit(model: Model, found: EstimatedAdaptation, audio: types.Audio) -> float:
+    adapted = found.adaptation.own_features(analysed(audio))
+    return model.phones.fit(adapted) + log_determinant(found.adaptation.own)
+
+
+@pytest.mark.long
+def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
+    toy_model: Model, voice: list[types.Audio], same_speaker: EstimatedAdaptation
+) -> None:
+    one = same_speaker.adaptation
+    assert (one.warp, one.own_weight) == (1.0, 1.0)
+    assert 0.3 < same_speaker.speech_s / sum(audio.duration_s for audio in voice) < 1
+    before, after = (Recogniser(toy_model.phones, "own", how) for how in (None, one))
+    for audio in voice:
+        features = analysed(audio).mfcc()
+        changed = one.own_features(analysed(audio)) - features.values
+        assert np.sqrt(np.square(changed).mean()) < 0.5
+        first, then = ([s.label.phone for s in recogniser.recognise(audio, features)] for recogniser in (before, after))
+        assert count_phone_edits(first, then) <= 2
+
+
+def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voice: list[types.Audio]) -> None:
+    """By features of a short recording that move apart from their deltas and these from theirs."""
+    one, other = (through_a_telephone(audio) for audio in voice[:2])
+    found = estimate_adaptation(toy_model.phones, [other])
+    plain = toy_model.phones.fit(analysed(one).mfcc(found.adaptation.warp).values)
+    assert fit(toy_model, found, one) > plain + 0.5
+    block, own = np.arange(39) // 13, found.adaptation.own[:, :-1]
+    between = block[:, None] != block
+    assert not own[between].any()
+    assert np.abs(own[~between]).sum() > 39
+
+
+@pytest.mark.long
+def test_much_speech_moves_them_together(
+    same_speaker: EstimatedAdaptation, toy_model: Model, voice: list[types.Audio]
+) -> None:
+    long = estimate_adaptation(toy_model.phones, voice * 3)
+    assert long.speech_s == pytest.approx(3 * same_speaker.speech_s, rel=0.1)
+    assert long.speech_s > 10
+    assert np.abs(long.adaptation.own[:13, 13:39]).max() > 1e-3
+
+
+def test_too_little_speech(toy_model: Model, voice: list[types.Audio]) -> None:
+    loud = int(np.abs(voice[0].samples).argmax())
+    short = np.pad(voice[0].samples[max(loud - 4000, 0) : loud + 4000], 16_000)
+    for samples, message in (
+        (0.01 * np.random.default_rng(0).normal(size=32_000), "no speech found"),
+        (short, r"found 0.\d s of speech, required at least 1 s"),
+    ):
+        with pytest.raises(errors.InputError, match=message):
+            estimate_adaptation(toy_model.phones, [types.Audio(samples.astype(np.float32), 16_000)])

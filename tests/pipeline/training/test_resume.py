@@ -1,8 +1,11 @@
 import multiprocessing
+import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,15 +14,25 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.training import em_steps
+from lipmotion.errors import CorpusError, MissingDependencyError
+from lipmotion.formats.label_files import write_labels
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream import multistream_training
 from lipmotion.pipeline import workers
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
+from lipmotion.pipeline.training import other_speakers as module
 from lipmotion.pipeline.training.labels import fingerprint_training
+from lipmotion.pipeline.training.other_speakers import align_recordings, is_held_out_speaker, synthesise_sentences
+from lipmotion.speech.sound.acoustic_conditions import spoken_samples
+from lipmotion.speech.voices.installed import installed_voices
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.stats import em
-from lipmotion.types import Item, Monitor, Progress, silent_monitor
-from lipmotion.units import Lexicon
+from lipmotion.types import Audio, Item, Monitor, Progress, Timeline, Unit, silent_monitor
+from lipmotion.units import Lexicon, split_words
+from pipeline.made import recogniser_of, write_sound
+from testing.formant_synthesiser import synthesise
+from testing.toy import toy_sentences
 
 CONFIG = HmmConfig(mixtures=2, iterations=1, context_frames=20)
 Train = Callable[..., Model]
@@ -218,3 +231,194 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path):
     assert digests()[1] != pictured
     corpus.add(replace(utterance, words=("papa",)))
     assert digests()[0] != plain
+
+
+VOICES = [SyntheticVoice("low", "flite", "anna"), SyntheticVoice("high", "flite", "bert")]
+TEXTS = ["Blue baby.", "Five tea."]
+Sayings = Iterator[tuple[Audio, Timeline[Unit]]]
+
+
+@pytest.fixture
+def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every voice speaks as the formant synthesiser does, without any pause."""
+
+    def say(texts: list[str], voice: SyntheticVoice, _: Lexicon | None) -> Sayings:
+        for text in texts:
+            if text == "Bee":
+                yield synthesise([("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)])
+                continue
+            phones = [phone for word in split_words(text) for phone in Lexicon().pronunciations(word)[0]]
+            yield synthesise([(phone, 0.12) for phone in phones], pitch_hz=100 if voice.name == "low" else 200)
+
+    monkeypatch.setattr(module, "speak_sentences", say)
+
+
+@pytest.mark.usefixtures("spoken")
+def test_every_text_in_every_voice():
+    sentences = list(synthesise_sentences(TEXTS, VOICES))
+    assert [sentence.name for sentence in sentences] == [
+        "flite-low-001", "flite-low-002", "flite-high-001", "flite-high-002",
+    ]  # fmt: skip
+    assert [sentence.speaker for sentence in sentences] == ["anna", "anna", "bert", "bert"]
+    assert [s.name for s in synthesise_sentences(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
+
+
+@pytest.mark.usefixtures("spoken")
+def test_sentences_stand_between_pauses_over_a_faint_noise():
+    for sentence in synthesise_sentences(TEXTS, VOICES):
+        first, last = sentence.phones[0], sentence.phones[-1]
+        assert first.label == last.label == Unit("sil")
+        assert (first.start_s, first.end_s) == (0, 0.25)
+        assert last.end_s == pytest.approx(sentence.audio.duration_s)
+        assert last.duration_s == pytest.approx(0.25)
+        assert all(a.end_s == b.start_s for a, b in pairwise(sentence.phones))
+        loud = sentence.audio.samples[spoken_samples(sentence.audio)].std()
+        for part in (sentence.audio.samples[:4000], sentence.audio.samples[-4000:]):
+            assert 20 * np.log10(loud / part.std()) == pytest.approx(50, abs=0.6)
+
+
+@pytest.mark.usefixtures("spoken")
+def test_pauses_of_the_synthesiser_become_longer():
+    (sentence,) = synthesise_sentences(["Bee"], VOICES[:1])
+    assert [span.label.phone for span in sentence.phones] == ["sil", "b", "iy", "sil"]
+    assert [span.start_s for span in sentence.phones] == pytest.approx([0, 0.35, 0.45, 0.65])
+    assert sentence.phones[-1].end_s == pytest.approx(1.1)
+
+
+@pytest.mark.usefixtures("spoken")
+def test_the_same_again():
+    for one, other in zip(synthesise_sentences(TEXTS, VOICES), synthesise_sentences(TEXTS, VOICES), strict=True):
+        assert np.array_equal(one.audio.samples, other.audio.samples)
+        assert one.phones == other.phones
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("spoken")
+def test_texts_by_default_say_every_phone_of_the_dictionary():
+    sentences = list(synthesise_sentences(voices=VOICES[:1]))
+    said = {span.label.phone for sentence in sentences for span in sentence.phones}
+    assert len(sentences) == 60
+    assert {"er", "hh", "ng", "oy", "sh", "uh", "zh"} <= said
+    assert len(said) == 43  # 42 of the dictionary, and silence
+
+
+def test_without_voices_it_says_what_to_install():
+    with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
+        next(synthesise_sentences(TEXTS, ()))
+
+
+def test_sides_never_change():
+    named = {"slt": True, "espeak-f2": True, "espeak-m7": True, "kal": False, "awb": False, "rms": False}
+    assert {speaker: is_held_out_speaker(speaker) for speaker in named} == named
+
+
+def test_a_quarter_is_kept_aside():
+    assert np.mean([is_held_out_speaker(f"speaker {number}") for number in range(2000)]) == pytest.approx(
+        0.25, abs=0.03
+    )
+
+
+def write(path: Path, audio: Audio, text: str | None = None) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_sound(path, audio)
+    if text is not None:
+        path.with_suffix(".txt").write_text(text, encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def own(toy_model: Model) -> Any:
+    return recogniser_of(toy_model)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two recordings that can be used, and four that cannot."""
+    first, second, third = toy_sentences(3)
+    write(tmp_path / "anna" / "one.wav", first.audio, " ".join(first.words))
+    write(tmp_path / "two.wav", second.audio, " ".join(second.words).upper())
+    write(tmp_path / "unsaid.wav", third.audio)
+    write(tmp_path / "too long.wav", Audio(third.audio.samples[:6000], 16_000), " ".join(third.words * 4))
+    write(tmp_path / "unsayable.wav", third.audio, "猫")
+    (tmp_path / "broken.wav").write_bytes(b"RIFF nothing")
+    (tmp_path / "broken.txt").write_text("blue", encoding="utf-8")
+    return tmp_path
+
+
+def test_recordings_are_aligned(folder, own):
+    items: list[Item] = []
+    sentences = list(align_recordings(folder, own, monitor=items.append))  # type: ignore[arg-type]
+    assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "anna"), ("two", "two")]
+    for sentence, toy in zip(sentences, toy_sentences(3), strict=False):
+        assert [span.label for span in sentence.phones] == [span.label for span in toy.units]
+        late_s = [a.start_s - b.start_s for a, b in zip(sentence.phones, toy.units, strict=True)]
+        assert np.median(np.abs(late_s)) < 0.04  # the toy model is a crude one
+    assert sorted((item.name, item.outcome) for item in items) == [
+        ("broken", "skipped"),
+        ("too long", "skipped"),
+        ("unsayable", "skipped"),
+    ]
+
+
+def test_librispeech_is_read_as_it_is_distributed(tmp_path, own):
+    chapter = tmp_path / "LibriSpeech" / "dev-clean" / "84" / "121123"
+    sentences = toy_sentences(3)
+    for number, sentence in enumerate(sentences):
+        write(chapter / f"84-121123-{number:04d}.flac", sentence.audio)
+    lines = [f"84-121123-{number:04d} {' '.join(s.words).upper()}\n" for number, s in enumerate(sentences[:2])]
+    (chapter / "84-121123.trans.txt").write_text("".join(lines))
+    items: list[Item] = []
+    for folder in (tmp_path, chapter.parent):
+        spoken = list(align_recordings(folder, own, monitor=items.append))  # type: ignore[arg-type]
+        assert [each.speaker for each in spoken] == ["84", "84"]
+        for each, sentence in zip(spoken, sentences, strict=False):
+            assert [span.label for span in each.phones] == [span.label for span in sentence.units]
+    assert {item.reason for item in items} == {
+        f"{chapter / '84-121123.trans.txt'}: has no line of 84-121123-0002; required this name, a blank and its words"
+    }
+
+
+def test_labelled_phones_are_used_as_they_are(tmp_path, own):
+    sentence, *_ = toy_sentences(3)
+    write(tmp_path / "one.wav", sentence.audio)
+    write_labels(tmp_path / "one.TextGrid", sentence.units)
+    (spoken,) = align_recordings(tmp_path, own)
+    assert [span.start_s for span in spoken.phones] == pytest.approx([span.start_s for span in sentence.units])
+
+
+def test_a_transcript_of_other_words_is_detected(folder, own):
+    (folder / "two.txt").write_text("squash six fish chefs")
+    items: list[Item] = []
+    (sentence,) = align_recordings(folder, own, monitor=items.append)  # type: ignore[arg-type]
+    assert sentence.name == "anna-one"
+    (reason,) = (item.reason for item in items if item.name == "two")
+    assert re.search(r"agree with the sound at -\d+\.\d, required -4\.2 or more", reason)
+
+
+@pytest.mark.parametrize("name", ["nothing", ""])
+def test_a_folder_without_transcripts(tmp_path, own, toy_sentence, name):
+    write(tmp_path / "unsaid.wav", toy_sentence.audio)
+    with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
+        next(align_recordings(tmp_path / name, own))
+
+
+@pytest.mark.recordings
+def test_real_recordings(recordings, toy_model):
+    folder = recordings / "speech-open"
+    if not folder.is_dir():
+        pytest.skip("speech-open is not here")
+    items: list[Item] = []
+    general = recogniser_of(toy_model, "general")
+    sentences = list(align_recordings(folder, general, monitor=items.append))  # type: ignore[arg-type]
+    assert len(sentences) == 11
+    assert sorted(item.name for item in items) == ["13697_11991_000000", "common_voice_ja_24511055"]
+
+
+@pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
+def test_real_voices():
+    voices = installed_voices()[-1:]
+    if not voices:
+        pytest.skip("the synthesisers have no voices")
+    (sentence,) = synthesise_sentences(["My baby may be home."], voices)
+    closed = [span.label.phone for span in sentence.phones if span.label.phone in ("m", "b")]
+    assert closed == list("mbbmbm")
+    assert sentence.phones[0].duration_s >= 0.25
