@@ -6,8 +6,9 @@ import pytest
 
 from lipmotion import errors, types
 from lipmotion.engines import ENGINES, Engine, base, engine_named
-from lipmotion.testing.check_engine import ENGINE_CHECKS, SENTENCE, TrainedEngine
-from lipmotion.testing.examples import RATE_HZ, examples, speech, timeline
+from lipmotion.testing import ENGINE_CHECKS, TrainedEngine, examples, speech, timeline
+from lipmotion.testing.check_engine import SENTENCE
+from lipmotion.testing.examples import RATE_HZ
 
 SYSTEMS = {
     **{name: (name, {}) for name in sorted(ENGINES.names)},

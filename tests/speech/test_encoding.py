@@ -18,7 +18,7 @@ from lipmotion.speech.features.encoding import (
     shipped_encoder,
 )
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.testing.examples import example
+from lipmotion.testing import example
 from speech.made_voices import pulses, recording, vowels
 
 RATE_HZ = 16_000

@@ -3,12 +3,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
+from lipmotion.units import find_words
 from lipmotion.units.text_normalisation import (
     LONGEST_SENTENCE,
     LONGEST_WORD,
     MAX_CHARACTERS,
     clean_text,
-    find_words,
     split_sentences,
 )
 

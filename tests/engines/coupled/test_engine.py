@@ -16,7 +16,7 @@ from lipmotion.engines.coupled.explanation import (
     unit_posteriors,
 )
 from lipmotion.motion import generation
-from lipmotion.testing.examples import CHANNELS, examples, speech, timeline
+from lipmotion.testing import CHANNELS, examples, speech, timeline
 from oracles import coupled as oracle
 
 every = pytest.mark.parametrize(("kind", "sets", "limit"), [kind for kind in KINDS if kind[2] is not None])

@@ -7,7 +7,7 @@ import pytest
 from lipmotion import engines, errors, types
 from lipmotion.engines.joint.engine import JointEngine, JointModel
 from lipmotion.hmm.multistream.densities import StreamWeights
-from lipmotion.testing.examples import example, examples, speech, timeline
+from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.units import UNIT_SETS
 
 SOUND = speech(timeline(("t", "aa", "p", "iy", "m", "uw", "s", "aa")))

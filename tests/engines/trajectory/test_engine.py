@@ -8,11 +8,12 @@ import pytest
 from lipmotion import engines, errors, types
 from lipmotion.engines.trajectory.config import TrajectoryConfig
 from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, fit_trajectory
-from lipmotion.motion import closure, frame_labels
-from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
+from lipmotion.motion import closure, fit_acoustic_context, frame_labels
+from lipmotion.motion.context_window import OFFSETS, SCALE
 from lipmotion.motion.frame_labels import FullContextState, label_full_context
 from lipmotion.stats.trees import Question, Tree, fit_regression_node, fit_tree_regressions, ridge, zero_statistics
-from lipmotion.testing.examples import CHANNELS, OPENINGS, examples, speech, timeline
+from lipmotion.testing import CHANNELS, examples, speech, timeline
+from lipmotion.testing.examples import OPENINGS
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin, silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, load_unit_set
 

@@ -7,7 +7,7 @@ from lipmotion import errors, types
 from lipmotion.engines import engine_named
 from lipmotion.hmm.multistream import phone_recogniser as module
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.testing.examples import example, examples, speech, timeline
+from lipmotion.testing import example, examples, speech, timeline
 
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
 

@@ -19,7 +19,7 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training.coupled_training import _state_regressions, fit_coupled
 from lipmotion.stats.curves import with_dynamics
-from lipmotion.testing.examples import example, examples, speech, timeline
+from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
 from oracles import coupled as oracle
 

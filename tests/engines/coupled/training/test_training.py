@@ -13,7 +13,7 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training import alignment, coupled_training, em_steps
 from lipmotion.engines.coupled.training.chain_training import CONVERGENCE_GAIN, MixtureSchedule, growing_chains
-from lipmotion.testing.examples import examples
+from lipmotion.testing import examples
 from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit, silent_monitor
 from oracles import coupled as oracle
 

@@ -15,7 +15,8 @@ from lipmotion.engines.coupled.training import chain_training, em_steps
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.coupled_training import train_on_speech
 from lipmotion.stats.mixture import Mixtures
-from lipmotion.testing.examples import RATE_HZ, examples
+from lipmotion.testing import examples
+from lipmotion.testing.examples import RATE_HZ
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor
 from oracles.joint import mixture
 from oracles.paths import posteriors
