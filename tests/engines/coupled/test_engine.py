@@ -6,7 +6,6 @@ import pytest
 
 from engines.coupled.tiny import KINDS, chains, observations, structure
 from lipmotion import engines, types
-from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.explanation import (
     chain_states,
     explain_frames,
@@ -75,8 +74,8 @@ def test_posteriors_of_units_are_sums_over_their_states():
 
 
 def coupled_options(name):
-    kept = ("structure", "chains", "asynchrony")
-    return {key: value for key, value in SYSTEMS[name].items() if key in kept} | {"mixtures": 2}
+    config = engines.engine_from_settings(preset=name).config
+    return {key: getattr(config, key) for key in ("structure", "chains", "asynchrony")} | {"mixtures": 2}
 
 
 @cache

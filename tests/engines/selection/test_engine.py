@@ -13,7 +13,6 @@ from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import SEGMENT_S, target_of
 from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
 from lipmotion.testing import PHONES, example, examples, speech, timeline
-from lipmotion.testing.examples import OPENINGS
 from lipmotion.types import Generation, Span, Timeline, Unit, silent_monitor
 
 SPOKEN = speech(timeline(("b", "aa", "t", "iy", "m", "uw")))
@@ -193,7 +192,7 @@ def test_pruning_does_not_change_the_cost(model, engine, phones: list[str]) -> N
     assert select(costs, target).cost == pytest.approx(select(costs, target, prune=False).cost)
 
 
-LONGER = st.lists(st.sampled_from(tuple(OPENINGS)), min_size=2, max_size=8)
+LONGER = st.lists(st.sampled_from(PHONES), min_size=2, max_size=8)
 
 
 def laid_out(model, engine, units: types.Timeline):

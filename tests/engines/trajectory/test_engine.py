@@ -13,10 +13,10 @@ from lipmotion.motion.context_window import OFFSETS, SCALE
 from lipmotion.motion.frame_labels import FullContextState, label_full_context
 from lipmotion.stats.trees import Question, Tree, fit_regression_node, fit_tree_regressions, ridge, zero_statistics
 from lipmotion.testing import CHANNELS, examples, speech, timeline
-from lipmotion.testing.examples import OPENINGS
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin, silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, load_unit_set
 
+SHUT = 0.02  # of silence in the examples
 ENGINE = engines.engine_named("trajectory", {"silent_states": 7, "articulation": False})  # at rest from 0.24 s on
 
 
@@ -47,13 +47,13 @@ def test_the_mouth_rests_in_silence_and_does_not_learn_to_lick_the_lips_there():
     spoken = speech(timeline(("aa", "iy", "aa")))
     opening = ENGINE.generate(model(), spoken).motion["opening"]
     for rest in (opening[:25], opening[-25:]):
-        assert rest == pytest.approx(np.full(25, OPENINGS["sil"]), abs=2e-3)
+        assert rest == pytest.approx(np.full(25, SHUT), abs=2e-3)
         assert np.ptp(rest) < 2e-3
     restless = examples()
     for example in restless[:5]:
         example.motion.values[10:20, 0] += 0.2
     opening = ENGINE.generate(ENGINE.fit(restless, silent_monitor).model, spoken).motion["opening"]
-    assert opening[:25].max() < OPENINGS["sil"] + 0.01
+    assert opening[:25].max() < SHUT + 0.01
 
 
 def test_variance_is_smaller_near_a_pin_and_what_is_far_stays():
