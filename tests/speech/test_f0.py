@@ -25,7 +25,6 @@ from lipmotion.speech.features.speaker_similarity import (
 )
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.types import Audio
-from speech import f0_oracle
 from speech.mfcc_oracle import sample
 from testing.formant_synthesiser import PHONE_TARGETS, synthesise
 from testing.toy import toy_sentences
@@ -70,9 +69,9 @@ def test_correlations_are_their_slow_twin() -> None:
     assert f0.lags()[1::2].tolist() == list(range(10, 68))
     for n in (0, 5, 10):
         fast = f0.correlations(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
-        x = f0_oracle.frame(samples.astype(float), n)
-        silence = 1e-5 + f0_oracle.frication(samples.astype(float), n)
-        slow = [f0_oracle.correlation(x, int(lag), silence) for lag in f0.lags()[1::2]]
+        x = frame(samples.astype(float), n)
+        silence = 1e-5 + frication(samples.astype(float), n)
+        slow = [correlation(x, int(lag), silence) for lag in f0.lags()[1::2]]
         assert fast[1::2] == pytest.approx(slow, abs=1e-4)
 
 
