@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lipmotion import types
 from lipmotion.engines import engine_named
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion import generation as module
@@ -20,11 +21,18 @@ SPOKEN = speech(timeline(["sil", *(list(PHONES) * 30)[:40], "sil"]), seed=5)
 PINS = Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1)))
 
 
-@pytest.fixture
-def in_blocks(monkeypatch):
-    monkeypatch.setattr(module, "BLOCK_FRAMES", 97)
-    monkeypatch.setattr(module, "MARGIN_FRAMES", 250)
-    assert len(SPOKEN.features.values) > 3 * 97
+BEFORE = 5750
+"""Frames of silence after which the sentence lies on the border of two blocks."""
+
+
+def delayed():
+    """Return the sentence and its pins after as much silence that it lies in two blocks."""
+    assert BEFORE < module.BLOCK_FRAMES < BEFORE + 330
+    units = types.Timeline((types.Span(0.0, BEFORE / 100, types.Unit("sil")), *SPOKEN.units.shifted(BEFORE / 100)))
+    late = speech(units)
+    values = np.concatenate([late.features.values[:BEFORE], SPOKEN.features.values])
+    pins = Constraints(tuple(replace(pin, time_s=pin.time_s + BEFORE / 100) for pin in PINS.pins))
+    return replace(late, features=replace(late.features, values=values)), pins
 
 
 def around(taps):
@@ -40,22 +48,14 @@ def whole():
     return ENGINE.generate(MODEL, SPOKEN, PINS)
 
 
-@pytest.mark.usefixtures("in_blocks")
 def test_blocks_change_nothing(whole):
-    pieces = ENGINE.generate(MODEL, SPOKEN, PINS)
-    assert pieces.motion.values == pytest.approx(whole.motion.values, abs=1e-7)  # a regression of single precision
-    assert pieces.variance == pytest.approx(whole.variance, abs=1e-9)
-    assert np.array_equal(pieces.trace.frames, whole.trace.frames)
-    assert pieces.motion["opening"][330] == 0.2
-
-
-def test_a_long_recording_is_kept_in_single_precision(whole, monkeypatch):
-    monkeypatch.setattr(module, "DOUBLE_FRAMES", 10)
-    single = ENGINE.generate(MODEL, SPOKEN, PINS)
-    assert single.motion.values.dtype == single.variance.dtype == np.float32
-    assert single.motion.values == pytest.approx(whole.motion.values, abs=1e-5)
-    assert single.variance == pytest.approx(whole.variance, abs=1e-6)
-    assert single.spread.reduced.shape == (len(SPOKEN.features.values), MODEL.space.dimensions)
+    pieces, away = ENGINE.generate(MODEL, *delayed()), slice(100, None)
+    moved = pieces.motion.values[BEFORE:]
+    assert moved[away] == pytest.approx(whole.motion.values[away], abs=1e-7)  # a regression of single precision
+    assert pieces.variance[BEFORE:][away] == pytest.approx(whole.variance[away], abs=1e-9)
+    assert pieces.motion["opening"][BEFORE + 330] == 0.2
+    names = [[each.trace.states[state] for state in each.trace.frames] for each in (pieces, whole)]
+    assert names[0][BEFORE:][away] == names[1][away]
 
 
 def test_the_filter_is_weaker_for_voices_that_are_less_known():
@@ -71,7 +71,7 @@ def test_the_filter_is_weaker_for_voices_that_are_less_known():
     assert np.abs(unknown).sum(axis=0) == pytest.approx(1)
 
 
-def test_the_modulation_filter_keeps_pins_closures_and_blocks(request, whole):
+def test_the_modulation_filter_keeps_pins_closures_and_blocks(whole):
     model = replace(MODEL, modulation=around([-0.5, 0, 0, 2.0, 0, 0, -0.5]))  # sharpens
     filtered, plain = ENGINE.generate(model, SPOKEN, PINS).motion["opening"], whole.motion["opening"]
     assert np.abs(np.diff(filtered, 3)).mean() > 1.5 * np.abs(np.diff(plain, 3)).mean()
@@ -81,8 +81,9 @@ def test_the_modulation_filter_keeps_pins_closures_and_blocks(request, whole):
     assert len(ranges) > 5
     for each in ranges:
         assert filtered[each].min() <= plain[each].min()
-    request.getfixturevalue("in_blocks")
-    assert ENGINE.generate(model, SPOKEN, PINS).motion["opening"] == pytest.approx(filtered, abs=1e-7)
+    assert ENGINE.generate(model, *delayed()).motion["opening"][BEFORE + 100 :] == pytest.approx(
+        filtered[100:], abs=1e-7
+    )
 
 
 OPTIONS = {"articulation": False, "states": 3, "silent_states": 7, "components": 2, "acoustic_components": 20}
