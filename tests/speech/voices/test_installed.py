@@ -13,7 +13,7 @@ from lipmotion import Model, errors
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
-from lipmotion.speech.voices import espeak_events, installed, synthesiser
+from lipmotion.speech.voices import installed, synthesiser
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 
 FAKED = [
@@ -148,12 +148,6 @@ def test_flite_begins_again_at_each_utterance() -> None:
     phones = installed.parse_phone_ends("pau:0.2 ay:0.5 \npau:0.1 y:0.3 \n")
     found = [(span.label, span.start_s, span.end_s) for span in phones]
     assert found == [("pau", 0, 0.2), ("ay", 0.2, 0.5), ("pau", 0.5, 0.6), ("y", 0.6, 0.8)]
-
-
-def test_without_the_library_the_program_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(espeak_events, "LIBRARIES", ("libnothing.so.0",))
-    with pytest.raises(SystemExit, match=r"libnothing.so.0 is installed; apt install libespeak-ng1"):
-        espeak_events._library("")
 
 
 @pytest.fixture(params=sorted(installed.SYNTHESISERS))
