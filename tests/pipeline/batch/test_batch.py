@@ -405,8 +405,7 @@ def test_a_training_on_a_cluster_is_that_of_one_process(cluster, toy_corpus, tmp
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
-def test_no_cluster_answers(sounds, settings, tmp_path, monkeypatch):
+def test_no_cluster_answers(sounds, settings, tmp_path):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("lipmotion.pipeline.workers.CONNECT_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         batch(sounds, tmp_path / "out", settings, cluster="tcp://127.0.0.1:9")

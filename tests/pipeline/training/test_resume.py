@@ -13,11 +13,9 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.training import em_steps
 from lipmotion.errors import CorpusError, MissingDependencyError
 from lipmotion.formats.label_files import write_labels
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.hmm.multistream import multistream_training
 from lipmotion.pipeline import workers
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
@@ -27,7 +25,6 @@ from lipmotion.pipeline.training.other_speakers import align_recordings, is_held
 from lipmotion.speech.sound.acoustic_conditions import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.stats import em
 from lipmotion.types import Audio, Item, Monitor, Progress, Timeline, Unit, silent_monitor
 from lipmotion.units import Lexicon, split_words
 from pipeline.made import recogniser_of, write_sound
@@ -124,26 +121,6 @@ def test_stopped_again_and_again(corpus, whole, work, tmp_path):
             assert stops < 50
     assert stops > 1
     assert content(model, tmp_path) == whole
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "options"), [("joint", {}), ("coupled", {"chains": "sVis 2vis", "mixtures": 1})])
-def test_finished_shards_are_not_summed_again(corpus, work, tmp_path, monkeypatch, name, options):
-    """The E-steps of a training that is stopped are found again, under what their models and data are."""
-    monkeypatch.setattr(em, "SAVE_S", 0.0)
-    engine, computed = engine_named(name, options), []
-    for module, function in ((multistream_training, "_shard_sums"), (em_steps, "_shard_sums")):
-        usual = getattr(module, function)
-        monkeypatch.setattr(module, function, lambda job, usual=usual: (computed.append(1), usual(job))[1])
-    whole = content(train(corpus, recogniser=CONFIG, engine=engine)[0], tmp_path)
-    count = len(computed)
-    assert count > 3
-    stop = next(i for i, e in enumerate(create_events(corpus)) if getattr(e, "share", 0) > 0.6) + 3
-    with pytest.raises(Stopped):
-        train(corpus, recogniser=CONFIG, engine=engine, run=Run(work=work, monitor=stopping_after(stop)))
-    computed.clear()
-    assert content(train(corpus, recogniser=CONFIG, engine=engine, run=Run(work=work))[0], tmp_path) == whole
-    assert 0 < len(computed) < count
 
 
 @pytest.mark.long
