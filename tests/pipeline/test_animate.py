@@ -31,9 +31,9 @@ from lipmotion.errors import InputError
 from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.request import locate_paths
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Constraints, Generation, Motion, Pin, Span, Timeline, Unit
 from lipmotion.units import Lexicon
+from pipeline.made import read_sound
 from testing.toy import ToySentence, toy_motion
 
 Animate = Callable[..., Generation]
@@ -84,7 +84,7 @@ def test_the_lips_move_as_the_speakers_did(move, toy_sentence, transcript):
 def test_a_file_its_name_and_its_samples_are_the_same(toy_model, toy_speech):
     first, second, third = (
         animate(speech, model=toy_model).motion.values
-        for speech in (toy_speech, str(toy_speech), read_audio(toy_speech))
+        for speech in (toy_speech, str(toy_speech), read_sound(toy_speech))
     )
     assert np.array_equal(first, second)
     assert np.array_equal(first, third)
@@ -354,7 +354,7 @@ def test_a_job_of_a_sound_writes_it(toy_sentence, toy_model_file, tmp_path):
     request = Request(toy_sentence.audio, units=toy_sentence.units, model=toy_model_file)
     files = (str(tmp_path / "a.wav"), str(tmp_path / "a.csv"))
     made = Job(request, Outputs(files)).run()
-    assert len(read_audio(tmp_path / "a.wav").samples) == len(toy_sentence.audio.samples)
+    assert len(read_sound(tmp_path / "a.wav").samples) == len(toy_sentence.audio.samples)
     np.testing.assert_array_equal(made.motion.values, animate(request).motion.values)
 
 

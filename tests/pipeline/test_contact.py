@@ -22,13 +22,13 @@ from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curv
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
-from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.head.stage import figure, head_mesh, lip_gap
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 from meshes.heads import VISEMES, head, lip_points, renamed, write_glb, write_obj
 from meshes.speech import motion, units
+from pipeline.made import read_character
 
 Mask = NDArray[np.bool_]
 Reader = Callable[[Generation, float], Mask]
@@ -89,8 +89,8 @@ def characters(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     write_obj(folder / "points.obj", plain)
     rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
     (folder / "points.csv").write_text("point,vertex\n" + rows)
-    found = {name: load_character(folder / f"{name}.glb") for name in ("arkit", "visemes", "vowels")}
-    found["points"] = load_character(folder / "points.obj", points=folder / "points.csv")
+    found = {name: read_character(folder / f"{name}.glb") for name in ("arkit", "visemes", "vowels")}
+    found["points"] = read_character(folder / "points.obj", points=folder / "points.csv")
     return found
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from lipmotion import Delivery, Request, animate, cues, read_motion, speak, write
 from lipmotion.articulation.delivery import find_closed_times
-from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
@@ -25,11 +24,10 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, read_generation, thin_keys
 from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
-from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
 from lipmotion_faces.characters.calibration import POSES, calibrate_rows, pose_sources
-from lipmotion_faces.characters.character_files import load_character
 from meshes.heads import head, write_glb
+from pipeline.made import in_mood, read_character
 from speech import stand_in_voice
 
 TAKE = Path("a.livelink.csv")
@@ -138,9 +136,7 @@ def test_formats_of_the_mouth_do_not_depend_on_curves(generation, tmp_path, name
 def test_controls_of_a_rig_follow_brows_in_every_mood(generation, tmp_path):
     table = tmp_path / "rig.csv"
     table.write_text("control,source\nfrown,browDownLeft\ncheek,cheekSquintRight\n")
-    plain, angry = (
-        make_curves(with_moods(generation.motion, parse_moods(mood)), generation.units, table) for mood in ("", "angry")
-    )
+    plain, angry = (make_curves(in_mood(generation.motion, mood), generation.units, table) for mood in ("", "angry"))
     assert not plain["frown"].any()
     assert angry["frown"].min() > 0.5
     assert not angry["cheek"].any()
@@ -175,10 +171,10 @@ STATED = {"open": {"jawOpen": 0.6}, "closed": {"jawOpen": 0.05}, "rounded": {"mo
 
 def test_a_character_has_the_stated_weights(tmp_path):
     write_glb(tmp_path / "head.glb", head())
-    before = load_character(tmp_path / "head.glb")
+    before = read_character(tmp_path / "head.glb")
     rows = calibrate_rows(before.table_rows(), pose_sources(before, before.table_rows()), STATED)
     write_rig_table(before.table_file, rows)
-    after = load_character(tmp_path / "head.glb")
+    after = read_character(tmp_path / "head.glb")
     posed = {row.control: _values(after.table_rows(), pose_sources(after, rows), row.control) for row in rows}
     assert posed["jawOpen"][:2] == pytest.approx([0.6, 0.05], abs=1e-3)
     assert posed["mouthPucker"][2] == pytest.approx(0.9, abs=1e-3)

@@ -27,11 +27,10 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.generate.explain import chain_posteriors
 from lipmotion.pipeline.request import Onto
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
 from pipeline import made
-from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
+from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people, read_sound
 from robustness.case import changed_model, npy
 from testing.toy import SMALL, ToySentence, toy_motion, toy_utterances
 
@@ -370,7 +369,7 @@ def test_onto_a_real_person(recordings):
 
     video = recordings / "grid-others" / "brbk7n.mpg"
     rest = np.median(track(video, crops=False).motion["opening"][:8])
-    sound = read_audio(video)  # after a second of its room: before speech the mouth opens
+    sound = read_sound(video)  # after a second of its room: before speech the mouth opens
     audio = Audio(np.concatenate([np.resize(sound.samples[:1600], sound.rate_hz), sound.samples]), sound.rate_hz)
     own, mapped = (
         lipmotion.animate(Request(audio, onto=onto, pauses="natural")).motion["opening"] for onto in (None, video)

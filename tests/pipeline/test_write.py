@@ -38,11 +38,11 @@ from lipmotion.types import Audio, Generation, Prosody, Timeline
 from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
-from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
 from lipmotion_faces.outputs.scenes import SceneOutput, delivered_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
+from pipeline.made import performed, read_character
 from speech.made_voices import laugh, pulses, recording, said, vowels
 from testing.toy import toy_sentences
 
@@ -273,15 +273,13 @@ def test_files_say_when_the_sound_begins(generation, offset_ms, toy_speech, tmp_
     write(generation, paths, speech=toy_speech, delivery=delivery, curves="arkit", channels=["jawOpen"])
     assert json.loads(paths[0].read_text())["source"] == {"file": toy_speech.name, "start_s": f"{offset_ms / 1000:g}"}
     assert f"SOUND_S = {offset_ms / 1000!r}\n" in paths[1].read_text()
-    scene = delivered_scene(
-        Performance(generation, OutputSettings(shown_face("head"), outputs=Outputs(rate_hz=12.0), delivery=delivery))
-    )
+    scene = delivered_scene(performed(generation, "head", outputs=Outputs(rate_hz=12.0), delivery=delivery))
     assert scene.sound_s == pytest.approx(offset_ms / 1000)
 
 
 def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(generation, tmp_path):
     write_glb(tmp_path / "head.glb", head())
-    character = load_character(tmp_path / "head.glb")
+    character = read_character(tmp_path / "head.glb")
     larger = Delivery(intensity=2)
     both = with_curves(generation, "arkit")[0]
     before, after = both.motion["jawOpen"], deliver_to_face(both, larger, 25.0, character).motion["jawOpen"]

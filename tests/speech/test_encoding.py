@@ -17,8 +17,8 @@ from lipmotion.speech.features.encoding import (
     log_mel_spectrum,
     shipped_encoder,
 )
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing import example
+from pipeline.made import read_welcome
 from speech.made_voices import pulses, recording, vowels
 
 RATE_HZ = 16_000
@@ -47,7 +47,7 @@ def test_the_forward_pass_is_that_of_the_network() -> None:
     Smart Turn v3.2, output of the first normalisation of the third layer, every 20th row from the fifth on, its first
     eight components. With activations of eight bits, as the file has them, rows differ by a fifth of their deviation.
     """
-    samples = read_audio(WELCOME).samples
+    samples = read_welcome().samples
     padded = np.pad(samples, (0, 8 * RATE_HZ + mfcc.WINDOW - mfcc.HOP - len(samples)))
     rows = encode_window(log_mel_spectrum(padded.astype(np.float32))[:800], shipped_encoder())
     expected = np.loadtxt(Path(__file__).with_name("encoder_reference.csv"), delimiter=",")

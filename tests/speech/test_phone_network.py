@@ -1,7 +1,6 @@
 import sys
 from collections.abc import Sequence
 from importlib import metadata
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -10,17 +9,14 @@ from numpy.typing import NDArray
 
 from lipmotion import errors, load_model, types, units
 from lipmotion.hmm.network import wrap_log_likelihoods
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network import beam_search, posteriors
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.word_search import phones_without_words, spoken_items
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.units.phones import count_phone_edits
+from pipeline.made import read_sound, read_welcome, recogniser_of
 
 TOKENS = ("b", "p", "iː", "uː", "l", "ŋ", "t", "͡", "ʃ", posteriors.WORD_BOUNDARY, posteriors.BLANK)
-WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 
 def said(*tokens: str, sure: float = 0.9) -> posteriors.PhonePosteriors:
@@ -85,7 +81,7 @@ def test_nothing_is_said_in_blanks() -> None:
 
 @pytest.mark.parametrize("frames", [5, 40, 41])
 def test_posteriors_draw_phones_that_models_do_not_tell_apart(frames: int) -> None:
-    recogniser = Recogniser(load_model().phones, "fast")
+    recogniser = recogniser_of(load_model(), "fast")
     hmm = recogniser.combined.hmm
     same = wrap_log_likelihoods(np.zeros((60, len(hmm.table.names)), np.float32))
     rows = said(*["b"] * 7, sure=0.99)
@@ -150,7 +146,7 @@ def noise_after_silence(seconds: float) -> types.Audio:
 
 
 def test_a_recording_has_posteriors_throughout(loud: str) -> None:
-    audio = analysed(noise_after_silence(3.0))
+    audio = read_sound(noise_after_silence(3.0))
     stretches = posteriors.posterior_stretches(loud, audio)
     whole = posteriors.recording_posteriors(loud, audio)
     assert len(whole.values) == -(-len(audio.log_energy) // 2)
@@ -164,7 +160,7 @@ def test_a_recording_has_posteriors_throughout(loud: str) -> None:
 
 
 def test_a_long_recording_is_cut(loud: str) -> None:
-    found = posteriors.posterior_stretches(loud, analysed(noise_after_silence(50.0)))
+    found = posteriors.posterior_stretches(loud, read_sound(noise_after_silence(50.0)))
     assert len(found) > 2
     assert max(each.stretch.end - each.stretch.first for each in found) <= 2000
 
@@ -179,12 +175,12 @@ def test_a_recogniser_that_is_not_installed_or_is_none_is_refused() -> None:
 
 @pytest.mark.skipif(not posteriors.Hama.is_installed(), reason="hama has no library here")
 def test_unsure_posteriors_leave_phones_to_the_models(monkeypatch: pytest.MonkeyPatch) -> None:
-    noisy = analysed(noisy_audio(read_audio(WELCOME), "white", -5))
-    found = Recogniser(load_model().phones).recognition(noisy, noisy.mfcc())
+    noisy = read_sound(noisy_audio(read_welcome(), "white", -5))
+    found = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
     monkeypatch.setitem(sys.modules, "hama", None)
     posteriors.installed_phone_recogniser.cache_clear()
     try:
-        alone = Recogniser(load_model().phones).recognition(noisy, noisy.mfcc())
+        alone = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
     finally:
         posteriors.installed_phone_recogniser.cache_clear()
     assert found.units == alone.units
@@ -193,8 +189,8 @@ def test_unsure_posteriors_leave_phones_to_the_models(monkeypatch: pytest.Monkey
 
 @pytest.mark.skipif(not posteriors.Hama.is_installed(), reason="hama has no library here")
 def test_the_welcome_is_understood() -> None:
-    audio = read_audio(WELCOME)
-    found = Recogniser(load_model().phones).recognition(audio, analysed(audio).mfcc())
+    audio = read_welcome()
+    found = recogniser_of(load_model(), "auto").recognition(audio, audio.mfcc())
     assert [span.label.text for span in found.words][:7] == "please speak and my lips will move".split()
     assert found.confidence is not None
     assert found.confidence > 0.6

@@ -11,7 +11,6 @@ from scipy.signal import butter, lfilter
 from lipmotion import Model, errors, load_model, types
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.pipeline.training.train import train_phone_models
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition import adaptation, recogniser
 from lipmotion.speech.recognition import recogniser as module
 from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
@@ -26,12 +25,12 @@ from lipmotion.speech.recognition.recognised_speech import (
     spliced,
 )
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.stats.constrained_mllr import log_determinant
 from lipmotion.types import Audio, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
 from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
+from pipeline.made import features_of, read_sound
 from testing.formant_synthesiser import synthesise
 from testing.toy import WORDS, ToySentence, toy_sentences
 
@@ -47,13 +46,13 @@ def hmm(toy_model: Model) -> UnitHmm:
 
 
 def align(hmm: UnitHmm, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: str = "own") -> Timeline[Unit]:
-    heard = analysed(audio)
-    return recogniser.Recogniser(hmm, kind).align(heard, heard.mfcc(), words, lexicon)
+    sound = read_sound(audio)
+    return recogniser.Recogniser(hmm, kind).align(sound, sound.mfcc(), words, lexicon)
 
 
 def recognise(hmm: UnitHmm, audio: Audio, kind: str = "own") -> Timeline[Unit]:
-    heard = analysed(audio)
-    return recogniser.Recogniser(hmm, kind).recognise(heard, heard.mfcc())
+    sound = read_sound(audio)
+    return recogniser.Recogniser(hmm, kind).recognise(sound, sound.mfcc())
 
 
 def phones(units: Timeline[Unit]) -> list[str]:
@@ -161,7 +160,7 @@ def test_words_of_real_recordings_are_found_where_others_found_them(recordings: 
     for name in (grid / "test.txt").read_text().split()[::4][:12]:
         rows = [line.split() for line in (grid / "align" / f"{name}.align").read_text().splitlines()]
         words = [(int(start) / 25_000, word) for start, _, word in rows if word not in (SILENCE, PAUSE)]
-        audio = read_audio(grid / "clips" / f"{name}.mkv")
+        audio = read_sound(grid / "clips" / f"{name}.mkv")
         found = align(load_model().phones, audio, [word for _, word in words], Lexicon(), "auto")
         spoken = groupby((span for span in found if span.label.word), key=lambda span: span.label.word)
         starts_s = [next(spans).start_s for _, spans in spoken]
@@ -189,7 +188,7 @@ def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: li
     assert aligned == align(hmm, said.audio, said.words, lexicon, "general")
     assert aligned != align(hmm, said.audio, said.words, lexicon, "own")
     found = recognise(hmm, said.audio, "auto")
-    again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, analysed(said.audio).mfcc(), found)
+    again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, features_of(said.audio), found)
     assert phones(found) == phones(again)
     assert [span.start_s for span in found] == pytest.approx([span.start_s for span in again], abs=0.011)
 
@@ -201,7 +200,7 @@ def test_speakers_and_words_beyond_all_training(recordings: Path) -> None:
     for kind in ("own", "auto"):
         right = count = 0
         for name in ("61-70968-0000.flac", "sense_and_sensibility_01_austen_64kb-0880.wav"):
-            audio = read_audio(recordings / "speech-open" / name)
+            audio = read_sound(recordings / "speech-open" / name)
             text = (recordings / "speech-open" / name).with_suffix(".txt" if name.endswith("wav") else ".lab")
             spoken = phones(align(load_model().phones, audio, split_words(text.read_text()), Lexicon(), "general"))
             matcher = SequenceMatcher(None, spoken, phones(recognise(load_model().phones, audio, kind)), autojunk=False)
@@ -352,13 +351,13 @@ def some() -> adaptation.Adaptation:
 
 
 def test_own_features_are_warped_then_transformed_and_general_ones_stream_by_stream(audio: types.Audio) -> None:
-    heard, nothing, one = analysed(audio), adaptation.identity_adaptation(1.0, 0.5), some()
-    plain = heard.general_features
-    assert np.array_equal(nothing.own_features(heard), heard.mfcc().values)
-    assert np.array_equal(nothing.general_features(heard), plain)
-    expected = heard.mfcc(1.06).values @ one.own[:, :-1].T + one.own[:, -1]
-    np.testing.assert_allclose(one.own_features(heard), expected, rtol=1e-4, atol=1e-3)
-    found = one.general_features(heard)
+    sound, nothing, one = read_sound(audio), adaptation.identity_adaptation(1.0, 0.5), some()
+    plain = sound.general_features
+    assert np.array_equal(nothing.own_features(sound), sound.mfcc().values)
+    assert np.array_equal(nothing.general_features(sound), plain)
+    expected = sound.mfcc(1.06).values @ one.own[:, :-1].T + one.own[:, -1]
+    np.testing.assert_allclose(one.own_features(sound), expected, rtol=1e-4, atol=1e-3)
+    found = one.general_features(sound)
     for number, transform in enumerate(one.general):
         columns = slice(13 * number, 13 * number + 13)
         expected = plain[:, columns] @ transform[:, :-1].T + transform[:, -1]
@@ -387,11 +386,6 @@ def test_arrays_and_back_and_damaged_arrays() -> None:
             adaptation.adaptation_from_arrays(arrays)
 
 
-def test_a_warp_of_one_takes_the_features_that_are_known(audio: types.Audio) -> None:
-    features, one = replace(analysed(audio).mfcc(), values=np.ones((300, 39), np.float32)), replace(some(), warp=1.0)
-    np.testing.assert_allclose(one.own_features(analysed(audio, features))[7], one.own.sum(axis=1), rtol=1e-4)
-
-
 @pytest.fixture(scope="module")
 def voice() -> list[types.Audio]:
     """Not those that the toy model was trained on, but of the same voice."""
@@ -409,7 +403,7 @@ def through_a_telephone(audio: types.Audio) -> types.Audio:
 
 
 def fit(model: Model, found: EstimatedAdaptation, audio: types.Audio) -> float:
-    adapted = found.adaptation.own_features(analysed(audio))
+    adapted = found.adaptation.own_features(read_sound(audio))
     return model.phones.fit(adapted) + log_determinant(found.adaptation.own)
 
 
@@ -422,8 +416,8 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
     assert 0.3 < same_speaker.speech_s / sum(audio.duration_s for audio in voice) < 1
     before, after = (Recogniser(toy_model.phones, "own", how) for how in (None, one))
     for audio in voice:
-        features = analysed(audio).mfcc()
-        changed = one.own_features(analysed(audio)) - features.values
+        features = features_of(audio)
+        changed = one.own_features(read_sound(audio)) - features.values
         assert np.sqrt(np.square(changed).mean()) < 0.5
         first, then = ([s.label.phone for s in recogniser.recognise(audio, features)] for recogniser in (before, after))
         assert count_phone_edits(first, then) <= 2
@@ -433,7 +427,7 @@ def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voic
     """By features of a short recording that move apart from their deltas and these from theirs."""
     one, other = (through_a_telephone(audio) for audio in voice[:2])
     found = estimate_adaptation(toy_model.phones, [other])
-    plain = toy_model.phones.fit(analysed(one).mfcc(found.adaptation.warp).values)
+    plain = toy_model.phones.fit(read_sound(one).mfcc(found.adaptation.warp).values)
     assert fit(toy_model, found, one) > plain + 0.5
     block, own = np.arange(39) // 13, found.adaptation.own[:, :-1]
     between = block[:, None] != block

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 
 from lipmotion import errors, load_model
-from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition import recognised_speech, recogniser, word_search
+from lipmotion.speech.recognition import recognised_speech, word_search
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent
+from pipeline.made import read_sound, read_welcome, recogniser_of
 
-WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SAID = "please speak and my lips will move five big blue boats float by".split()
 
 
@@ -30,17 +28,17 @@ def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None
 
 @pytest.fixture(scope="module")
 def welcome() -> Audio:
-    return read_audio(WELCOME)
+    return read_welcome()
 
 
 def recognition(audio: Audio, kind: str = "auto") -> recognised_speech.Recognition:
-    return recogniser.Recogniser(load_model().phones, kind).recognition(audio, analysed(audio).mfcc())
+    return recogniser_of(load_model(), kind).recognition(audio, read_sound(audio).mfcc())
 
 
 @cache
 def of_welcome(kind: str) -> recognised_speech.Recognition:
     """Return what is recognised in the welcome, as it is."""
-    return recognition(read_audio(WELCOME), kind)
+    return recognition(read_welcome(), kind)
 
 
 def texts(found: recognised_speech.Recognition) -> list[str]:
@@ -48,7 +46,7 @@ def texts(found: recognised_speech.Recognition) -> list[str]:
 
 
 def test_words_decide_the_phones_of_english(welcome: Audio) -> None:
-    aligned = recogniser.Recogniser(load_model().phones).align(welcome, analysed(welcome).mfcc(), SAID, Lexicon())
+    aligned = recogniser_of(load_model(), "auto").align(welcome, read_sound(welcome).mfcc(), SAID, Lexicon())
     for found in (of_welcome("auto"), of_welcome("words")):
         assert texts(found) == SAID
         assert found.word_s > 9 * found.phone_s
@@ -110,13 +108,13 @@ def test_a_voice_and_words_that_the_model_knows_are_left_to_its_phones(recording
     """The speaker and the words of the training: no language model of English expects "bin blue at f two now"."""
     grid = recordings / "grid-s1"
     for name in (grid / "val.txt").read_text().split()[:2]:
-        audio = read_audio(grid / "clips" / f"{name}.mkv")
+        audio = read_sound(grid / "clips" / f"{name}.mkv")
         assert recognition(audio).units == recognition(audio, "fast").units
 
 
 @pytest.mark.recordings
 def test_strangers_are_understood_better_with_words(recordings: Path) -> None:
-    audio = read_audio(recordings / "speech-open" / "61-70968-0000.flac")
+    audio = read_sound(recordings / "speech-open" / "61-70968-0000.flac")
     said = (recordings / "speech-open" / "61-70968-0000.lab").read_text().lower().split()
     assert len(set(texts(recognition(audio))) & set(said)) > 0.7 * len(set(said))
 
@@ -124,14 +122,14 @@ def test_strangers_are_understood_better_with_words(recordings: Path) -> None:
 @pytest.mark.recordings
 def test_other_languages_have_no_confident_words(recordings: Path) -> None:
     confidence = recognition(
-        read_audio(recordings / "speech-open" / "common_voice_ja_24511055.mp3"), "words"
+        read_sound(recordings / "speech-open" / "common_voice_ja_24511055.mp3"), "words"
     ).confidence
     assert confidence is not None
     assert confidence < 0.35
 
 
 def test_words_of_a_sentence() -> None:
-    audio = read_audio(WELCOME)
+    audio = read_welcome()
     words = word_search.words_in(stretch_samples(audio, Stretch(0, len(audio.samples) // 160)))
     found = [word.text for word in words]
     assert all(0 <= word.posterior <= 1 for word in words)
@@ -153,7 +151,7 @@ def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers
 
 
 def test_one_recording_does_not_change_the_next() -> None:
-    audio = read_audio(WELCOME)
+    audio = read_welcome()
     samples = stretch_samples(audio, Stretch(0, 120))
     noise = np.random.default_rng(0).normal(0, 9000, 8_000).astype("<i2").tobytes()
     first = word_search.words_in(samples)

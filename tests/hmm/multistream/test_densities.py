@@ -135,14 +135,14 @@ def test_motion_is_unknown_beside_frames_that_were_not_measured():
 
 
 def test_what_does_not_fit_is_refused():
-    for given in (
+    for odd in (
         {"log_f0": np.zeros(4)},
         {"log_f0": np.full(5, np.inf)},
         {"motion": np.full((5, 2), NAN)},
         {"motion": np.zeros((5, 2)), "measured": np.ones(4, bool)},
     ):
         with pytest.raises(InputError):
-            stream_observations(np.zeros((5, 3)), **given)
+            stream_observations(np.zeros((5, 3)), **odd)
     with pytest.raises(InputError, match="required speech"):
         StreamObservations({"motion": ObservedStream(np.zeros((3, 3)), np.ones(3, bool))})
     for weight in (-0.1, NAN, float("inf")):

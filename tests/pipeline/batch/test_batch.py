@@ -20,13 +20,13 @@ from lipmotion import Delivery, Job, Outputs, Request, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.formats import motion_suffixes
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finish_line
 from lipmotion.pipeline.workers import WorkerDiedError
 from lipmotion.types import Item
+from testing.toy import SMALL
 
 
 @pytest.fixture
@@ -390,7 +390,7 @@ def test_a_worker_of_a_cluster_is_killed(cluster, toy_speech, settings, tmp_path
 def test_a_training_on_a_cluster_is_that_of_one_process(cluster, toy_corpus, tmp_path):
     """Also where a worker dies on the way."""
     address, processes = cluster
-    how = {"engine": engine_named("joint", {}), "recogniser": HmmConfig(mixtures=1, iterations=1)}
+    how = {"engine": engine_named("joint", {}), "recogniser": replace(SMALL, iterations=1)}
 
     def kill_one(event: object) -> None:
         if getattr(event, "stage", "").endswith("contexts"):

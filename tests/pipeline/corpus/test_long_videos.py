@@ -13,7 +13,6 @@ import pytest
 from lipmotion import Corpus, prepare
 from lipmotion.errors import CorpusError
 from lipmotion.measures.curves import best_offset
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import (
     Audio,
     Channel,
@@ -44,7 +43,7 @@ from lipmotion_faces.corpus.sync import clip_scores, offsets, sync
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.video_scan import VideoScan
-from pipeline.made import features_of, replace_tracking
+from pipeline.made import features_of, read_sound, replace_tracking
 
 RATE = 16_000
 SENTENCES = [(1.0 + 4.5 * n, 4.0 + 4.5 * n) for n in range(10)]
@@ -126,7 +125,7 @@ def test_a_long_video_is_divided_at_its_pauses(talk, tmp_path):
     assert report.prepared[0] == "talk-00h00m00.68s"
     assert report.kind.endswith(", divided into utterances")
     corpus = Corpus.open(tmp_path / "corpus")
-    samples = read_audio(talk).samples
+    samples = read_sound(talk).samples
     for name, (start_s, end_s) in zip(report.prepared, SENTENCES, strict=True):
         found = corpus.utterance(name)
         first_s, last_s = float(found.source["start_s"]), float(found.source["end_s"])
@@ -237,7 +236,7 @@ def joined(clips: list[Path], path: Path) -> None:
 
     images, samples = [], np.zeros(3 * RATE * len(clips))
     for number, clip in enumerate(clips):
-        frames, sound = frames_of(clip)[:75], read_audio(clip).samples[: 3 * RATE]
+        frames, sound = frames_of(clip)[:75], read_sound(clip).samples[: 3 * RATE]
         images += frames + frames[-1:] * (75 - len(frames))
         samples[3 * RATE * number :][: len(sound)] = sound
     write_video(path, images, (360, 288), samples, crf="8")
@@ -488,7 +487,7 @@ def test_other_speakers_on_video(recordings, tmp_path, late_s):
     pytest.importorskip("mediapipe")
     corpus = Corpus.create(tmp_path / "corpus")
     for path in sorted((recordings / "grid-others").glob("*.mpg")):
-        sound = read_audio(path).samples
+        sound = read_sound(path).samples
         shift = round(late_s * RATE_HZ)
         sound = np.pad(sound, (shift, 0), mode="reflect") if shift > 0 else sound[-shift:]
         audio = Audio(np.ascontiguousarray(sound), RATE_HZ)

@@ -15,7 +15,6 @@ from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generation import generate_for
-from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.speaker_similarity import voice_knowledge
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Utterance
@@ -87,7 +86,7 @@ def test_a_voice_is_as_well_known_as_in_animation(toy_model, toy_corpus):
         recordings = load_held_out(toy_corpus, recogniser, selection=Selection(split="val"), lexicon=Lexicon())
         speeches = make_speech(recordings, AUDIO_ONLY, Medium(None), {})
         heard.append([speech.voice for speech in speeches])
-        known = [voice_knowledge(own, analysed(each.audio)) for each in recordings.utterances]
+        known = [voice_knowledge(own, made.read_sound(each.audio)) for each in recordings.utterances]
         assert heard[-1] == pytest.approx(known)
     similar, less, least = np.array(heard)
     assert similar.max() == 1 > less.max() > least.max() == 0

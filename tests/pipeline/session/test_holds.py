@@ -15,12 +15,12 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.types import Delivery, Generation
 from lipmotion_faces.base import Staging
-from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.head.pose import head_poses
 from lipmotion_faces.outputs.scenes import character_scene, head_scene
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths
 from lipmotion_faces.portrait.portrait_rasteriser import face_poses
 from meshes.heads import head, write_glb
+from pipeline.made import read_character
 from testing.toy import ToySentence
 
 Rows = NDArray[np.float64]
@@ -32,7 +32,7 @@ HOLD, LASTS = "hold from 0.8 to 1.4", slice(81, 140)
 def character(tmp_path_factory: pytest.TempPathFactory) -> Any:
     path: Path = tmp_path_factory.mktemp("character") / "head.glb"
     write_glb(path, head())
-    return load_character(path)
+    return read_character(path)
 
 
 @pytest.fixture

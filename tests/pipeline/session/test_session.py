@@ -18,13 +18,12 @@ from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
 from lipmotion.pipeline.excerpts import GRID_S, LONGEST_S, MARGIN_S, find_excerpt
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
-from lipmotion.pipeline.outputs.output import OutputSettings, Performance, measure_prosody
+from lipmotion.pipeline.outputs.output import measure_prosody
 from lipmotion.types import Audio, Constraints, Generation, Outlook, Pin, Span, Speech, Timeline, Unit
 from lipmotion.units import group_words
 from lipmotion_faces.outputs.drawn_video import sound_track
-from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.registry import stage_face
-from pipeline.made import write_sound
+from pipeline.made import performed, write_sound
 from testing.toy import ToySentence
 
 
@@ -300,11 +299,8 @@ def test_single_pictures_are_those_of_the_video(session, request_):
     """Any frame, before and after an edit; what is not at that time is refused."""
     pictures = SessionPictures(session)
     for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
-        performance = Performance(
-            session.generate(edits),
-            OutputSettings(shown_face("portrait"), None, sounded=True, staging=edits.staging()),
-            sound=request_.recording,  # type: ignore[arg-type]
-        )
+        shown = performed(session.generate(edits), "portrait", sounded=True, staging=edits.staging())
+        performance = replace(shown, sound=request_.recording)
         seen, prosody = (
             deliver_to_face(performance.generation, Delivery(), 25.0),
             measure_prosody(sound_track(performance)),

@@ -15,7 +15,6 @@ from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, MissingDependencyError
 from lipmotion.formats.label_files import write_labels
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline import workers
 from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
@@ -29,9 +28,9 @@ from lipmotion.types import Audio, Item, Monitor, Progress, Timeline, Unit, sile
 from lipmotion.units import Lexicon, split_words
 from pipeline.made import recogniser_of, write_sound
 from testing.formant_synthesiser import synthesise
-from testing.toy import toy_sentences
+from testing.toy import SMALL, toy_sentences
 
-CONFIG = HmmConfig(mixtures=2, iterations=1, context_frames=20)
+CONFIG = replace(SMALL, mixtures=2, iterations=1, context_frames=20)
 Train = Callable[..., Model]
 
 
