@@ -1,6 +1,5 @@
 """Requests to analysed speech: what they name, their language, their words, and what engines are given."""
 
-import json
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -117,11 +116,6 @@ SILENCE = Audio(np.zeros(16_000, np.float32), 16_000)
 USER = Lexicon({"papa": (("p", "aa", "p", "aa"),), "2": (("m", "aa"),)})
 
 
-def test_english_stays_as_it_is():
-    request = Request(SILENCE, "two papas")
-    assert resolve_language(request) is request
-
-
 def test_another_language_has_its_own_words_and_lexicon(tmp_path):
     (tmp_path / "words.txt").write_text("¡Papa, 2!", encoding="utf-8")
     for transcript in ("¡Papa, 2!", tmp_path / "words.txt"):
@@ -176,12 +170,6 @@ def test_mapped_phones_are_not_called_sure(toy_model, toy_sentence):
     assert outlook.confidence == pytest.approx(0.25)
 
 
-def test_the_option_reaches_the_request():
-    assert read_request(Request("a.wav", language="ko")).language == "ko"
-    assert as_request(Request(SILENCE, language="ko"), language="fr").language == "fr"
-    assert as_request(Request(SILENCE, language="ko")).language == "ko"
-
-
 @pytest.mark.long
 def test_the_words_of_english_are_known(caplog):
     pytest.importorskip("hama.asr")
@@ -228,16 +216,6 @@ def test_files_of_words_are_transcripts(found, tmp_path, suffix):
     assert labels(aligned) == labels(found.units)
     starts = [(a.start_s, b.start_s) for a, b in zip(aligned, found.units, strict=True)]
     assert all(abs(a - b) < 0.05 for a, b in starts)
-
-
-def test_json_has_times_and_confidences(found, tmp_path):
-    write_words(found.words, [tmp_path / "words.json"])
-    document = json.loads((tmp_path / "words.json").read_text())
-    assert document["text"].startswith("please speak")
-    first = document["result"][0]
-    assert set(first) == {"word", "start", "end", "conf"}
-    assert 0.4 < first["start"] < first["end"] < 1.0
-    assert all(0 <= word["conf"] <= 1 for word in document["result"])
 
 
 def test_files_that_cannot_be_written(found, tmp_path):

@@ -110,25 +110,6 @@ def test_the_mouth_closes_on_p_b_m_and_rests_in_silence(move, toy_sentence):
         assert silence.std() < 1e-3
 
 
-def test_in_a_silent_recording_the_mouth_is_shut_and_still(toy_model):
-    opening = animate(Audio(np.zeros(32_000, np.float32), 16_000), model=toy_model).motion["opening"]
-    assert opening.max() < 0.01
-    assert np.ptp(opening) < 1e-3
-
-
-def test_edited_units_change_the_motion_where_they_are(move, toy_sentence):
-    """``see`` becomes ``saw``: the mouth opens there, and nowhere else."""
-    spans = toy_sentence.units.spans
-    position = next(number for number, span in enumerate(spans) if span.label.phone == "iy")
-    wider = [*spans[:position], replace(spans[position], label=Unit("aa")), *spans[position + 1 :]]
-    before, after = move(units=toy_sentence.units), move(units=Timeline(tuple(wider)))
-    inside = frames_of(spans[position])
-    assert after.motion["opening"][inside].max() > 1.3 * before.motion["opening"][inside].max()
-    far = inside.stop + 40
-    assert after.motion.values[far:] == pytest.approx(before.motion.values[far:], abs=5e-3)
-    assert after.units.spans[position].label.phone == "aa"
-
-
 def test_units_need_no_recogniser(move):
     with pytest.raises(InputError, match="unknown phone 'AA' at 0"):
         move(units=Timeline((Span(0.0, 0.5, Unit("AA")),)))
@@ -216,12 +197,6 @@ def test_the_same_bytes_again_whatever_the_number_of_threads(toy_model, toy_spee
     with threadpool_limits(2, user_api="blas"):
         write(animate(toy_speech, model=toy_model), tmp_path / "second.npz")
     assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "second.npz").read_bytes()
-
-
-def test_motion_says_which_model_it_is_of(move, tmp_path):
-    """Attribution is not lost where the model is not given again."""
-    write(move(), tmp_path / "a.json")
-    assert json.loads((tmp_path / "a.json").read_text())["model"]["corpus"] == "toy"
 
 
 def test_confidence_is_of_every_frame_that_is_delivered(move, transcript, tmp_path):

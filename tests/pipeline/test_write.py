@@ -18,9 +18,8 @@ from lipmotion.articulation.delivery import close_on_frame_grid
 from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.pipeline.outputs import output
-from lipmotion.pipeline.outputs.cues import CueOutput, cue_text
+from lipmotion.pipeline.outputs.cues import CueOutput
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
 from lipmotion.pipeline.outputs.motion_files import MotionOutput, with_articulation
@@ -118,13 +117,6 @@ def test_nothing_is_written_unless_everything_can_be(result, toy_model, toy_spee
         assert [path.name for path in tmp_path.iterdir()] == ["folder.json"]
 
 
-def test_some_channels_to_one_file(result, toy_model, tmp_path):
-    write(result, str(tmp_path / "a.csv"), model=toy_model, channels=["width", "opening"])
-    motion, _ = read_motion(str(tmp_path / "a.csv"))
-    assert motion.names == ("width", "opening")
-    assert motion["opening"] == pytest.approx(result.motion["opening"], abs=1e-5)
-
-
 @pytest.mark.parametrize("name", ["a.mov", "a%03d.png"])
 def test_a_face_may_be_transparent_where_the_file_can_be(result, toy_model, toy_speech, tmp_path, name):
     staging = Staging(size=64, background="transparent")
@@ -219,14 +211,6 @@ def test_a_kind_of_a_package_is_written_beside_others(result, tmp_path, monkeypa
     with pytest.raises(ExportError, match="no phones"):
         write(silent, [tmp_path / "b.json", tmp_path / "b.words.csv"])
     assert not (tmp_path / "b.json").exists()
-
-
-def test_cues_of_several_formats(result, tmp_path):
-    sheet = lipmotion.cues(result)
-    paths = [tmp_path / f"é.{form}" for form in CUE_FORMATS]
-    lipmotion.write_cues(sheet, paths, speech="é.wav")
-    for path, form in zip(paths, CUE_FORMATS, strict=True):
-        assert path.read_text() == cue_text(sheet, speech="é.wav", form=form)
 
 
 def test_results_that_have_no_cues(result):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion import Model, load_model
+from lipmotion import load_model
 from lipmotion.corpora.folder import spell_name
 from lipmotion.speech.recognition import agreement, general
 from lipmotion.speech.recognition import transcript_evidence as module
@@ -17,9 +17,8 @@ from lipmotion.speech.recognition.transcript_evidence import (
     label_evidence,
     transcript_evidence,
 )
-from lipmotion.speech.voices.installed import installed_voices, speak_sentences
 from lipmotion.types import Audio, Span, Timeline, Unit
-from lipmotion.units import PHONES, Lexicon, split_words
+from lipmotion.units import PHONES, Lexicon
 from pipeline.made import features_of, read_sound, recogniser_of
 from testing.toy import ToySentence, toy_sentences
 
@@ -236,19 +235,6 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
     assert agreement.agreement_score(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
 
 
-@pytest.mark.long
-def test_right_words_agree_and_wrong_ones_do_not(sentences: list[ToySentence], toy_model: Model) -> None:
-    phones = recogniser_of(toy_model, "auto")
-    for said in sentences:
-        features = features_of(said.audio)
-        right, order, wrong = (
-            agreement.agreement_score(said.audio, phones.align(said.audio, features, words, Lexicon()))
-            for words in (said.words, said.words[::-1], ("squash", "six", "fish", "chefs"))
-        )
-        assert right > agreement.DOUBTFUL_SCORE - 0.8 > wrong  # one voice of espeak-ng has -4.9
-        assert right > order
-
-
 def test_loud_silence_is_missing_speech(sentences: list[ToySentence]) -> None:
     audio, units = sentences[0].audio, sentences[0].units
     fit = agreement.transcript_fit(audio, Timeline((Span(0.0, audio.duration_s, Unit("sil")),)))
@@ -328,18 +314,3 @@ def test_real_recordings(recordings: Path) -> None:
             found.append(agreement.agreement_score(audio, phones.align(audio, features, words, Lexicon())))
     assert min(right) > agreement.DOUBTFUL_SCORE
     assert np.mean(np.array(wrong) < agreement.DOUBTFUL_SCORE) > 0.6
-
-
-@pytest.mark.long
-@pytest.mark.skipif(not installed_voices(), reason="no synthesiser is here")
-def test_synthetic_voices_are_believed() -> None:
-    """What they say in their own way does not decide alone: by the mean over frames most of them were doubted."""
-    texts = "Loyal boys voice their choice to employers.", "Sharp knives belong in the upper drawer."
-    phones = recogniser_of(load_model(), "auto")
-    for voice in installed_voices()[::2]:
-        audio, _ = next(speak_sentences([texts[0]], voice))
-        right, wrong = (
-            agreement.agreement_score(audio, phones.align(audio, features_of(audio), split_words(text), Lexicon()))
-            for text in texts
-        )
-        assert right > agreement.DOUBTFUL_SCORE - 0.5 > wrong  # one voice of espeak-ng has -4.4

@@ -187,14 +187,6 @@ def test_a_channel_that_never_moves_keeps_a_variance():
         assert np.isfinite(statistic).all()
 
 
-def test_the_source_of_a_state_names_the_leaf_of_its_density():
-    emission = fit(examples(6)).emission
-    said = emission.source(FullContextState("t", "aa", "p", 1), LAYOUT)
-    assert said.startswith("t-aa+p speech.1: ")
-    assert said.endswith(" frames)")
-    assert emission.source(LAYOUT.rest, LAYOUT) == "rest"
-
-
 def test_phones_without_training_frames_resolve_like_those_of_their_class():
     emission = fit(examples(8)).emission
     for phone in ("zh", "oy", "em"):

@@ -12,12 +12,10 @@ import pytest
 
 from lipmotion import Corpus, prepare
 from lipmotion.errors import CorpusError
-from lipmotion.measures.curves import best_offset
 from lipmotion.types import (
     Audio,
     Channel,
     Motion,
-    Progress,
     Span,
     TimedTranscript,
     TimedWord,
@@ -39,7 +37,7 @@ from lipmotion_faces.corpus.long_videos import (
     spoken_lines,
     utterance_spans,
 )
-from lipmotion_faces.corpus.sync import clip_scores, offsets, sync
+from lipmotion_faces.corpus.sync import offsets, sync
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.video_scan import VideoScan
@@ -141,13 +139,6 @@ def test_a_long_video_is_divided_at_its_pauses(talk, tmp_path):
 
 
 @pytest.mark.usefixtures("scanned")
-def test_it_is_kept_when_it_is_prepared_again(talk, tmp_path):
-    prepare(talk, tmp_path / "corpus", workers=1)
-    again = prepare(talk, tmp_path / "corpus", workers=1)
-    assert again.counts == {"prepared": 0, "kept": 10, "skipped": 0}
-
-
-@pytest.mark.usefixtures("scanned")
 def test_words_come_from_the_lines_in_time(talk, tmp_path):
     lines = [f"{start_s}\t{end_s}\tSentence {n}." for n, (start_s, end_s) in enumerate(SENTENCES[:5])]
     talk.with_suffix(".txt").write_text("\n".join(lines))
@@ -190,18 +181,6 @@ def test_silence_is_refused(tmp_path):
     with pytest.raises(CorpusError, match=r"the first, talk: .*talk\.mkv: no speech in it"):
         prepare(silent, tmp_path / "other", workers=1)
     assert not (tmp_path / "other").exists()
-
-
-@pytest.mark.usefixtures("scanned")
-def test_progress_is_reported(talk, tmp_path):
-    seen: list[Progress] = []
-    prepare(
-        talk, tmp_path / "corpus", workers=1, monitor=lambda event: isinstance(event, Progress) and seen.append(event)
-    )
-    assert [event.stage for event in seen[:3]] == ["dividing long videos"] * 2 + ["preparing recordings"]
-    shares = [event.share for event in seen]
-    assert shares == sorted(shares)
-    assert (shares[0], shares[-1]) == pytest.approx((0.0, 1.0))
 
 
 @pytest.mark.video
@@ -477,26 +456,3 @@ def test_lips_that_do_not_follow_are_left_alone(corpus):
     before = corpus.utterance(names[0]).audio.samples.copy()
     assert "there" not in sync(corpus)
     np.testing.assert_array_equal(corpus.utterance(names[0]).audio.samples, before)
-
-
-@pytest.mark.long
-@pytest.mark.video
-@pytest.mark.recordings
-@pytest.mark.parametrize("late_s", [-0.06, 0.13])
-def test_other_speakers_on_video(recordings, tmp_path, late_s):
-    pytest.importorskip("mediapipe")
-    corpus = Corpus.create(tmp_path / "corpus")
-    for path in sorted((recordings / "grid-others").glob("*.mpg")):
-        sound = read_sound(path).samples
-        shift = round(late_s * RATE_HZ)
-        sound = np.pad(sound, (shift, 0), mode="reflect") if shift > 0 else sound[-shift:]
-        audio = Audio(np.ascontiguousarray(sound), RATE_HZ)
-        one = Utterance(
-            path.stem, audio, features_of(audio), track(path, crops=False), None, "test", {"collection": "others"}
-        )
-        corpus.add(one)
-        found = best_offset(clip_scores(one), 100.0)
-        assert not found.known or found.late_s == pytest.approx(late_s, abs=0.05)
-    assert sum(clip.known for clip in offsets(corpus).clips.values()) >= 4
-    assert offsets(corpus).collections["others"].late_s == pytest.approx(late_s, abs=0.02)
-    shutil.rmtree(corpus.path)

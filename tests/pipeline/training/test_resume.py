@@ -108,21 +108,6 @@ def test_stopped_after_any_event(corpus, whole, work, tmp_path):
 
 
 @pytest.mark.long
-def test_stopped_again_and_again(corpus, whole, work, tmp_path):
-    """Every run gets some steps further than the one before."""
-    stops = 0
-    while True:
-        try:
-            model = run(corpus, work, stopping_after(8))
-            break
-        except Stopped:
-            stops += 1
-            assert stops < 50
-    assert stops > 1
-    assert content(model, tmp_path) == whole
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("what", ["corpus", "lexicon"])
 def test_another_job_starts_over(corpus, work, tmp_path, what):
     run(corpus, work)
@@ -138,15 +123,6 @@ def test_another_job_starts_over(corpus, work, tmp_path, what):
         options["lexicon"] = Lexicon({"papa": (("p", "ae", "p", "ax"),)})
     expected = content(train(corpus, **options)[0], tmp_path)  # type: ignore[arg-type]
     assert content(train(corpus, **options, run=Run(work=work))[0], tmp_path) == expected  # type: ignore[arg-type]
-
-
-@pytest.mark.long
-def test_a_damaged_checkpoint_is_not_used(corpus, whole, work, tmp_path):
-    assert content(run(corpus, work), tmp_path) == whole
-    for name in ("phones", "labels-0"):
-        path = work / f"{name}.checkpoint"
-        path.write_bytes(path.read_bytes()[:-500])
-    assert content(run(corpus, work), tmp_path) == whole
 
 
 @pytest.mark.long
@@ -375,18 +351,6 @@ def test_a_folder_without_transcripts(tmp_path, own, toy_sentence, name):
     write(tmp_path / "unsaid.wav", toy_sentence.audio)
     with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
         next(align_recordings(tmp_path / name, own))
-
-
-@pytest.mark.recordings
-def test_real_recordings(recordings, toy_model):
-    folder = recordings / "speech-open"
-    if not folder.is_dir():
-        pytest.skip("speech-open is not here")
-    items: list[Item] = []
-    general = recogniser_of(toy_model, "general")
-    sentences = list(align_recordings(folder, general, monitor=items.append))  # type: ignore[arg-type]
-    assert len(sentences) == 11
-    assert sorted(item.name for item in items) == ["13697_11991_000000", "common_voice_ja_24511055"]
 
 
 @pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
