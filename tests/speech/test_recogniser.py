@@ -1,7 +1,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from difflib import SequenceMatcher
-from itertools import groupby, pairwise
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +9,7 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from lipmotion import Model, errors, load_model, types
-from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.pipeline.training.train import train_phone_models
+from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.recognition import adaptation, recogniser
 from lipmotion.speech.recognition import recogniser as module
 from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
@@ -27,8 +26,8 @@ from lipmotion.speech.recognition.recognised_speech import (
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.stats.constrained_mllr import log_determinant
-from lipmotion.types import Audio, Span, Timeline, Unit, silent_monitor
-from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
+from lipmotion.types import Audio, Span, Timeline, Unit
+from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon
 from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
 from pipeline.made import features_of, read_sound
 from testing.formant_synthesiser import synthesise
@@ -193,24 +192,6 @@ def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: li
     assert [span.start_s for span in found] == pytest.approx([span.start_s for span in again], abs=0.011)
 
 
-@pytest.mark.recordings
-def test_speakers_and_words_beyond_all_training(recordings: Path) -> None:
-    """The general models find about twice as many phones as those of one GRID speaker."""
-    share = {}
-    for kind in ("own", "auto"):
-        right = count = 0
-        for name in ("61-70968-0000.flac", "sense_and_sensibility_01_austen_64kb-0880.wav"):
-            audio = read_sound(recordings / "speech-open" / name)
-            text = (recordings / "speech-open" / name).with_suffix(".txt" if name.endswith("wav") else ".lab")
-            spoken = phones(align(load_model().phones, audio, split_words(text.read_text()), Lexicon(), "general"))
-            matcher = SequenceMatcher(None, spoken, phones(recognise(load_model().phones, audio, kind)), autojunk=False)
-            right += sum(block.size for block in matcher.get_matching_blocks())
-            count += len(spoken)
-        share[kind] = right / count
-    assert share["auto"] > 0.5
-    assert share["auto"] > share["own"] + 0.15
-
-
 def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model) -> None:
     own = toy_model.phones
     combined = combine_phones(own)
@@ -239,30 +220,6 @@ def test_evidence_is_the_sum_of_both(toy_model: Model, trust: float) -> None:
     assert log_likelihoods.log_density(3, 7, some) == pytest.approx(wanted[3:7, some], abs=2e-3)
 
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
-
-
-def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence]) -> None:
-    steps: list[tuple[str, float | None]] = []
-    spoken = [(sentence.audio, sentence.words) for sentence in sentences[:4]]
-    hmm = train_phone_models(spoken, Lexicon(), SMALL, lambda event: steps.append((event.stage, event.figure)))
-    assert {"flat start", "pronunciations"} <= {step for step, _ in steps}
-    for stage in ("flat start", "pronunciations"):
-        values = [value for step, value in steps if step == stage and value is not None]
-        assert all(before <= after + 1e-6 for before, after in pairwise(values))
-    said = {phone for sentence in sentences[:4] for word in sentence.words for phone in WORDS[word]}
-    assert set(hmm.table.units) == said | {SILENCE, PAUSE}
-
-
-def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) -> None:
-    good = [(sentence.audio, sentence.words) for sentence in sentences[:3]]
-    bad = (good[0][0], ("five",) * 100)
-    hmm = train_phone_models([*good, bad], Lexicon(), SMALL, silent_monitor)
-    assert np.array_equal(hmm.mixtures.means, train_phone_models(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
-    with pytest.raises(errors.CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
-        train_phone_models([bad], Lexicon(), SMALL, silent_monitor)
-
-
 BASE = [LabelledFrames(0, "sil"), LabelledFrames(20, "aa"), LabelledFrames(50, "t"), LabelledFrames(70, "sil")]
 ALIGNED = AlignedWords(
     words=("a", "boat"),
@@ -282,24 +239,6 @@ def test_a_stretch_nothing_or_all_is_replaced() -> None:
     sliver = (Stretch(22, 69), [LabelledFrames(22, "b", 0)])
     assert SLIVER_FRAMES > 2
     assert [label.phone for label in spliced(BASE, [sliver], 100)] == ["sil", "b", "sil"]
-
-
-def test_every_frame_has_one_label() -> None:
-    for seed in range(5):
-        draw = np.random.default_rng(seed)
-        frames = 200
-        base = [LabelledFrames(int(first), "aa") for first in [0, *np.unique(draw.integers(1, frames, 15))]]
-        bounds = np.unique(draw.integers(0, frames + 1, 8))
-        parts = [
-            (Stretch(int(first), int(end)), [LabelledFrames(int(first), "b", number)])
-            for number, (first, end) in enumerate(zip(bounds[::2], bounds[1::2], strict=False))
-        ]
-        firsts = [label.first for label in spliced(base, parts, frames)]
-        assert firsts[0] == 0
-        assert firsts == sorted(set(firsts))
-        assert {number for _, ((_, _, number),) in parts} == {
-            label.word for label in spliced(base, parts, frames) if label.word >= 0
-        }
 
 
 def test_labels_are_those_of_the_words_that_are_believed() -> None:

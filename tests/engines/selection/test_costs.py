@@ -151,20 +151,6 @@ def test_velocities_that_differ_cost_where_units_are_joined() -> None:
     assert costs.join_costs(target_of(costs, "aa iy"), 1, array(1), array(2)) == pytest.approx(wanted)
 
 
-def test_by_default_a_cut_in_a_cluster_and_a_merge_in_another_stress_cost_more() -> None:
-    costs = costs_of(inventory("uw", "uw", "s l"), engine_named("selection", {}).config)
-    inside, between = (costs.join_costs(target_of(costs, text), 1, array(0), array(1)) for text in ("s l", "s | l"))
-    assert inside > between + 0.01
-    stressed = with_stress(inventory("iy aa s", "f aa uw", "f aa uw"), -1, 1, -1, -1, 0, -1, -1, 1, -1)
-    costs = costs_of(stressed, engine_named("selection", {}).config)
-    target = target_of(costs, "iy aa uw")
-    for other, equal in (
-        costs.join_costs(target, 2, array(1), array(5, 8))[0],
-        costs.join_costs(target, 1, array(0), array(4, 7))[0],
-    ):
-        assert other > equal + 0.01
-
-
 def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
     """§4: "smoothed for the last 5% of the first unit, and the first 5% of the second unit"."""
     units = inventory("s iy", "uw n", levels=(0, 1), duration_s=1.0)

@@ -231,16 +231,6 @@ def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
     assert len(found.log_likelihoods) == 1
 
 
-def test_many_steps_over_one_gaussian_change_nothing():
-    one = random_densities(1, 15, 1)
-    twins = generate.FrameDensities(
-        np.full((15, 2), np.log(0.5)), one.means.repeat(2, axis=1), one.precisions.repeat(2, axis=1)
-    )
-    found, wanted = generate.solve_trajectory(twins), generate.solve_trajectory(one)
-    assert found.values == pytest.approx(wanted.values, abs=1e-9)
-    assert found.log_likelihoods[-1] == pytest.approx(wanted.log_likelihoods[0], abs=1e-9)
-
-
 @settings(max_examples=30)
 @given(frames=st.integers(1, 25), components=st.integers(2, 4), seed=st.integers(0, 50), pinned=st.booleans())
 def test_the_likelihood_of_the_trajectory_never_falls(frames, components, seed, pinned):

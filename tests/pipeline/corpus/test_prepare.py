@@ -5,7 +5,6 @@ import signal
 import sys
 from collections import Counter
 from dataclasses import replace
-from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -291,22 +290,6 @@ def test_real_clips_in_two_processes_stopped_and_gone_on(clips, tmp_path, stop):
     assert content(tmp_path / "corpus") == content(tmp_path / "whole")
 
 
-@pytest.mark.video
-@pytest.mark.recordings
-def test_real_clips_with_their_words(clips, tmp_path, capfd):
-    for path in sorted(clips.iterdir())[2:]:
-        path.unlink()
-    report = prepare(clips, tmp_path / "corpus", workers=1)
-    found = Corpus.open(report.corpus).utterance("bbaf2n")
-    assert found.words == ("bin", "blue", "at", "f", "two", "now")
-    assert found.source["licence"] == "CC BY 4.0"
-    assert found.track.motion.values.shape == (75, 159)
-    assert found.audio.duration_s == pytest.approx(2.978)
-    entry = json.loads((report.corpus / "utterances" / "bbaf2n" / "entry.json").read_text())
-    assert entry["settings"]["tracker"].startswith("mediapipe 0.10.")
-    assert capfd.readouterr() == ("", "")
-
-
 WORDS = Lexicon({"pab": (("p", "aa", "b"),), "tib": (("t", "iy", "b"),), "zog": (("zh", "oy", "g"),)})
 
 
@@ -389,13 +372,6 @@ def test_labelled_phones_count_and_silence_divides_them(tmp_path):
     assert "p-aa" not in {unit.unit for unit in diphones.missing}
 
 
-def test_everything_is_covered(tmp_path):
-    corpus = corpus_of(tmp_path / "corpus", "pab tib")
-    found = coverage(corpus, format_moods(tmp_path / "text", "pab tib"), lexicon=WORDS)
-    assert [(kind.covered, kind.missing) for kind in found.kinds] == [(5, ()), (7, ()), (6, ())]
-    assert all(kind.share == pytest.approx(1) for kind in found.kinds)
-
-
 def test_sentences_of_the_package_and_what_is_not_counted(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "see bob", "qwrtzx", None)
     found = coverage(corpus)
@@ -442,16 +418,6 @@ def test_the_lazy_cover_is_the_greedy_one(sets, data):
     arrays = [np.array(sorted(elements)) for elements in sets]
     for count in (1, 3, 20):
         assert cover_greedily(arrays, costs, np.array(worth), count) == plain_cover(sets, costs, worth, count)
-
-
-@given(SETS)
-def test_it_is_near_the_best_cover_there_is(sets):
-    """Of k sets, a greedy choice covers at least 1 - 1/e of what any k cover (Nemhauser, Wolsey, Fisher 1978)."""
-    arrays = [np.array(sorted(elements)) for elements in sets]
-    chosen = cover_greedily(arrays, [1.0] * len(sets), np.ones(12), 3)
-    covered = len(set().union(*(sets[i] for i in chosen)))
-    best = max(len(set().union(*some)) for some in permutations(sets, min(3, len(sets))))
-    assert covered >= (1 - 1 / np.e) * best
 
 
 def test_units_of_a_word():

@@ -202,17 +202,6 @@ def test_closed_is_closed_by_the_training_list(toy_model, toy_corpus, figures):
     assert (everything["split"], everything["clips"], everything["closed_under"]) == ("all", 12, expected)
 
 
-@pytest.mark.long
-def test_the_seed_decides(toy_model, toy_corpus):
-    one, two, other = (
-        evaluate(toy_model, toy_corpus, selection=Selection(None), seed=seed)["conditions"]["audio only"]
-        for seed in (1, 1, 2)
-    )
-    assert one == two
-    assert one["opening_acc_95"] != other["opening_acc_95"]
-    assert one["channels"] == other["channels"]
-
-
 def test_without_transcripts_there_is_audio_only(toy_model, toy_corpus, tmp_path):
     first, second = held_out(toy_corpus)
     untold = corpus_of([replace(first, words=None), second], tmp_path)
@@ -442,14 +431,3 @@ def test_what_cannot_be_compared(other, words):
 def test_there_must_be_another():
     with pytest.raises(InputError, match="give another motion file or video"):
         lipmotion.compare(SPEECH)
-
-
-@pytest.mark.long
-@pytest.mark.video
-@pytest.mark.recordings
-def test_videos_are_tracked(recordings):
-    pytest.importorskip("mediapipe")
-    clip = min((recordings / "grid-others").glob("*.mpg"))
-    (pair,) = compare(clip, clip)["others"]
-    assert pair["acc"] == pytest.approx(1)
-    assert pair["points"]["points"] == 52

@@ -1,5 +1,5 @@
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 import pytest
@@ -17,17 +17,14 @@ from engines.coupled.tiny import (
     observations,
     structure,
 )
-from engines.coupled.training.test_training import sentences
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.coupled.chains import densities, model, structures
-from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
+from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.product import JointState, Transitions, initial_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert, precision_statistics
 from lipmotion.engines.coupled.training.chain_training import (
     LEAST_FRAMES,
-    MixtureSchedule,
-    growing_chains,
     with_joint_state_densities,
 )
 from lipmotion.errors import InputError
@@ -449,24 +446,3 @@ def test_only_allowed_units_are_in_the_lattice_and_visual_ones_a_little_before_a
     assert seen[31:, shut].max() == 0
     assert seen[20:29, shut].max() > 0
     np.testing.assert_allclose(found.chains[1].sum(axis=1), 1, atol=1e-5)
-
-
-def test_training_without_a_limit_rises_at_every_step():
-    steps = []
-    of = structure(FACTORIAL, (THREE, TWO), states=3, limit=None)
-    *_, grown = growing_chains(
-        of, ("speech", "seen"), sentences(), MixtureSchedule((2, 2), (1.0, 1.0), most_steps=6), steps.append
-    )
-    trained = grown.model
-    assert isinstance(trained.transitions, FactorialTransitions)
-    assert len(trained.transitions.own_density_states) > 5
-    for one, other in pairwise(steps):
-        if one.mixtures == other.mixtures:
-            assert other.log_likelihood >= one.log_likelihood - 1e-5
-
-
-def test_joint_states_have_names():
-    of = structure(FACTORIAL, (THREE, TWO), limit=None)
-    free = FactorialProduct(of, chains(of).transitions.product.grammar)
-    assert free.name(0) == f"{of.units[0][0]}.1 | {of.units[1][0]}.1"
-    assert free.name(of.state_counts[1] + 1) == f"{of.units[0][0]}.2 | {of.units[1][0]}.2"
