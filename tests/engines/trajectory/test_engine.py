@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from lipmotion import engines, errors, types
-from lipmotion.engines.trajectory.config import TrajectoryConfig
 from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, fit_trajectory
 from lipmotion.motion import closure, fit_acoustic_context, frame_labels
 from lipmotion.motion.context_window import OFFSETS, SCALE
@@ -124,7 +123,8 @@ def test_models_from_before_the_modulation_filter_have_none():
     assert one == pytest.approx(two, abs=2e-3)  # half precision
 
 
-OPTIONS = TrajectoryConfig(states=3, silent_states=7, components=2, acoustic_regression=False)
+SMALL = {"states": 3, "silent_states": 7, "components": 2}
+OPTIONS = engines.engine_named("trajectory", SMALL | {"acoustic_regression": False}).config
 LAYOUT = OPTIONS.training_layout
 
 
@@ -196,9 +196,9 @@ def test_phones_without_training_frames_resolve_like_those_of_their_class():
     )
 
 
-REGRESSION = TrajectoryConfig(
-    states=3, silent_states=7, components=2, acoustic_components=20, ridge=10.0, ridge_frames=50.0
-)
+REGRESSION = engines.engine_named(
+    "trajectory", SMALL | {"acoustic_components": 20, "ridge": 10.0, "ridge_frames": 50.0}
+).config
 
 
 def moments_of(z, r):
