@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from formats.examples import of_motion
 from lipmotion import Delivery, Edits, Model, Request, Session, Staging, cues, read_motion
 from lipmotion.articulation.contact import LEAST_GAP, opening_to_gap
-from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import LIP_SPEED, frame_times, spoken_mouth
 from lipmotion.formats import write_motion
@@ -142,7 +141,7 @@ def _of_head_scene(generation: Generation, fps: float) -> Mask:
     moved = of_motion(with_mouth(generation.motion), generation.units)
     weights = head_scene(moved, fps).weights
     character = figure()
-    mesh = head_mesh(character, moods=any(map(is_mood, generation.motion.names)))
+    mesh = head_mesh(character, moods=any(name.startswith("mood_") for name in generation.motion.names))
     moved = mesh.displacements(np.arange(len(character.skin.rest)))
     parting = dict(zip(mesh.shape_names, lip_gap(moved[:, character.skin.lip_rows()]), strict=True))
     return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING_GAP)

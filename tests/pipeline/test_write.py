@@ -15,30 +15,24 @@ from lipmotion import Delivery, FilmedFace, Outputs, Request, animate, cues, rea
 from lipmotion.articulation.contact import find_closures
 from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.articulation.delivery import close_on_frame_grid
-from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.articulation.rest import LAUGH_GAP
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.outputs import output
-from lipmotion.pipeline.outputs.cues import CueOutput
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
-from lipmotion.pipeline.outputs.motion_files import MotionOutput, with_articulation
+from lipmotion.pipeline.outputs.motion_files import with_articulation
 from lipmotion.pipeline.outputs.output import (
-    LabelOutput,
     Output,
     OutputSettings,
     Performance,
-    SoundOutput,
     create_outputs,
     plan,
     shift_prosody,
 )
 from lipmotion.types import Audio, Generation, Prosody, Timeline
-from lipmotion.types.audio import LAUGHTER
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
-from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
-from lipmotion_faces.outputs.scenes import SceneOutput, delivered_scene
+from lipmotion_faces.outputs.scenes import delivered_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
 from pipeline.made import performed, read_character
@@ -139,7 +133,7 @@ def test_articulatory_channels_are_written_where_they_are_asked_for(result, toy_
     assert [channel.unit for channel in motion.channels] == ["eye_distance", "weight", "weight"]
     assert 0 <= motion["teeth"].min() < motion["teeth"].max() <= 1
     more = with_articulation(result)
-    assert more.motion.names == (*result.motion.names, *GESTURES)
+    assert {*more.motion.names} > {*result.motion.names, "tongue", "teeth", "protrusion"}
     assert more.variance.shape == more.motion.values.shape
     assert not more.variance[:, -1].any()
 
@@ -172,13 +166,14 @@ def settings() -> OutputSettings:
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        ("a.json", MotionOutput), ("a.LIVELINK.csv", MotionOutput), ("a.cues.json", CueOutput),
-        ("a.Cues.TSV", CueOutput), ("cues.json", MotionOutput), ("a.mp4", VideoOutput), ("a.MOV", VideoOutput),
-        ("a%05d.png", PicturesOutput), ("a.glb", SceneOutput), ("a.textgrid", LabelOutput), ("a.flac", SoundOutput),
+        ("a.json", "MotionOutput"), ("a.LIVELINK.csv", "MotionOutput"), ("a.cues.json", "CueOutput"),
+        ("a.Cues.TSV", "CueOutput"), ("cues.json", "MotionOutput"), ("a.mp4", "VideoOutput"), ("a.MOV", "VideoOutput"),
+        ("a%05d.png", "PicturesOutput"), ("a.glb", "SceneOutput"), ("a.textgrid", "LabelOutput"),
+        ("a.flac", "SoundOutput"),
     ],
 )  # fmt: skip
 def test_a_name_asks_for_a_kind(name, kind, settings):
-    assert type(plan(name, settings)) is kind
+    assert type(plan(name, settings)).__name__ == kind
 
 
 def test_what_no_kind_writes_is_refused(settings, tmp_path):
@@ -369,7 +364,7 @@ def request_with_laughter() -> Request:
 def test_a_face_laughs_where_laughter_is_detected(toy_model, request_with_laughter):
     laughing = animate(request_with_laughter, model=toy_model)
     (event,) = laughing.events
-    assert event.kind == LAUGHTER
+    assert event.kind == "laughter"
     opening = laughing.motion["opening"]
     loudest_s = max(event.calls, key=lambda call: call[1])[0]
     assert opening[round(loudest_s * 100)] == pytest.approx(LAUGH_GAP, rel=0.1)

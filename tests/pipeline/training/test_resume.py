@@ -16,10 +16,7 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, MissingDependencyError
 from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline import workers
-from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
-from lipmotion.pipeline.training import other_speakers as module
-from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.pipeline.training.other_speakers import align_recordings, is_held_out_speaker, synthesise_sentences
 from lipmotion.speech.sound.acoustic_conditions import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
@@ -164,16 +161,23 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path):
     engine, job = engine_named("trajectory", {}), (CONFIG, Lexicon())
 
     def digests() -> list[str]:
-        return [fingerprint_training(corpus, ["toy00"], engine, *job, visual, None) for visual in (GEOMETRY, BOTH)]
+        return [
+            labels.fingerprint_training(corpus, ["toy00"], engine, *job, visual, None)
+            for visual in ("geometry", "both")
+        ]
 
     corpus.add(utterance)
     plain, pictured = digests()
     assert plain != pictured
     others = [
-        fingerprint_training(corpus, [], engine, *job, GEOMETRY, None),
-        fingerprint_training(corpus, ["toy00"], engine_named("trajectory", {"states": 3}), *job, GEOMETRY, None),
-        fingerprint_training(corpus, ["toy00"], engine, replace(CONFIG, relevance=3.0), Lexicon(), GEOMETRY, None),
-        fingerprint_training(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), GEOMETRY, None),
+        labels.fingerprint_training(corpus, [], engine, *job, "geometry", None),
+        labels.fingerprint_training(
+            corpus, ["toy00"], engine_named("trajectory", {"states": 3}), *job, "geometry", None
+        ),
+        labels.fingerprint_training(
+            corpus, ["toy00"], engine, replace(CONFIG, relevance=3.0), Lexicon(), "geometry", None
+        ),
+        labels.fingerprint_training(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), "geometry", None),
     ]
     assert len({plain, *others}) == 5
     crops = np.array(utterance.track.crops)
@@ -202,7 +206,7 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
             phones = [phone for word in split_words(text) for phone in Lexicon().pronunciations(word)[0]]
             yield synthesise([(phone, 0.12) for phone in phones], pitch_hz=100 if voice.name == "low" else 200)
 
-    monkeypatch.setattr(module, "speak_sentences", say)
+    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.speak_sentences", say)
 
 
 @pytest.mark.usefixtures("spoken")

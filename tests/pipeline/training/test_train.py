@@ -13,7 +13,6 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.pipeline.model import BOTH, EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.labels import (
     MAX_NAMED_RECORDINGS,
@@ -291,9 +290,9 @@ def space(utterances: list[Utterance]) -> Eigenlips:
 def models(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A model of the pictures, and one of pictures and points, as they are saved."""
     folder = tmp_path_factory.mktemp("visual")
-    for visual in (EIGENLIPS, BOTH):
+    for visual in ("eigenlips", "both"):
         save_model(quickly(toy_corpus, visual=visual, articulation=False), folder / visual)
-    return {visual: folder / visual for visual in (EIGENLIPS, BOTH)}
+    return {visual: folder / visual for visual in ("eigenlips", "both")}
 
 
 def crops(given: Sequence[Utterance]) -> list[np.ndarray]:
@@ -325,8 +324,8 @@ def test_an_utterance_that_was_never_seen_gives_no_picture(utterances):
 
 def test_motion_has_the_channels_that_are_learned(utterances, space):
     one = utterances[0]
-    assert with_visual_channels(one, GEOMETRY, None) is one
-    pictured, both = (with_visual_channels(one, visual, space).track.motion for visual in (EIGENLIPS, BOTH))
+    assert with_visual_channels(one, "geometry", None) is one
+    pictured, both = (with_visual_channels(one, visual, space).track.motion for visual in ("eigenlips", "both"))
     assert pictured.channels == space.channels
     assert np.array_equal(pictured.values, space.project(crops([one])[0]))
     assert both.channels == (*one.track.motion.channels, *space.channels)
@@ -340,15 +339,15 @@ def test_what_is_missing_is_reported(utterances, space, tmp_path):
     with pytest.raises(CorpusError, match=words):
         train_eigenlips([utterances[1], blind])
     with pytest.raises(CorpusError, match=words):
-        with_visual_channels(blind, BOTH, space)
+        with_visual_channels(blind, "both", space)
     with pytest.raises(InputError, match="visual 'both' without eigenlips"):
-        with_visual_channels(utterances[0], BOTH, None)
+        with_visual_channels(utterances[0], "both", None)
     with pytest.raises(InputError, match="visual is 'pixels', required one of: geometry, eigenlips, both"):
         with_visual_channels(utterances[0], "pixels", None)
     corpus = Corpus.create(tmp_path / "corpus")
     corpus.add(blind)
     with pytest.raises(CorpusError, match=words):
-        train(corpus, visual=EIGENLIPS)
+        train(corpus, visual="eigenlips")
     with pytest.raises(InputError, match="visual is 'lips'"):
         train(corpus, visual="lips")
 
@@ -356,7 +355,7 @@ def test_what_is_missing_is_reported(utterances, space, tmp_path):
 @pytest.mark.long
 def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models, toy_corpus):
     """Saved, loaded, and asked for the mouth of a sentence of the test list."""
-    model = load_model(models[EIGENLIPS])
+    model = load_model(models["eigenlips"])
     held_out = toy_corpus.utterance(toy_corpus.names("test")[0])
     motion = animate(held_out.audio, transcript=" ".join(held_out.words or ()), model=model).motion
     assert motion.channels == model.eigenlips.channels
@@ -368,7 +367,7 @@ def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models, toy_corpus):
 
 
 def test_figures_of_pictures(models, toy_corpus):
-    figures = evaluate(load_model(models[EIGENLIPS]), toy_corpus, recogniser="own")
+    figures = evaluate(load_model(models["eigenlips"]), toy_corpus, recogniser="own")
     assert figures["closed_under"] is None
     for condition in figures["conditions"].values():
         lips = condition["eigenlips"]
@@ -385,7 +384,9 @@ def test_figures_of_pictures(models, toy_corpus):
 
 def test_figures_of_both(models, toy_model, toy_corpus):
     """The eigenlips stand apart: figures of the lip distances are of these alone."""
-    figures, plain = (evaluate(model, toy_corpus, recogniser="own") for model in (load_model(models[BOTH]), toy_model))
+    figures, plain = (
+        evaluate(model, toy_corpus, recogniser="own") for model in (load_model(models["both"]), toy_model)
+    )
     assert figures["closed_under"] == plain["closed_under"]
     for name, condition in figures["conditions"].items():
         assert set(condition) == set(plain["conditions"][name]) | {"eigenlips"}
@@ -399,7 +400,7 @@ def test_figures_of_both(models, toy_model, toy_corpus):
 
 
 def test_originals_are_the_projected_pictures(models, toy_corpus):
-    model = load_model(models[BOTH])
+    model = load_model(models["both"])
     found = load_held_out(toy_corpus, recogniser_of(model), visual=model.visual, eigenlips=model.eigenlips)
     assert found.channels == ("opening", "width", "outer", *(channel.name for channel in model.eigenlips.channels))
     made = generate_clips(found, "with transcript", model.engine, model.learned)
@@ -409,7 +410,7 @@ def test_originals_are_the_projected_pictures(models, toy_corpus):
 
 
 def test_motion_files_hold_the_coefficients_and_videos_need_an_opening(models, toy_speech, tmp_path):
-    result = animate(toy_speech, model=models[EIGENLIPS])
+    result = animate(toy_speech, model=models["eigenlips"])
     write(result, [tmp_path / "a.npz", tmp_path / "a.json"])
     for name in ("a.npz", "a.json"):
         assert read_motion(tmp_path / name)[0].channels == result.motion.channels
