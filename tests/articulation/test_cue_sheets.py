@@ -93,24 +93,12 @@ def test_shapes_of_words() -> None:
         assert shapes(choose_cues(spoken(said, 0.17))) == wanted, said
 
 
-def test_silence_is_rest() -> None:
-    for fps in FRAME_RATES:
-        assert shapes(choose_cues(result(timeline([("sil", 2.0)])), fps)) == "X"
-        assert shapes(choose_cues(result(timeline([("sil", 2.0)])), fps, optional="GH")) == "A"
-
-
 def test_what_moves_in_silence_does_not_open_the_mouth() -> None:
     generation = spoken("b aa b")
     noise = np.abs(np.random.default_rng(3).normal(0, 0.2, generation.motion.values.shape))
     first, *_, last = choose_cues(with_values(generation, generation.motion.values + noise)).cues
     assert (first.label, last.label) == ("X", "X")
     assert first.end_s == pytest.approx(0.3, abs=0.09)
-
-
-def test_gaps_between_phones_are_silence() -> None:
-    full = spoken("b aa b aa")
-    gaps = Timeline(tuple(span for span in full.units if not is_silent(span.label.phone)))
-    assert shapes(choose_cues(replace(full, units=gaps))) == shapes(choose_cues(full))
 
 
 def test_p_b_m_win_over_f_v_where_there_is_no_room_for_both() -> None:

@@ -108,7 +108,6 @@ def test_a_recording_that_is_called_as_a_device_names_no_output(output):
     assert plan_outputs([Path("CON.wav")], ["../a.json"], ["json"]) == [["../a.json"]]
 
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 SILENCE = Audio(np.zeros(16_000, np.float32), 16_000)
 USER = Lexicon({"papa": (("p", "aa", "p", "aa"),), "2": (("m", "aa"),)})
 

@@ -163,9 +163,6 @@ def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(gene
     assert json[0] == json[1]
 
 
-STATED = {"open": {"jawOpen": 0.6}, "closed": {"jawOpen": 0.05}, "rounded": {"mouthPucker": 0.9}}
-
-
 def test_controls_of_a_rig_have_the_stated_values(tmp_path):
     (tmp_path / "rig.csv").write_text("control,source,gain,offset\nJaw,jawOpen,-25,\nJaw,mouthPucker,-5,1\nLip,ou,1,\n")
     rows = read_rig_table(tmp_path / "rig.csv")

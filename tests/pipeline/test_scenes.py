@@ -10,9 +10,7 @@ import lipmotion
 from faces.test_cut_out import draw
 from lipmotion import Delivery
 from lipmotion.articulation.cue_sheets import list_frame_shapes
-from lipmotion.articulation.expression import mood_table
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
-from lipmotion.storage.files import sound_reference
 from lipmotion.types import Audio, Channel, Generation, Motion, Pin, Timeline
 from lipmotion_faces import Staging
 from lipmotion_faces.characters import fbx
@@ -62,19 +60,6 @@ def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
     assert gap[(time_s > 0.7) & (time_s < 0.8)].max() > 0.15
 
 
-@pytest.mark.long
-def test_shapes_of_moods_are_in_the_head_where_a_mood_is(generation, own_head):
-    moody = replace(generation, motion=in_mood(generation.motion, "angry:0.8, surprised at 1.0"))
-    scene = head_scene(moody, staging=Staging(brows=False))
-    added = {*scene.mesh.shape_names} - {*own_head.mesh.shape_names}
-    assert "browDownLeft" in added
-    weights = {name: scene.weights[name] for name in scene.weights.names}
-    assert weights["browDownLeft"][50] == pytest.approx(0.8)
-    assert weights["browDownLeft"][-1] == 0
-    assert weights["eyeWideRight"][-1] == pytest.approx(mood_table()["surprised"][5])
-    assert weights["browInnerUp"][-1] == 1
-
-
 def test_the_rate_is_that_of_the_keys(generation):
     made = head_scene(generation, 30.0)
     assert made.weights.rate_hz == pytest.approx(30.0)
@@ -106,24 +91,9 @@ def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
             assert np.abs(part.turn.rotations - whole.turn.rotations[frames]).max() < 1e-9
 
 
-def test_closures_between_two_keys_are_kept(generation, character, tmp_path):
-    path = tmp_path / "head.glb"
-    write_glb(path, head())
-    slow = character_scene(generation, read_character(path), 12.0)
-    assert character.weights is not None
-    parted = slow.weights["jawOpen"] - slow.weights["mouthClose"]
-    closed = (slow.weights.time_s > 0.45) & (slow.weights.time_s < 0.65)
-    assert parted[closed].min() < 0.02
-
-
 def test_a_motion_without_opening_is_refused(generation):
     with pytest.raises(InputError, match="no channel 'opening'"):
         head_scene(generation.selected(["x_13"]))
-
-
-def test_the_sound_is_named_from_the_folder_of_the_file(tmp_path):
-    assert sound_reference(tmp_path / "a.wav", tmp_path / "out.glb") == "a.wav"
-    assert sound_reference(tmp_path / "in" / "a b.wav", tmp_path / "out" / "a.glb") == "../in/a b.wav"
 
 
 def test_the_sound_is_in_the_extras_of_the_scene(character, tmp_path):

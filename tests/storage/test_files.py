@@ -27,7 +27,6 @@ from lipmotion.storage.locks import LOCK, lock_folder, unfinished_work
 from lipmotion.storage.sources import Source, check_apart, check_kind
 
 Context = Callable[[Path], AbstractContextManager[Path]]
-TOO_LONG = "x" * 300 + ".json"
 
 
 def names(folder: Path) -> list[str]:

@@ -155,14 +155,6 @@ def test_the_dictionary_is_searched_as_if_line_by_line() -> None:
         assert lexicon._dictionary_entries(word) == expected
 
 
-@pytest.mark.long
-def test_the_whole_dictionary_can_be_a_user_s_file(lexicon_file: Path) -> None:
-    lexicon_file.write_bytes(lexicon._dictionary())
-    found = Lexicon.from_file(lexicon_file)
-    assert len(found.user) > 125_000
-    assert found.pronunciations("read") == (("r", "eh", "d"), ("r", "iy", "d"))
-
-
 def test_a_made_up_word_is_read_as_people_read_it() -> None:
     pytest.importorskip("hama.inference")
     assert Lexicon().pronunciations("lipmotion") == (tuple("l ih p m ow sh ax n".split()),)

@@ -73,15 +73,6 @@ def test_any_rate(filmed_face, motion):
             make_film(filmed_face, motion, fps=fps)
 
 
-def test_speech_longer_and_shorter_than_the_background(filmed_face, motion):
-    frames = list(make_film(filmed_face, motion).frames)
-    assert len(frames) == pytest.approx(len(motion.values) / 4, abs=1)
-    assert len(frames) > len(filmed_face.background.video)
-    for samples, count in ((9, 3), (1, 1)):
-        short = Motion(motion.values[:samples], 100.0, motion.channels)
-        assert len(list(make_film(filmed_face, short).frames)) == count
-
-
 def test_the_jaw_follows_what_it_is_told(filmed_face, brief, toy_sentence):
     closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(brief.values), 1)), 100.0, brief.channels)
     sound = Audio(toy_sentence.audio.samples[16_000 * 4 // 10 :], 16_000)

@@ -1,7 +1,7 @@
 import multiprocessing
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -28,7 +28,6 @@ from testing.formant_synthesiser import synthesise
 from testing.toy import SMALL, toy_sentences
 
 CONFIG = replace(SMALL, mixtures=2, iterations=1, context_frames=20)
-Train = Callable[..., Model]
 
 
 class Stopped(Exception):  # noqa: N818

@@ -44,7 +44,6 @@ from oracles import coupled as oracle
 from oracles.joint import mixture
 from oracles.paths import posteriors
 
-FLOORS = (np.full(2, 1e-3, np.float32), np.full(1, 1e-3, np.float32))
 PHONES = ("p", "uw", "aa", "b", "aa", "uw")
 
 
