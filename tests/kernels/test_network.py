@@ -86,22 +86,6 @@ def chained(seed: int, frames: int, spread: float, chains: int = 2):
     return expectation, factors, columns
 
 
-@given(seed=st.integers(0, 1000), chains=st.integers(1, 3), spread=st.sampled_from([0.1, 4.0, 1e2, 1e3, 1e5]))
-@SHARED
-def test_densities_of_chains_are_as_their_products(seed, chains, spread):
-    expectation, factors, columns = chained(seed, 30, spread, chains)
-    masked = np.random.default_rng(seed).random(factors[0].shape) < 0.1
-    factors[0][masked] = -np.inf
-    frames = np.array([12, 18])
-    found = expectation.product_posteriors(factors, columns, frames)
-    log_emission = sum(factor[:, column] for factor, column in zip(factors, columns, strict=True))
-    wanted = expectation.posteriors(log_emission, np.arange(log_emission.shape[1]), frames)
-    tolerance = 1e-10 if spread < 1e4 else 1e-7
-    assert found.posterior == pytest.approx(wanted.posterior, abs=tolerance)
-    assert found.counts == pytest.approx(wanted.counts, abs=30 * tolerance)
-    assert found.log_likelihood == pytest.approx(wanted.log_likelihood, abs=1e-8 if spread < 1e4 else 1e-4)
-
-
 def test_recordings_left_by_single_precision_spoil_no_others():
     expectation, factors, columns = chained(10, 90, 3.0)
     factors = [factor.astype(np.float32) for factor in factors]

@@ -225,10 +225,3 @@ def test_lines_after_the_end_are_left_out(caplog):
     assert "goes on after the recording ends at 10.00 s; its last 1 lines are left out" in record.getMessage()
     with pytest.raises(InputError, match=r"begins at 20\.00 s, the recording ends at 10\.00 s; give the transcript"):
         anchors.fitted(transcript(line("a", 20.0, 22.0)), loud, 10.0)
-
-
-def test_widening_ends():
-    found = anchors.anchors_of(transcript(line(" ".join("a" * 50), 1.0, 1.1)))
-    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, np.full(50, 90, np.intp), 3, 3000)
-    assert np.all(np.isinf(tolerance_s))
-    assert (windows.first.max(), windows.end.min()) == (0, 3000)
