@@ -50,7 +50,6 @@ settings.register_profile(FIXED, ANYWHERE, derandomize=True)
 settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100 * MORE_SENTENCES)
 settings.load_profile(FIXED)
 
-
 ENOUGH_STEPS = posterior_network.STEPS / 3
 HASTY = {"cli", "docs", "experiments", "training"}
 """Folders of tests whose networks are trained for a few steps, and whose intervals are of a few draws."""
