@@ -1,13 +1,13 @@
 """Installs the package as strangers would, animates, and writes ``docs/results/figures/release.json``.
 
-    python scripts/release_matrix.py WORK python3.10 python3.12 … [--simulate]
+    python scripts/release_matrix.py WORK python3.10 python3.12 … [--collect] [--simulate]
 
-WORK/dist holds both archives, built by ``python -m build -o WORK/dist`` and checked by ``twine check --strict``. The
-wheel and all that it or an extra needs are collected in WORK/wheels, once for all Pythons; the pins of ``make demo`` are
-downloaded, too. From then on pip has that folder alone. Each Python gets an empty environment, in which
-``examples/welcome`` becomes a video as in ``make demo``; then come the extras, one after the other, of which each
-package is imported; then the video again. Rows of other Pythons stay as they are. ``--simulate`` takes away, in the
-environment of the last Python, what other systems lack; it needs Linux and ``unshare``.
+WORK/dist holds both archives, built by ``python -m build -o WORK/dist`` and checked by ``twine check --strict``. With
+``--collect``, the wheel and all that it or an extra needs come into WORK/wheels, for all Pythons; the pins of
+``make demo`` are downloaded, too. Without it there is no network: pip has that folder alone. Each Python gets an empty
+environment, in which ``examples/welcome`` becomes a video as in ``make demo``; then come the extras, one after the
+other, of which each package is imported; then the video again. Rows of other Pythons stay as they are. ``--simulate``
+takes away, in the environment of the last Python, what other systems lack; it needs Linux and ``unshare``.
 
 Processor seconds are of all processes of a step: other work does not change them. The parts of the first video are
 differences: the second one finds compiled kernels, a motion alone draws nothing, and what a command imports is
@@ -107,9 +107,11 @@ class Environment:
         settings = {"PIP_CONFIG_FILE": os.devnull, "PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(self.work / "wheels")}
         return run(self.python, "-m", "pip", "install", "--no-compile", *wanted, **settings)
 
-    def animate(self, *outputs: str, before: tuple[object, ...] = (), **variables: str) -> tuple[str, float, float]:
+    def animate(
+        self, *outputs: str, face: str = "head", before: tuple[object, ...] = (), **variables: str
+    ) -> tuple[str, float, float]:
         """Animate the welcome as ``make demo`` does; return as ``run``."""
-        options = ("--transcript", WELCOME.with_suffix(".txt"), "--face", "head", "--force")
+        options = ("--transcript", WELCOME.with_suffix(".txt"), "--face", face, "--force")
         files = [self.made / name for name in outputs]
         return run(
             *before, self.python, "-m", "lipmotion", "animate", WELCOME, *options, "-o", *files, **variables
@@ -184,11 +186,11 @@ def simulate(place: Environment) -> list[list[str]]:
     """Return a row for each thing that another system lacks: what it is, what ``doctor`` says, and what was made."""
     rows = []
 
-    def make(title: str, outputs: tuple[str, ...] = ("simulated.mp4",), **options: Any) -> None:
+    def make(title: str, face: str = "head", **options: Any) -> None:
         try:
-            *_, video, _ = place.animate(*outputs, **options)
+            *_, video, _ = place.animate("simulated.mp4", face=face, **options)
             *_, batch, _ = place.batch(**options)
-            made = f"{', '.join(name.partition('.')[2] for name in outputs)} {video:.0f} s, batch {batch:.0f} s"
+            made = f"video {video:.0f} s, batch {batch:.0f} s"
         except FailedError as failure:
             made = str(failure).splitlines()[-1]
         rows.append([title, place.look(**options), made])
@@ -197,20 +199,18 @@ def simulate(place: Environment) -> list[list[str]]:
     make("nothing but the core")
     make("Windows: its branches, no `fork`, no handles of folders, no POSIX; what is open stays", **LIKE_WINDOWS)
     make("a console in cp1252, a locale without UTF-8, `PYTHONUTF8=0`", **FOREIGN)
-    for cache in place.folder.rglob("__pycache__"):
-        shutil.rmtree(cache)
-    make(
-        "installation and home read-only, nothing compiled",
-        before=("unshare", "-rm", "sh", "-ec", READ_ONLY, place.folder),
-    )
-    for package, outputs in (
-        ("hama", ("simulated.mp4",)),
-        ("numba", ("simulated.json",)),
-        ("pocketsphinx", ("simulated.mp4",)),
+    for package, title in (
+        ("hama", "no hama"),
+        ("numba", "no numba, the usual face"),
+        ("pocketsphinx", "no pocketsphinx"),
     ):
         run(place.python, "-m", "pip", "uninstall", "--yes", package)
-        make(f"no {package}", outputs)
+        make(title, face="woman" if package == "numba" else "head")
         place.install("lipmotion")
+    for cache in place.folder.rglob("__pycache__"):
+        shutil.rmtree(cache)
+    read_only = ("unshare", "-rm", "sh", "-ec", READ_ONLY, place.folder)
+    make("installation and home read-only, nothing compiled", before=read_only)
     return rows
 
 
@@ -234,7 +234,7 @@ def main() -> None:
         if options.collect:
             place.collect()
         found = {"installed": [measure(place)]}
-        if options.simulate:
+        if options.simulate and python == options.pythons[-1]:
             found["simulated"] = simulate(place)
         found["extras"] = [install_extras(place)]
         print(json.dumps(found, ensure_ascii=False), flush=True)

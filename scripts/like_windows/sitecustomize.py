@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable
 from importlib.machinery import SourceFileLoader
 from multiprocessing import util  # noqa: F401 # stays as it is
+from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
@@ -33,7 +34,7 @@ def refuse_in_use(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function on files that this process may neither have open nor mapped."""
 
     def refuse(*paths: Any, **places: Any) -> Any:
-        used = {os.path.realpath(f"/proc/self/fd/{handle}") for handle in os.listdir("/proc/self/fd")}
+        used = {os.path.realpath(handle) for handle in Path("/proc/self/fd").iterdir()}
         with open("/proc/self/maps", encoding="utf-8", errors="surrogateescape") as maps:  # noqa: PTH123
             used.update("/" + line.rstrip().partition(" /")[2] for line in maps)
         for path in paths:

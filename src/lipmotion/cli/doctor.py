@@ -203,6 +203,14 @@ def _phone_recogniser() -> str:
     return phone_recogniser(name).source
 
 
+def _microphone() -> str:
+    try:
+        import sounddevice
+    except (ImportError, OSError) as error:  # from an index, only wheels for Windows and macOS hold PortAudio
+        raise _AbsentError(f"for 'live': {error}; {install_command('live')}, on Linux also libportaudio2") from error
+    return str(sounddevice.get_portaudio_version()[1])
+
+
 def _face_tracking() -> str:
     """Return which OpenCV and MediaPipe are imported, and whether another OpenCV lies over that of the extra."""
     try:
@@ -303,6 +311,7 @@ _PARTS: dict[str, Callable[[], str]] = {
     "FFmpeg": _ffmpeg,
     "voices": _voices,
     "phone recogniser": _phone_recogniser,
+    "microphone": _microphone,
     "face tracking": _face_tracking,
     "model that ships": _model,
     "compiled kernels": _compiled_kernels,

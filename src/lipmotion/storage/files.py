@@ -25,8 +25,6 @@ from lipmotion.storage.sources import Source, check_apart, is_same
 
 TEMPORARY = ".part-"
 """Prefix of unfinished files' names; a killed run may leave such a file, which the next run removes."""
-LEFT_S = 3600.0
-"""An unfinished file that nobody wrote to for so long is left by a killed run, where no process can be looked for."""
 
 
 def check_target(target: Path, source: str | Path | None = None) -> None:
@@ -244,7 +242,7 @@ def remove_left_files(target: Path) -> None:
             try:
                 if sys.platform != "win32":
                     os.kill(int(process), 0)
-                elif time.time() - left.stat().st_mtime > LEFT_S:  # there signal 0 would end the process
+                elif time.time() - left.stat().st_mtime > 3600:  # there signal 0 would end the process
                     remove(left)
             except ProcessLookupError:
                 remove(left)
