@@ -148,8 +148,8 @@ def extras() -> list[str]:
     return re.findall(r"^([\w-]+) = \[", text.split("[project.optional-dependencies]")[1].split("\n[")[0], re.MULTILINE)
 
 
-def measure(place: Environment) -> list[str]:
-    """Install and animate; return the row of the table of times."""
+def measure(place: Environment) -> list[float]:
+    """Install and animate; return the processor seconds of each part of the way to the first video."""
 
     def imports_again(profile: str) -> float:
         return run(place.python, "-c", IMPORT_ALL, *re.findall(r"\| +([\w.]+)$", profile, re.MULTILINE))[1]
@@ -162,55 +162,52 @@ def measure(place: Environment) -> list[str]:
     short_profile, motion, _ = place.animate("welcome.json", PYTHONPROFILEIMPORTTIME="1")
     imports, motion_imports = imports_again(profile), imports_again(short_profile)
     drawing = second - imports - (motion - motion_imports)
-    parts = (install, compiling, imports, first - second, motion - motion_imports, drawing)
-    total = (install + compiling + first, install_s + compiling_s + first_s)
-    return [place.version, *(f"{seconds:.1f}" for seconds in parts), *(f"{seconds:.0f}" for seconds in total)]
+    print(place.version, f"first video after {install_s + compiling_s + first_s:.0f} s by the clock", flush=True)
+    return [install, compiling, imports, first - second, motion - motion_imports, drawing]
 
 
-def install_extras(place: Environment) -> list[str]:
-    """Install one extra after the other, then animate; return the row: what works, and what does not."""
-    works, fails = [], []
+def install_extras(place: Environment) -> str:
+    """Install one extra after the other, then animate; return those of which a package is absent or not imported."""
+    fails = []
     for extra in extras():
         try:
             place.install(f"lipmotion[{extra}]")
             run(place.python, "-c", IMPORT_EXTRA, extra)
-            works.append(extra)
         except FailedError as failure:
-            print(place.version, extra, failure, sep=" | ", flush=True)
+            print(place.version, extra, str(failure).splitlines()[-1], sep=" | ", flush=True)
             fails.append(extra)
-    *_, used, _ = place.animate("extras.mp4")
-    return [place.version, ", ".join(works), ", ".join(fails) or "–", f"{used:.0f} s", place.look()]
+    place.animate("extras.mp4")
+    print(place.version, place.look(), flush=True)
+    return ", ".join(fails) or "–"
 
 
 def simulate(place: Environment) -> list[list[str]]:
-    """Return a row for each thing that another system lacks: what it is, what ``doctor`` says, and what was made."""
-    rows = []
+    """Return a row for each thing that another system lacks: what it is, seconds, and what ``doctor`` says of it."""
+    rows: list[list[str]] = []
+    usual = place.look()
 
     def make(title: str, face: str = "head", **options: Any) -> None:
         try:
             *_, video, _ = place.animate("simulated.mp4", face=face, **options)
             *_, batch, _ = place.batch(**options)
-            made = f"video {video:.0f} s, batch {batch:.0f} s"
+            made = [f"{video:.0f}", f"{batch:.0f}"]
         except FailedError as failure:
-            made = str(failure).splitlines()[-1]
-        rows.append([title, place.look(**options), made])
+            made = ["refused" if str(failure).splitlines()[-1].startswith("lipmotion: error:") else "–", "–"]
+            print(failure, flush=True)
+        found = [each for each in place.look(**options).split(", ") if each not in usual]
+        rows.append([title, *made, ", ".join(found) or "–"])
         print(*rows[-1], sep=" | ", flush=True)
 
-    make("nothing but the core")
-    make("Windows: its branches, no `fork`, no handles of folders, no POSIX; what is open stays", **LIKE_WINDOWS)
-    make("a console in cp1252, a locale without UTF-8, `PYTHONUTF8=0`", **FOREIGN)
-    for package, title in (
-        ("hama", "no hama"),
-        ("numba", "no numba, the usual face"),
-        ("pocketsphinx", "no pocketsphinx"),
-    ):
+    make("nothing")
+    make("Windows: no `fork`, handles, POSIX", **LIKE_WINDOWS)
+    make("cp1252, ASCII locale", **FOREIGN)
+    for package, face in (("hama", "head"), ("numba", "woman"), ("pocketsphinx", "head")):
         run(place.python, "-m", "pip", "uninstall", "--yes", package)
-        make(title, face="woman" if package == "numba" else "head")
+        make(package, face)
         place.install("lipmotion")
     for cache in place.folder.rglob("__pycache__"):
         shutil.rmtree(cache)
-    read_only = ("unshare", "-rm", "sh", "-ec", READ_ONLY, place.folder)
-    make("installation and home read-only, nothing compiled", before=read_only)
+    make("writable folders, caches", before=("unshare", "-rm", "sh", "-ec", READ_ONLY, place.folder))
     return rows
 
 
@@ -223,25 +220,22 @@ def main() -> None:
     parser.add_argument("--simulate", action="store_true")
     options = parser.parse_args()
     commit, *_ = run("git", "-C", ROOT, "rev-parse", "--short", "HEAD")
-    stamp = {
-        "commit": commit.strip(),
-        "date": date.today().isoformat(),
-        "model": "none",
-        "command": "python scripts/release_matrix.py",
-    }
+    stamp = {"commit": commit.strip(), "date": date.today().isoformat(), "command": "python scripts/release_matrix.py"}
     for python in options.pythons:
         place = Environment(python, options.work.resolve())
         if options.collect:
             place.collect()
-        found = {"installed": [measure(place)]}
+        parts = measure(place)
+        found = {"parts": [[f"{seconds:.1f}" for seconds in parts]]}
         if options.simulate and python == options.pythons[-1]:
             found["simulated"] = simulate(place)
-        found["extras"] = [install_extras(place)]
+        found["installed"] = [[place.version, f"{sum(parts):.0f}", install_extras(place)]]
         print(json.dumps(found, ensure_ascii=False), flush=True)
-        sheet = json.loads(SHEET.read_text(encoding="utf-8"))
+        tables = (sheet := json.loads(SHEET.read_text(encoding="utf-8")))["tables"]
+        others = [row for row in tables["installed"]["rows"] if row[0] != place.version]
+        found["installed"] = sorted(others + found["installed"], key=lambda row: row[0])
         for name, rows in found.items():
-            kept = [row for row in sheet["tables"][name]["rows"] if row[0] != place.version and name != "simulated"]
-            sheet["tables"][name] |= {**stamp, "rows": sorted(kept + rows, key=lambda row: row[0]) if kept else rows}
+            tables[name] |= {**stamp, "rows": rows}
         SHEET.write_text(json.dumps(sheet, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
