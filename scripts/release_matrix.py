@@ -139,6 +139,8 @@ class Environment:
             printed = str(failure)
         rows = [(line[:8].strip(), line[8:29].strip()) for line in printed.splitlines()]
         found = dict.fromkeys(f"{name} {state}" for state, name in rows if state in {"absent", "broken"})
+        if "main path" not in printed:
+            found = {"doctor ended early": None}
         return ", ".join(each for each in found if not each.startswith("[")) or "all works"
 
 

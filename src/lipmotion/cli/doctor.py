@@ -8,8 +8,10 @@ import platform
 import re
 import tempfile
 from collections.abc import Callable, Iterator
+from ctypes.util import find_library
 from dataclasses import dataclass
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -204,11 +206,10 @@ def _phone_recogniser() -> str:
 
 
 def _microphone() -> str:
-    try:
-        import sounddevice
-    except (ImportError, OSError) as error:  # from an index, only wheels for Windows and macOS hold PortAudio
-        raise _AbsentError(f"for 'live': {error}; {install_command('live')}, on Linux also libportaudio2") from error
-    return str(sounddevice.get_portaudio_version()[1])
+    """Return the version of sounddevice; it is not imported: that starts PortAudio, which may end the process."""
+    if not find_spec("sounddevice") or not (find_spec("_sounddevice_data") or find_library("portaudio")):
+        raise _AbsentError(f"for 'live': {install_command('live')}, on Linux also libportaudio2")
+    return f"sounddevice {metadata.version('sounddevice')}, PortAudio"
 
 
 def _face_tracking() -> str:
