@@ -190,26 +190,24 @@ def simulate(place: Environment) -> list[list[str]]:
 
     def make(title: str, face: str = "head", **options: Any) -> None:
         try:
-            *_, video, _ = place.animate("simulated.mp4", face=face, **options)
-            *_, batch, _ = place.batch(**options)
-            made = [f"{video:.0f}", f"{batch:.0f}"]
+            made = f"{place.animate('simulated.mp4', face=face, **options)[1]:.0f} s"
+            place.batch(**options)
         except FailedError as failure:
-            made = ["refused" if str(failure).splitlines()[-1].startswith("lipmotion: error:") else "–", "–"]
             print(failure, flush=True)
-        found = [each for each in place.look(**options).split(", ") if each not in usual]
-        rows.append([title, *made, ", ".join(found) or "–"])
+            made = "refused" if str(failure).splitlines()[-1].startswith("lipmotion: error:") else "failed"
+        found = [each.rpartition(" ")[0] for each in place.look(**options).split(", ") if each not in usual]
+        rows.append([title, made, ", ".join(found) or "–"])
         print(*rows[-1], sep=" | ", flush=True)
 
-    make("nothing")
-    make("Windows: no `fork`, handles, POSIX", **LIKE_WINDOWS)
-    make("cp1252, ASCII locale", **FOREIGN)
+    make("Windows: no `fork`, POSIX", **LIKE_WINDOWS)
+    make("UTF-8: cp1252, ASCII", **FOREIGN)
     for package, face in (("hama", "head"), ("numba", "woman"), ("pocketsphinx", "head")):
         run(place.python, "-m", "pip", "uninstall", "--yes", package)
-        make(package, face)
+        make(package if face == "head" else f"{package}; usual face", face)
         place.install("lipmotion")
     for cache in place.folder.rglob("__pycache__"):
         shutil.rmtree(cache)
-    make("writable folders, caches", before=("unshare", "-rm", "sh", "-ec", READ_ONLY, place.folder))
+    make("writable folders", before=("unshare", "-rm", "sh", "-ec", READ_ONLY, place.folder))
     return rows
 
 
