@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from appearance.test_eigenlips import pictures
+from appearance.test_candidates import pictures
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import read_archive, write_archive
 from lipmotion_faces.appearance import looping

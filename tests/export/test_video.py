@@ -1,15 +1,32 @@
 import struct
+import xml.etree.ElementTree as ET
 from fractions import Fraction
+from importlib import metadata
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 from lipmotion.types import Audio
-from lipmotion_faces.video.mp4 import LARGEST_PACKET_BYTES, TAGS, XMP_UUID, append_xmp, frame_rate, write_mp4
+from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, add_inset, inset_box
+from lipmotion_faces.video.mp4 import (
+    LARGEST_PACKET_BYTES,
+    TAGS,
+    XMP_UUID,
+    append_xmp,
+    frame_rate,
+    write_mp4,
+    write_pictures,
+    write_with_alpha,
+)
+from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_frames, mark_metadata
 
 RATES = [24, 29.97, 60]
 
@@ -244,3 +261,258 @@ def test_what_does_not_end_with_a_whole_box_is_left_alone(tmp_path):
 def test_packets_that_cannot_be_are_refused(video):
     with pytest.raises(ExportError, match="at most"):
         append_xmp(video, "x" * (LARGEST_PACKET_BYTES + 1))
+
+
+HZ = 16_000
+
+
+def frames(count: int, channels: int = 4) -> list[np.ndarray]:
+    """Return pictures of a square that moves right, opaque, on nothing."""
+    drawn = [np.zeros((64, 96, channels), np.uint8) for _ in range(count)]
+    for n, frame in enumerate(drawn):
+        frame[16:48, 2 * n : 2 * n + 32] = (200, 60, 30, 255)[:channels]
+    return drawn
+
+
+def tone(duration_s: float = 1.0) -> Audio:
+    return Audio(0.3 * np.sin(np.arange(int(duration_s * HZ)) / 8).astype(np.float32), HZ)
+
+
+def decoded(path: Path) -> tuple[list[float], list[np.ndarray]]:
+    """Return times and RGBA pictures. VP9's transparency is a second stream that only libvpx decodes."""
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        times, pictures = [], []
+        if stream.codec_context.name == "vp9":
+            codec = av.CodecContext.create("libvpx-vp9", "r")
+            packets = [packet for packet in container.demux(stream) if packet.size]
+            shown = [(packet, frame) for packet in packets for frame in codec.decode(packet)]
+            times = [float(packet.pts * packet.time_base) for packet, _ in shown]
+            pictures = [frame.to_ndarray(format="rgba") for _, frame in shown]
+        else:
+            for frame in container.decode(stream):
+                times.append(frame.time)
+                pictures.append(frame.to_ndarray(format="rgba"))
+    return times, pictures
+
+
+@pytest.mark.parametrize("suffix", [".webm", ".mov"])
+@pytest.mark.parametrize("fps", [12, 29.97])
+def test_pictures_come_back_at_their_times_with_their_transparency(tmp_path, suffix, fps):
+    path = tmp_path / f"a{suffix}"
+    written = frames(10)
+    write_with_alpha(path, written, fps=fps, audio=tone())
+    times, pictures = decoded(path)
+    assert len(pictures) == 10
+    assert times == pytest.approx(np.arange(10) / fps, abs=2e-3)
+    for one, other in zip(written, pictures, strict=True):
+        assert np.abs(one[..., 3].astype(int) - other[..., 3]).mean() < 4
+        inside = one[..., 3] == 255
+        assert np.abs(one[inside][:, :3].astype(int) - other[inside][:, :3]).mean() < 12
+        assert np.abs(np.median(other[inside], axis=0) - (200, 60, 30, 255)).max() <= 4
+
+
+@pytest.mark.parametrize("suffix", [".webm", ".mov"])
+def test_the_sound_is_as_long_as_given_and_starts_at_zero(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    write_with_alpha(path, frames(25, 3), fps=25, audio=tone(1.3))
+    with av.open(str(path)) as container:
+        parts = list(container.decode(audio=0))
+        assert parts[0].time == pytest.approx(0, abs=0.01)
+        samples = np.concatenate([part.to_ndarray().ravel() for part in parts])
+    assert len(samples) / 48_000 == pytest.approx(1.3, abs=0.03)
+    assert np.abs(samples).max() > (0.2 if samples.dtype.kind == "f" else 0.2 * 32767)
+
+
+def test_numbered_pictures_are_exact(tmp_path):
+    for channels in (3, 4):
+        written = frames(3, channels)
+        write_pictures(tmp_path / "frame%03d.png", written)
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["frame000.png", "frame001.png", "frame002.png"]
+        for n, frame in enumerate(written):
+            assert np.array_equal(np.asarray(Image.open(tmp_path / f"frame{n:03d}.png")), frame)
+
+
+def test_what_cannot_be_written_is_refused_and_leaves_no_file(tmp_path):
+    for suffix, pictures, fps, sound, message in (
+        (".webm", [], 25, tone(), "no frames"),
+        (".webm", [np.zeros((63, 96, 4), np.uint8)], 25, tone(), "even sizes"),
+        (".mov", frames(1) + frames(1, 3), 25, tone(), "frame 1"),
+        (".mov", frames(1), 0, tone(), "frame rate"),
+        (".mov", frames(1), 25, Audio(np.zeros(0, np.float32), HZ), "no samples"),
+        (".avi", frames(1), 25, tone(), "required one of"),
+    ):
+        with pytest.raises(ExportError, match=message):
+            write_with_alpha(tmp_path / f"a{suffix}", pictures, fps=fps, audio=sound)
+        assert not list(tmp_path.iterdir())
+
+
+def grey_frames(count: int = 3, height: int = 120, width: int = 160) -> list[np.ndarray]:
+    return [np.full((height, width, 3), 10 * n, np.uint8) for n in range(count)]
+
+
+def drawn(frame: np.ndarray, made: np.ndarray) -> tuple[slice, slice]:
+    """Return the rows and columns that differ."""
+    rows, columns = np.nonzero((made != frame).any(axis=2))
+    return slice(int(rows.min()), int(rows.max()) + 1), slice(int(columns.min()), int(columns.max()) + 1)
+
+
+@pytest.mark.parametrize("size", [(56, 72), (10, 300), (300, 10), (1, 1)])
+@pytest.mark.parametrize("frame_size", [(120, 160), (480, 270)])
+def test_it_lies_in_the_lower_right_corner(size, frame_size):
+    (frame,), picture = grey_frames(1, *frame_size), np.full((*size, 3), 130, np.uint8)
+    (made,) = add_inset([frame], [picture])
+    assert (made.shape, made.dtype) == (frame.shape, np.uint8)
+    rows, columns = drawn(frame, made)
+    assert inset_box(frame_size, size) == (columns.start, rows.start, columns.stop, rows.stop)
+    margin = round(MARGIN_SHARE * min(frame_size))
+    assert (rows.stop, columns.stop) == (frame_size[0] - margin, frame_size[1] - margin)
+    inner = (made[rows, columns] == 130).all(axis=2)
+    assert 1 <= inner.any(axis=1).sum() <= HEIGHT_SHARE * frame_size[0] + 1
+    assert 1 <= inner.any(axis=0).sum() <= WIDTH_SHARE * frame_size[1] + 1
+    border = made[rows, columns][~inner]
+    assert (border == WHITE).all()
+    assert np.array_equal(np.unique(made[rows, columns]), [130, WHITE])
+
+
+def test_the_picture_keeps_its_form_and_its_place():
+    """A picture that is dark at the left and light at the right, and red above."""
+    picture = np.zeros((56, 72, 3), np.uint8)
+    picture[:, 36:, 1] = 200
+    picture[:28, :, 0] = 200
+    (frame,) = grey_frames(1, 288, 360)
+    (made,) = add_inset([frame], [picture])
+    rows, columns = drawn(frame, made)
+    inner = made[rows, columns][2:-2, 2:-2].astype(int)
+    height, width = inner.shape[:2]
+    assert width / height == pytest.approx(72 / 56, abs=0.03)
+    assert inner[3, 3].tolist() == [200, 0, 0]
+    assert inner[-4, 3].tolist() == [0, 0, 0]
+    assert inner[3, -4].tolist() == [200, 200, 0]
+    assert inner[-4, -4].tolist() == [0, 200, 0]
+    middle = np.abs(np.diff(inner[-4, :, 1])).argmax()
+    assert middle == pytest.approx(width / 2, abs=1.5)
+    (turned,) = add_inset([frame], [picture[::-1, ::-1]])
+    assert np.abs(turned[rows, columns].astype(int) - made[rows, columns][::-1, ::-1]).max() <= 1
+
+
+def test_every_frame_has_its_own_picture_and_is_not_changed():
+    films, pictures = grey_frames(5), [np.full((56, 72, 3), 100 + n, np.uint8) for n in range(4)]
+    before = [frame.copy() for frame in films]
+    made = list(add_inset(films, pictures))
+    assert len(made) == 4  # as many as there are of both
+    assert [frame[-15, -15, 0] for frame in made] == [100, 101, 102, 103]
+    assert all(np.array_equal(frame, old) for frame, old in zip(films, before, strict=True))
+    assert [frame[0, 0, 0] for frame in made] == [0, 10, 20, 30]
+    assert list(add_inset([], pictures)) == []
+
+
+def test_a_label_leaves_the_inset_free():
+    (made,) = add_inset(grey_frames(1, 288, 360), [np.full((56, 72, 3), 130, np.uint8)])
+    left, top, right, bottom = inset_box((288, 360), (56, 72))
+    (marked,) = mark_frames([made], (left, top, right, bottom))
+    assert np.array_equal(marked[top:bottom, left:right], made[top:bottom, left:right])
+    assert (marked != made).any()
+
+
+NAMES = {
+    "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
+    "iptc": "http://iptc.org/std/Iptc4xmpExt/2008-02-29/",
+    "dc": "http://purl.org/dc/elements/1.1/",
+}
+
+
+def noise(height: int, width: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).integers(0, 256, (height, width, 3), np.uint8)
+
+
+def marked_part(frame: np.ndarray, marked: np.ndarray) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom of what differs."""
+    rows, columns = np.nonzero((frame != marked).any(axis=2))
+    return int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1
+
+
+def test_a_marked_video_says_so_to_people_and_programs(tmp_path):
+    mark = mark_metadata()
+    frames = [np.zeros((64, 96, 3), np.uint8)] * 3
+    audio = Audio(np.zeros(1600, np.float32), 16_000)
+    write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=audio, tags=mark.tags, xmp=mark.xmp)
+    with av.open(str(tmp_path / "a.mp4"), options={"export_xmp": "1"}) as container:
+        assert container.metadata["comment"] == STATEMENT
+        assert container.metadata["comment"].startswith("synthetic: ")
+        assert SOURCE_TYPE in container.metadata["keywords"]
+        packet = ET.fromstring(container.metadata["xmp"].encode())  # noqa: S314  (our own)
+    description = packet.find("rdf:RDF/rdf:Description", NAMES)
+    assert description.findtext("iptc:DigitalSourceType", None, NAMES) == SOURCE_TYPE
+    assert description.findtext("dc:description/rdf:Alt/rdf:li", None, NAMES) == STATEMENT
+
+
+def test_any_statement_is_valid_xml():
+    packet = ET.fromstring(mark_metadata('<"&größe{}>').xmp.encode())  # noqa: S314
+    assert packet.findtext(".//dc:description/rdf:Alt/rdf:li", None, NAMES) == '<"&größe{}>'
+    odd = ET.fromstring(mark_metadata("a\x00b\udcff\nc").xmp.encode())  # noqa: S314
+    assert odd.findtext(".//dc:description/rdf:Alt/rdf:li", None, NAMES) == r"a\x00b\udcff\nc"
+
+
+def test_every_frame_has_the_same_label_and_nothing_else_changes():
+    frames = [noise(288, 360, n) for n in range(3)]
+    copies = [frame.copy() for frame in frames]
+    marked = list(mark_frames(iter(frames)))
+    assert len(marked) == 3
+    parts = {marked_part(*pair) for pair in zip(frames, marked, strict=True)}
+    (left, top, right, bottom), *others = parts
+    assert not others
+    assert right > 345  # in the lower right corner,
+    assert bottom > 275
+    assert 30 < right - left < 90  # and small
+    assert 10 < bottom - top < 25
+    assert all((frame == copy).all() for frame, copy in zip(frames, copies, strict=True))
+
+
+def test_the_label_is_legible_on_any_ground():
+    for grey in (0, 128, 255):
+        (marked,) = mark_frames([np.full((720, 1280, 3), grey, np.uint8)])
+        part = marked[-70:, -160:, 0].astype(int)
+        letters = (part > 225).mean() if grey < 225 else 1
+        ground = part[(part < 160)]
+        assert letters > 0.02
+        assert ground.size > 0.2 * part.size
+        assert part.max() - np.median(ground) > 80
+
+
+@given(
+    height=st.integers(40, 400).map(lambda n: 2 * n),
+    width=st.integers(60, 640).map(lambda n: 2 * n),
+    corners=st.tuples(*[st.floats(-0.2, 1.2)] * 4),
+)
+@settings(max_examples=25)
+def test_the_face_is_left_free(height, width, corners):
+    left, right = sorted(corners[:2])
+    top, bottom = sorted(corners[2:])
+    face = (left * width, top * height, right * width, bottom * height)
+    frame = np.full((height, width, 3), 100, np.uint8)
+    try:
+        marked = next(mark_frames([frame], face))
+    except ExportError:
+        for y, x in product((0, 1), (0, 1)):  # all corners are taken, or nearly so
+            assert face[0] - 65 < x * width < face[2] + 65
+            assert face[1] - 25 < y * height < face[3] + 25
+        return
+    changed = marked_part(frame, marked)
+    assert changed[2] <= face[0] or changed[0] >= face[2] or changed[3] <= face[1] or changed[1] >= face[3]
+
+
+def test_a_label_that_has_no_room_is_refused():
+    with pytest.raises(ExportError, match="no corner of the 360 × 288 px frame"):
+        next(mark_frames([noise(288, 360)], (5, 5, 355, 283)))
+    with pytest.raises(InputError, match="left before right"):
+        next(mark_frames([noise(288, 360)], (50, 5, 20, 283)))
+    assert list(mark_frames([])) == []
+
+
+def test_a_program_that_is_not_installed_has_a_mark_too(monkeypatch):
+    def nothing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", nothing)
+    assert "lipmotion source" in mark_metadata().xmp
