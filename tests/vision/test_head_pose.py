@@ -3,8 +3,24 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from lipmotion_faces.tracking.head_pose import fit_similarities, remove_head_motion
-from lipmotion_faces.tracking.trackers import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
+from lipmotion_faces.tracking import image_similarity
+from lipmotion_faces.tracking.head_pose import (
+    crop_mouth,
+    eyes_to_image,
+    face_to_image,
+    fit_similarities,
+    region_to_image,
+    remove_head_motion,
+)
+from lipmotion_faces.tracking.trackers import (
+    EYE_CORNERS,
+    FOREHEAD_SLOPE_DEG,
+    JAW_POINTS,
+    LIP_POINTS,
+    NASION,
+    RIGID_POINTS,
+    TRACKED_POINTS,
+)
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 FRAMES = 40
@@ -90,3 +106,159 @@ def test_similarity_is_the_least_squares_solution_and_no_reflection():
     assert np.linalg.det(mirrored[0]) == pytest.approx(1)
     assert not {*RIGID_POINTS} & {*LIP_POINTS, *JAW_POINTS}
     assert (len({*LIP_POINTS}), len({*JAW_POINTS})) == (40, 12)
+
+
+cv2 = pytest.importorskip("cv2")
+
+
+def ramp(width: int, height: int) -> np.ndarray:
+    """Red rises to the right and green downwards, one a pixel centre."""
+    image = np.zeros((height, width, 3), np.uint8)
+    image[..., 0] = np.arange(width)
+    image[..., 1] = np.arange(height)[:, None]
+    return image
+
+
+def test_an_upright_face_of_the_right_size_is_cut_out_as_it_is():
+    eyes = np.array([[60.0, 50.0], [150.0, 50.0]])  # 90 px apart, the middle at 105, 50
+    image = ramp(256, 200)
+    np.testing.assert_array_equal(crop_mouth(image, eyes_to_image(eyes)), image[98 : 98 + 56, 69 : 69 + 72])
+
+
+def test_the_eyes_of_the_turned_head_become_level():
+    angle = np.deg2rad(20)
+    half = 45 * np.array([np.cos(angle), np.sin(angle)])
+    crop = crop_mouth(ramp(256, 200), eyes_to_image(np.array([130, 80]) + np.stack([-half, half])))
+    along = np.diff(crop[28].astype(int), axis=0).mean(axis=0)
+    np.testing.assert_allclose(along[:2], [np.cos(angle), np.sin(angle)], atol=0.03)
+
+
+def test_region_pixels_map_to_the_head():
+    eyes = np.array([[10.0, 20.0], [28.0, 20.0]])  # 18 px: five region pixels to one of the image
+    matrix = region_to_image(eyes_to_image(eyes))
+    # the centre of the region, (36, 28) from its corner, lies (0, 76) from between the eyes
+    centre = matrix @ [35.5, 27.5, 1]
+    np.testing.assert_allclose(centre + 0.5, [19, 20 + 76 / 5])
+
+
+def test_a_large_face_is_averaged_not_skipped_and_outside_of_the_image_its_edge_repeats():
+    image = np.random.default_rng(0).integers(0, 256, (2000, 2000, 3)).astype(np.uint8)
+    crop = crop_mouth(image, eyes_to_image(np.array([[600.0, 600.0], [1320.0, 600.0]])))  # eight times the size
+    assert crop.shape == (56, 72, 3)
+    assert crop.std() < 20  # of noise with a deviation of 74
+    flat = np.full((100, 160, 3), 77, np.uint8)
+    assert (crop_mouth(flat, eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77).all()
+
+
+def nodding(frames: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A head that nods, turns and comes nearer while it speaks: points in its own frame, then where it is."""
+    column = {index: n for n, index in enumerate(TRACKED_POINTS)}
+    draw = np.random.default_rng(4)
+    face = draw.uniform(-0.8, 0.8, (len(TRACKED_POINTS), 3))
+    slope = np.deg2rad(FOREHEAD_SLOPE_DEG)
+    face[[column[33], column[263], column[10], column[168]]] = [
+        [-0.5, 0, 0],
+        [0.5, 0, 0],
+        [0, 0.1 + np.cos(slope), 0.3 - np.sin(slope)],
+        [0, 0.1, 0.3],
+    ]
+    head = np.repeat(face[None], frames, axis=0)
+    head[:, [column[index] for index in LIP_POINTS], :2] += 0.1 * draw.normal(size=(frames, len(LIP_POINTS), 2))
+    turns = Rotation.from_rotvec(0.3 * draw.normal(size=(frames, 3))).as_matrix()
+    return head, turns, draw.uniform(50, 200, frames), draw.uniform(100, 300, (frames, 3))
+
+
+def test_the_lips_are_found_whatever_the_head_does():
+    head, turns, sizes, places = nodding()
+    points = (sizes[:, None, None] * head @ turns.transpose(0, 2, 1) + places[:, None]) * (1, -1, -1)
+    depth = head[:, [TRACKED_POINTS.index(index) for index in LIP_POINTS], 2].mean()
+    maps = face_to_image(points)
+    for turn, size, place, to_image in zip(turns, sizes, places, maps, strict=True):
+        for x, y in ((0, 0), (-36, 48), (36, 104), (12, 70)):  # px of the region, y down
+            seen = size * turn @ np.array([x / 90, -y / 90, depth]) + place
+            np.testing.assert_allclose(to_image @ [x, y, 1], [seen[0], -seen[1]], atol=1e-6)
+
+
+def test_a_face_straight_ahead_is_cut_out_as_by_its_eyes():
+    head, *_ = nodding()
+    points = (head * 75 + (120, -90, 0)) * (1, -1, -1)
+    eyes = points[0][[TRACKED_POINTS.index(33), TRACKED_POINTS.index(263)], :2]
+    np.testing.assert_allclose(face_to_image(points)[0], eyes_to_image(eyes), atol=1e-9)
+    image = np.random.default_rng(1).integers(0, 256, (220, 260, 3)).astype(np.uint8)
+    crops = [crop_mouth(image, to_image) for to_image in (face_to_image(points)[0], eyes_to_image(eyes))]
+    assert np.abs(np.subtract(*crops, dtype=int)).max() <= 1
+
+
+DRAW = np.random.default_rng(5)
+COARSE = DRAW.uniform(40, 215, (9, 12, 3))
+
+
+@pytest.fixture(autouse=True)
+def _opencv():
+    pytest.importorskip("cv2")
+
+
+def picture(scale: int) -> np.ndarray:
+    """Squares of many colours, on a grid of 12 by 9."""
+    return np.kron(COARSE, np.ones((scale, scale, 1))).astype(np.uint8)
+
+
+def test_a_scene_is_small_and_its_brightness_does_not_count():
+    image = picture(20)
+    assert image_similarity.scene_thumbnail(image).shape == (24, 32, 3)
+    np.testing.assert_allclose(
+        image_similarity.scene_thumbnail(image), image_similarity.scene_thumbnail(image + np.uint8(30)), atol=1
+    )
+    assert abs(image_similarity.scene_thumbnail(image).mean()) < 1e-9
+
+
+def test_a_face_looks_the_same_from_nearer_and_turned():
+    far, near = picture(10), picture(30)
+    eyes = np.array([[40.0, 40.0], [80.0, 40.0]])
+    upright = image_similarity.face_thumbnail(far, eyes)
+    assert image_similarity.image_correlation(upright, image_similarity.face_thumbnail(near, 3 * eyes)) > 0.95
+    turned = image_similarity.face_thumbnail(np.rot90(far), np.stack([eyes[:, 1], far.shape[1] - eyes[:, 0]], axis=1))
+    assert image_similarity.image_correlation(upright, turned) > 0.95
+    assert (
+        image_similarity.image_correlation(upright, image_similarity.face_thumbnail(far, eyes + np.array([20, 25])))
+        < 0.6
+    )
+
+
+def test_likeness_is_a_correlation_without_tint():
+    one, other = DRAW.uniform(0, 255, (2, 6, 5, 3))
+    assert image_similarity.image_correlation(one, 0.5 * one + (10, 20, 30)) == pytest.approx(1)
+    assert image_similarity.image_correlation(one, 200 - one) == pytest.approx(-1)
+    assert image_similarity.image_correlation(one, np.full_like(one, 90)) == 0
+    assert image_similarity.image_correlation(np.stack([one, other])[:, None], np.stack([one, other])).shape == (2, 2)
+
+
+def mouths(count: int = 40) -> np.ndarray:
+    usual = np.kron(DRAW.uniform(60, 190, (7, 9, 3)), np.ones((8, 8, 1)))
+    frames = usual + DRAW.normal(0, 8, (count, *usual.shape))
+    return np.stack([image_similarity.mouth_thumbnail(frame.clip(0, 255).astype(np.uint8)) for frame in frames])
+
+
+def test_boxes_and_other_textures_are_strange_at_any_shift():
+    for value in (0, 255, None):
+        frames = mouths()
+        frames[10:18] = DRAW.integers(0, 255, frames[10:18].shape) if value is None else value
+        assert np.flatnonzero(image_similarity.find_occluded_mouths(frames)).tolist() == list(range(10, 18))
+
+
+def test_where_the_usual_look_is_flat_nothing_is_strange():
+    frames = np.full((20, 14, 18, 3), 100, np.uint8)
+    frames[3] = 250
+    assert not image_similarity.find_occluded_mouths(frames).any()
+
+
+def test_neither_usual_mouths_nor_other_light_nor_a_nod_are_strange():
+    usual = mouths()
+    assert not image_similarity.find_occluded_mouths(usual).any()
+    dark = usual.copy()
+    dark[10:18] //= 2
+    assert not image_similarity.find_occluded_mouths(dark).any()
+    for rows in (-4, -2, 3):
+        nodded = usual.copy()
+        nodded[10:18] = np.roll(nodded[10:18], rows, axis=1)
+        assert not image_similarity.find_occluded_mouths(nodded).any()
