@@ -25,6 +25,15 @@ from lipmotion_faces.appearance.candidates import (
 )
 from oracles.components import components, share
 
+
+def pictures(seed: int = 0, count: int = 40, height: int = 9, width: int = 12) -> np.ndarray:
+    """Coloured blobs that come and go, and a little noise."""
+    draw = np.random.default_rng(seed)
+    blobs = draw.normal(0, 1, (6, height, width, 3)) * 0.6 ** np.arange(6)[:, None, None, None]
+    values = 120 + 25 * np.einsum("tk,khwc->thwc", draw.normal(0, 1, (count, 6)), blobs)
+    return np.clip(values + draw.normal(0, 1, values.shape), 0, 255).astype(np.uint8)
+
+
 TRAINING, HELD_OUT = np.split(pictures(count=160), [120])
 
 
@@ -288,14 +297,6 @@ def test_edges_become_steeper_in_lightness_alone() -> None:
     lips = np.repeat(np.repeat(edge[:, :1], 56, axis=1), 3, axis=2)
     gained = np.abs(sharpen(lips, 0.5, 1).astype(int) - lips).max(axis=(0, 2, 3))
     assert gained[28] > 1.2 * gained[0]  # the lips are in the middle
-
-
-def pictures(seed: int = 0, count: int = 40, height: int = 9, width: int = 12) -> np.ndarray:
-    """Coloured blobs that come and go, and a little noise."""
-    draw = np.random.default_rng(seed)
-    blobs = draw.normal(0, 1, (6, height, width, 3)) * 0.6 ** np.arange(6)[:, None, None, None]
-    values = 120 + 25 * np.einsum("tk,khwc->thwc", draw.normal(0, 1, (count, 6)), blobs)
-    return np.clip(values + draw.normal(0, 1, values.shape), 0, 255).astype(np.uint8)
 
 
 @pytest.fixture(scope="module")

@@ -13,20 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from lipmotion.errors import ExportError, InputError
-from lipmotion.types import Audio
+from lipmotion import errors, types
 from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, add_inset, inset_box
-from lipmotion_faces.video.mp4 import (
-    LARGEST_PACKET_BYTES,
-    TAGS,
-    XMP_UUID,
-    append_xmp,
-    frame_rate,
-    write_mp4,
-    write_pictures,
-    write_with_alpha,
-)
-from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_frames, mark_metadata
+from lipmotion_faces.video import mp4, synthetic_mark
 
 RATES = [24, 29.97, 60]
 
@@ -35,8 +24,8 @@ def black(count: int, height: int = 64, width: int = 96) -> list[np.ndarray]:
     return [np.zeros((height, width, 3), dtype=np.uint8) for _ in range(count)]
 
 
-def silence(duration_s: float, rate_hz: int = 16_000) -> Audio:
-    return Audio(np.zeros(round(duration_s * rate_hz), dtype=np.float32), rate_hz)
+def silence(duration_s: float, rate_hz: int = 16_000) -> types.Audio:
+    return types.Audio(np.zeros(round(duration_s * rate_hz), dtype=np.float32), rate_hz)
 
 
 def pictures(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -60,7 +49,7 @@ def test_a_click_and_a_flash_stay_together(tmp_path, fps):
     frames[flash][:] = 255
     audio = silence(2.0, rate_hz)
     audio.samples[round(flash / fps * rate_hz)] = 1.0
-    write_mp4(tmp_path / "a.mp4", frames, fps=fps, audio=audio)
+    mp4.write_mp4(tmp_path / "a.mp4", frames, fps=fps, audio=audio)
 
     time_s, brightness = pictures(tmp_path / "a.mp4")
     start_s, samples, played_hz = sound(tmp_path / "a.mp4")
@@ -73,14 +62,14 @@ def test_a_click_and_a_flash_stay_together(tmp_path, fps):
 @pytest.mark.parametrize(("fps", "duration_s"), [(24, 1.617), (29.97, 1.0), (60, 1.617)])
 def test_streams_start_at_zero_and_keep_their_lengths(tmp_path, fps, duration_s):
     count = int(1.2 * fps)
-    write_mp4(tmp_path / "a.mp4", black(count), fps=fps, audio=silence(duration_s, 22_050))
+    mp4.write_mp4(tmp_path / "a.mp4", black(count), fps=fps, audio=silence(duration_s, 22_050))
     with av.open(str(tmp_path / "a.mp4")) as container:
         video, sound_stream = container.streams.video[0], container.streams.audio[0]
         assert video.start_time == sound_stream.start_time == 0
         assert (video.codec_context.name, sound_stream.codec_context.name) == ("h264", "aac")
         assert video.codec_context.pix_fmt == "yuv420p"
         assert video.frames == count
-        assert video.average_rate == frame_rate(fps)
+        assert video.average_rate == mp4.frame_rate(fps)
         assert float(video.duration * video.time_base) == pytest.approx(count / fps, abs=1e-3)
         assert float(sound_stream.duration * sound_stream.time_base) == pytest.approx(duration_s, abs=1e-3)
     time_s, _ = pictures(tmp_path / "a.mp4")
@@ -91,7 +80,7 @@ def test_streams_start_at_zero_and_keep_their_lengths(tmp_path, fps, duration_s)
 def test_the_end_of_the_sound_is_played(tmp_path):
     audio = silence(1.0)
     audio.samples[-80:] = 0.5
-    write_mp4(tmp_path / "a.mp4", black(5), fps=25, audio=audio)
+    mp4.write_mp4(tmp_path / "a.mp4", black(5), fps=25, audio=audio)
     start_s, samples, rate_hz = sound(tmp_path / "a.mp4")
     loud = np.flatnonzero(np.abs(samples) > 0.2)
     assert start_s + loud[-1] / rate_hz == pytest.approx(1.0, abs=0.005)
@@ -99,7 +88,7 @@ def test_the_end_of_the_sound_is_played(tmp_path):
 
 def test_sound_lies_beside_its_frames(tmp_path):
     """A player that streams must not wait for the end of the file to play the beginning."""
-    write_mp4(tmp_path / "a.mp4", black(300), fps=10, audio=silence(30.0))
+    mp4.write_mp4(tmp_path / "a.mp4", black(300), fps=10, audio=silence(30.0))
     with av.open(str(tmp_path / "a.mp4")) as container:
         packets = [(p.pos, p.stream.type, float(p.dts * p.time_base)) for p in container.demux() if p.dts is not None]
     latest = {"video": 0.0, "audio": 0.0}
@@ -111,7 +100,7 @@ def test_sound_lies_beside_its_frames(tmp_path):
 def test_colours_come_back(tmp_path):
     colours = np.zeros((64, 96, 3), dtype=np.uint8)
     colours[:, :32], colours[:, 32:64], colours[:, 64:] = (242, 190, 156), (44, 92, 104), (188, 84, 80)
-    write_mp4(tmp_path / "a.mp4", [colours] * 3, fps=25, audio=silence(0.1))
+    mp4.write_mp4(tmp_path / "a.mp4", [colours] * 3, fps=25, audio=silence(0.1))
     with av.open(str(tmp_path / "a.mp4")) as container:
         back = next(container.decode(video=0)).to_ndarray(format="rgb24")
     for x in (16, 48, 80):
@@ -121,7 +110,7 @@ def test_colours_come_back(tmp_path):
 def test_the_frame_rate_is_exact():
     exact = {24: Fraction(24), 25.0: Fraction(25), 12.5: Fraction(25, 2), 23.976: Fraction(24000, 1001)}
     exact |= {29.97: Fraction(30000, 1001), 30000 / 1001: Fraction(30000, 1001), 59.94: Fraction(60000, 1001)}
-    assert {fps: frame_rate(fps) for fps in exact} == exact
+    assert {fps: mp4.frame_rate(fps) for fps in exact} == exact
 
 
 def test_unusable_frames_are_refused_and_leave_no_file(tmp_path):
@@ -134,21 +123,23 @@ def test_unusable_frames_are_refused_and_leave_no_file(tmp_path):
         ([np.zeros((64, 64, 3))], "float64"),
     ]
     for frames, message in unusable:
-        with pytest.raises(ExportError, match=message):
-            write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(0.1))
+        with pytest.raises(errors.ExportError, match=message):
+            mp4.write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(0.1))
         assert not list(tmp_path.iterdir())
 
 
 def test_other_unusable_input_is_refused(tmp_path):
-    with pytest.raises(ExportError, match="sound has no samples"):
-        write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0))
-    with pytest.raises(ExportError, match="XMP metadata"):
-        write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), xmp="x" * (LARGEST_PACKET_BYTES + 1))
+    with pytest.raises(errors.ExportError, match="sound has no samples"):
+        mp4.write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0))
+    with pytest.raises(errors.ExportError, match="XMP metadata"):
+        mp4.write_mp4(
+            tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), xmp="x" * (mp4.LARGEST_PACKET_BYTES + 1)
+        )
     for fps in (0, -1, float("nan"), float("inf")):
-        with pytest.raises(ExportError, match="frame rate"):
-            write_mp4(tmp_path / "a.mp4", black(1), fps=fps, audio=silence(0.1))
-    with pytest.raises(ExportError, match="does not exist"):
-        write_mp4(tmp_path / "no" / "a.mp4", black(1), fps=25, audio=silence(0.1))
+        with pytest.raises(errors.ExportError, match="frame rate"):
+            mp4.write_mp4(tmp_path / "a.mp4", black(1), fps=fps, audio=silence(0.1))
+    with pytest.raises(errors.ExportError, match="does not exist"):
+        mp4.write_mp4(tmp_path / "no" / "a.mp4", black(1), fps=25, audio=silence(0.1))
 
 
 def moving(count: int, height: int = 96, width: int = 128) -> list[np.ndarray]:
@@ -160,7 +151,7 @@ def moving(count: int, height: int = 96, width: int = 128) -> list[np.ndarray]:
 
 def test_the_same_frames_give_the_same_bytes(tmp_path):
     for name in ("a.mp4", "b.mp4"):
-        write_mp4(tmp_path / name, moving(40), fps=25, audio=silence(1.6), tags={"comment": "c"}, xmp="<x/>")
+        mp4.write_mp4(tmp_path / name, moving(40), fps=25, audio=silence(1.6), tags={"comment": "c"}, xmp="<x/>")
     content = (tmp_path / "a.mp4").read_bytes()
     assert content == (tmp_path / "b.mp4").read_bytes()
     assert b" bframes=0 " in content
@@ -169,22 +160,22 @@ def test_the_same_frames_give_the_same_bytes(tmp_path):
 
 def test_the_bytes_do_not_depend_on_the_number_of_processors(tmp_path):
     """The encoder writes its settings into the video; where the number of threads is its own choice, it varies."""
-    write_mp4(tmp_path / "a.mp4", moving(2, 720, 1280), fps=25, audio=silence(0.2))
+    mp4.write_mp4(tmp_path / "a.mp4", moving(2, 720, 1280), fps=25, audio=silence(0.2))
     assert b" threads=4 " in (tmp_path / "a.mp4").read_bytes()
 
 
 def test_tags_come_back(tmp_path):
-    tags = {name: f"{name}: größe\nline" for name in TAGS} | {"title": "a\udcffb"}
-    write_mp4(tmp_path / "a.mp4", black(2), fps=25, audio=silence(0.1), tags=tags)
+    tags = {name: f"{name}: größe\nline" for name in mp4.TAGS} | {"title": "a\udcffb"}
+    mp4.write_mp4(tmp_path / "a.mp4", black(2), fps=25, audio=silence(0.1), tags=tags)
     with av.open(str(tmp_path / "a.mp4")) as container:
-        assert {name: container.metadata.get(name) for name in TAGS} == tags | {"title": r"a\udcffb"}
+        assert {name: container.metadata.get(name) for name in mp4.TAGS} == tags | {"title": r"a\udcffb"}
     content = (tmp_path / "a.mp4").read_bytes()
     assert content.index(b"moov") < content.index("\xa9cmt".encode("latin-1")) < content.index(b"mdat")
 
 
 def test_a_tag_that_would_be_lost_is_refused(tmp_path):
-    with pytest.raises(ExportError, match="unknown tags colour, encoder; known: album"):
-        write_mp4(
+    with pytest.raises(errors.ExportError, match="unknown tags colour, encoder; known: album"):
+        mp4.write_mp4(
             tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), tags={"encoder": "x", "colour": "y", "title": "z"}
         )
     assert not list(tmp_path.iterdir())
@@ -196,7 +187,7 @@ def test_change_from_frame_to_frame_is_kept(tmp_path):
     still = np.stack([127 + 60 * np.sin(x / 9), 127 + 60 * np.cos(y / 7), 100 + 0.5 * x], axis=2)
     draw = np.random.default_rng(0)
     frames = [np.rint(still + draw.normal(0, 3, (96, 128, 1))).astype(np.uint8) for _ in range(40)]
-    write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(1.6))
+    mp4.write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(1.6))
     with av.open(str(tmp_path / "a.mp4")) as container:
         shown = [frame.to_ndarray()[:96] for frame in container.decode(video=0)]
     given = [av.VideoFrame.from_ndarray(frame).reformat(format="yuv420p").to_ndarray()[:96] for frame in frames]
@@ -209,7 +200,7 @@ def video(tmp_path):
     """A video without XMP."""
     path = tmp_path / "a.mp4"
     frames = [np.full((32, 48, 3), 9 * n, np.uint8) for n in range(10)]
-    write_mp4(path, frames, fps=25, audio=Audio(np.zeros(6400, np.float32), 16_000))
+    mp4.write_mp4(path, frames, fps=25, audio=types.Audio(np.zeros(6400, np.float32), 16_000))
     return path
 
 
@@ -226,7 +217,7 @@ def read_xmp(path):
 def test_what_is_appended_is_read_and_the_video_stays(video):
     before, shown = video.read_bytes(), brightness(video)
     assert read_xmp(video) is None
-    append_xmp(video, "<größe/>")
+    mp4.append_xmp(video, "<größe/>")
     assert read_xmp(video) == "<größe/>"
     assert video.read_bytes().startswith(before)
     assert brightness(video) == shown
@@ -238,8 +229,8 @@ def test_long_boxes_and_other_uuids_are_passed_over(tmp_path):
         struct.pack(">I4sQ", 1, b"mdat", 20) + b"abcd" + struct.pack(">I4s", 26, b"uuid") + bytes(16) + b"no"
     )
     before = path.read_bytes()
-    append_xmp(path, "yes")
-    assert path.read_bytes() == before + struct.pack(">I4s", 27, b"uuid") + XMP_UUID + b"yes"
+    mp4.append_xmp(path, "yes")
+    assert path.read_bytes() == before + struct.pack(">I4s", 27, b"uuid") + mp4.XMP_UUID + b"yes"
 
 
 def test_what_does_not_end_with_a_whole_box_is_left_alone(tmp_path):
@@ -253,14 +244,14 @@ def test_what_does_not_end_with_a_whole_box_is_left_alone(tmp_path):
         struct.pack(">I4s", 8, b"free") + b"abc",
     ):
         path.write_bytes(content)
-        with pytest.raises(ExportError, match="not whole boxes"):
-            append_xmp(path, "x")
+        with pytest.raises(errors.ExportError, match="not whole boxes"):
+            mp4.append_xmp(path, "x")
         assert path.read_bytes() == content
 
 
 def test_packets_that_cannot_be_are_refused(video):
-    with pytest.raises(ExportError, match="at most"):
-        append_xmp(video, "x" * (LARGEST_PACKET_BYTES + 1))
+    with pytest.raises(errors.ExportError, match="at most"):
+        mp4.append_xmp(video, "x" * (mp4.LARGEST_PACKET_BYTES + 1))
 
 
 HZ = 16_000
@@ -274,8 +265,8 @@ def frames(count: int, channels: int = 4) -> list[np.ndarray]:
     return drawn
 
 
-def tone(duration_s: float = 1.0) -> Audio:
-    return Audio(0.3 * np.sin(np.arange(int(duration_s * HZ)) / 8).astype(np.float32), HZ)
+def tone(duration_s: float = 1.0) -> types.Audio:
+    return types.Audio(0.3 * np.sin(np.arange(int(duration_s * HZ)) / 8).astype(np.float32), HZ)
 
 
 def decoded(path: Path) -> tuple[list[float], list[np.ndarray]]:
@@ -301,7 +292,7 @@ def decoded(path: Path) -> tuple[list[float], list[np.ndarray]]:
 def test_pictures_come_back_at_their_times_with_their_transparency(tmp_path, suffix, fps):
     path = tmp_path / f"a{suffix}"
     written = frames(10)
-    write_with_alpha(path, written, fps=fps, audio=tone())
+    mp4.write_with_alpha(path, written, fps=fps, audio=tone())
     times, pictures = decoded(path)
     assert len(pictures) == 10
     assert times == pytest.approx(np.arange(10) / fps, abs=2e-3)
@@ -315,7 +306,7 @@ def test_pictures_come_back_at_their_times_with_their_transparency(tmp_path, suf
 @pytest.mark.parametrize("suffix", [".webm", ".mov"])
 def test_the_sound_is_as_long_as_given_and_starts_at_zero(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
-    write_with_alpha(path, frames(25, 3), fps=25, audio=tone(1.3))
+    mp4.write_with_alpha(path, frames(25, 3), fps=25, audio=tone(1.3))
     with av.open(str(path)) as container:
         parts = list(container.decode(audio=0))
         assert parts[0].time == pytest.approx(0, abs=0.01)
@@ -327,7 +318,7 @@ def test_the_sound_is_as_long_as_given_and_starts_at_zero(tmp_path, suffix):
 def test_numbered_pictures_are_exact(tmp_path):
     for channels in (3, 4):
         written = frames(3, channels)
-        write_pictures(tmp_path / "frame%03d.png", written)
+        mp4.write_pictures(tmp_path / "frame%03d.png", written)
         assert sorted(path.name for path in tmp_path.iterdir()) == ["frame000.png", "frame001.png", "frame002.png"]
         for n, frame in enumerate(written):
             assert np.array_equal(np.asarray(Image.open(tmp_path / f"frame{n:03d}.png")), frame)
@@ -339,11 +330,11 @@ def test_what_cannot_be_written_is_refused_and_leaves_no_file(tmp_path):
         (".webm", [np.zeros((63, 96, 4), np.uint8)], 25, tone(), "even sizes"),
         (".mov", frames(1) + frames(1, 3), 25, tone(), "frame 1"),
         (".mov", frames(1), 0, tone(), "frame rate"),
-        (".mov", frames(1), 25, Audio(np.zeros(0, np.float32), HZ), "no samples"),
+        (".mov", frames(1), 25, types.Audio(np.zeros(0, np.float32), HZ), "no samples"),
         (".avi", frames(1), 25, tone(), "required one of"),
     ):
-        with pytest.raises(ExportError, match=message):
-            write_with_alpha(tmp_path / f"a{suffix}", pictures, fps=fps, audio=sound)
+        with pytest.raises(errors.ExportError, match=message):
+            mp4.write_with_alpha(tmp_path / f"a{suffix}", pictures, fps=fps, audio=sound)
         assert not list(tmp_path.iterdir())
 
 
@@ -410,7 +401,7 @@ def test_every_frame_has_its_own_picture_and_is_not_changed():
 def test_a_label_leaves_the_inset_free():
     (made,) = add_inset(grey_frames(1, 288, 360), [np.full((56, 72, 3), 130, np.uint8)])
     left, top, right, bottom = inset_box((288, 360), (56, 72))
-    (marked,) = mark_frames([made], (left, top, right, bottom))
+    (marked,) = synthetic_mark.mark_frames([made], (left, top, right, bottom))
     assert np.array_equal(marked[top:bottom, left:right], made[top:bottom, left:right])
     assert (marked != made).any()
 
@@ -433,31 +424,31 @@ def marked_part(frame: np.ndarray, marked: np.ndarray) -> tuple[int, int, int, i
 
 
 def test_a_marked_video_says_so_to_people_and_programs(tmp_path):
-    mark = mark_metadata()
+    mark = synthetic_mark.mark_metadata()
     frames = [np.zeros((64, 96, 3), np.uint8)] * 3
-    audio = Audio(np.zeros(1600, np.float32), 16_000)
-    write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=audio, tags=mark.tags, xmp=mark.xmp)
+    audio = types.Audio(np.zeros(1600, np.float32), 16_000)
+    mp4.write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=audio, tags=mark.tags, xmp=mark.xmp)
     with av.open(str(tmp_path / "a.mp4"), options={"export_xmp": "1"}) as container:
-        assert container.metadata["comment"] == STATEMENT
+        assert container.metadata["comment"] == synthetic_mark.STATEMENT
         assert container.metadata["comment"].startswith("synthetic: ")
-        assert SOURCE_TYPE in container.metadata["keywords"]
+        assert synthetic_mark.SOURCE_TYPE in container.metadata["keywords"]
         packet = ET.fromstring(container.metadata["xmp"].encode())  # noqa: S314  (our own)
     description = packet.find("rdf:RDF/rdf:Description", NAMES)
-    assert description.findtext("iptc:DigitalSourceType", None, NAMES) == SOURCE_TYPE
-    assert description.findtext("dc:description/rdf:Alt/rdf:li", None, NAMES) == STATEMENT
+    assert description.findtext("iptc:DigitalSourceType", None, NAMES) == synthetic_mark.SOURCE_TYPE
+    assert description.findtext("dc:description/rdf:Alt/rdf:li", None, NAMES) == synthetic_mark.STATEMENT
 
 
 def test_any_statement_is_valid_xml():
-    packet = ET.fromstring(mark_metadata('<"&größe{}>').xmp.encode())  # noqa: S314
+    packet = ET.fromstring(synthetic_mark.mark_metadata('<"&größe{}>').xmp.encode())  # noqa: S314
     assert packet.findtext(".//dc:description/rdf:Alt/rdf:li", None, NAMES) == '<"&größe{}>'
-    odd = ET.fromstring(mark_metadata("a\x00b\udcff\nc").xmp.encode())  # noqa: S314
+    odd = ET.fromstring(synthetic_mark.mark_metadata("a\x00b\udcff\nc").xmp.encode())  # noqa: S314
     assert odd.findtext(".//dc:description/rdf:Alt/rdf:li", None, NAMES) == r"a\x00b\udcff\nc"
 
 
 def test_every_frame_has_the_same_label_and_nothing_else_changes():
     frames = [noise(288, 360, n) for n in range(3)]
     copies = [frame.copy() for frame in frames]
-    marked = list(mark_frames(iter(frames)))
+    marked = list(synthetic_mark.mark_frames(iter(frames)))
     assert len(marked) == 3
     parts = {marked_part(*pair) for pair in zip(frames, marked, strict=True)}
     (left, top, right, bottom), *others = parts
@@ -471,7 +462,7 @@ def test_every_frame_has_the_same_label_and_nothing_else_changes():
 
 def test_the_label_is_legible_on_any_ground():
     for grey in (0, 128, 255):
-        (marked,) = mark_frames([np.full((720, 1280, 3), grey, np.uint8)])
+        (marked,) = synthetic_mark.mark_frames([np.full((720, 1280, 3), grey, np.uint8)])
         part = marked[-70:, -160:, 0].astype(int)
         letters = (part > 225).mean() if grey < 225 else 1
         ground = part[(part < 160)]
@@ -492,8 +483,8 @@ def test_the_face_is_left_free(height, width, corners):
     face = (left * width, top * height, right * width, bottom * height)
     frame = np.full((height, width, 3), 100, np.uint8)
     try:
-        marked = next(mark_frames([frame], face))
-    except ExportError:
+        marked = next(synthetic_mark.mark_frames([frame], face))
+    except errors.ExportError:
         for y, x in product((0, 1), (0, 1)):  # all corners are taken, or nearly so
             assert face[0] - 65 < x * width < face[2] + 65
             assert face[1] - 25 < y * height < face[3] + 25
@@ -503,11 +494,11 @@ def test_the_face_is_left_free(height, width, corners):
 
 
 def test_a_label_that_has_no_room_is_refused():
-    with pytest.raises(ExportError, match="no corner of the 360 × 288 px frame"):
-        next(mark_frames([noise(288, 360)], (5, 5, 355, 283)))
-    with pytest.raises(InputError, match="left before right"):
-        next(mark_frames([noise(288, 360)], (50, 5, 20, 283)))
-    assert list(mark_frames([])) == []
+    with pytest.raises(errors.ExportError, match="no corner of the 360 × 288 px frame"):
+        next(synthetic_mark.mark_frames([noise(288, 360)], (5, 5, 355, 283)))
+    with pytest.raises(errors.InputError, match="left before right"):
+        next(synthetic_mark.mark_frames([noise(288, 360)], (50, 5, 20, 283)))
+    assert list(synthetic_mark.mark_frames([])) == []
 
 
 def test_a_program_that_is_not_installed_has_a_mark_too(monkeypatch):
@@ -515,4 +506,4 @@ def test_a_program_that_is_not_installed_has_a_mark_too(monkeypatch):
         raise metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(metadata, "version", nothing)
-    assert "lipmotion source" in mark_metadata().xmp
+    assert "lipmotion source" in synthetic_mark.mark_metadata().xmp

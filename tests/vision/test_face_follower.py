@@ -9,23 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
+from lipmotion_faces.tracking import face_follower, mediapipe, trackers
 from lipmotion_faces.tracking import face_follower as follow
-from lipmotion_faces.tracking.face_follower import (
-    JUMP,
-    LOST_FRAMES,
-    MOST_THUMBNAILS,
-    REACH,
-    SIZE_PX,
-    FaceFollower,
-    FaceWindow,
-    WindowedMesh,
-)
-from lipmotion_faces.tracking.mediapipe import FaceFinder, parts
-from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, FaceBox, LandmarkTracker
 from vision.scripted import Opened
 
 HEIGHT, WIDTH = 240, 320
-EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
+EYES = [trackers.TRACKED_POINTS.index(index) for index in trackers.EYE_CORNERS]
 Face = tuple[str, float, float, float]  # who, x and y between the eyes, distance between them
 
 
@@ -44,7 +33,7 @@ def picture(faces: Sequence[Face], place: int = 0) -> NDArray[np.uint8]:
 
 def points(face: Face) -> NDArray[np.float64]:
     _, x, y, unit = face
-    found = np.full((len(TRACKED_POINTS), 3), (x, y, 0.0))
+    found = np.full((len(trackers.TRACKED_POINTS), 3), (x, y, 0.0))
     found[EYES] = [(x - unit / 2, y, 0), (x + unit / 2, y, 0)]
     return found
 
@@ -68,11 +57,11 @@ class Mesh(Opened):
 class Finder(Opened):
     """Stands for the detector: finds all faces of the frame that is being shown, those in capitals too."""
 
-    def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
-        return [FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
+    def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[trackers.FaceBox]:  # noqa: ARG002
+        return [trackers.FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
 
 
-class Shown(LandmarkTracker):
+class Shown(trackers.LandmarkTracker):
     """Finds the faces of the frame that is being shown."""
 
     def versions(self) -> dict[str, str]:
@@ -90,7 +79,7 @@ class SmallMesh:
 
     open = 0
 
-    def __init__(self, box: FaceBox, _: LandmarkTracker) -> None:
+    def __init__(self, box: trackers.FaceBox, _: trackers.LandmarkTracker) -> None:
         self.x = box.x
 
     def __enter__(self) -> "SmallMesh":
@@ -107,7 +96,7 @@ class SmallMesh:
         return [points(face) for face in near[:1]]
 
 
-Show = Callable[..., tuple[FaceFollower, list[float | None]]]
+Show = Callable[..., tuple[face_follower.FaceFollower, list[float | None]]]
 
 
 @pytest.fixture
@@ -119,9 +108,9 @@ def show(monkeypatch: pytest.MonkeyPatch) -> Show:
 
     def run(
         frames: Sequence[tuple[Sequence[Face], int]], person: Sequence[NDArray[np.float64]] = ()
-    ) -> tuple[FaceFollower, list[float | None]]:
+    ) -> tuple[face_follower.FaceFollower, list[float | None]]:
         followed: list[float | None] = []
-        with FaceFollower(person) as follower:
+        with face_follower.FaceFollower(person) as follower:
             for faces, place in frames:
                 Mesh.shown = faces
                 found = follower.points(picture(faces, place))
@@ -143,7 +132,9 @@ def test_a_moving_face_is_one_scene(show: Show) -> None:
     assert followed == [150.0 + n for n in range(30)]
     assert follower.person().all()
     assert follower.cuts() == []
-    assert len(show([([ANNA], 0)] * 110)[0].thumbnails()) == MOST_THUMBNAILS  # later looks are kept when they are new
+    assert (
+        len(show([([ANNA], 0)] * 110)[0].thumbnails()) == face_follower.MOST_THUMBNAILS
+    )  # later looks are kept when they are new
 
 
 def test_the_one_shown_longest_is_the_person(show: Show) -> None:
@@ -161,7 +152,7 @@ def test_she_is_known_again_elsewhere(show: Show) -> None:
 
 def test_a_face_that_jumps_is_looked_at_again(show: Show) -> None:
     """Without a cut in the picture, the mesh goes over to somebody else."""
-    there = moved(BELLA, 1.5 * JUMP * 64)
+    there = moved(BELLA, 1.5 * face_follower.JUMP * 64)
     follower, _ = show([([ANNA], 0)] * 12 + [([there], 0)] * 4 + [([ANNA], 0)] * 4)
     assert follower.person().tolist() == [True] * 12 + [False] * 4 + [True] * 4
 
@@ -189,7 +180,7 @@ def test_a_small_face_that_is_lost_is_searched_where_it_was(show: Show) -> None:
 
 
 def test_who_leaves_and_returns_elsewhere_is_known_again(show: Show) -> None:
-    gone = [([], 0)] * (LOST_FRAMES + 5)
+    gone = [([], 0)] * (face_follower.LOST_FRAMES + 5)
     follower, followed = show([([SMALL_ANNA], 0)] * 12 + gone + [([moved(SMALL_ANNA, -120)], 0)] * 6)
     assert followed == [220.0] * 12 + [None] * len(gone) + [100.0] * 6
     assert np.flatnonzero(follower.person()).tolist() == [*range(12), *range(len(followed) - 6, len(followed))]
@@ -235,7 +226,7 @@ def test_after_a_cut_to_several_the_known_one_is_taken(show: Show) -> None:
 
 
 def test_away_for_long_is_compared_again(show: Show) -> None:
-    gone = [([], 0)] * (LOST_FRAMES + 2)
+    gone = [([], 0)] * (face_follower.LOST_FRAMES + 2)
     for after, is_known in ((BELLA, False), (ANNA, True)):
         follower, followed = show([([ANNA], 0)] * 8 + gone + [([moved(after, 15)], 0)] * 4)
         assert [x is None for x in followed] == [False] * 8 + [True] * len(gone) + [False] * 4
@@ -260,21 +251,23 @@ def middle_of_bright(image: NDArray[np.uint8]) -> NDArray[np.float64]:
 
 def test_positions_in_the_window_are_those_in_the_picture():
     for side in (96, 384, 800):
-        window = FaceWindow.around(500, 300, side)
+        window = face_follower.FaceWindow.around(500, 300, side)
         shown = window.cut(dot(720, 1280, 480, 310))
-        assert shown.shape == (SIZE_PX, SIZE_PX, 3)
+        assert shown.shape == (face_follower.SIZE_PX, face_follower.SIZE_PX, 3)
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [484, 314, 0], atol=0.6)
-    scaled = FaceWindow(10, 20, 2 * SIZE_PX).to_picture(np.array([[3.0, 4.0, 5.0]]))  # depth is scaled, too
+    scaled = face_follower.FaceWindow(10, 20, 2 * face_follower.SIZE_PX).to_picture(
+        np.array([[3.0, 4.0, 5.0]])
+    )  # depth is scaled, too
     np.testing.assert_allclose(scaled, [[16.0, 28.0, 10.0]])
 
 
 def test_beyond_the_edges_it_is_black():
     for x, y in ((4, 4), (1270, 4), (4, 710), (1270, 710)):
-        window = FaceWindow.around(x, y, 300)
+        window = face_follower.FaceWindow.around(x, y, 300)
         shown = window.cut(dot(720, 1280, x - 4, y - 4))
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [x, y, 0], atol=3)
         assert (shown == 0).mean() > 0.9
-    assert not FaceWindow(2000, 0, 100).cut(np.full((72, 128, 3), 255, np.uint8)).any()
+    assert not face_follower.FaceWindow(2000, 0, 100).cut(np.full((72, 128, 3), 255, np.uint8)).any()
 
 
 class BrightMesh:
@@ -300,12 +293,14 @@ def square(x: int, side: int) -> NDArray[np.uint8]:
 
 
 def test_the_window_goes_along_and_grows_with_the_face():
-    with WindowedMesh(FaceBox(230, 330, 60, 0.9), cast(LandmarkTracker, SimpleNamespace(points=BrightMesh))) as mesh:
+    with face_follower.WindowedMesh(
+        trackers.FaceBox(230, 330, 60, 0.9), cast(trackers.LandmarkTracker, SimpleNamespace(points=BrightMesh))
+    ) as mesh:
         for n in range(40):  # it moves much further than a window's side, and becomes twice as large
             x, side = 200 + 20 * n, 60 + 2 * n
             (found,) = mesh.faces(square(x, side))
             np.testing.assert_allclose(found[:, :2], [[x, 300], [x + side, 300 + side]], atol=2)
-        assert mesh._window.side == pytest.approx(REACH * side, rel=0.3)
+        assert mesh._window.side == pytest.approx(face_follower.REACH * side, rel=0.3)
         assert mesh.faces(np.zeros((720, 1280, 3), np.uint8)) == []
         assert len(mesh.faces(square(x, side))) == 1
     assert BrightMesh.closed == 1
@@ -342,8 +337,8 @@ def bright(height: int, width: int, left: int, top: int, side: int) -> NDArray[n
 
 
 @pytest.fixture
-def finder() -> FaceFinder:
-    found = FaceFinder()
+def finder() -> mediapipe.FaceFinder:
+    found = mediapipe.FaceFinder()
     found._running = Detector()
     return found
 
@@ -374,7 +369,7 @@ def test_a_large_picture_is_reduced_and_the_box_is_not(finder):
 @pytest.mark.parametrize(("height", "width"), [(720, 1280), (1280, 720), (600, 600)])
 def test_parts_cover_the_picture(height, width):
     covered = np.zeros((height, width), bool)
-    for left, top, side in parts(height, width):
+    for left, top, side in mediapipe.parts(height, width):
         assert 0 <= left <= width - side
         assert 0 <= top <= height - side
         covered[top : top + side, left : left + side] = True
@@ -383,7 +378,7 @@ def test_parts_cover_the_picture(height, width):
 
 def test_missing_mediapipe_is_named_when_it_is_first_needed(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
-    with FaceFinder() as finder, pytest.raises(MissingDependencyError):
+    with mediapipe.FaceFinder() as finder, pytest.raises(MissingDependencyError):
         finder.boxes(np.zeros((48, 64, 3), np.uint8))
 
 
@@ -399,7 +394,7 @@ def test_a_face_in_a_large_picture(recordings: Path, scale: float):
     frame = cv2.resize(frames_of(recordings / "grid-s1" / "clips" / "bbaf2n.mkv")[0], None, fx=scale, fy=scale)
     image = np.full((720, 1280, 3), 128, np.uint8)
     image[100 : 100 + frame.shape[0], 700 : 700 + frame.shape[1]] = frame
-    with FaceFinder() as finder:
+    with mediapipe.FaceFinder() as finder:
         boxes = finder.boxes(image)
     assert len(boxes) == 1
     assert boxes[0].x == pytest.approx(700 + 157 * scale, abs=12)
