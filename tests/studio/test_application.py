@@ -14,9 +14,7 @@ import pytest
 from lipmotion import load_model, save_model, units
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion_faces.characters.gltf_weights import read_gltf_motion
-from lipmotion_faces.video.mp4 import write_mp4
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
@@ -30,6 +28,7 @@ from lipmotion_studio.studio import Studio, known_model
 from lipmotion_studio.votes import read_votes
 from studio.open_studio import HOST, TOKEN, TOY_DIGEST, OpenStudio, open_studio, toy
 from study.asgi import Reply
+from testing.toy import write_film
 
 OTHER_DIGEST = "1" * 64
 
@@ -351,7 +350,7 @@ def test_a_filmed_face_the_real_video_and_another_model(
     shutil.copy(toy_speech, sound)
     sound.with_suffix(".txt").write_text(" ".join(toy_sentence.words), encoding="utf-8")
     pictures = [np.full((32, 48, 3), 60 + 4 * number, np.uint8) for number in range(20)]
-    write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
+    write_film(sound.with_suffix(".mp4"), pictures, sound)
     with open_folder(sound) as opened:
         opened.change(lambda now: replace(now, characters={"toy": str(filmed_face_file)}))
         with closing(Studio(opened, toy(toy_model), replace(toy(coupled_model), digest=OTHER_DIGEST))) as running:

@@ -14,10 +14,7 @@ import pytest
 from children import LIPMOTION, child, wait_until
 from lipmotion import load_model, save_model
 from lipmotion.pipeline.model import shipped_path
-from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.sources import sha256_of
 from lipmotion_faces.characters.gltf_weights import read_gltf_motion
-from lipmotion_faces.video.mp4 import write_mp4
 from studio.test_recorded_videos import shifted
 from study.browser import (
     CONTROL,
@@ -35,9 +32,11 @@ from study.browser import (
     check_screens,
 )
 from study.firefox import BOTH, Opens
+from study.small_study import sha256_of
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 from lipmotion_studio.votes import read_votes
+from testing.toy import write_film
 
 pytestmark = pytest.mark.long
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
@@ -540,7 +539,7 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
     (tmp_path / "home").mkdir()
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
-    write_mp4(tmp_path / "in step.mp4", pictures, fps=25, audio=read_audio(sound))
+    write_film(tmp_path / "in step.mp4", pictures, sound)
     shifted(tmp_path / "in step.mp4", sound.with_suffix(".mp4"), sound_s=0.2)
     other = tmp_path / shipped_path().name  # another file, of the same name
     model = load_model()

@@ -17,16 +17,16 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from lipmotion import Model
-from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import read_edits
-from lipmotion.storage.sources import sha256_of
 from lipmotion_studio.application import studio_application
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.project import digest_of
 from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
+from pipeline.made import write_sound
 from studio.open_studio import HOST, TOKEN, OpenStudio, toy
 from study.asgi import Reply
+from study.small_study import sha256_of
 from testing.toy import ToySentence
 
 EDITS = ("phone 2 is p", "pin opening 0.1 at 0.2", "set intensity 1.1", "remove phone 3", "phone 99 is p")

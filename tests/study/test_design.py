@@ -10,14 +10,13 @@ import pytest
 from lipmotion import errors, types
 from lipmotion.pipeline import job, request
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.sources import sha256_of
 from lipmotion_faces.video import mp4, synthetic_mark
 from lipmotion_studio.study import answers, manifest
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.design import design_study, encode_video, make_condition, parse_conditions, read_sentences
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
 from lipmotion_studio.study.settings import Region, StudySettings
-from study.small_study import CONDITIONS, SENTENCES, small_study
+from study.small_study import CONDITIONS, SENTENCES, sha256_of, small_study
 
 DRAWN = job.Job(request.Request(), request.Outputs(face="portrait"))
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)

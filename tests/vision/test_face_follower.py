@@ -103,7 +103,7 @@ Show = Callable[..., tuple[face_follower.FaceFollower, list[float | None]]]
 def show(monkeypatch: pytest.MonkeyPatch) -> Show:
     """Shows frames (faces, place); returns the follower, and where the face was followed to."""
     pytest.importorskip("cv2")
-    monkeypatch.setattr("lipmotion_faces.tracking.trackers.make_tracker", lambda _: Shown())
+    monkeypatch.setitem(trackers.TRACKERS.built_in, "mediapipe", f"{__name__}:Shown")
     monkeypatch.setattr(follow, "WindowedMesh", SmallMesh)
 
     def run(
@@ -177,13 +177,6 @@ def test_a_small_face_that_is_lost_is_searched_where_it_was(show: Show) -> None:
     assert SmallMesh.open == 0
     assert show([([hidden], 0)] * 6)[1] == [None] * 6  # of which the mesh is unsure is nobody's
     assert SmallMesh.open == 0
-
-
-def test_who_leaves_and_returns_elsewhere_is_known_again(show: Show) -> None:
-    gone = [([], 0)] * (face_follower.LOST_FRAMES + 5)
-    follower, followed = show([([SMALL_ANNA], 0)] * 12 + gone + [([moved(SMALL_ANNA, -120)], 0)] * 6)
-    assert followed == [220.0] * 12 + [None] * len(gone) + [100.0] * 6
-    assert np.flatnonzero(follower.person()).tolist() == [*range(12), *range(len(followed) - 6, len(followed))]
 
 
 def test_of_several_small_ones_the_largest_then_the_known_one(show: Show) -> None:

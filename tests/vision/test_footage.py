@@ -1,7 +1,7 @@
 import sys
 from dataclasses import replace
+from itertools import count, repeat
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -9,13 +9,13 @@ import pytest
 from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.types import Motion, Track
-from lipmotion_faces.tracking import steadying, video_scan
+from lipmotion_faces.tracking import video_scan
 from lipmotion_faces.tracking.footage import Footage, footage_frames, footage_groups, read_video_frames, track_footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
 from lipmotion_faces.tracking.track import CHANNELS, measure_motion, track
 from lipmotion_faces.tracking.trackers import JAW_POINTS, LIP_POINTS
-from vision.scripted import COLUMN, Opened, face
+from vision.scripted import COLUMN, face
 from vision.variants import write_frames
 
 OPENINGS = 0.1 + 0.05 * np.sin(np.arange(20) / 3)
@@ -142,33 +142,6 @@ def test_untracked_frames_hold_the_last_picture(write_video):
         assert levels(frames) == wanted
 
 
-class Follower(Opened):
-    """Stands for the follower of faces: counts what it is shown."""
-
-    share = 1.0
-    shown: ClassVar[list[int]] = []
-
-    def __init__(self, tracker: str) -> None:
-        assert tracker == "mediapipe"
-        self.shown.clear()
-
-    def points(self, image: np.ndarray) -> None:
-        self.shown.append(int(image.mean()))
-
-    def share_of_person(self) -> float:
-        return Follower.share
-
-    def thumbnails(self) -> list[np.ndarray]:
-        return [np.ones((24, 36, 3))]
-
-
-@pytest.fixture
-def followed(monkeypatch):
-    pytest.importorskip("cv2")
-    monkeypatch.setattr(video_scan, "FaceFollower", Follower)
-    Follower.share = 1.0
-
-
 def scenes(path: Path, cuts: list[int], count: int = 120) -> Path:
     """Write a video of patterns that change at some frames."""
     draw = np.random.default_rng(0)
@@ -180,8 +153,8 @@ def scenes(path: Path, cuts: list[int], count: int = 120) -> Path:
     return write_frames(path, pictures)
 
 
-@pytest.mark.usefixtures("followed")
-def test_times_and_cuts(tmp_path):
+def test_times_and_cuts(tmp_path, scripted):
+    scripted(repeat(None))
     shares: list[float] = []
     found = video_scan.scan_video(scenes(tmp_path / "a.mp4", [30, 77], 260), shares.append)
     np.testing.assert_allclose(found.times_s, np.arange(260) / 25, atol=1e-6)
@@ -191,22 +164,23 @@ def test_times_and_cuts(tmp_path):
     assert shares == [pytest.approx(0.96, abs=0.01)]
 
 
-@pytest.mark.usefixtures("followed")
-def test_faces_are_looked_for_every_two_seconds(tmp_path):
+def test_faces_are_looked_for_every_two_seconds(tmp_path, scripted):
+    looks = count()
+    scripted(FACES[n % 2] for n in looks)
     video_scan.scan_video(write_frames(tmp_path / "a.mp4", [np.full((48, 64, 3), n, np.uint8) for n in range(120)]))
-    assert Follower.shown == pytest.approx([0, 50, 100], abs=2)
+    assert next(looks) == 3
 
 
-@pytest.mark.usefixtures("followed")
-def test_the_person_matters_only_where_there_are_others(tmp_path):
-    path = scenes(tmp_path / "a.mp4", [])
-    assert video_scan.scan_video(path).person == ()
-    Follower.share = 0.6
-    assert len(video_scan.scan_video(path).person) == 1
+def test_the_person_matters_only_where_there_are_others(tmp_path, scripted):
+    """After a cut, somebody else is where the face was."""
+    for cuts, is_alone in (([], True), ([100], False)):
+        scripted(repeat(FACES[0]))
+        found = video_scan.scan_video(scenes(tmp_path / "a.mp4", cuts, 260))
+        assert (found.person == ()) == is_alone
 
 
-@pytest.mark.usefixtures("followed")
-def test_a_video_that_is_cut_short_is_told(tmp_path):
+def test_a_video_that_is_cut_short_is_told(tmp_path, scripted):
+    scripted(repeat(None))
     content = write_frames(tmp_path / "a.mkv", [np.full((48, 64, 3), n, np.uint8) for n in range(120)]).read_bytes()
     assert video_scan.scan_video(tmp_path / "a.mkv").damage == ()
     (tmp_path / "a.mkv").write_bytes(content[: round(0.6 * len(content))])
@@ -380,8 +354,8 @@ def test_less_is_taken_away_where_less_is_noise():
 def test_a_face_that_moves_evenly_is_not_held_back():
     places = np.arange(60)[:, None] * np.array([1.5, 0.5])
     np.testing.assert_allclose(steady_maps(at(places), RATE_HZ)[4:-4], at(places)[4:-4], atol=1e-6)
-    for count in (1, 2):  # a few frames suffice
-        still = at(np.zeros((count, 2)))
+    for few in (1, 2):  # frames suffice
+        still = at(np.zeros((few, 2)))
         np.testing.assert_allclose(steady_maps(still, RATE_HZ), still, atol=1e-9)
 
 
@@ -400,26 +374,26 @@ class TestRegistration:
         pytest.importorskip("cv2")
 
     @pytest.fixture
-    def scene(self, monkeypatch):
+    def scene(self, tmp_path):
         from cv2 import GaussianBlur
         from scipy.ndimage import shift
 
-        def make(places, tremble, cuts=(), seen=None) -> Footage:
+        def make(places, tremble, cuts=(), seen=None, contrast=4) -> Footage:
             texture = GaussianBlur(np.random.default_rng(1).uniform(0, 255, (120, 170)), (0, 0), 2.0)
-            texture = 128 + 4 * (texture - texture.mean())
+            texture = 128 + contrast * (texture - texture.mean())
             frames = [
                 np.repeat(
                     np.clip(shift(texture, place[::-1], mode="reflect"), 0, 255).astype(np.uint8)[..., None], 3, 2
                 )
                 for place in places
             ]
-            monkeypatch.setattr(steadying, "footage_frames", lambda _footage: iter(frames))
+            path = write_frames(tmp_path / "scene.mkv", frames, options={"qp": "0"})
             count = len(places)
             shown = np.ones(count, bool) if seen is None else seen
             track = Track(Motion(np.zeros((count, 0)), RATE_HZ, ()), shown)
             times_s = np.arange(count) / RATE_HZ
             maps = at(np.asarray(places) + tremble)
-            return Footage(Path("scene"), WHOLE, track, maps, times_s, tuple(cuts), (120, 170), RATE_HZ)
+            return Footage(path, WHOLE, track, maps, times_s, tuple(cuts), (120, 170), RATE_HZ)
 
         return make
 
@@ -451,8 +425,7 @@ class TestRegistration:
         footage = scene(places, -places, seen=seen)
         np.testing.assert_allclose(register_maps(footage), footage.face_to_image, atol=0.05)
 
-    def test_a_region_without_texture_stays(self, scene, monkeypatch):
-        footage = scene(np.zeros((5, 2)), 0.0)
-        monkeypatch.setattr(steadying, "footage_frames", lambda _: iter([np.full((120, 170, 3), 90, np.uint8)] * 5))
+    def test_a_region_without_texture_stays(self, scene):
+        footage = scene(np.zeros((5, 2)), 0.0, contrast=0)
         with np.errstate(invalid="raise"):
             np.testing.assert_array_equal(register_maps(footage), footage.face_to_image)
