@@ -133,9 +133,10 @@ def test_a_terminal_that_does_not_know_the_letters(run_outside, toy_speech, toy_
 
 
 @pytest.mark.usefixtures("here")
-def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, bad_speech):
+def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, here):
     """FFmpeg's own messages are not printed."""
-    assert is_one_error(run_outside("animate", bad_speech["text"], "-o", "a.json"), 3)
+    (here / "text.wav").write_text("words, not sound\n" * 50)
+    assert is_one_error(run_outside("animate", "text.wav", "-o", "a.json"), 3)
     assert is_one_error(run_outside("animate", "a.wav", "-o", "missing/a.json"), 7)
     assert run_outside("animate", "a.wav").code == 2
 

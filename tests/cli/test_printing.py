@@ -11,8 +11,7 @@ import warnings
 import zipfile
 from argparse import Namespace
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from functools import partial
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
 from lipmotion.cli.terminal.progress import outcome, report_progress
-from lipmotion.errors import CorpusError, InputError
+from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
@@ -305,25 +304,6 @@ def test_training_for_a_program(run, toy_corpus, here):
     assert values == sorted(values)  # type: ignore[type-var]
     assert (values[0], values[-1]) == (0, 1)
     assert [path.name for path in here.iterdir()] == ["m.lipmotion"]
-
-
-def test_why_it_failed(capsys, monkeypatch):
-    def fail(error: BaseException, _: Namespace) -> None:
-        raise error
-
-    errors: list[tuple[BaseException, int, str]] = [
-        (CorpusError("two\nlines"), 4, "two\\nlines"),
-        (KeyboardInterrupt(), 130, "stopped; run the same command again to go on"),
-        (ZeroDivisionError("what"), 1, "ZeroDivisionError: what"),
-    ]
-    for error, code, reason in errors:
-        monkeypatch.setattr(measure, "run_evaluate", partial(fail, error))
-        with suppress(ZeroDivisionError):  # a bug is not hidden
-            assert main(["evaluate", "m", "c", "--machine-readable"]) == code
-        said = capsys.readouterr()
-        start, last = map(json.loads, said.out.splitlines())
-        assert (start, last) == ({"type": "start"}, {"type": "failure", "reason": reason, "exit_code": code})
-        assert said.err.endswith(f"{reason}\n") or code == 1
 
 
 def test_an_error_on_the_command_line_is_a_failure_too(run):

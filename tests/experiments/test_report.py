@@ -19,17 +19,17 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from experiments.conftest import few_sets
 from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus, errors, units
 from lipmotion_lab import hofer2008, learning_curve, minnis2000, runner
-from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab.report import report
 from lipmotion_lab.report.charts import Dot, draw_curve, draw_dots, draw_rising
 from lipmotion_lab.report.section import Column, PaperOrder, PaperPair, Section, Table
 from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
 from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
 
-TWO, SETS = ("hofer2008", "folds"), ("eVis", "phone")
+TWO = ("hofer2008", "folds")
 SCREENS = ((1280, 900, "light"), (1280, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 
 
@@ -191,9 +191,7 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> rep
     """A report of one real experiment, on recordings without pictures of the mouth."""
     folder = tmp_path_factory.mktemp("real")
     bare = copied(toy_corpus, folder, lambda each: replace(each, track=replace(each.track, crops=None)))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(table1, "PAPER_SCORES", {name: hofer2008.PAPER_SCORES[name] for name in SETS})
-        patch.setattr(table1, "QUICK", hofer2008.PhoneticTableOptions(states=(3,), mixtures=(1,)))
+    with few_sets():
         return report.experiment_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
 
 
@@ -201,7 +199,7 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> rep
 def test_a_real_experiment_has_videos_and_curves(written):
     folder = written.page.parent
     record = json.loads((folder / "hofer2008" / "figures.json").read_text())
-    systems = [f"{name}, 3 states" for name in SETS]
+    systems = ["eVis, 5 states", "phone, 5 states"]
     assert [each["caption"] for each in record["videos"]] == ["a drawn face, recorded motion", *systems]
     motion = json.loads((folder / "hofer2008" / "motion.json").read_text())
     assert sorted(motion["systems"]) == sorted(systems)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.conftest import states
 from experiments.copies import SETTINGS, copied
 from lipmotion import Corpus, engines, evaluate, train
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
@@ -16,7 +17,7 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.report.sections import xie_liu_section
-from lipmotion_lab.xie_liu2007 import plots, six_systems, systems
+from lipmotion_lab.xie_liu2007 import plots, systems
 from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
 from testing.toy import SMALL, toy_sentences
 
@@ -114,14 +115,14 @@ def test_a_number_of_gaussians_is_the_best_that_was_tried(figures):
 
 
 @LONG
-def test_it_goes_on_from_what_is_finished(figures, work, toy_corpus, monkeypatch):
-    monkeypatch.setattr(systems, "train_stages", None)
-    monkeypatch.setattr(six_systems, "generate_clips", None)
+def test_it_goes_on_from_what_is_finished(figures, work, toy_corpus):
+    before = states(work)
     options = ComparisonOptions(systems=[*CHAINS, "mean pose"], mixtures=2)
     again = xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SETTINGS)
     for name in CHAINS:
         kept, rows = (each["rows"][-1]["conditions"]["audio only"][name] for each in (again, figures))
         assert kept == rows
+    assert states(work) == before
 
 
 @LONG

@@ -1,7 +1,6 @@
 import struct
 import xml.etree.ElementTree as ET
 from fractions import Fraction
-from importlib import metadata
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -499,11 +498,3 @@ def test_a_label_that_has_no_room_is_refused():
     with pytest.raises(errors.InputError, match="left before right"):
         next(synthetic_mark.mark_frames([noise(288, 360)], (50, 5, 20, 283)))
     assert list(synthetic_mark.mark_frames([])) == []
-
-
-def test_a_program_that_is_not_installed_has_a_mark_too(monkeypatch):
-    def nothing(name: str) -> str:
-        raise metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(metadata, "version", nothing)
-    assert "lipmotion source" in synthetic_mark.mark_metadata().xmp

@@ -12,7 +12,6 @@ from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion_faces import FACES, Staging, stage_face, testing
 from lipmotion_faces.portrait import characters, layer
 from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
-from lipmotion_faces.portrait.design import STEPS, closed_curve, mirror_curve, open_curve, path_points, stroke
 from lipmotion_faces.portrait.geometry import (
     NECK_END,
     NECK_TOP,
@@ -323,25 +322,3 @@ def test_above_a_tucked_lip_the_opening_is_full_of_upper_teeth_and_arched_upward
     assert (within.teeth_upper >= shape.lower_inner - 1e-9)[near].all()
     assert (within.teeth_lower >= shape.lower_inner - 1e-9)[near].all()
     assert shape.corner_y - shape.upper_inner[MIDDLE] > 1.5 * (shape.lower_inner[MIDDLE] - shape.corner_y)
-
-
-PATH = "0 0, 1 0.5, 2 -0.5, 3 0"
-
-
-def test_curves_go_through_their_points_smoothly():
-    assert open_curve(PATH)[::STEPS] == pytest.approx(path_points(PATH))
-    assert closed_curve(PATH)[::STEPS] == pytest.approx(path_points(PATH))
-    steps = np.diff(closed_curve("0 0, 1 0, 1 1, 0 1"), axis=0)
-    turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
-    assert turns.max() < 0.3
-    line = open_curve([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)])
-    assert line[:, 0] == pytest.approx(line[:, 1])
-
-
-def test_symmetric_outlines_mirror_themselves_and_a_stroke_is_as_wide_as_asked():
-    outline = mirror_curve("0 -1, 1 0, 0.5 0.5, 0 1")
-    mirrored = outline * (-1, 1)
-    assert np.abs(outline[:, None] - mirrored[None]).sum(axis=2).min(axis=1).max() < 1e-9
-    outline = stroke(open_curve("0 0, 1 0, 2 0"), [0.2, 0.4])
-    assert outline[0, 1] - outline[-1, 1] == pytest.approx(0.2)
-    assert np.ptp(outline[:, 1]) == pytest.approx(0.4)

@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.formats import label_files, label_tiers
 from lipmotion.formats.textgrid import parse_interval_tiers, write_textgrid
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, find_phone, group_words
+from lipmotion.units import PHONES, group_words
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES
 
 SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
@@ -152,13 +152,6 @@ def test_other_names_of_silence(read):
     labels = [label for name in names for label in (name, "aa")]
     text = "".join(f"{n}000000 {n + 1}000000 {label}\n" for n, label in enumerate(labels))
     assert {phone for *_, phone in rows(read(text))} == {"sil", "sp", "aa"}
-
-
-def test_names_of_phones():
-    for phone in SPOKEN:
-        for stress in ("", "1", "2"):
-            assert find_phone(phone + stress) == find_phone(phone.upper() + stress) == phone
-        assert find_phone(phone + "!9") is None
 
 
 def test_files_beside_a_recording(tmp_path):

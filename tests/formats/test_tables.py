@@ -23,15 +23,6 @@ def test_the_table_is_as_specified(tmp_path, generation):
     assert table[:, 1:] == pytest.approx(generation.motion.values, abs=5.1e-6)
 
 
-def test_a_table_saved_by_a_spreadsheet_is_read(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_bytes("\ufefftime_s,opening\r\n0,0.1\r\n0.04,0.2\r\n".encode())
-    motion, units = read_motion(path)
-    assert motion.rate_hz == 25
-    assert motion["opening"].tolist() == [0.1, 0.2]
-    assert len(units) == 0
-
-
 WRONG = [
     ("time_s\n0\n", "first line is 'time_s'"),
     ("opening\n0\n", "first line is 'opening', required 'time_s,opening"),
@@ -84,19 +75,6 @@ def test_names_that_other_separators_would_part_are_refused_and_odd_ones_come_ba
     for name in ("jaw open", "Mouth (L)", "a=b", "p1.x", "öffnen", "a|b", "x-y", "'x"):
         write(name)
         assert read_motion(path)[0].names == (name,)
-
-
-@pytest.mark.parametrize(
-    ("head", "times"),
-    [("time", [5.0, 5.5, 6.0]), ("Timestamp", [0, 0.5, 1.0]), ("time_ms", [100, 600, 1100]), (" t ", [0, 0.5, 1])],
-)
-def test_tables_of_other_programs_begin_with_their_first_row(tmp_path, head, times):
-    path = tmp_path / "a.csv"
-    path.write_text(f"{head}, jawOpen,chin\n" + "".join(f"{t},{n},{n}\n" for n, t in enumerate(times)))
-    motion, _ = read_motion(path)
-    assert motion.rate_hz == pytest.approx(2.0)
-    assert motion.channels == (Channel("jawOpen", "weight"), Channel("chin"))
-    assert motion["chin"].tolist() == [0, 1, 2]
 
 
 def test_uneven_times_of_other_programs_are_evened_out(tmp_path):
@@ -219,25 +197,6 @@ def test_uneven_times_and_lost_frames_are_evened_out(tmp_path, curves):
     inner = slice(1, 600)
     assert np.abs(motion.values[inner] - curves.values[inner]).max() < 0.03
     assert np.abs(motion.values[inner] - curves.values[inner]).mean() < 0.002
-
-
-@pytest.mark.parametrize(("before", "first"), [("00:00:59", 2), ("00:09:59", 0)])  # none is left out at each tenth
-def test_drop_frame_timecode_is_real_time(tmp_path, before, first):
-    """At 29.97 frames a second, 00:00:59;29 is followed by 00:01:00;02."""
-    after = f"00:{int(before[3:5]) + 1:02d}:00"
-    codes = [f"{before};{n:02d}" for n in range(30)] + [f"{after};{n:02d}" for n in range(first, 30)]
-    motion = read(tmp_path, "\n".join([HEAD, *(row(code, n / 100) for n, code in enumerate(codes))]))
-    assert motion.rate_hz == pytest.approx(30 / 1.001, abs=1e-3)
-    assert motion["eyeBlinkLeft"] == pytest.approx(np.arange(len(codes)) / 100)
-
-
-def test_rows_without_a_face_are_bridged_and_a_short_take_has_the_rate_of_the_app(tmp_path):
-    lines = [row(f"10:00:0{n // 60}:{n % 60:02d}.000", 0.01 * n) for n in range(90)]
-    lines[10:13] = [lines[10].split(",")[0] + ",0", lines[11].split(",")[0] + ",0,,,", lines[12].split(",")[0] + ",0"]
-    motion = read(tmp_path, "\n".join([HEAD + ",", *lines]) + "\n")
-    np.testing.assert_allclose(motion["eyeBlinkLeft"], 0.01 * np.arange(90), atol=1e-9)
-    motion = read(tmp_path, "\n".join([HEAD, *(row(f"10:00:00:{n:02d}.000") for n in range(10, 21))]))
-    assert motion.rate_hz == 60.0
 
 
 def test_curves_that_speech_moves(curves, tmp_path):

@@ -5,14 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formats.examples import of_motion
 from lipmotion import Staging
 from lipmotion.articulation.contact import CLOSED_OPENING, opening_to_gap
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.articulation.phone_targets import FADE_S, crossfade_phones
-from lipmotion.articulation.rest import rest_in_pauses
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting import driven, eyes_and_brows, lip_placement, shape_weights
 from lipmotion.meshes.fitting.blendshape_motion import (
@@ -34,7 +31,7 @@ from lipmotion_faces.characters.character_files import JAW_OPEN, load_character,
 from lipmotion_faces.head.pose import head_poses
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, VISEMES, head, lip_points, renamed, shaped, write_glb, write_obj
-from meshes.speech import motion, said, units
+from meshes.speech import motion, units
 
 TIME_S = np.arange(51) / 25.0
 
@@ -466,26 +463,3 @@ def test_visemes_follow_how_open_and_how_round_the_mouth_is():
     assert found[0.25]["viseme_aa"][50] > found[0.1]["viseme_aa"][50] + 0.2
     assert found[0.1]["viseme_ou"][95] > 0.1  # the lips round before the vowel
     assert found[0.1]["viseme_ou"][50] < 0.02
-
-
-def test_phones_fade_around_their_border():
-    time_s = np.array([0.9 - FADE_S, 0.9 - 0.02, 0.9, 0.9 + 0.02, 0.9 + FADE_S])
-    weights = crossfade_phones(units(), time_s, lambda phone: phone)
-    assert weights["p"][2] == pytest.approx(0.5)
-    assert weights["aa"][2] == pytest.approx(0.5)
-    assert weights["aa"][0] == pytest.approx(1)
-    assert 0.5 < weights["aa"][1] < 1
-
-
-def test_visemes_rest_where_the_curves_do():
-    spoken = said((0, 0.5, "aa"), (0.5, 1.1, "sp"), (1.1, 1.6, "aa"))
-    held = Motion(np.full((161, 1), 0.1), 100.0, (Channel("opening"),))
-    generation = of_motion(held, spoken)
-    for style, rests in (("rest", True), ("natural", False)):
-        moved = rest_in_pauses(generation, style).motion
-        found, arkit = (
-            shape_weights.weigh_visemes(spoken, spoken_mouth(moved, spoken)),
-            shape_weights.solve_shape_weights(moved, spoken, arkit_mouth()),
-        )
-        assert (found["viseme_sil"][80] > 0.99) == rests
-        assert (arkit["jawOpen"][80] < 0.01) == rests

@@ -208,7 +208,7 @@ def test_every_scale_and_every_slider_has_a_value(tmp_path):
     sent = {"trial": 0, "values": ["01", "2", "3", "4", "5"], "plays": [1], "seconds": 0.5}
     sheet = check_sheet(opinions, order_trials(opinions, 1), 1, sent)
     assert sheet.values == ("1", "2", "3", "4", "5")
-    for values in (["1"] * 4, ["0", "2", "3", "4", "5"], ["6", "2", "3", "4", "5"]):
+    for values in (["1"] * 4, ["0", "2", "3", "4", "5"], ["6", "2", "3", "4", "5"], ["٣", "2", "3", "4", "5"]):
         with pytest.raises(InputError):
             check_sheet(opinions, order_trials(opinions, 1), 1, sent | {"values": values})
     sent = {"trial": 0, "values": ["0", "50", "100", "7"], "plays": [1] * 4, "seconds": 2.0}

@@ -226,12 +226,6 @@ def test_every_video_once_for_opinions():
     assert sorted(trial.videos[0] for trial in trials) == sorted(late.values())
 
 
-def test_all_conditions_of_a_sentence_on_a_page_of_a_ranking():
-    late = SHOWN | {(sentence, answers.ANCHOR): 100 + n for n, sentence in enumerate(SENTENCES)}
-    trials = manifest.main_trials(answers.RANKING, CONDITIONS, SENTENCES, late)
-    assert [len(trial.videos) for trial in trials] == [4] * 6
-
-
 def test_the_condition_in_step_is_expected_first_and_second():
     late = SHOWN | {("one", answers.ANCHOR): 100, ("two", answers.ANCHOR): 101}
     first, second = manifest.anchor_trials("phones", ("one", "two"), late)

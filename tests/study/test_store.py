@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion_studio.study.answers import COLUMNS, KINDS, Answer, is_possible, read_answers, write_answers
+from lipmotion_studio.study.answers import COLUMNS, KINDS, Answer, read_answers, write_answers
 from lipmotion_studio.study.manifest import MANIFEST, check_videos, read_study
-from lipmotion_studio.study.store import ANSWERS, AnswerSheet, StudyStore, rater_name, rater_number
+from lipmotion_studio.study.store import ANSWERS, AnswerSheet, StudyStore
 from study.small_study import small_study
 
 
@@ -117,13 +117,6 @@ def test_a_failure_to_write_is_reported_and_passes(store):
     assert store.record(AnswerSheet(number, 0, ("first",), 1.0, 2)).result()
 
 
-def test_names_of_raters():
-    assert [rater_number(rater_name(number)) for number in (1, 99, 12_345)] == [1, 99, 12_345]
-    for name in ("", "r", "r-1", "x7", "r²", "r" + "9" * 30):
-        with pytest.raises(InputError, match="as r007"):
-            rater_number(name)
-
-
 SIX = [
     Answer("r1", "paired", 0, 'say "b", now', "preference", "recording", "trajectory", "first", 12.5, 2, False, ""),
     Answer("r1", "mos", 1, "bin blue", "smoothness", "anchor", "", "1", 8.25, 1, True, "1"),
@@ -144,18 +137,6 @@ def test_no_name_is_a_formula_in_the_table(tmp_path, name):
         rows = list(csv.reader(file))
     assert rows[1][COLUMNS.index("condition")] == f"'{name}"
     assert read_answers(tmp_path / "answers.csv") == [answer]
-
-
-@pytest.mark.parametrize(
-    ("kind", "value", "wanted"),
-    [
-        ("paired", "first", True), ("paired", "both", False), ("mos", "5", True), ("mos", "0", False),
-        ("mos", "6", False), ("mos", "3.5", False), ("mos", "٣", False), ("ranking", "0", True),
-        ("ranking", "101", False), ("ranking", "-1", False), ("ranking", "", False),
-    ],
-)  # fmt: skip
-def test_possible_values(kind, value, wanted):
-    assert is_possible(kind, value) == wanted
 
 
 @pytest.mark.parametrize(
