@@ -16,9 +16,8 @@ import numpy as np
 from websockets.sync.client import connect
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require, short_speech
-from lipmotion import Stream, errors
-from lipmotion.live.face import LiveFrame
+from fuzz.plausible import require, short_speech
+from lipmotion import LiveFrame, Stream, errors
 from lipmotion.storage import archive, json_text
 from lipmotion_studio.live import servers, vtube
 

@@ -9,7 +9,7 @@ from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json, nan_as_null
 from lipmotion_studio.study.analysis.analyse import RULES, analyse_study, analysis_table, counts, screen
 from lipmotion_studio.study.answers import Answer, write_answers
-from study.analysis.simulated import Effects, comparisons, pair_answer, paired_answers, rated_answers, rating, ratings
+from study.simulated import Effects, comparisons, pair_answer, paired_answers, rated_answers, rating, ratings
 
 NAMES = {"c0": "ph-HMM", "c1": "ph-vi-CHMM", "c2": "recording", "c3": "anchor", "": ""}
 

@@ -5,7 +5,7 @@ from scipy import stats
 from lipmotion.errors import InputError
 from lipmotion_studio.study.analysis import paired
 from lipmotion_studio.study.analysis.paired import deviations, fit_strengths, link_groups
-from study.analysis.simulated import Effects, comparisons, expected_preference, pair_answer, paired_answers
+from study.simulated import Effects, comparisons, expected_preference, pair_answer, paired_answers
 
 USUAL = Effects(rater_each=0.4, sentence_each=0.3)
 

@@ -13,7 +13,7 @@ from lipmotion_studio.study.analysis.ratings import (
     relative_improvement,
 )
 from lipmotion_studio.study.answers import MOS
-from study.analysis.simulated import Effects, expected_rating, rated_answers, rating, ratings
+from study.simulated import Effects, expected_rating, rated_answers, rating, ratings
 
 MEANS = np.array([3.1, 3.9, 4.7])
 XIE_LIU = {"ph-HMM": 3.16, "ph-MSHMM": 3.18, "ph-FHMM": 3.31, "ph-vi-FHMM": 3.39, "ph-CHMM": 3.67}
