@@ -15,7 +15,6 @@ from lipmotion.pipeline.training.train import TrainReport
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import Audio
 from lipmotion.units import load_unit_set
-from lipmotion_faces.corpus.coverage import coverage
 from pipeline.made import features_of, write_sound
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 from studio.toy_recordings import SENTENCES, write_recordings
@@ -197,11 +196,11 @@ def test_prepare_prints_the_counts(run, here):
 def test_coverage(run, toy_corpus):
     done = run("corpus", "coverage", toy_corpus.path, "--count", "3")
     assert (done.code, done.err) == (0, [])
-    found = coverage(toy_corpus)
-    assert done.out[0] == f"{len(toy_corpus)} of {len(toy_corpus)} utterances, {found.sentences} sentences"
-    for line, kind in zip(done.out[1:4], found.kinds, strict=True):
-        assert line.split()[:4] == [kind.kind, str(kind.covered), "of", str(kind.needed)]
-    assert f"and {len(found.kinds[1].missing) - 3} more diphones" in done.out
+    found = json.loads(run("corpus", "coverage", toy_corpus.path, "--json").out[0])
+    assert done.out[0] == f"{len(toy_corpus)} of {len(toy_corpus)} utterances, {found['sentences']} sentences"
+    for line, kind in zip(done.out[1:4], found["kinds"], strict=True):
+        assert line.split()[:4] == [kind["kind"], str(kind["covered"]), "of", str(kind["needed"])]
+    assert f"and {len(found['kinds'][1]['missing']) - 3} more diphones" in done.out
 
 
 def test_prompts(run, here, toy_corpus):

@@ -281,16 +281,10 @@ def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_traine
 
 
 def test_what_cannot_be_trained_on(toy_corpus, tmp_path):
-    for order, sizes, words in (
-        ([], None, "the list of utterances to train on is empty; give one name a line"),
-        (None, [], "sizes none; required: from 1 to 8"),
-        (["toy00", "toy01"], [2, 3], "sizes 2, 3; required: from 1 to 2, which is how many names the list has"),
-    ):
-        with pytest.raises(InputError, match=words):
-            learning_curve(toy_corpus, order=order, sizes=sizes)
+    with pytest.raises(InputError, match="sizes none; required: from 1 to 8"):
+        learning_curve(toy_corpus, sizes=[])
     for order, words in (
         (["x1", "x2", "x3", "x4", "x5", "x6"], r"6 of 6 names to train on \(x1, x2, x3, x4, x5, ...\) are not"),
-        (["toy00", "toy11"], r"1 of 2 names to train on \(toy11\) are in the split that is compared with"),
         (["toy00", "toy01", "toy00"], r"1 of 3 names to train on \(toy00\) stand in the list more than once"),
     ):
         with pytest.raises(CorpusError, match=words):

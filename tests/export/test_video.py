@@ -115,33 +115,39 @@ def test_the_frame_rate_is_exact():
     assert {fps: mp4.frame_rate(fps) for fps in exact} == exact
 
 
-def test_unusable_frames_are_refused_and_leave_no_file(tmp_path):
+@pytest.mark.parametrize("write", [mp4.write_mp4, mp4.write_with_alpha])
+def test_unusable_frames_are_refused_and_leave_no_file(tmp_path, write):
     unusable: list[tuple[list[Any], str]] = [
         ([], "no frames"),
         (black(1, 63, 64), "even sizes"),
         (black(1, 64, 63), "even sizes"),
-        ([*black(1), *black(1, 32, 32)], "frame 1 .* all alike"),
+        ([*black(1), *black(1, 32, 32)], "frame 1"),
         ([np.zeros((64, 64), dtype=np.uint8)], "uint8 RGB"),
         ([np.zeros((64, 64, 3))], "float64"),
     ]
+    path = tmp_path / ("a.mp4" if write is mp4.write_mp4 else "a.webm")
     for frames, message in unusable:
         with pytest.raises(errors.ExportError, match=message):
-            mp4.write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(0.1))
-        assert not list(tmp_path.iterdir())
+            write(path, frames, fps=25, audio=silence(0.1))
+    for fps in (0, -1, float("nan"), float("inf")):
+        with pytest.raises(errors.ExportError, match="frame rate"):
+            write(path, black(1), fps=fps, audio=silence(0.1))
+    with pytest.raises(errors.ExportError, match="no samples"):
+        write(path, black(1), fps=25, audio=silence(0))
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(errors.ExportError, match="does not exist"):
+        write(tmp_path / "no" / path.name, black(1), fps=25, audio=silence(0.1))
 
 
 def test_other_unusable_input_is_refused(tmp_path):
-    with pytest.raises(errors.ExportError, match="sound has no samples"):
-        mp4.write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0))
     with pytest.raises(errors.ExportError, match="XMP metadata"):
         mp4.write_mp4(
             tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), xmp="x" * (mp4.LARGEST_PACKET_BYTES + 1)
         )
-    for fps in (0, -1, float("nan"), float("inf")):
-        with pytest.raises(errors.ExportError, match="frame rate"):
-            mp4.write_mp4(tmp_path / "a.mp4", black(1), fps=fps, audio=silence(0.1))
-    with pytest.raises(errors.ExportError, match="does not exist"):
-        mp4.write_mp4(tmp_path / "no" / "a.mp4", black(1), fps=25, audio=silence(0.1))
+    with pytest.raises(errors.ExportError, match="frame 1"):
+        mp4.write_with_alpha(tmp_path / "a.mov", frames(1) + frames(1, 3), fps=25, audio=tone())
+    with pytest.raises(errors.ExportError, match="required one of"):
+        mp4.write_with_alpha(tmp_path / "a.avi", frames(1), fps=25, audio=tone())
 
 
 def moving(count: int, height: int = 96, width: int = 128) -> list[np.ndarray]:
@@ -324,20 +330,6 @@ def test_numbered_pictures_are_exact(tmp_path):
         assert sorted(path.name for path in tmp_path.iterdir()) == ["frame000.png", "frame001.png", "frame002.png"]
         for n, frame in enumerate(written):
             assert np.array_equal(np.asarray(Image.open(tmp_path / f"frame{n:03d}.png")), frame)
-
-
-def test_what_cannot_be_written_is_refused_and_leaves_no_file(tmp_path):
-    for suffix, pictures, fps, sound, message in (
-        (".webm", [], 25, tone(), "no frames"),
-        (".webm", [np.zeros((63, 96, 4), np.uint8)], 25, tone(), "even sizes"),
-        (".mov", frames(1) + frames(1, 3), 25, tone(), "frame 1"),
-        (".mov", frames(1), 0, tone(), "frame rate"),
-        (".mov", frames(1), 25, types.Audio(np.zeros(0, np.float32), HZ), "no samples"),
-        (".avi", frames(1), 25, tone(), "required one of"),
-    ):
-        with pytest.raises(errors.ExportError, match=message):
-            mp4.write_with_alpha(tmp_path / f"a{suffix}", pictures, fps=fps, audio=sound)
-        assert not list(tmp_path.iterdir())
 
 
 def grey_frames(count: int = 3, height: int = 120, width: int = 160) -> list[np.ndarray]:

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from children import LIPMOTION, child, wait_until
-from lipmotion import load_model, save_model
+from lipmotion import load_model, read_motion, save_model
 from lipmotion.pipeline.model import shipped_path
-from lipmotion_faces.characters.gltf_weights import read_gltf_motion
 from studio.test_recorded_videos import shifted
 from study.browser import (
     CONTROL,
@@ -378,7 +377,7 @@ def test_the_weights_of_the_page_are_those_of_the_exported_file(page):
         """const done = arguments[0], { server, store } = studio;
         server.post(`lines/${store.recordingId}/export`, { preset: "web" }).then(() => done());"""
     )
-    read, _ = read_gltf_motion(page.project / "exports" / "welcome.glb")
+    read, _ = read_motion(page.project / "exports" / "welcome.glb")
     shared = [name for name in read.names if name in names]
     assert len(shared) > 20
     assert "jawOpen" in shared
