@@ -89,23 +89,17 @@ def test_answers_are_still_there_after_the_next_start(folder):
         assert store.next_trial(number) == 1
 
 
-def test_answers_to_another_study_are_refused(folder):
+def test_no_answers_those_of_another_study_and_what_is_no_database_are_refused(folder):
+    with pytest.raises(InputError, match="lipmotion study serve"):
+        StudyStore(folder, create=False)
     StudyStore(folder).close()
     path = folder / MANIFEST
     path.write_text(path.read_text(encoding="utf-8").replace("A study", "Another study"), encoding="utf-8")
     with pytest.raises(InputError, match="another study"):
         StudyStore(folder)
-
-
-def test_a_file_that_is_no_database_is_refused(folder):
     (folder / ANSWERS).write_bytes(b"no database, but long enough to be taken for one" * 100)
     with pytest.raises(InputError, match="move it away"):
         StudyStore(folder)
-
-
-def test_a_study_without_answers_says_how_to_get_some(folder):
-    with pytest.raises(InputError, match="lipmotion study serve"):
-        StudyStore(folder, create=False)
 
 
 def test_a_failure_to_write_is_reported_and_passes(store):

@@ -202,15 +202,6 @@ def test_distances_are_measured_in_the_image_plane():
     assert measure_motion(points)[0, :2] == pytest.approx([0.2, width])
 
 
-def test_every_frame_is_measured(write_video, scripted):
-    scripted([face(opening) for opening in OPENINGS])
-    result = track(write_video(ticks=range(20)), crops=False)
-    np.testing.assert_allclose(result.motion["opening"], OPENINGS, atol=1e-9)
-    assert result.motion.rate_hz == 25
-    assert result.seen.all()
-    assert result.crops is None
-
-
 def test_frames_without_a_face_are_marked_and_interpolated(write_video, scripted):
     unseen = [0, 1, 9, 19]
     scripted([None if n in unseen else face(opening) for n, opening in enumerate(OPENINGS)])
