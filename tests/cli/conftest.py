@@ -7,7 +7,7 @@ from typing import NamedTuple
 import pytest
 
 from children import LIPMOTION, environment, run_child
-from lipmotion.cli.main import main
+from lipmotion.cli import main
 from lipmotion.cli.verbs import about
 
 
@@ -37,7 +37,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> RunCommand:
     def run(*arguments: object) -> Done:
         capsys.readouterr()
         try:
-            code = main([str(argument) for argument in arguments])
+            code = main.main([str(argument) for argument in arguments])
         except SystemExit as stop:  # argparse: help, version, wrong command line
             code = int(str(stop.code))
         out, err = capsys.readouterr()

@@ -21,7 +21,7 @@ import pytest
 from children import LIPMOTION, environment, run_child
 from cli.conftest import Done, is_one_error
 from lipmotion import Corpus
-from lipmotion.cli.main import main
+from lipmotion.cli import main
 from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
 from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
 from lipmotion.cli.terminal.progress import outcome, report_progress
@@ -136,7 +136,7 @@ NOT_SHOWN = {
 def test_what_is_obeyed_is_shown(capsys):
     for line in LINES:
         with logged():
-            main([word.replace("EVIL", EVIL) for word in line.split()])
+            main.main([word.replace("EVIL", EVIL) for word in line.split()])
         out, err = capsys.readouterr()
         assert OBEYED.search(out + err) is None, (line, out, err)
         shown = (out + err).replace("\\u001b", "\\x1b").replace("\\\\", "\\")

@@ -11,9 +11,6 @@ import pytest
 
 from children import run_child
 from lipmotion.engines import ENGINES
-from lipmotion.engines.coupled.model import CoupledConfig
-from lipmotion.engines.joint.engine import JointEngineConfig
-from lipmotion.engines.selection.costs import SelectionConfig
 
 ROOT = Path(__file__).parents[2]
 DOCS, INDEX = ROOT / "docs", ROOT / "docs" / "index.md"
@@ -137,7 +134,7 @@ def test_no_package_registry_and_no_absolute_path_is_named():
 SOURCE, CORE, TESTS = ROOT / "src", ROOT / "src" / "lipmotion", ROOT / "tests"
 PAPERS = {"hofer2008": 12, "xieliu2007": 21, "minnis2000": 0}
 """The pages, and how many equations each paper numbers, besides those of appendices."""
-CONFIGURATIONS = (JointEngineConfig, CoupledConfig, SelectionConfig)
+CONFIGURATIONS = [ENGINES.load(name).Config for name in ("joint", "coupled", "selection")]
 NAMED = re.compile(r"`((?:\w+/)+\w+\.py)::(\w+)`")
 DEFINED = re.compile(r"^ *(?:(?:def|class) (\w+)|(\w+)(?:: [^=\n]+)? = )", re.MULTILINE)
 FENCES = re.compile(r"```.*?```", re.DOTALL)
