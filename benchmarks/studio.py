@@ -55,7 +55,7 @@ from lipmotion_faces.registry import make_face  # noqa: E402
 from lipmotion_studio.folder import open_folder  # noqa: E402
 from lipmotion_studio.recording import OpenRecording, analyse_recording, open_recording  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
-from studio.attack import attacked  # noqa: E402
+from studio.hostile import attacked  # noqa: E402
 from studio.served import Served, lost_edits, random_edit, served, undone_edits  # noqa: E402
 from studio.two_clients import walk  # noqa: E402
 from testing.toy import toy_sentences  # noqa: E402

@@ -28,7 +28,7 @@ from lipmotion_studio.study.analysis.analyse import power_of, raters_needed
 from lipmotion_studio.study.analysis.crossed import Components, Interval, crossed_mean
 from lipmotion_studio.study.analysis.paired import fit_strengths, paired_figures
 from lipmotion_studio.study.analysis.ratings import RANKS, RatingTable, rating_figures
-from study.analysis.simulated import Effects, comparisons, expected_preference, expected_rating, ratings
+from study.simulated import Effects, comparisons, expected_preference, expected_rating, ratings
 
 Array = NDArray[np.float64]
 SIZES = [(raters, sentences) for sentences in (6, 20) for raters in (10, 20, 40)]

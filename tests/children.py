@@ -1,6 +1,6 @@
 """Processes that tests start: alike whatever the tests run under, limited in time, and none outlives its test.
 
-Every test starts processes here and nowhere else (``architecture/test_tests.py``): ``run_child`` waits for the end of
+Every test starts processes here and nowhere else (``architecture/test_code.py``): ``run_child`` waits for the end of
 one, ``child`` gives one that is at work, ``wait_until`` waits for what another process does. A process begins with the
 signals as a terminal leaves them (``nohup`` and background jobs ignore some, and children inherit that), without a
 terminal, without the settings of the shell, and as the leader of a process group, which is killed at the end of the

@@ -1,7 +1,9 @@
 """Extensions of installed packages, and built-in ones, by name."""
 
+import importlib
 import json
 import re
+import shutil
 import sys
 from collections.abc import Callable
 from importlib import metadata
@@ -21,20 +23,25 @@ from lipmotion_faces import FACES, Face, make_face
 
 
 @pytest.fixture
-def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Entry points that name what is there, what is not there, and a name that is built in."""
-    found = [
-        metadata.EntryPoint("text", "json:dumps", "kind"),
-        metadata.EntryPoint("broken", "no_such_module_at_all:x", "kind"),
-        metadata.EntryPoint("built", "json:loads", "kind"),
-    ]
-    monkeypatch.setattr(metadata, "entry_points", lambda group: [e for e in found if e.group == group])
+def distribution(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Installs a package with some files about it, before all others."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def install(name: str, **files: str) -> None:
+        folder = tmp_path / f"{name.replace('-', '_')}-1.0.dist-info"
+        folder.mkdir(exist_ok=True)
+        for file, text in {"METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n", **files}.items():
+            (folder / file).write_text(text)
+        importlib.invalidate_caches()
+
+    return install
 
 
-def test_names_and_loading(installed: None) -> None:  # noqa: ARG001
+def test_names_and_loading(distribution: Callable[..., None]) -> None:
+    """A package names what is there, what is not there, and a name that is built in."""
+    points = "[kind]\ntext = json:dumps\nbroken = no_such_module_at_all:x\nbuilt = json:loads\n"
+    distribution("odd-name", **{"entry_points.txt": points})
     registry: Registry[object] = Registry("thing", "kind", {"built": "json:dump"})
-    import json
-
     assert registry.names == ("built", "broken", "text")
     assert registry.load("text") is json.dumps
     assert registry.load("built") is json.dump  # not what a package calls so
@@ -80,19 +87,14 @@ PLUGINS = {
 
 
 @pytest.fixture
-def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], Registry[object]]:
+def plugin(tmp_path: Path, distribution: Callable[..., None]) -> Callable[..., Registry[object]]:
     """Returns a registry of one installed package, whose module ``odd_plugin`` holds a text."""
 
     def install(text: str, value: str = "odd_plugin:x") -> Registry[object]:
+        shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
         (tmp_path / "odd_plugin.py").write_text(text)
-        (tmp_path / "odd_name-1.0.dist-info").mkdir(exist_ok=True)
-        (tmp_path / "odd_name-1.0.dist-info" / "METADATA").write_text(
-            "Metadata-Version: 2.1\nName: odd-name\nVersion: 1.0\n"
-        )
-        (tmp_path / "odd_name-1.0.dist-info" / "entry_points.txt").write_text(f"[lipmotion.faces]\nodd = {value}\n")
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.setattr(sys, "dont_write_bytecode", True)
-        monkeypatch.delitem(sys.modules, "odd_plugin", raising=False)
+        distribution("odd-name", **{"entry_points.txt": f"[lipmotion.faces]\nodd = {value}\n"})
+        sys.modules.pop("odd_plugin", None)
         return Registry("face", "lipmotion.faces", {})
 
     return install
@@ -134,17 +136,13 @@ def test_what_fails_in_a_package_is_told_from_a_bug(plugin) -> None:
     assert outcome(own.value) is None
 
 
-def test_an_extra_is_installed_from_where_lipmotion_came_from(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    class Installed:
-        record: str | None = None
-
-        def read_text(self, _: str) -> str | None:
-            return self.record
-
-    here = Installed()
-    monkeypatch.setattr(metadata, "distribution", lambda _: here)
+def test_an_extra_is_installed_from_where_lipmotion_came_from(
+    distribution: Callable[..., None], tmp_path: Path
+) -> None:
+    distribution("lipmotion")
     assert install_command("video") == 'pip install "lipmotion[video]"'
-    here.record = json.dumps({"url": (tmp_path / "a copy").as_uri(), "dir_info": {}})
+    place = {"url": (tmp_path / "a copy").as_uri(), "dir_info": {}}
+    distribution("lipmotion", **{"direct_url.json": json.dumps(place)})
     assert install_command("video") == 'pip install "lipmotion[video]"'
     (tmp_path / "a copy").mkdir()
     assert install_command("video") == f'pip install "{tmp_path / "a copy"}[video]"'

@@ -1,24 +1,45 @@
+"""Eigenlips, the recorded mouths that are chosen as candidates, and refinement by them."""
+
+from dataclasses import replace
+from itertools import product
+
 import numpy as np
 import pytest
 
-from appearance.test_eigenlips import pictures
-from lipmotion.errors import InputError
-from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
+from lipmotion import Corpus
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.motion.eigenlips import Eigenlips, eigenlips_from_arrays, eigenlips_to_arrays, fit_eigenlips
+from lipmotion.stats.pca import fit_pca
 from lipmotion_faces.appearance.candidates import (
     MIXTURE_SHARE,
+    PAPER,
+    RefinementOptions,
+    Refiner,
+    best_sequence,
     choose_candidates,
     draw_to_recorded,
     make_candidates,
     measure_details,
+    sharpen,
     squared_distances,
 )
+from oracles.components import components, share
 
-HELD_OUT = pictures(count=160)[120:]
+
+def pictures(seed: int = 0, count: int = 40, height: int = 9, width: int = 12) -> np.ndarray:
+    """Coloured blobs that come and go, and a little noise."""
+    draw = np.random.default_rng(seed)
+    blobs = draw.normal(0, 1, (6, height, width, 3)) * 0.6 ** np.arange(6)[:, None, None, None]
+    values = 120 + 25 * np.einsum("tk,khwc->thwc", draw.normal(0, 1, (count, 6)), blobs)
+    return np.clip(values + draw.normal(0, 1, values.shape), 0, 255).astype(np.uint8)
+
+
+TRAINING, HELD_OUT = np.split(pictures(count=160), [120])
 
 
 @pytest.fixture(scope="module")
 def space() -> Eigenlips:
-    return fit_eigenlips(pictures(count=160)[:120], 4)
+    return fit_eigenlips(TRAINING, 4)
 
 
 def mouths(seed: int = 0) -> np.ndarray:
@@ -133,3 +154,241 @@ def test_mouths_are_drawn_smoothly_over_time() -> None:
     path = np.linspace(recorded[0], recorded[50], 400)
     steps = np.linalg.norm(np.diff(draw_to_recorded(path.astype(np.float32), recorded), axis=0), axis=1)
     assert steps.max() < 0.02 * np.linalg.norm(path[-1] - path[0])  # where the nearest ones change
+
+
+@pytest.fixture(scope="module")
+def refiner(space: Eigenlips) -> Refiner:
+    return Refiner(space, make_candidates(space, TRAINING[::4]), PAPER)
+
+
+def refine(refiner: Refiner, coefficients: np.ndarray) -> np.ndarray:
+    return refiner.pictures(coefficients, refiner.choose(coefficients))
+
+
+def test_the_paper_frame_by_frame(space: Eigenlips, refiner: Refiner) -> None:
+    """Eqs. 14 to 16 as printed, with coefficients of all dimensions, one colour and frame at a time."""
+    training, wanted = TRAINING, space.project(HELD_OUT[:6])
+    result = refine(refiner, wanted).astype(float)
+    for colour in range(3):
+        values = training[..., colour].reshape(120, -1)
+        basis = fit_pca(values, 108).basis
+        g = (values[::4] - space.mean[colour]) @ basis.T  # Eq. 14
+        for frame in range(6):
+            first = wanted[frame, 4 * colour : 4 * colour + 4]
+            j = np.linalg.norm(first - g[:, :4], axis=1).argmin()  # Eq. 15
+            expected = space.mean[colour] + np.concatenate([first, g[j, 4:]]) @ basis  # Eq. 16
+            assert result[frame, :, :, colour].ravel() == pytest.approx(np.clip(expected, 0, 255), abs=1.1)
+
+
+def test_a_candidate_comes_back_whole(space: Eigenlips, refiner: Refiner) -> None:
+    images, coefficients = TRAINING[::4], space.project(TRAINING[::4])
+    for options in (PAPER, RefinementOptions(steadiness=0.0, neighbours=1)):
+        restored = refine(Refiner(space, refiner.candidates, options), coefficients)
+        assert np.abs(restored.astype(int) - images).max() <= 1
+    assert np.abs(space.restore(coefficients).astype(int) - images).max() > 4  # which eigenlips alone do not give
+
+
+def test_one_candidate_for_all_colours(space: Eigenlips, refiner: Refiner) -> None:
+    wanted = space.project(HELD_OUT[:40])
+    apart, together = refiner.choose(wanted), Refiner(space, refiner.candidates).choose(wanted)
+    assert (apart != apart[:, :1]).any()
+    assert (together == together[:, :1]).all()
+    nearest = Refiner(space, refiner.candidates, RefinementOptions(steadiness=0.0)).choose(wanted)[:, 0]
+    distances = np.square(wanted[:, None] - refiner.candidates.coefficients).sum(axis=2)
+    assert np.array_equal(nearest, distances.argmin(axis=1))
+
+
+@pytest.mark.parametrize("together", [False, True])
+def test_the_search_finds_the_cheapest_of_all_sequences(space: Eigenlips, together: bool) -> None:
+    candidates = make_candidates(space, TRAINING[:5])
+    options = RefinementOptions(together, steadiness=2.0, neighbours=5)
+    wanted = space.project(HELD_OUT[:4])
+    chosen = Refiner(space, candidates, options).choose(wanted)
+    low = [
+        np.square(a[:, None] - b).sum(axis=2) for a, b in zip(np.split(wanted, 3, 1), candidates.by_colour, strict=True)
+    ]
+    for colours in ([0, 1, 2],) if together else ([0], [1], [2]):
+
+        def cost(path: tuple[int, ...], colours: list[int] = colours) -> float:
+            near = sum(low[c][t, j] for c in colours for t, j in enumerate(path))
+            change = sum(candidates.detail_distances[c][path[t - 1], path[t]] for c in colours for t in range(1, 4))
+            return float(near + 2.0 * change)
+
+        least = min(cost(path) for path in product(range(5), repeat=4))
+        assert cost(tuple(chosen[:, colours[0]])) == pytest.approx(least, rel=1e-4)
+
+
+def test_a_steadier_sequence_changes_detail_less(space: Eigenlips, refiner: Refiner) -> None:
+    noise = np.random.default_rng(0).normal(0, 30, (60, 12))
+    wanted, changes = space.project(HELD_OUT)[:30].repeat(2, axis=0) + noise, []
+    for steadiness in (0.0, 1.0, 10.0):
+        steady = Refiner(space, refiner.candidates, RefinementOptions(steadiness=steadiness))
+        chosen = steady.choose(wanted)[:, 0]
+        changes.append(refiner.candidates.detail_distances.sum(axis=0)[chosen[:-1], chosen[1:]].sum())
+    assert changes[0] > changes[1] > changes[2]
+
+
+def test_parts_of_a_video_are_those_of_the_whole(space: Eigenlips, refiner: Refiner) -> None:
+    wanted = space.project(HELD_OUT[:30])
+    steady = Refiner(space, refiner.candidates)
+    chosen, whole = steady.choose(wanted), refine(steady, wanted)
+    parts = [steady.pictures(wanted[part], chosen[part]) for part in (slice(0, 11), slice(11, 30))]
+    assert np.abs(np.concatenate(parts).astype(int) - whole).max() <= 1  # products of other sizes may round otherwise
+
+
+def test_a_change_is_worth_its_cost() -> None:
+    costs = np.array([[[0.0, 5.0], [3.0, 0.0], [0.0, 5.0]]], np.float32)
+    numbers = np.tile([0, 1], (1, 3, 1))
+    change = np.array([[[0.0, 1.0], [1.0, 0.0]]], np.float32)
+    assert best_sequence(costs, numbers, change).tolist() == [[0, 1, 0]]
+    assert best_sequence(costs, numbers, 2 * change).tolist() == [[0, 0, 0]]
+
+
+def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:
+    crops = {split: crops_of(toy_corpus, split) for split in ("train", "val")}
+    space = fit_eigenlips(crops["train"][::4], 2)
+    known = space.project(crops["train"])
+    refiner = Refiner(space, make_candidates(space, crops["train"][choose_candidates(known, 100)]))
+    wanted = space.project(crops["val"])
+    true, blurred, refined = map(edges, (crops["val"], space.restore(wanted), refine(refiner, wanted)))
+    assert blurred < 0.97 * true
+    assert abs(refined - true) < 0.5 * (true - blurred)
+
+
+def crops_of(corpus: Corpus, split: str) -> np.ndarray:
+    """The mouth pictures of all utterances of a split."""
+    tracks = [corpus.utterance(name).track for name in corpus.names(split)]
+    return np.concatenate([track.crops for track in tracks if track.crops is not None])
+
+
+def edges(images: np.ndarray) -> float:
+    """The energy of the gradient."""
+    return float(sum(np.square(np.diff(images.astype(float), axis=axis)).mean() for axis in (1, 2)))
+
+
+def test_short_videos_and_far_coefficients(space: Eigenlips, refiner: Refiner) -> None:
+    for options in (PAPER, RefinementOptions()):
+        for count in (0, 1, 2):
+            result = refine(Refiner(space, refiner.candidates, options), space.project(HELD_OUT[:2])[:count])
+            assert (result.shape, result.dtype) == ((count, 9, 12, 3), np.uint8)
+    assert {0, 255} <= set(np.unique(refine(refiner, np.array([[1e5] * 12, [-1e5] * 12]))))
+
+
+def test_what_cannot_be_refined(refiner: Refiner) -> None:
+    for values, says in (
+        (np.zeros((2, 11)), r"shape \(2, 11\), required finite ones of shape \(T, 12\)"),
+        (np.full((2, 12), np.inf), "finite"),
+    ):
+        with pytest.raises(InputError, match=says):
+            refine(refiner, values)
+    for others in (fit_eigenlips(pictures(), 5), fit_eigenlips(pictures(height=8), 4)):
+        with pytest.raises(InputError, match="make them with the same eigenlips"):
+            Refiner(others, refiner.candidates)
+    for options in ({"steadiness": -1.0}, {"steadiness": np.nan}, {"neighbours": 0}):
+        with pytest.raises(InputError, match="required"):
+            RefinementOptions(**options)  # type: ignore[arg-type]
+
+
+def test_edges_become_steeper_in_lightness_alone() -> None:
+    edge = np.zeros((2, 20, 20, 3), np.uint8)
+    edge[:, :, :10], edge[:, :, 10:] = (60, 80, 100), (110, 130, 150)
+    sharp = sharpen(edge, 0.5, 1).astype(int)
+    assert (sharp[:, :, 10] - sharp[:, :, 9] > 55).all()  # 50 before
+    assert (np.ptp(sharp - edge, axis=3) <= 1).all()  # no colour gets more than another
+    assert np.abs(sharp - edge)[:, :, [0, -1]].max() == 0
+    assert np.abs(sharpen(edge, 0.5, 2).astype(int) - edge)[:, :, 6].max() > np.abs(sharp - edge)[:, :, 6].max()
+    assert sharpen(edge, 0, 1) is edge
+    lips = np.repeat(np.repeat(edge[:, :1], 56, axis=1), 3, axis=2)
+    gained = np.abs(sharpen(lips, 0.5, 1).astype(int) - lips).max(axis=(0, 2, 3))
+    assert gained[28] > 1.2 * gained[0]  # the lips are in the middle
+
+
+@pytest.fixture(scope="module")
+def five() -> Eigenlips:
+    return fit_eigenlips(pictures(), 5)
+
+
+def test_each_colour_has_the_components_of_its_own(five: Eigenlips) -> None:
+    assert (five.mean.shape, five.basis.shape, five.size) == ((3, 108), (3, 5, 108), (9, 12))
+    for colour in range(3):
+        values = pictures()[..., colour].reshape(40, -1).astype(float)
+        mean, basis = components(values, 5)
+        assert five.mean[colour] == pytest.approx(mean, rel=1e-6)
+        assert five.basis[colour] == pytest.approx(basis, abs=1e-4)
+        assert five.explained[colour] == pytest.approx(share(values, basis), rel=1e-5)
+
+
+def test_coefficients_are_what_the_paper_says(five: Eigenlips) -> None:
+    """Eq. 13, one picture and one component at a time; red first, then green, then blue."""
+    images = pictures(1, 3)
+    coefficients = five.project(images)
+    assert (coefficients.shape, coefficients.dtype) == ((3, 15), np.float32)
+    for t, colour, k in np.ndindex(3, 3, 5):
+        left = images[t, :, :, colour].astype(float).ravel() - five.mean[colour]
+        assert coefficients[t, 5 * colour + k] == pytest.approx(five.basis[colour, k] @ left, abs=1e-2)
+
+
+def test_all_components_restore_the_pictures() -> None:
+    images = pictures(count=12)
+    five = fit_eigenlips(images, 30)
+    assert five.basis.shape[1] == 11  # twelve pictures span no more
+    assert np.abs(five.restore(five.project(images)).astype(int) - images).max() <= 1
+    assert five.explained == pytest.approx([1, 1, 1], abs=1e-6)
+
+
+def test_more_components_restore_better() -> None:
+    images = pictures(2)
+    spaces = [fit_eigenlips(images, count) for count in (1, 3, 6)]
+    errors = [np.square(five.restore(five.project(images)).astype(float) - images).mean() for five in spaces]
+    assert errors[0] > 2 * errors[1] > 4 * errors[2]
+    assert (np.diff([five.explained for five in spaces], axis=0) > 0).all()
+
+
+def test_restored_pictures_stay_within_black_and_white(five: Eigenlips) -> None:
+    extreme = np.zeros((2, 15), np.float32)
+    extreme[:, 0] = -1e6, 1e6
+    restored = five.restore(extreme)
+    assert (restored.dtype, restored.shape) == (np.uint8, (2, 9, 12, 3))
+    assert set(np.unique(restored[..., 0])) == {0, 255}
+    assert np.array_equal(five.restore(np.zeros((1, 15)))[0, :, :, 1].ravel(), np.rint(five.mean[1]))
+
+
+def test_channels_say_colour_and_number(five: Eigenlips) -> None:
+    names = [channel.name for channel in five.channels]
+    assert (names[0], names[4], names[5], names[-1]) == ("lips_r_01", "lips_r_05", "lips_g_01", "lips_b_05")
+    assert {channel.unit for channel in five.channels} == {"grey"}
+    assert five.summary.startswith("15 of 12 × 9 px, 9")
+
+
+def test_as_arrays_and_back_and_damaged_arrays(five: Eigenlips) -> None:
+    whole, images = eigenlips_to_arrays(five), pictures(3)
+    again = eigenlips_from_arrays(whole)
+    assert np.array_equal(again.project(images), five.project(images))
+    assert (again.size, again.explained.tolist()) == (five.size, five.explained.tolist())
+    for what, array in whole.items():
+        number = np.full_like(array, -1 if what == "size" else np.nan)
+        for damaged in ({}, {what: array[:-1]}, {what: number}):
+            others = {name: each for name, each in whole.items() if name != what}
+            with pytest.raises(ModelFormatError, match=r"the eigenlips are damaged .*; train the model again"):
+                eigenlips_from_arrays(others | damaged)
+
+
+def test_what_cannot_be_learned_from() -> None:
+    for images, count, message in (
+        (pictures()[..., 0], 5, r"shape \(40, 9, 12\) and type uint8, required \(N, H, W, 3\)"),
+        (pictures().astype(float), 5, "type float64"),
+        (pictures()[:0], 5, r"shape \(0, 9, 12, 3\)"),
+        (pictures()[:1], 5, "1 mouth pictures, all the same; required at least two that differ"),
+        (pictures(), 0, "0 components asked for, required at least 1"),
+    ):
+        with pytest.raises(InputError, match=message):
+            fit_eigenlips(images, count)
+
+
+def test_other_pictures_than_those_learned(five: Eigenlips) -> None:
+    with pytest.raises(InputError, match=r"shape \(40, 8, 12, 3\) .*required \(T, 9, 12, 3\), uint8; prepare"):
+        five.project(pictures(height=8))
+    with pytest.raises(InputError, match=r"coefficients of shape \(2, 14\), required \(T, 15\)"):
+        five.restore(np.zeros((2, 14)))
+    with pytest.raises(InputError, match="required"):
+        replace(five, size=(12, 9)).project(pictures())

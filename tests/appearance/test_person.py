@@ -4,36 +4,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion import FilmedFace
+from lipmotion import FilmedFace, types
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.types import Channel, Motion
-from lipmotion_faces.appearance import motion_map, person
-from lipmotion_faces.appearance.candidates import CANDIDATES
-from lipmotion_faces.appearance.lower_face import (
-    CORNER,
-    HEIGHT,
-    LARGEST_PX,
-    LEAST_PX,
-    NECK_PX,
-    SIDE_PX,
-    STILL_PX,
-    WIDTH,
-    FaceShape,
-    cheek_light,
-    mouth_ellipse,
-    mouth_part,
-    move_chin,
-    moved_part,
-    relight,
-    replaced_part,
-)
+from lipmotion_faces.appearance import candidates, lower_face, motion_map, person
 from lipmotion_faces.appearance.person import EDGE_PX, JAW_CANDIDATES, Appearance, FootagePictures, learn_appearance
 from pipeline.damage import DAMAGES, UNREADABLE, damaged
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
 
-MOUTH = (slice(None), *mouth_part(1))
+MOUTH = (slice(None), *lower_face.mouth_part(1))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +34,7 @@ def footage() -> FootagePictures:
 
 
 @pytest.fixture(scope="module")
-def unseen() -> Motion:
+def unseen() -> types.Motion:
     """Of a sentence that the appearance was not learned from."""
     return toy_motion(toy_sentences(8)[6].units, 25.0)
 
@@ -63,17 +43,17 @@ def test_its_parts(appearance: Appearance, footage: FootagePictures) -> None:
     count = len(footage.motion)
     assert (appearance.shape, appearance.scale) == (SHAPE, 1)
     assert appearance.mouth_codes.shape == (len(appearance.mouths), 90)
-    assert 200 < len(appearance.mouths) <= min(CANDIDATES, count)
+    assert 200 < len(appearance.mouths) <= min(candidates.CANDIDATES, count)
     assert appearance.jaw_codes.shape == (len(appearance.jaws), 36)
     assert len(appearance.jaws) == JAW_CANDIDATES
     assert appearance.from_motion.names == ("opening", "width", "outer")
     assert (appearance.mouth.explained > 0.98).all()
     assert np.sqrt(np.diag(appearance.noise.covariance)) == pytest.approx([NOISE] * 3, rel=0.05)
-    light = np.median(cheek_light(np.concatenate(footage.clips)[MOUTH]), axis=0)
+    light = np.median(lower_face.cheek_light(np.concatenate(footage.clips)[MOUTH]), axis=0)
     assert appearance.light == pytest.approx(light)
 
 
-def test_motion_becomes_the_mouth_that_was_drawn(appearance: Appearance, unseen: Motion) -> None:
+def test_motion_becomes_the_mouth_that_was_drawn(appearance: Appearance, unseen: types.Motion) -> None:
     codes, drawn = appearance.predict_codes(unseen), toy_lower_faces(unseen, noise=0)[MOUTH].astype(float)
     assert len(codes) == len(unseen.values)
     shown = appearance.mouth.restore(codes.mouth).astype(float)
@@ -84,26 +64,26 @@ def test_motion_becomes_the_mouth_that_was_drawn(appearance: Appearance, unseen:
     assert codes.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.5)
 
 
-def test_mouths_are_as_wide_as_the_motion(appearance: Appearance, distances: np.ndarray, unseen: Motion) -> None:
+def test_mouths_are_as_wide_as_the_motion(appearance: Appearance, distances: np.ndarray, unseen: types.Motion) -> None:
     """A regression alone draws them to the mean; a person's own recorded mouths are the limit."""
     order = distances[:, 1].argsort()
     narrow, wide = (appearance.mouth_codes[ends] for ends in (order[:20], order[-20:]))
     for width, near, far in ((np.percentile(distances[:, 1], 5), narrow, wide), (9.0, wide, narrow)):
         values = unseen.values.copy()
         values[:, unseen.column("width")] = width
-        shown = appearance.predict_codes(Motion(values, 25.0, unseen.channels)).mouth
+        shown = appearance.predict_codes(types.Motion(values, 25.0, unseen.channels)).mouth
         likeness = [np.linalg.norm(shown[:, None] - each, axis=2).min(axis=1).mean() for each in (near, far)]
         assert likeness[0] < likeness[1]
 
 
 def test_a_closure_shows_a_recorded_mouth_that_is_closed(
-    appearance: Appearance, distances: np.ndarray, unseen: Motion
+    appearance: Appearance, distances: np.ndarray, unseen: types.Motion
 ) -> None:
     contact = np.zeros(len(unseen.values))
     contact[[9, 13]], contact[10:13] = 0.5, 1.0
     values = unseen.values.copy()
     values[10:13, unseen.column("opening")] = 0.0
-    motion = Motion(values, 25.0, unseen.channels)
+    motion = types.Motion(values, 25.0, unseen.channels)
     mixed, closed = appearance.predict_codes(motion).mouth, appearance.predict_codes(motion, contact).mouth
     apart = np.linalg.norm(appearance.mouth_codes - closed[11], axis=1)
     assert apart.min() < 1e-3 * np.linalg.norm(closed[11])
@@ -115,9 +95,9 @@ def test_a_closure_shows_a_recorded_mouth_that_is_closed(
     assert np.array_equal(pause, mixed)
 
 
-def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: Motion) -> None:
+def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: types.Motion) -> None:
     drawn = toy_lower_faces(unseen, noise=0)[MOUTH]
-    dim = relight(drawn, np.tile([0.6, 0.7, 0.9], (len(drawn), 1)))
+    dim = lower_face.relight(drawn, np.tile([0.6, 0.7, 0.9], (len(drawn), 1)))
     bright, dark = appearance.measure_codes(drawn), appearance.measure_codes(dim)
     assert bright.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.0)
     assert dark.chin_px == pytest.approx(bright.chin_px, abs=0.3)
@@ -126,7 +106,7 @@ def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: Moti
 
 
 def test_a_jaw_of_sound_is_the_least_squares_line_of_its_level(
-    appearance: Appearance, footage: FootagePictures, unseen: Motion
+    appearance: Appearance, footage: FootagePictures, unseen: types.Motion
 ) -> None:
     codes = appearance.predict_codes(unseen)
     levels = (np.full(len(codes), level) for level in (-60, -40, -20))
@@ -142,9 +122,9 @@ def test_a_jaw_of_sound_is_the_least_squares_line_of_its_level(
 def test_jaws_differ_in_the_jaw_alone(appearance: Appearance) -> None:
     """Their mouth is the mean one, and so is what is further away from the jaw than cloning reads."""
     same = (appearance.jaws == appearance.jaws[0]).all(axis=(0, 3))
-    inside = replaced_part(SHAPE, 1)
-    assert same[mouth_ellipse(1)].all()
-    assert not same[inside & ~mouth_ellipse(1)].any()
+    inside = lower_face.replaced_part(SHAPE, 1)
+    assert same[lower_face.mouth_ellipse(1)].all()
+    assert not same[inside & ~lower_face.mouth_ellipse(1)].any()
     rows, columns = np.nonzero(~same)
     reach = np.nonzero(inside)
     for found, wanted in ((rows, reach[0]), (columns, reach[1])):
@@ -155,11 +135,11 @@ def test_jaws_differ_in_the_jaw_alone(appearance: Appearance) -> None:
 def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
     """A clip under another lamp is learned as if it had been the same."""
     lamp = np.tile([0.7, 0.8, 0.9], (len(footage.clips[1]), 1))
-    dimmed = replace(footage, clips=(footage.clips[0], relight(footage.clips[1], lamp), *footage.clips[2:]))
+    dimmed = replace(footage, clips=(footage.clips[0], lower_face.relight(footage.clips[1], lamp), *footage.clips[2:]))
     found, wanted = learn_appearance(dimmed), learn_appearance(footage)
     assert found.light == pytest.approx(wanted.light, abs=0.5)
-    assert cheek_light(found.mouths) == pytest.approx(np.tile(found.light, (len(found.mouths), 1)), abs=0.5)
-    motion = Motion(footage.motion[::5], 25.0, footage.channels)
+    assert lower_face.cheek_light(found.mouths) == pytest.approx(np.tile(found.light, (len(found.mouths), 1)), abs=0.5)
+    motion = types.Motion(footage.motion[::5], 25.0, footage.channels)
     pictures = [each.mouth.restore(each.predict_codes(motion).mouth).astype(int) for each in (found, wanted)]
     assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
 
@@ -171,7 +151,7 @@ def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatc
     learned = set(choose_evenly(120, len(footage.motion)))
     damaged = next(n for n in range(20, 60) if n not in learned)
     clip = footage.clips[0].copy()
-    rows, columns = mouth_part(1)
+    rows, columns = lower_face.mouth_part(1)
     clip[damaged, rows.start + 20 : rows.start + 28, columns.start + 30 : columns.start + 38] = [0, 0, 255]
     found = learn_appearance(replace(footage, clips=(clip, *footage.clips[1:])))
     whole = learn_appearance(footage)
@@ -190,7 +170,7 @@ def test_footage_that_does_not_fit_together(footage: FootagePictures, wrong: str
         learn_appearance(replace(footage, **{wrong: part}))
 
 
-CHANNELS = (Channel("opening"), Channel("width"), Channel("still"), Channel("weight", "weight"))
+CHANNELS = (types.Channel("opening"), types.Channel("width"), types.Channel("still"), types.Channel("weight", "weight"))
 FRAMES = 3000
 
 
@@ -208,8 +188,8 @@ def pictured(values: np.ndarray) -> np.ndarray:
     return np.stack([opening * own, np.exp(2 * opening) / 4, 2 * opening - own, np.full(len(values), 7.0)], axis=1)
 
 
-def motion(values: np.ndarray) -> Motion:
-    return Motion(values, 25.0, CHANNELS)
+def motion(values: np.ndarray) -> types.Motion:
+    return types.Motion(values, 25.0, CHANNELS)
 
 
 @pytest.fixture(scope="module")
@@ -243,7 +223,7 @@ def test_components_have_unit_variance_and_are_as_many_as_move() -> None:
     for values, count in ((draw.normal(0, 1, (600, 6)) @ draw.normal(0, 0.1, (6, 50)), 6),
                           (draw.normal(0, 1, (900, 30)), motion_map.COMPONENTS)):  # fmt: skip
         found = motion_map.fit_motion_map(
-            values, tuple(Channel(f"x_{n}") for n in range(values.shape[1])), values[:, :2]
+            values, tuple(types.Channel(f"x_{n}") for n in range(values.shape[1])), values[:, :2]
         )
         assert found.basis.shape == (values.shape[1], count)
         components = (values - found.mean) / found.scale @ found.basis
@@ -299,7 +279,7 @@ def test_motion_that_cannot_be_learned_from() -> None:
 
 
 def test_motion_that_nobody_can_map(fitted: motion_map.MotionMap) -> None:
-    blendshapes = Motion(np.zeros((5, 2)), 25.0, (Channel("jawOpen", "weight"), Channel("opening")))
+    blendshapes = types.Motion(np.zeros((5, 2)), 25.0, (types.Channel("jawOpen", "weight"), types.Channel("opening")))
     with pytest.raises(InputError, match=r"no channel 'width' \(2 of the 3 that this face needs are missing\)"):
         fitted.predict(blendshapes)
     values = poses(5)
@@ -311,7 +291,7 @@ def test_motion_that_nobody_can_map(fitted: motion_map.MotionMap) -> None:
 def test_channels_are_found_by_name(fitted: motion_map.MotionMap) -> None:
     values = poses(50, seed=5)
     order = [3, 1, 2, 0]
-    turned = Motion(values[:, order], 25.0, tuple(CHANNELS[n] for n in order))
+    turned = types.Motion(values[:, order], 25.0, tuple(CHANNELS[n] for n in order))
     assert motion_map.channel_values(turned, ("opening", "width")) == pytest.approx(values[:, :2])
     assert fitted.predict(turned) == pytest.approx(fitted.predict(motion(values)))
 
@@ -345,17 +325,19 @@ CHIN_PX = 118.0
 
 def with_line(chin_px: float = CHIN_PX, scale: int = 1, count: int = 1) -> np.ndarray:
     """Lower faces of one colour, with a soft dark line at the tip of the chin."""
-    y = (np.arange(HEIGHT * scale) + 0.5) / scale + CORNER[1]
+    y = (np.arange(lower_face.HEIGHT * scale) + 0.5) / scale + lower_face.CORNER[1]
     levels = np.rint(180 - 120 * np.exp(-(((y - chin_px) / 1.5) ** 2))).astype(np.uint8)
-    return np.broadcast_to(levels[:, None, None], (count, HEIGHT * scale, WIDTH * scale, 3)).copy()
+    return np.broadcast_to(
+        levels[:, None, None], (count, lower_face.HEIGHT * scale, lower_face.WIDTH * scale, 3)
+    ).copy()
 
 
 def line_px(picture: np.ndarray, x: float = 0.0) -> float:
     """Return how far the line is below the eyes in one column, to a fraction of a pixel."""
-    scale = picture.shape[0] // HEIGHT
-    column = round((x - CORNER[0]) * scale - 0.5)
+    scale = picture.shape[0] // lower_face.HEIGHT
+    column = round((x - lower_face.CORNER[0]) * scale - 0.5)
     darkness = 180.0 - picture[:, column, 0]
-    y = (np.arange(len(picture)) + 0.5) / scale + CORNER[1]
+    y = (np.arange(len(picture)) + 0.5) / scale + lower_face.CORNER[1]
     return float((y * darkness).sum() / darkness.sum())
 
 
@@ -363,34 +345,43 @@ def test_the_tip_moves_as_far_as_it_should() -> None:
     drops = np.array([-9.0, -0.4, 0.0, 0.3, 6.7, 12.0])
     for scale in (1, 2):
         pictures = with_line(scale=scale, count=len(drops))
-        moved = move_chin(pictures, np.full(len(drops), CHIN_PX), drops)
+        moved = lower_face.move_chin(pictures, np.full(len(drops), CHIN_PX), drops)
         assert moved.dtype == np.uint8
         assert [line_px(picture) - line_px(pictures[0]) for picture in moved] == pytest.approx(drops, abs=0.15)
     chins = np.array([112.0, 125.0])  # elsewhere in every frame
-    moved = move_chin(np.concatenate([with_line(chin) for chin in chins]), chins, np.full(2, 5.0))
+    moved = lower_face.move_chin(np.concatenate([with_line(chin) for chin in chins]), chins, np.full(2, 5.0))
     assert [line_px(picture) for picture in moved] == pytest.approx(chins + 5, abs=0.3)
-    for wanted, done in ((40.0, LARGEST_PX), (-40.0, -LARGEST_PX)):  # no further than a neck allows
-        moved, limit = (move_chin(with_line(), np.array([CHIN_PX]), np.array([drop])) for drop in (wanted, done))
+    for wanted, done in (
+        (40.0, lower_face.LARGEST_PX),
+        (-40.0, -lower_face.LARGEST_PX),
+    ):  # no further than a neck allows
+        moved, limit = (
+            lower_face.move_chin(with_line(), np.array([CHIN_PX]), np.array([drop])) for drop in (wanted, done)
+        )
         assert np.array_equal(moved, limit)
 
 
 def test_what_does_not_move_stays_to_the_bit() -> None:
-    noise = np.random.default_rng(0).integers(0, 256, (2, HEIGHT, WIDTH, 3), np.uint8)
+    noise = np.random.default_rng(0).integers(0, 256, (2, lower_face.HEIGHT, lower_face.WIDTH, 3), np.uint8)
     before = noise.copy()
-    still = move_chin(noise, np.full(2, CHIN_PX), np.array([0.0, 0.9 * LEAST_PX]))
+    still = lower_face.move_chin(noise, np.full(2, CHIN_PX), np.array([0.0, 0.9 * lower_face.LEAST_PX]))
     assert np.array_equal(still, before)
-    moved = move_chin(noise, np.full(2, CHIN_PX), np.array([8.0, -8.0]))
+    moved = lower_face.move_chin(noise, np.full(2, CHIN_PX), np.array([8.0, -8.0]))
     assert np.array_equal(noise, before)  # the given pictures are not changed
-    y = np.arange(HEIGHT) + 0.5 + CORNER[1]
-    x = np.abs(np.arange(WIDTH) + 0.5 + CORNER[0])
-    untouched = (y[:, None] < STILL_PX) | (y[:, None] > CHIN_PX + 8 + 4 + NECK_PX) | (x[None] >= SIDE_PX[1])
+    y = np.arange(lower_face.HEIGHT) + 0.5 + lower_face.CORNER[1]
+    x = np.abs(np.arange(lower_face.WIDTH) + 0.5 + lower_face.CORNER[0])
+    untouched = (
+        (y[:, None] < lower_face.STILL_PX)
+        | (y[:, None] > CHIN_PX + 8 + 4 + lower_face.NECK_PX)
+        | (x[None] >= lower_face.SIDE_PX[1])
+    )
     assert np.array_equal(moved[:, untouched], before[:, untouched])
     assert (moved != before)[:, ~untouched].mean() > 0.5
 
 
 def test_the_jaw_moves_less_towards_its_joints() -> None:
     picture = with_line()
-    moved = move_chin(picture, np.array([CHIN_PX]), np.array([10.0]))
+    moved = lower_face.move_chin(picture, np.array([CHIN_PX]), np.array([10.0]))
     steps = [line_px(moved[0], x) - line_px(picture[0], x) for x in (0.5, 20.5, 40.5, 50.5)]
     assert steps[0] > steps[1] + 0.3 > steps[2] + 1 > steps[3]
     mirrored = [line_px(moved[0], -x) - line_px(picture[0], -x) for x in (0.5, 20.5, 40.5, 50.5)]
@@ -399,20 +390,25 @@ def test_the_jaw_moves_less_towards_its_joints() -> None:
 
 def test_the_part_that_may_differ_holds_all_that_does() -> None:
     for scale in (1, 2):
-        part = moved_part(scale)
-        assert part.shape == (HEIGHT * scale, WIDTH * scale)
+        part = lower_face.moved_part(scale)
+        assert part.shape == (lower_face.HEIGHT * scale, lower_face.WIDTH * scale)
         assert not np.concatenate([part[[0, -1]].ravel(), part[:, [0, -1]].ravel()]).any()
-        inside = replaced_part(FaceShape(44.0, 120.0), scale)
+        inside = lower_face.replaced_part(lower_face.FaceShape(44.0, 120.0), scale)
         assert (part & inside).sum() == inside.sum()
 
 
 def test_no_chin_folds_or_tears() -> None:
     """A picture that gets lighter downwards still does. Short chins, of children or a tracker's errors, move less."""
-    ramp = np.broadcast_to(np.arange(HEIGHT, dtype=np.uint8)[:, None, None], (HEIGHT, WIDTH, 3))
+    ramp = np.broadcast_to(
+        np.arange(lower_face.HEIGHT, dtype=np.uint8)[:, None, None], (lower_face.HEIGHT, lower_face.WIDTH, 3)
+    )
     chins = np.repeat([60.0, 80.0, 86.0, 92.0, 99.0, CHIN_PX], 2)
-    drops, above = np.tile([-LARGEST_PX, LARGEST_PX], 6), round(STILL_PX - CORNER[1])
-    for moved in move_chin(np.repeat(ramp[None], 12, axis=0), chins, drops).astype(int):
+    drops, above = (
+        np.tile([-lower_face.LARGEST_PX, lower_face.LARGEST_PX], 6),
+        round(lower_face.STILL_PX - lower_face.CORNER[1]),
+    )
+    for moved in lower_face.move_chin(np.repeat(ramp[None], 12, axis=0), chins, drops).astype(int):
         assert np.array_equal(moved[:above], ramp[:above])
-        steps = np.diff(moved[:, WIDTH // 2, 0])
+        steps = np.diff(moved[:, lower_face.WIDTH // 2, 0])
         assert steps.min() >= 0
         assert steps.max() <= 5

@@ -4,10 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion_faces.appearance import poisson
 from lipmotion_faces.appearance.poisson import CLEARANCE, CloningSystem, GridFiller, cloning_system, nested_grids
 from oracles.membranes import cloned
+
+WIDTH, HEIGHT = 72, 56
 
 
 def ellipse(height: int = HEIGHT, width: int = WIDTH) -> np.ndarray:

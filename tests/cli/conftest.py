@@ -4,12 +4,10 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import pytest
-from scipy.io import wavfile
 
 from children import LIPMOTION, environment, run_child
-from lipmotion.cli.main import main
+from lipmotion.cli import main
 from lipmotion.cli.verbs import about
 
 
@@ -39,7 +37,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> RunCommand:
     def run(*arguments: object) -> Done:
         capsys.readouterr()
         try:
-            code = main([str(argument) for argument in arguments])
+            code = main.main([str(argument) for argument in arguments])
         except SystemExit as stop:  # argparse: help, version, wrong command line
             code = int(str(stop.code))
         out, err = capsys.readouterr()
@@ -78,22 +76,6 @@ def takes(here: Path, toy_speech: Path) -> Path:
 @pytest.fixture
 def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
     return ("animate", toy_speech, "--model", toy_model_file)
-
-
-@pytest.fixture
-def bad_speech(here: Path) -> dict[str, Path]:
-    """Unusable recordings, by their defect."""
-    from speech.sounds import write_pictures
-
-    folder = here.parent / "bad"
-    (folder / "folder").mkdir(parents=True)
-    (folder / "empty.wav").touch()
-    (folder / "text.wav").write_text("words, not sound\n" * 50)
-    write_pictures(folder / "mute.mp4")
-    wavfile.write(folder / "short.wav", 16_000, np.zeros(500, "<i2"))
-    names = {"missing": "nothing.wav", "empty": "empty.wav", "text": "text.wav", "mute": "mute.mp4"}
-    names |= {"short": "short.wav", "folder": "folder", "long name": "x" * 300 + ".wav"}
-    return {what: folder / name for what, name in names.items()}
 
 
 def is_one_error(done: Done, code: int) -> bool:

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from types import FrameType
 
-from lipmotion.cli.main import main
+from lipmotion.cli import main
 
 RETURN_MARK, CLEARANCE_MARK = -1, -2
 
@@ -48,7 +48,7 @@ if __name__ == "__main__":
     number, step, sys.argv = int(sys.argv[1]), int(sys.argv[2]), ["lipmotion", *sys.argv[3:]]
     steps, last = Steps(step, number), Last(number) if step == CLEARANCE_MARK else None
     sys.setprofile(steps.watch)
-    code = main()
+    code = main.main()
     sys.setprofile(None)
     if step == RETURN_MARK:
         os.kill(os.getpid(), number)

@@ -12,7 +12,6 @@ import pytest
 from children import LIPMOTION, child
 from cli.conftest import Done, RunCommand, check_refused
 from lipmotion import animate, cues, load_model, write_cues
-from lipmotion.cli.command_line import parser
 from lipmotion.pipeline.outputs.cues import cue_text
 
 
@@ -89,17 +88,6 @@ def test_transcript_and_edited_phones(run, basics, here):
     assert [line.split("\t")[1] for line in run(*basics, "--units", "b.json").out] == ["X", "X"]
 
 
-def test_speech_that_cannot_be_used(run, toy_model_file, bad_speech):
-    for path in bad_speech.values():
-        done = run("cues", path, "--model", toy_model_file, "--machineReadable")
-        assert (done.code, done.out) == (3, [])
-        start, *_, failure = events(done)
-        assert (start["type"], start["file"]) == ("start", str(path))
-        assert failure["type"] == "failure"
-        message = f"Application terminating with error: {failure['reason']}"
-        assert failure["log"] == {"level": "Fatal", "message": message}
-
-
 @pytest.mark.usefixtures("here")
 def test_status_lines(run, basics, toy_speech):
     done = run(*basics, "-f", "json", "--machine-readable")
@@ -138,13 +126,6 @@ def test_sound_from_a_pipe_is_not_named(here, toy_speech, toy_model_file):
         assert process.wait() == 0
     assert json.loads((here / "a.json").read_text())["metadata"]["soundFile"] == ""
     assert "<soundFile></soundFile>" in (here / "a.xml").read_text()
-
-
-def test_recognisers_of_rhubarb():
-    understood = parser()
-    for name, ours in (("pocketSphinx", "auto"), ("phonetic", "fast"), ("general", "general")):
-        assert understood.parse_args(["cues", "a.wav", "--recognizer", name]).recogniser == ours
-    assert understood.parse_args(["cues", "a.wav"]).recogniser == "auto"
 
 
 def test_options_of_rhubarb(run, basics, here):

@@ -1,23 +1,24 @@
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
 import pytest
 
 from cli.conftest import is_one_error
+from experiments.conftest import few_sets
 from lipmotion.hmm.model import HmmConfig
-from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab import runner
 from lipmotion_lab.report import sections
 
 
 @pytest.fixture(autouse=True)
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
+def small(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Small phone models, and only two of the paper's unit sets."""
     phones = HmmConfig(mixtures=1, iterations=1)
     monkeypatch.setattr(runner, "ExperimentSettings", partial(runner.ExperimentSettings, recogniser=phones))
-    monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})
+    with few_sets():
+        yield
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from cli.conftest import check_refused, is_one_error
 from lipmotion import load_model, save_model
 from lipmotion.citations import ENGINE_KEYS, bibliography, engine_citations, model_citations
 from lipmotion.cli import main
+from lipmotion.cli.verbs.about import SHELLS
 from lipmotion.engines import ENGINES
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
 from lipmotion.pipeline.model import read_header, shipped_path
@@ -133,9 +134,10 @@ def test_a_terminal_that_does_not_know_the_letters(run_outside, toy_speech, toy_
 
 
 @pytest.mark.usefixtures("here")
-def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, bad_speech):
+def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, here):
     """FFmpeg's own messages are not printed."""
-    assert is_one_error(run_outside("animate", bad_speech["text"], "-o", "a.json"), 3)
+    (here / "text.wav").write_text("words, not sound\n" * 50)
+    assert is_one_error(run_outside("animate", "text.wav", "-o", "a.json"), 3)
     assert is_one_error(run_outside("animate", "a.wav", "-o", "missing/a.json"), 7)
     assert run_outside("animate", "a.wav").code == 2
 
@@ -279,3 +281,40 @@ def test_every_entry_is_whole():
         assert entry.count("{") == entry.count("}")
         assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))
         assert entry.endswith("\n}")
+
+
+ASKED: dict[tuple[str, ...], set[str]] = {
+    ("cue",): {"cues"}, ("corpus", "pre"): {"prepare"}, ("corpus", "prepare", "--no"): {"--no-crops"},
+    ("face", "info", "--struc"): set(), ("info", "--struc"): {"--structure"},
+    ("animate", "--pauses", ""): {"rest", "natural"}, ("animate", "a.wav", "-o", "ou"): {"out.json"},
+    ("completion", ""): set(SHELLS),
+}  # fmt: skip
+"""The words of a command line, and what may stand for the last of them."""
+BASH = 'source "$1"; shift; COMP_WORDS=(lipmotion "$@"); COMP_CWORD=$#; _shtab_lipmotion'
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_a_script_offers_verbs_and_options(run, shell):
+    done = run("completion", shell)
+    assert (done.code, done.err) == (0, [])
+    text = "\n".join(done.out)
+    assert all(name in text for name in ("animate", "prepare", "no-crops", "machine-readable", "natural"))
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+def test_bash_completes(run, here):
+    (here / "script").write_text("\n".join(run("completion", "bash").out) + "\n")
+    (here / "out.json").touch()
+    program = f"{BASH}; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+    offered = {}
+    for words in ASKED:
+        done = run_child(["bash", "--norc", "-c", program, "bash", here / "script", *words], check=True)
+        offered[words] = {word for word in done.stdout.split("\n") if word}
+    assert offered == ASKED
+
+
+def test_it_loads_no_numpy():
+    """A shell asks for it whenever it starts."""
+    asked = "main(['completion', 'bash']); sys.exit('numpy' in sys.modules)"
+    program = f"import sys; from lipmotion.cli.main import main; {asked}"
+    assert run_child([sys.executable, "-c", program]).returncode == 0

@@ -1,8 +1,8 @@
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,14 +13,11 @@ from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.training.train import TrainReport
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.types import Item, Progress
+from lipmotion.types import Audio
 from lipmotion.units import load_unit_set
-from lipmotion_faces.corpus import prepare
-from lipmotion_faces.corpus import sync as offset
-from lipmotion_faces.corpus.coverage import coverage
-from lipmotion_faces.corpus.prepare import PrepareReport
-from pipeline.made import write_sound
+from pipeline.made import features_of, write_sound
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
+from studio.toy_recordings import SENTENCES, write_recordings
 from testing.toy import toy_sentences
 
 
@@ -170,53 +167,40 @@ def test_motion_that_was_tracked_is_written_as_files(run, toy_corpus, here):
     assert not (here / "other").exists()
 
 
-def test_sync(run, toy_corpus, here, monkeypatch):
-    shutil.copytree(toy_corpus.path, here / "mine")
-    moved = iter([{"studio": 0.12}, {}])
-    monkeypatch.setattr(offset, "sync", lambda _corpus: next(moved))
-    assert run("corpus", "sync", "mine") == (0, ["studio: sound moved by -120 ms"], [])
+def test_sync(run, toy_corpus, here):
+    """The sound of the toy corpus is made 120 ms late."""
+    corpus = Corpus.create(here / "mine")
+    for utterance in map(toy_corpus.utterance, toy_corpus.names()):
+        late = Audio(np.append(np.zeros(1920), utterance.audio.samples), 16_000)
+        corpus.add(replace(utterance, audio=late, features=features_of(late)))
+    done = run("corpus", "sync", "mine")
+    assert (done.code, done.err) == (0, [])
+    assert re.fullmatch(r".*: sound moved by -1[1-5]\d ms", done.out[0])
     assert run("corpus", "sync", "mine").out == [
         "mine: nothing moved: the sound is in step, or its offset could not be measured"
     ]
     assert is_one_error(run("corpus", "sync", "missing"), 4)
 
 
-EVENTS = (Item("a", "prepared"), Progress("preparing recordings", 1, 2, 0.5), Item("d", "skipped", "no face"))
-
-
-def test_prepare_prints_the_counts(run, monkeypatch):
-    asked: dict[str, object] = {}
-
-    def done(directory: Path, output: Path, **options: object) -> PrepareReport:
-        monitor = options.pop("monitor")
-        assert callable(monitor)
-        for event in EVENTS:
-            monitor(event)
-        asked.update(options, directory=directory, output=output)
-        return PrepareReport(
-            output, "folder of videos", ("a", "b"), ("c",), {"d": "no face"}, {"a": 3}, 1.0, {"b": ("cut at 1.00 s",)}
-        )
-
-    monkeypatch.setattr(prepare, "prepare", done)
-    arguments = ("videos", "-o", "mine", "--workers", "2", "--no-crops", "--offset-ms", "-40")
-    assert run("corpus", "prepare", *arguments) == (
-        0,
-        ["mine: 2 prepared, 1 kept, 1 skipped (folder of videos)"],
-        ["lipmotion: warning: skipped d: no face"],
-    )
-    assert asked == {
-        "directory": Path("videos"), "output": Path("mine"), "workers": 2, "crops": False, "offset_ms": -40.0,
-    }  # fmt: skip
+def test_prepare_prints_the_counts(run, here):
+    """What was prepared is kept, and what cannot be used is skipped."""
+    recordings = write_recordings(here / "recordings")
+    options = ("-o", "mine", "--workers", "2", "--no-crops", "--offset-ms", "-40")
+    for counts in (f"{SENTENCES} prepared, 0 kept", f"0 prepared, {SENTENCES} kept"):
+        done = run("corpus", "prepare", recordings, *options)
+        assert (done.code, len(done.out)) == (0, 1)
+        assert done.out[0].startswith(f"mine: {counts}, 1 skipped (")
+        assert [line for line in done.err if line.startswith("lipmotion: warning: skipped empty: ")]
 
 
 def test_coverage(run, toy_corpus):
     done = run("corpus", "coverage", toy_corpus.path, "--count", "3")
     assert (done.code, done.err) == (0, [])
-    found = coverage(toy_corpus)
-    assert done.out[0] == f"{len(toy_corpus)} of {len(toy_corpus)} utterances, {found.sentences} sentences"
-    for line, kind in zip(done.out[1:4], found.kinds, strict=True):
-        assert line.split()[:4] == [kind.kind, str(kind.covered), "of", str(kind.needed)]
-    assert f"and {len(found.kinds[1].missing) - 3} more diphones" in done.out
+    found = json.loads(run("corpus", "coverage", toy_corpus.path, "--json").out[0])
+    assert done.out[0] == f"{len(toy_corpus)} of {len(toy_corpus)} utterances, {found['sentences']} sentences"
+    for line, kind in zip(done.out[1:4], found["kinds"], strict=True):
+        assert line.split()[:4] == [kind["kind"], str(kind["covered"]), "of", str(kind["needed"])]
+    assert f"and {len(found['kinds'][1]['missing']) - 3} more diphones" in done.out
 
 
 def test_prompts(run, here, toy_corpus):

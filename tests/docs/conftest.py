@@ -3,10 +3,13 @@ from functools import partial
 
 import pytest
 
+from cli.conftest import run
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import Audio, Features, ParallelMap
+
+__all__ = ["recognised_once", "run", "small_phone_models"]
 
 
 @pytest.fixture(autouse=True)

@@ -16,7 +16,7 @@ from lipmotion.types import Audio
 from lipmotion_studio.study.answers import write_answers
 from meshes.heads import head, lip_points, write_glb, write_obj
 from pipeline.made import write_sound
-from study.analysis.simulated import Effects, rated_answers, ratings
+from study.simulated import Effects, rated_answers, ratings
 from testing.toy import ToySentence, toy_sentences, toy_utterances
 
 SAID = ("speech", "talk", "a", "b", "one", "lines/one", "perro")

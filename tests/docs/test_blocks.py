@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import lipmotion
+from cli.conftest import RunCommand
 from docs.desk import copied, set_desk
 from docs.site_pages import ROOT, Block, blocks, pages
 from lipmotion import Corpus
 from lipmotion.cli.command_line import parser
-from lipmotion.cli.main import main
 
 TESTED = {
     "README": "test_readme.py", "docs/start": "test_readme.py", "docs/your-face": "docs/test_your_face.py",
@@ -64,7 +64,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory, toy_model_file: Path, coupled
 @pytest.mark.long
 @pytest.mark.usefixtures("recognised_once")
 @pytest.mark.parametrize("page", dict.fromkeys(block.page for block in HERE))
-def test_blocks_of_a_page_run(page, desk, toy_model, tmp_path, monkeypatch):
+def test_blocks_of_a_page_run(page, desk, toy_model, tmp_path, monkeypatch, run):
     monkeypatch.chdir(copied(desk, tmp_path / "desk"))
     names: dict[str, object] = {"lipmotion": lipmotion, "corpus": Corpus.open(Path("my-corpus"))}
     names["result"] = lipmotion.animate("speech.wav", transcript=Path("speech.txt"), model=toy_model)
@@ -72,13 +72,13 @@ def test_blocks_of_a_page_run(page, desk, toy_model, tmp_path, monkeypatch):
         monkeypatch.setattr("sys.stdin", piped)
         for block in HERE:
             if block.page == page:
-                perform(block, names)
+                perform(block, names, run)
 
 
-def perform(block: Block, names: dict[str, object]) -> None:
+def perform(block: Block, names: dict[str, object], run: RunCommand) -> None:
     """Run a block in the current folder."""
     if block.language == "python":
         exec(compile(block.text, block.page, "exec"), names)  # noqa: S102
         return
     for words in commands(block):
-        assert main(words[1:]) in (0, None), words
+        assert run(*words[1:]).code == 0, words

@@ -1,8 +1,9 @@
-"""Links of all Markdown files resolve, the index has every page, and names of modules and options are present ones."""
+"""Links of all Markdown files resolve, and what pages name of modules, options, equations and tests is there."""
 
 import re
 from collections.abc import Iterator
 from dataclasses import fields
+from functools import cache
 from itertools import chain
 from pathlib import Path
 
@@ -128,3 +129,59 @@ def test_no_package_registry_and_no_absolute_path_is_named():
     texts = [ROOT / name for name in listed.stdout.splitlines() if Path(name).suffix in endings]
     hosts = re.compile(r"py" + r"pi\.org|python" + r"hosted\.org|registry\.npm" + r"js|/ho" + r"me/\w|/ro" + r"ot/")
     assert [path.name for path in texts if path.is_file() and hosts.search(path.read_text(encoding="utf-8"))] == []
+
+
+SOURCE, CORE, TESTS = ROOT / "src", ROOT / "src" / "lipmotion", ROOT / "tests"
+PAPERS = {"hofer2008": 12, "xieliu2007": 21, "minnis2000": 0}
+"""The pages, and how many equations each paper numbers, besides those of appendices."""
+CONFIGURATIONS = [ENGINES.load(name).Config for name in ("joint", "coupled", "selection")]
+NAMED = re.compile(r"`((?:\w+/)+\w+\.py)::(\w+)`")
+DEFINED = re.compile(r"^ *(?:(?:def|class) (\w+)|(\w+)(?:: [^=\n]+)? = )", re.MULTILINE)
+FENCES = re.compile(r"```.*?```", re.DOTALL)
+
+
+@cache
+def defined(folder: Path) -> frozenset[str]:
+    """Return the names of modules, functions, classes, constants and attributes in a folder."""
+    paths = list(folder.rglob("*.py"))
+    found = (name for path in paths for names in DEFINED.findall(path.read_text("utf-8")) for name in names)
+    return frozenset(found) | {path.stem for path in paths} | {path.parent.name for path in paths}
+
+
+def text(page: str) -> str:
+    """Return a page without its commands."""
+    return FENCES.sub("", (DOCS / "papers" / f"{page}.md").read_text("utf-8"))
+
+
+def test_every_function_and_test_of_an_equation_exists():
+    found = [match for page in PAPERS for match in NAMED.findall(text(page))]
+    assert len(found) > 10
+    for path, name in found:
+        (place,) = [root / path for root in (CORE, SOURCE, TESTS) if (root / path).is_file()]
+        assert f"def {name}(" in place.read_text("utf-8"), (path, name)
+
+
+def test_names_without_a_path_exist():
+    names = [name for page in PAPERS for name in re.findall(r"`([A-Za-z_][\w.]*)`", text(page))]
+    tests = [name for name in names if name.startswith("test_")]
+    functions = [name for name in names if "." in name]
+    assert min(len(tests), len(functions)) > 20
+    assert [name for name in tests if name not in defined(TESTS)] == []
+    assert [name for name in functions if not defined(SOURCE).issuperset(name.split("."))] == []
+
+
+def test_options_exist():
+    options = {each.name for config in CONFIGURATIONS for each in fields(config)}
+    pages = [(DOCS / "papers" / f"{page}.md").read_text("utf-8") for page in PAPERS]
+    named = [name for page in pages for name in re.findall(r"(?:`|--set \"?)(\w+)=", page)]
+    assert len(named) > 10
+    assert [name for name in named if name not in options] == []
+
+
+@pytest.mark.parametrize("page", [page for page, count in PAPERS.items() if count])
+def test_every_equation_has_a_row_with_a_function_and_a_test(page):
+    numbers = set()
+    for row in re.findall(r"^\| (.+?) \|(.+`.+)\|(.*`.+`.*)\|$", text(page), re.MULTILINE):
+        for first, last in re.findall(r"(?<![\w.])(\d+)(?:–(\d+))?(?![\w.])", re.sub(r"§[\d.]+|Fig. \d+", "", row[0])):
+            numbers |= set(range(int(first), int(last or first) + 1))
+    assert numbers.issuperset(range(1, PAPERS[page] + 1)), sorted(set(range(1, PAPERS[page] + 1)) - numbers)

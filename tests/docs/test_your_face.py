@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 
 from docs.site_pages import blocks
-from lipmotion.cli.main import main
 from lipmotion.types import Audio, Timeline
 from lipmotion_faces import Staging, stage_face
-from lipmotion_faces.video.mp4 import write_mp4
 from pipeline.made import write_sound
-from testing.toy import CAMERA_HZ, toy_motion, toy_sentences
+from testing.toy import CAMERA_HZ, toy_motion, toy_sentences, write_film
 
 SENTENCES = 6
 
@@ -27,12 +25,12 @@ def write_clip(path: Path) -> None:
         face.render(toy_motion(each.units, CAMERA_HZ), Timeline(()), fps=CAMERA_HZ) for each in spoken
     )
     samples = np.concatenate([each.audio.samples for each in spoken])
-    write_mp4(path, frames, fps=CAMERA_HZ, audio=Audio(samples, spoken[0].audio.rate_hz))
+    write_film(path, frames, Audio(samples, spoken[0].audio.rate_hz))
 
 
 @pytest.mark.long
 @pytest.mark.video
-def test_a_clip_becomes_a_face_that_speaks(tmp_path, monkeypatch):
+def test_a_clip_becomes_a_face_that_speaks(tmp_path, monkeypatch, run):
     pytest.importorskip("mediapipe")
     monkeypatch.chdir(tmp_path)
     write_clip(tmp_path / "me.mp4")
@@ -40,7 +38,7 @@ def test_a_clip_becomes_a_face_that_speaks(tmp_path, monkeypatch):
     commands = [shlex.split(line) for block in blocks("docs/your-face") for line in block.text.splitlines()]
     assert [words[1] for words in commands] == ["corpus", "train", "face", "speak", "animate"]
     for words in commands:
-        assert main(words[1:]) == 0
+        assert run(*words[1:]).code == 0
     for name in ("morning.mp4", "said.mp4"):
         with av.open(tmp_path / name) as film:
             assert film.streams.video[0].frames > CAMERA_HZ

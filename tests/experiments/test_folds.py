@@ -9,24 +9,15 @@ import numpy as np
 import pytest
 
 from experiments.copies import SETTINGS, copied, renamed
-from lipmotion import Corpus, Selection, train
-from lipmotion.errors import CorpusError, InputError
-from lipmotion.measures import curves
-from lipmotion.measures.closures import closure_figures
+from lipmotion import Corpus, Selection, errors, train
+from lipmotion.measures import closures, curves
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion_lab import folds as module
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import (
-    ClipStatistic,
-    closing_score_statistic,
-    correlation_statistic,
-    distance_statistic,
-    significance_mark,
-)
+from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
 from lipmotion_lab.folds import folds, in_blocks
 from lipmotion_lab.report.sections import blocks_section, folds_section
-from lipmotion_lab.runner import ExperimentSettings
 from testing.toy import SMALL
 
 CONDITIONS = ["audio only", "with transcript"]
@@ -77,9 +68,9 @@ def test_figures_are_of_all_clips_as_one_split(figures, by_hand):
 
 
 def test_corpora_that_cannot_be(toy_corpus, tmp_path):
-    with pytest.raises(CorpusError, match="no utterances of split 'train'"):
+    with pytest.raises(errors.CorpusError, match="no utterances of split 'train'"):
         folds(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))
-    with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
+    with pytest.raises(errors.CorpusError, match="compared by the channel 'opening', which is not in it"):
         folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
 
 
@@ -115,7 +106,7 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
     assert figures["conditions"] == {"audio only": {"clips": wanted}}
     first = cut[:]
     cut.clear()
-    folds(toy_corpus, count=3, settings=ExperimentSettings(seed=1))
+    folds(toy_corpus, count=3, settings=runner.ExperimentSettings(seed=1))
     assert cut != first
 
 
@@ -176,7 +167,7 @@ def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypat
     left_out.clear()
     folds(corpus, by_speaker=True, count=2)
     assert [len(each) for each in left_out] == [2, 2]
-    with pytest.raises(InputError, match="5 folds; required: from 2 to 4, which is how many speakers there are"):
+    with pytest.raises(errors.InputError, match="5 folds; required: from 2 to 4, which is how many speakers there are"):
         folds(corpus, by_speaker=True, count=5)
 
 
@@ -196,24 +187,26 @@ def clips() -> tuple[Clips, Clips, Clips]:
 def test_figures_are_those_of_the_measures(clips):
     original, near, _ = clips
     wanted = curves.pooled_correlation(near, original).mean()
-    assert correlation_statistic(near, original).value == pytest.approx(wanted, abs=1e-12)
-    assert distance_statistic(near, original).value == pytest.approx(curves.mean_distance(near, original), abs=1e-12)
+    assert evaluate.correlation_statistic(near, original).value == pytest.approx(wanted, abs=1e-12)
+    assert evaluate.distance_statistic(near, original).value == pytest.approx(
+        curves.mean_distance(near, original), abs=1e-12
+    )
     some, others = [g[:, :1] for g in near], [o[:, :1] for o in original]
-    score = closure_figures([g[:, 0] for g in near], [o[:, 0] for o in original], 50, 25).score
-    assert closing_score_statistic(some, others, 50).value == pytest.approx(100 * score)
+    score = closures.closure_figures([g[:, 0] for g in near], [o[:, 0] for o in original], 50, 25).score
+    assert evaluate.closing_score_statistic(some, others, 50).value == pytest.approx(100 * score)
 
 
 def test_a_channel_that_stands_still_explains_nothing(clips):
     original, near, _ = clips
     still = [np.concatenate([g[:, :2], np.full((len(g), 1), 0.1)], axis=1) for g in near]
-    assert correlation_statistic(still, original).value == pytest.approx(
+    assert evaluate.correlation_statistic(still, original).value == pytest.approx(
         curves.pooled_correlation(still, original).mean(), abs=1e-12
     )
 
 
 def test_nothing_closes():
     open_mouth = [np.ones((5, 1))]
-    assert np.isnan(closing_score_statistic(open_mouth, open_mouth, 0.5).value)
+    assert np.isnan(evaluate.closing_score_statistic(open_mouth, open_mouth, 0.5).value)
 
 
 def test_the_interval_is_that_of_drawn_clips(clips):
@@ -224,17 +217,17 @@ def test_the_interval_is_that_of_drawn_clips(clips):
     def acc(made: Clips, chosen: np.ndarray) -> float:
         return float(curves.pooled_correlation([made[i] for i in chosen], [original[i] for i in chosen]).mean())
 
-    one, other = correlation_statistic(near, original), correlation_statistic(far, original)
+    one, other = evaluate.correlation_statistic(near, original), evaluate.correlation_statistic(far, original)
     wanted = np.percentile([acc(near, chosen) for chosen in drawn], [2.5, 97.5])
     assert one.interval(7) == pytest.approx(tuple(wanted), abs=1e-12)
     paired = np.percentile([acc(near, chosen) - acc(far, chosen) for chosen in drawn], [2.5, 97.5])
     assert one.gain(other, 7) == pytest.approx(tuple(paired), abs=1e-12)
-    assert significance_mark(one.gain(other, 7)) == "*"
+    assert evaluate.significance_mark(one.gain(other, 7)) == "*"
     assert one.gain(one, 7) == (0, 0)
 
 
 def test_the_interval_of_one_clip_is_its_value():
-    one = ClipStatistic([np.array([3.0, 2.0])], lambda total: float(total[0] / total[1]))
+    one = evaluate.ClipStatistic([np.array([3.0, 2.0])], lambda total: float(total[0] / total[1]))
     assert one.interval(0) == (1.5, 1.5)
 
 
@@ -243,14 +236,14 @@ def test_the_interval_of_one_clip_is_its_value():
     [((0.1, 0.2), "*"), ((-2, -0.1), "*"), ((-0.1, 0.1), ""), ((0, 0), ""), ((2e-10, 7e-9), ""), ((None, None), "")],
 )
 def test_marks(gain, wanted):
-    assert significance_mark(gain) == wanted
+    assert evaluate.significance_mark(gain) == wanted
 
 
 def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy_corpus, tmp_path):
     """The figures are those of all clips; what is done is not done again, and clips of ``val`` are not compared."""
     cut: list[list[tuple[str, ...]]] = []
 
-    def experiment(corpus: Corpus, *, settings: ExperimentSettings) -> dict[str, Any]:
+    def experiment(corpus: Corpus, *, settings: runner.ExperimentSettings) -> dict[str, Any]:
         cut.append([corpus.names(split) for split in ("train", "val", "test")])
         for split in ("val", "test"):
             utterances = [corpus.utterance(name) for name in corpus.names(split)]
@@ -278,5 +271,5 @@ def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy
     assert in_blocks(experiment, toy_corpus, ["true"], count=4, work=tmp_path) == figures
     assert len(cut) == 4
     assert blocks_section(figures).verdict == "Highest ACC: true, 1.000."
-    with pytest.raises(InputError, match="2 blocks; required: from 3 to 12"):
+    with pytest.raises(errors.InputError, match="2 blocks; required: from 3 to 12"):
         in_blocks(experiment, toy_corpus, [], count=2)

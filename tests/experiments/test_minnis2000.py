@@ -9,21 +9,19 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import PHONE_S, costs_of, inventory, target_of
+from experiments.conftest import few_sets, states
 from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus, evaluate, train
 from lipmotion.engines import engine_from_settings
-from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.engines.selection.concatenation import pieces_of
 from lipmotion.engines.selection.costs import SelectionConfig
 from lipmotion.errors import CorpusError
-from lipmotion_lab import hofer2008 as table1
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
-from lipmotion_lab.hofer2008 import PAPER_SCORES, PhoneticTableOptions, hofer2008
+from lipmotion_lab.hofer2008 import PhoneticTableOptions, hofer2008
 from lipmotion_lab.minnis2000 import (
     ADDITIONS,
     EVERYTHING,
     PRINTED,
-    join_figures,
     minnis2000,
     overlap_times_s,
     rows,
@@ -102,27 +100,20 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
 
 
 @LONG
-def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path, monkeypatch):
-    def run() -> dict[str, Any]:
-        return minnis2000(toy_corpus, work=tmp_path, settings=SETTINGS)
+def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path):
+    received: list[object] = []
 
-    module = "lipmotion_lab.minnis2000.join_figures"
-    made: list[None] = []
-
-    def stopping(*given: Any) -> dict[str, Any]:
-        made.append(None)
-        if len(made) == 4:
+    def stop(*given: object) -> None:
+        received.append(given)
+        if len(received) == 4:
             raise KeyboardInterrupt
-        return join_figures(*given)
 
-    monkeypatch.setattr(module, stopping)
     with pytest.raises(KeyboardInterrupt):
-        run()
-    again = run()
+        minnis2000(toy_corpus, work=tmp_path, settings=replace(SETTINGS, receive=stop))
+    before = states(tmp_path)
+    again = minnis2000(toy_corpus, work=tmp_path, settings=SETTINGS)
     assert (again["seconds"], again["lists"]) == (None, figures["lists"])  # the model was kept, too
-    assert len(made) == 1 + sum(
-        len(systems) for found in figures["lists"].values() for systems in found["conditions"].values()
-    )
+    assert before.items() <= states(tmp_path).items()
 
 
 TWO = PhoneticTableOptions(states=(3,), mixtures=(1, 2), motion_mixtures=(1, 2), channels="opening width outer")
@@ -135,8 +126,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def hofer_figures(toy_corpus: Corpus, work: Path) -> dict[str, Any]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
+    with few_sets():
         return hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
 
 
@@ -165,10 +155,11 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(hofer_figures, toy_co
 
 
 @pytest.mark.long
-def test_what_was_finished_is_not_trained_again(hofer_figures, toy_corpus, work, monkeypatch):
-    monkeypatch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in ("eVis", "2vis", "phone")})
-    monkeypatch.setattr(JointEngine, "growing_models", None)
-    again = hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
+def test_what_was_finished_is_not_trained_again(hofer_figures, toy_corpus, work):
+    before = states(work)
+    with few_sets():
+        again = hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
+    assert states(work) == before
     assert hofer_section(again).as_text() == hofer_section(hofer_figures).as_text()
 
 

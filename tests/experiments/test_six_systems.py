@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.conftest import states
 from experiments.copies import SETTINGS, copied
-from lipmotion import Corpus, evaluate, train
-from lipmotion.engines import engine_from_settings, engine_named
+from lipmotion import Corpus, engines, evaluate, train
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.measures import curves
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
@@ -17,28 +17,15 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.report.sections import xie_liu_section
-from lipmotion_lab.xie_liu2007 import six_systems, systems
-from lipmotion_lab.xie_liu2007.plots import PLOT_FILES
+from lipmotion_lab.xie_liu2007 import plots, systems
 from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
-from lipmotion_lab.xie_liu2007.systems import (
-    ALL_PATHS,
-    BEST_PATH,
-    BLSTM,
-    COMPARED_SYSTEMS,
-    PAPER_FIGURES,
-    REFERENCE_SYSTEM,
-    SPLIT,
-    TWO_STAGES,
-    select_systems,
-    system_from_arrays,
-)
 from testing.toy import SMALL, toy_sentences
 
 LONG = pytest.mark.long
 
 MULTISTREAM = "ph-MSHMM"
-CHAINS = [MULTISTREAM, REFERENCE_SYSTEM, MULTISTREAM + SPLIT, REFERENCE_SYSTEM + SPLIT]
-OTHERS = [MULTISTREAM + ALL_PATHS, BEST_PATH, "trajectory HMM", "mean pose"]
+CHAINS = [MULTISTREAM, systems.REFERENCE_SYSTEM, MULTISTREAM + systems.SPLIT, systems.REFERENCE_SYSTEM + systems.SPLIT]
+OTHERS = [MULTISTREAM + systems.ALL_PATHS, systems.BEST_PATH, "trajectory HMM", "mean pose"]
 SYSTEMS = [*CHAINS, *OTHERS]
 PICTURE = b"\x89PNG\r\n\x1a\n"
 
@@ -83,16 +70,16 @@ def test_a_row_is_what_train_and_evaluate_say(figures, toy_corpus):
 
 
 @LONG
-@pytest.mark.parametrize("name", [MULTISTREAM, REFERENCE_SYSTEM])
+@pytest.mark.parametrize("name", [MULTISTREAM, systems.REFERENCE_SYSTEM])
 def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     """The arrays of the model file and the motion are the same; conversions of one model differ by that alone."""
-    model = train(toy_corpus, recogniser=SMALL, engine=engine_from_settings(preset=name))[0]
+    model = train(toy_corpus, recogniser=SMALL, engine=engines.engine_from_settings(preset=name))[0]
     arrays = model.engine.to_arrays(model.learned)
     kept = read_archive(work / "8" / f"system-{name}.checkpoint")
     assert kept.keys() == {*arrays, "about"}
     for key, array in arrays.items():
         np.testing.assert_array_equal(array, kept[key])
-    system, learned = system_from_arrays(kept), model.engine.from_arrays(arrays)
+    system, learned = systems.system_from_arrays(kept), model.engine.from_arrays(arrays)
     recordings = load_held_out(toy_corpus, cached_recogniser(model.phones))
     made = generate_clips(recordings, "audio only", model.engine, learned)
     for ours, theirs in zip(made, generate_clips(recordings, "audio only", system.engine, system.model), strict=True):
@@ -103,39 +90,39 @@ def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     assert row["acc"] == pytest.approx(curves.pooled_correlation(generated, original).mean())
     assert row["amse"] == pytest.approx(curves.mean_distance(generated, original))
     assert training[name]["parameters"] == model.learned.chains.parameters
-    if name == REFERENCE_SYSTEM:
-        by_path = engine_named("coupled", model.engine.config.as_mapping() | {"conversion": "viterbi"})
+    if name == systems.REFERENCE_SYSTEM:
+        by_path = engines.engine_named("coupled", model.engine.config.as_mapping() | {"conversion": "viterbi"})
         made = generate_clips(recordings, "audio only", by_path, learned)
         acc = curves.pooled_correlation([clip.generated for clip in made], original).mean()
-        assert rows["audio only"][BEST_PATH]["acc"] == pytest.approx(acc)
+        assert rows["audio only"][systems.BEST_PATH]["acc"] == pytest.approx(acc)
 
 
 @LONG
 def test_a_number_of_gaussians_is_the_best_that_was_tried(figures):
-    for name in (MULTISTREAM, REFERENCE_SYSTEM):
-        row = figures["rows"][-1]["training"][name + SPLIT]
+    for name in (MULTISTREAM, systems.REFERENCE_SYSTEM):
+        row = figures["rows"][-1]["training"][name + systems.SPLIT]
         best = max(row["tried"], key=lambda trial: trial["acc"])
         assert (row["options"], row["parameters"]) == (best["options"], best["parameters"])
         assert row["tried"][0]["options"].keys() == {"structure", "chains"}  # as printed
     pairs = figures["rows"][-1]["pairs"]
     compared = [(pair["better"], pair["worse"]) for pair in pairs]
-    assert compared[:2] == [(REFERENCE_SYSTEM, MULTISTREAM), (MULTISTREAM + ALL_PATHS, MULTISTREAM)]
-    assert compared[2:] == [(REFERENCE_SYSTEM + SPLIT, MULTISTREAM + SPLIT)]
-    split = figures["rows"][-1]["training"][MULTISTREAM + SPLIT]
+    assert compared[:2] == [(systems.REFERENCE_SYSTEM, MULTISTREAM), (MULTISTREAM + systems.ALL_PATHS, MULTISTREAM)]
+    assert compared[2:] == [(systems.REFERENCE_SYSTEM + systems.SPLIT, MULTISTREAM + systems.SPLIT)]
+    split = figures["rows"][-1]["training"][MULTISTREAM + systems.SPLIT]
     assert {trial["options"].get("visual_mixtures", 1) for trial in split["tried"]} == {1, 2}
     rows = figures["rows"][-1]["conditions"]["audio only"]
-    assert pairs[0]["acc"] == pytest.approx(rows[REFERENCE_SYSTEM]["acc"] - rows[MULTISTREAM]["acc"])
+    assert pairs[0]["acc"] == pytest.approx(rows[systems.REFERENCE_SYSTEM]["acc"] - rows[MULTISTREAM]["acc"])
 
 
 @LONG
-def test_it_goes_on_from_what_is_finished(figures, work, toy_corpus, monkeypatch):
-    monkeypatch.setattr(systems, "train_stages", None)
-    monkeypatch.setattr(six_systems, "generate_clips", None)
+def test_it_goes_on_from_what_is_finished(figures, work, toy_corpus):
+    before = states(work)
     options = ComparisonOptions(systems=[*CHAINS, "mean pose"], mixtures=2)
     again = xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SETTINGS)
     for name in CHAINS:
         kept, rows = (each["rows"][-1]["conditions"]["audio only"][name] for each in (again, figures))
         assert kept == rows
+    assert states(work) == before
 
 
 @LONG
@@ -146,14 +133,14 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures):
             low, high = row[f"{key}_95"]
             assert low - 1e-9 <= row[key] <= high + 1e-9
         # chosen on val, the same system may be the same
-        assert row["acc_gain_95"] != (0, 0) or name.startswith(REFERENCE_SYSTEM)
-    assert rows[REFERENCE_SYSTEM]["acc_gain_95"] == (0, 0)
+        assert row["acc_gain_95"] != (0, 0) or name.startswith(systems.REFERENCE_SYSTEM)
+    assert rows[systems.REFERENCE_SYSTEM]["acc_gain_95"] == (0, 0)
 
 
 @LONG
 def test_pictures_are_written(figures, folder):
     assert figures
-    assert sorted(path.name for path in folder.iterdir()) == sorted(PLOT_FILES.values())
+    assert sorted(path.name for path in folder.iterdir()) == sorted(plots.PLOT_FILES.values())
     assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
 
 
@@ -189,9 +176,11 @@ def test_eigenlips(visual, toy_corpus):
 @LONG
 def test_two_stages_beside_one(toy_corpus):
     others = tuple(SpokenSentence(s.name, "anna", s.audio, s.units) for s in toy_sentences(3))
-    options = ComparisonOptions(systems=[REFERENCE_SYSTEM + TWO_STAGES], voices=others)
+    options = ComparisonOptions(systems=[systems.REFERENCE_SYSTEM + systems.TWO_STAGES], voices=others)
     (row,) = xieliu2007(toy_corpus, options, sizes=[4], settings=SETTINGS)["rows"]
-    assert [(each["better"], each["worse"]) for each in row["pairs"]] == [(options.systems[0], REFERENCE_SYSTEM)]
+    assert [(each["better"], each["worse"]) for each in row["pairs"]] == [
+        (options.systems[0], systems.REFERENCE_SYSTEM)
+    ]
     one, two = row["training"].values()
     assert two["parameters"] > one["parameters"]
     with pytest.raises(InputError, match="two stages needs speech of others; give it by --recordings or --voices"):
@@ -199,18 +188,24 @@ def test_two_stages_beside_one(toy_corpus):
 
 
 def test_systems_in_the_order_of_the_table():
-    assert select_systems(["mean pose", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "mean pose"]
-    assert select_systems(["ph-CHMM" + ALL_PATHS]) == ["ph-CHMM", REFERENCE_SYSTEM, "ph-CHMM" + ALL_PATHS]
-    assert list(PAPER_FIGURES) == list(COMPARED_SYSTEMS)[:6]
+    assert systems.select_systems(["mean pose", "ph-HMM"]) == ["ph-HMM", systems.REFERENCE_SYSTEM, "mean pose"]
+    assert systems.select_systems(["ph-CHMM" + systems.ALL_PATHS]) == [
+        "ph-CHMM",
+        systems.REFERENCE_SYSTEM,
+        "ph-CHMM" + systems.ALL_PATHS,
+    ]
+    assert list(systems.PAPER_FIGURES) == list(systems.COMPARED_SYSTEMS)[:6]
     with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
-        select_systems(["ph-RNN"])
+        systems.select_systems(["ph-RNN"])
 
 
 def test_other_engines_are_compared_when_named():
-    left_out = COMPARED_SYSTEMS.keys() - select_systems(None)
-    twice = {name for name in COMPARED_SYSTEMS if TWO_STAGES in name}
-    assert left_out - twice == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", BLSTM}
-    assert set(PAPER_FIGURES) | {name + SPLIT for name in PAPER_FIGURES} <= set(select_systems(None))
+    left_out = systems.COMPARED_SYSTEMS.keys() - systems.select_systems(None)
+    twice = {name for name in systems.COMPARED_SYSTEMS if systems.TWO_STAGES in name}
+    assert left_out - twice == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", systems.BLSTM}
+    assert set(systems.PAPER_FIGURES) | {name + systems.SPLIT for name in systems.PAPER_FIGURES} <= set(
+        systems.select_systems(None)
+    )
 
 
 def test_without_matplotlib_there_are_no_pictures(toy_corpus, tmp_path, monkeypatch):
@@ -221,7 +216,7 @@ def test_without_matplotlib_there_are_no_pictures(toy_corpus, tmp_path, monkeypa
 
 def test_what_cannot_be_chosen(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="sizes 9; required: from 1 to 8"):
-        xieliu2007(toy_corpus, ComparisonOptions(systems=[REFERENCE_SYSTEM]), sizes=[9], settings=SETTINGS)
+        xieliu2007(toy_corpus, ComparisonOptions(systems=[systems.REFERENCE_SYSTEM]), sizes=[9], settings=SETTINGS)
     with pytest.raises(CorpusError, match="are in the split that is compared with"):
         xieliu2007(toy_corpus, order=toy_corpus.names("val"))
     with pytest.raises(CorpusError, match="no utterances of split 'val'"):

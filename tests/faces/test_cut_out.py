@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lipmotion import Staging, errors
+from lipmotion import errors
 from lipmotion.units.phones import BLAIR
+from lipmotion_faces import Staging
 from lipmotion_faces.cut_out import read_cut_out
 
 LETTERS = "ABCDEFGHX"

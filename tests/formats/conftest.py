@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
 
+from cli.conftest import run
 from formats.examples import of_motion
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
+
+__all__ = ["generation", "run"]
 
 
 @pytest.fixture

@@ -15,22 +15,15 @@ from xml.etree import ElementTree
 import numpy as np
 
 from formats.examples import of_motion
-from lipmotion import CueSheet, read_motion
-from lipmotion.citations import model_citations
-from lipmotion.errors import ExportError, InputError
-from lipmotion.formats import write_motion
+from lipmotion import CueSheet, citations, errors, formats, read_motion, types
+from lipmotion.formats import label_files, textgrid
 from lipmotion.formats.cues import write_cue_file
-from lipmotion.formats.label_files import write_labels
-from lipmotion.formats.textgrid import parse_interval_tiers
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
 from lipmotion.pipeline.batch.report import Mark, _field, _for_page
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import as_text
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
-from lipmotion_faces.characters.gltf_document import read_gltf_document
-from lipmotion_faces.characters.gltf_writer import write_gltf_scene
+from lipmotion_faces.characters import gltf_document, gltf_writer, usd_writer
 from lipmotion_faces.characters.scene import Scene
-from lipmotion_faces.characters.usd_writer import write_usda
 from lipmotion_faces.video.synthetic_mark import mark_metadata
 
 PARTS = (
@@ -53,10 +46,10 @@ def names() -> Iterator[str]:
             yield name
 
 
-def generation(name: str, unit: str = "eye_distance", label: Unit | None = None) -> Generation:
+def generation(name: str, unit: str = "eye_distance", label: types.Unit | None = None) -> types.Generation:
     """Return three frames of a channel of that name."""
-    motion = Motion(np.array([[0.0], [0.5], [0.25]]), 25.0, (Channel(name, unit),))
-    units = Timeline((Span(0.0, 0.1, label or Unit("aa")),))
+    motion = types.Motion(np.array([[0.0], [0.5], [0.25]]), 25.0, (types.Channel(name, unit),))
+    units = types.Timeline((types.Span(0.0, 0.1, label or types.Unit("aa")),))
     return of_motion(motion, units)
 
 
@@ -70,7 +63,7 @@ def mesh(name: str) -> Mesh:
 def _motion_file(suffix: str) -> Callable[[Path, str], None]:
     def check(folder: Path, name: str) -> None:
         path = folder / f"a.{suffix}"
-        write_motion(path, generation(name), source={"file": name, "path": name}, model={"name": name})
+        formats.write_motion(path, generation(name), source={"file": name, "path": name}, model={"name": name})
         assert read_motion(path)[0].names == (name,)
 
     return check
@@ -78,13 +71,13 @@ def _motion_file(suffix: str) -> Callable[[Path, str], None]:
 
 def _fap(folder: Path, name: str) -> None:
     path = folder / "a.fap"
-    write_motion(path, generation(f"fap3_{name}"), source={"file": name}, model={})
+    formats.write_motion(path, generation(f"fap3_{name}"), source={"file": name}, model={})
     assert read_motion(path)[0].names == ("fap3_open_jaw",)
 
 
 def _script(folder: Path, name: str) -> None:
     path = folder / "a.blender.py"
-    write_motion(path, generation(name), source={"path": name}, model={})
+    formats.write_motion(path, generation(name), source={"path": name}, model={})
     text = path.read_bytes().decode("ascii")
     body = ast.parse(text[text.index("\nRATE_HZ = ") : text.index("\n}\n") + 3]).body
     values = {ast.unparse(node.targets[0]): node.value for node in body if isinstance(node, ast.Assign)}
@@ -96,14 +89,14 @@ def _script(folder: Path, name: str) -> None:
 def _labels(suffix: str, read: Callable[[str], str]) -> Callable[[Path, str], None]:
     def check(folder: Path, name: str) -> None:
         path = folder / f"a{suffix}"
-        write_labels(path, generation("a", label=Unit("aa", word=f"x{name}x")).units)
+        label_files.write_labels(path, generation("a", label=types.Unit("aa", word=f"x{name}x")).units)
         assert read(path.read_bytes().decode()) == f"x{name}x"
 
     return check
 
 
 def _of_textgrid(text: str) -> str:
-    return parse_interval_tiers(text, "a")[1].labels[0].text
+    return textgrid.parse_interval_tiers(text, "a")[1].labels[0].text
 
 
 def _of_webvtt(text: str) -> str:
@@ -119,8 +112,8 @@ def _of_webvtt(text: str) -> str:
 def _cues(form: str, read: Callable[[str], list[str]]) -> Callable[[Path, str], None]:
     def check(folder: Path, name: str) -> None:
         path, word = folder / f"a.{form}", f"x{name}x"
-        cues = Timeline((Span(0.0, 0.1, "X"), Span(0.1, 0.5, "A")))
-        sheet = CueSheet(cues, 10.0, "ABCDEFX", Timeline((Span(0.1, 0.5, word),)))
+        cues = types.Timeline((types.Span(0.0, 0.1, "X"), types.Span(0.1, 0.5, "A")))
+        sheet = CueSheet(cues, 10.0, "ABCDEFX", types.Timeline((types.Span(0.1, 0.5, word),)))
         write_cue_file(path, sheet, as_text(word), form)
         assert read(path.read_bytes().decode()) in ([as_text(word)], [_seen(as_text(word)), _seen(word)], [])
 
@@ -160,7 +153,7 @@ def _of_rows(text: str) -> list[str]:
 
 def _usda(folder: Path, name: str) -> None:
     path = folder / "a.usda"
-    write_usda(path, Scene(mesh(name), sound=as_text(f"x{name}")))
+    usd_writer.write_usda(path, Scene(mesh(name), sound=as_text(f"x{name}")))
     text = path.read_bytes().decode()
     assert _usd_tokens(text, "uniform token[] blendShapes") == [as_text(name)]
     found = re.search(r"filePath = (@@@(?:[^@\n]|@{1,2}(?!@)|\\@@@)*?@{0,2}@@@(?!@)|@[^@\n]*@)\n", text)
@@ -178,10 +171,11 @@ def _usd_tokens(text: str, attribute: str) -> list[str]:
 
 def _glb(folder: Path, name: str) -> None:
     path = folder / "a.glb"
-    write_gltf_scene(
-        path, Scene(mesh(name), Motion(np.zeros((2, 1)), 25.0, (Channel(name, WEIGHT),)), sound=f"x{name}")
+    gltf_writer.write_gltf_scene(
+        path,
+        Scene(mesh(name), types.Motion(np.zeros((2, 1)), 25.0, (types.Channel(name, types.WEIGHT),)), sound=f"x{name}"),
     )
-    document = read_gltf_document(path).json
+    document = gltf_document.read_gltf_document(path).json
     assert document["meshes"][0]["extras"]["targetNames"] == [name]
     assert document["scenes"][0]["extras"]["audio"]["uri"] == quote(as_text(f"x{name}"), safe="/")
     assert document["materials"][0]["name"] == (name or "part")
@@ -206,7 +200,7 @@ def _xmp(_: Path, name: str) -> None:
 
 
 def _bibtex(_: Path, name: str) -> None:
-    entries = model_citations({"engine": "own" + name, "attribution": [f"x{name}x"]})
+    entries = citations.model_citations({"engine": "own" + name, "attribution": [f"x{name}x"]})
     assert sum(line.startswith("@") for line in re.split(r"[\n\r]", entries)) == 1
 
 
@@ -229,7 +223,7 @@ def outcome(writer: str, folder: Path, name: str) -> str:
     """Return ``kept``, or ``refused`` where there is one line and no file instead. Raises what else there is."""
     try:
         WRITERS[writer](folder, name)
-    except (ExportError, InputError) as error:
+    except (errors.ExportError, errors.InputError) as error:
         good = len(printable(error)) < 1000 and not list(folder.iterdir())
         return "refused" if good else f"refused with a long line, or a file is left: {error}"
     for path in folder.iterdir():

@@ -90,21 +90,6 @@ def test_values_that_are_not_finite_are_not_written(tmp_path, generation, suffix
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", EXACT)
-def test_an_old_file_survives_a_failure(tmp_path, generation, suffix, monkeypatch):
-    path = write(tmp_path / f"a{suffix}", generation)
-    before = path.read_bytes()
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(ExportError, match="No space left"):
-        write(path, generation)
-    assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]
-
-
 @pytest.mark.parametrize("suffix", readable_suffixes())
 def test_a_missing_and_a_damaged_file_are_named(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"

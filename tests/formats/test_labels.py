@@ -1,3 +1,4 @@
+import html
 import math
 import re
 from pathlib import Path
@@ -7,11 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import LARGEST_LABELS, check_plain_text, find_labels, read_labels, read_phones
-from lipmotion.formats.label_tiers import MAX_LABELS
+from lipmotion.formats import label_files, label_tiers
 from lipmotion.formats.textgrid import parse_interval_tiers, write_textgrid
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, find_phone, group_words
+from lipmotion.units import PHONES, group_words
 from lipmotion.units.text_normalisation import LARGEST_TRANSCRIPT_BYTES
 
 SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
@@ -21,7 +21,7 @@ SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 def read(tmp_path):
     def read(text: str, name: str = "a.lab"):
         (tmp_path / name).write_text(text, encoding="utf-8")
-        return read_labels(tmp_path / name)
+        return label_files.read_labels(tmp_path / name)
 
     return read
 
@@ -109,7 +109,7 @@ def test_plain_text(read):
     ],
 )
 def test_what_cannot_be_used_is_named_with_its_line(read, text, message):
-    most = {"0 1000000 p\n": MAX_LABELS, "a": LARGEST_TRANSCRIPT_BYTES, " ": LARGEST_LABELS}
+    most = {"0 1000000 p\n": label_tiers.MAX_LABELS, "a": LARGEST_TRANSCRIPT_BYTES, " ": label_files.LARGEST_LABELS}
     with pytest.raises(InputError) as error:
         read(text * (1 + most.get(text, 0)))
     assert "a.lab" in str(error.value)
@@ -127,9 +127,9 @@ def test_what_is_written_is_read(tmp_path_factory, phones):
     names = [name for name, _ in phones]
     spans = list(zip(edges, edges[1:], names, strict=False))
     path.write_text("".join(f"{a * 100_000} {b * 100_000} {name}\n" for a, b, name in spans))
-    htk = rows(read_labels(path))
+    htk = rows(label_files.read_labels(path))
     path.write_text("".join(f"{a / 100:.6f}\t{b / 100:.6f}\t{name.upper()}\n" for a, b, name in spans))
-    audacity = rows(read_labels(path))
+    audacity = rows(label_files.read_labels(path))
     for found in (htk, audacity):
         assert [name for *_, name in found] == names
         assert [round(100 * start_s) for start_s, *_ in found] == edges[:-1]
@@ -142,9 +142,9 @@ def test_without_stress_the_word_decides(tmp_path):
     lines += ['"IntervalTier" "phones" 0 0.4 4', *(f'{a} {b} "{name}"' for name, a, b in phones)]
     path = tmp_path / "a.TextGrid"
     path.write_text("\n".join(lines))
-    assert [phone for *_, phone in rows(read_labels(path))] == ["b", "ah", "t", "axr"]
+    assert [phone for *_, phone in rows(label_files.read_labels(path))] == ["b", "ah", "t", "axr"]
     path.write_text("\n".join(lines).replace('"Butter"', '"butter it"'))  # a sentence: no word to be had
-    assert [phone for *_, phone in rows(read_labels(path))] == ["b", "ah", "t", "er"]
+    assert [phone for *_, phone in rows(label_files.read_labels(path))] == ["b", "ah", "t", "er"]
 
 
 def test_other_names_of_silence(read):
@@ -154,36 +154,29 @@ def test_other_names_of_silence(read):
     assert {phone for *_, phone in rows(read(text))} == {"sil", "sp", "aa"}
 
 
-def test_names_of_phones():
-    for phone in SPOKEN:
-        for stress in ("", "1", "2"):
-            assert find_phone(phone + stress) == find_phone(phone.upper() + stress) == phone
-        assert find_phone(phone + "!9") is None
-
-
 def test_files_beside_a_recording(tmp_path):
     recording = tmp_path / "a.mp4"
-    assert find_labels(recording).words is None
+    assert label_files.find_labels(recording).words is None
     (tmp_path / "a.lab").write_text("0 1000000 t\n1000000 2000000 uw\n")
-    assert find_labels(recording).words is None
+    assert label_files.find_labels(recording).words is None
     (tmp_path / "a.txt").write_text("Two.")
-    found = find_labels(recording)
+    found = label_files.find_labels(recording)
     assert found.words == ("two",)
     assert [phone for *_, phone in rows(found)] == ["t", "uw"]
     (tmp_path / "a.TextGrid").write_text('"ooTextFile" "TextGrid" 0 1 <exists> 1 "IntervalTier" "w" 0 1 1 0 1 "too"')
-    assert find_labels(recording).words == ("two",)  # plain text before labels
-    assert find_labels(recording, ignored=frozenset({tmp_path / "a.txt"})).words == ("too",)
+    assert label_files.find_labels(recording).words == ("two",)  # plain text before labels
+    assert label_files.find_labels(recording, ignored=frozenset({tmp_path / "a.txt"})).words == ("too",)
 
 
 @pytest.mark.recordings
 def test_real_ones(recordings: Path):
     folder = recordings / "speech-open"
-    phones = rows(read_labels(folder / "arctic_a0009_phone.lab"))
-    assert phones == rows(read_labels(folder / "arctic_a0009_state.lab"))
+    phones = rows(label_files.read_labels(folder / "arctic_a0009_phone.lab"))
+    assert phones == rows(label_files.read_labels(folder / "arctic_a0009_state.lab"))
     assert len(phones) == 40
     assert [phone for *_, phone in phones][:8] == ["sil", "hh", "iy", "t", "er", "n", "d", "sh"]
     assert phones[0][:2] == (0, 0.13)
-    found = find_labels(folder / "sense_and_sensibility_01_austen_64kb-0880.wav")
+    found = label_files.find_labels(folder / "sense_and_sensibility_01_austen_64kb-0880.wav")
     assert found.words == ("he", "was", "not", "an", "ill", "disposed", "young", "man")
 
 
@@ -218,24 +211,24 @@ def test_what_would_be_read_as_words_is_refused(tmp_path: Path) -> None:
             path = tmp_path / f"a{suffix}"
             path.write_text(text, encoding="utf-8")
             with pytest.raises(InputError, match=message):
-                read_labels(path)
+                label_files.read_labels(path)
         with pytest.raises(InputError, match=message):
-            check_plain_text(text, "a.txt")
+            label_files.check_plain_text(text, "a.txt")
 
 
 def test_words_and_labels_in_time_are_no_plain_text_and_words_with_numbers_are(tmp_path: Path) -> None:
     for text, message in TIMED.values():
         with pytest.raises(InputError, match=message):
-            check_plain_text(text, "a.txt")
+            label_files.check_plain_text(text, "a.txt")
         (tmp_path / "a.txt").write_text(text, encoding="utf-8")
-        assert "hello" in (read_labels(tmp_path / "a.txt").words or ())
+        assert "hello" in (label_files.read_labels(tmp_path / "a.txt").words or ())
     for text in ("0 1000000 p\n1000000 2000000 aa\n", "0.0\t0.5\thello\n", '"ooTextFile" "TextGrid"'):
         with pytest.raises(InputError, match=r"a\.txt: holds labels in time, required the words alone"):
-            check_plain_text(text, "a.txt")
+            label_files.check_plain_text(text, "a.txt")
     for text in LABEL_WORDS:
-        check_plain_text(text, "a.txt")
+        label_files.check_plain_text(text, "a.txt")
         (tmp_path / "a.txt").write_text(text, encoding="utf-8")
-        assert read_labels(tmp_path / "a.txt").words
+        assert label_files.read_labels(tmp_path / "a.txt").words
 
 
 LABELLED = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 0.7, "dh", 'a "the"')]
@@ -244,9 +237,9 @@ LABELLED = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "m
 def test_phones_and_words_are_read_back(tmp_path: Path) -> None:
     units = Timeline(tuple(Span(a, b, Unit(phone, "", word)) for a, b, phone, word in LABELLED))
     write_textgrid(tmp_path / "a.TextGrid", units)
-    again = read_phones(tmp_path / "a.TextGrid")
+    again = label_files.read_phones(tmp_path / "a.TextGrid")
     assert [(s.start_s, s.end_s, s.label.phone) for s in again] == [row[:3] for row in LABELLED]
-    assert read_labels(tmp_path / "a.TextGrid").words == ("ma", "a", "the")
+    assert label_files.read_labels(tmp_path / "a.TextGrid").words == ("ma", "a", "the")
 
 
 def test_times_words_and_confidences_are_exact_and_gaps_become_intervals_without_text(tmp_path: Path) -> None:
@@ -254,9 +247,9 @@ def test_times_words_and_confidences_are_exact_and_gaps_become_intervals_without
     labels = [Unit("sil"), Unit("b", word="big", confidence=0.1 + 0.2), Unit("ih", word="big", confidence=1e-7)]
     units = Timeline(tuple(Span(a, b, label) for a, b, label in zip(edges_s, edges_s[1:], labels, strict=False)))
     write_textgrid(tmp_path / "a.TextGrid", units)
-    assert read_phones(tmp_path / "a.TextGrid") == units
+    assert label_files.read_phones(tmp_path / "a.TextGrid") == units
     write_textgrid(tmp_path / "b.TextGrid", Timeline((Span(0.1, 0.2, Unit("m")), Span(0.3, 0.4, Unit("aa")))))
-    again = [(span.label.phone, span.end_s) for span in read_phones(tmp_path / "b.TextGrid")]
+    again = [(span.label.phone, span.end_s) for span in label_files.read_phones(tmp_path / "b.TextGrid")]
     assert again == [("sil", 0.1), ("m", 0.2), ("sil", 0.3), ("aa", 0.4)]
 
 
@@ -265,9 +258,9 @@ def test_recognised_phones_are_no_words_and_a_tier_of_that_name_may_hold_somethi
     write_textgrid(path, Timeline((Span(0.0, 0.2, Unit("m", confidence=0.0)),)))
     text = path.read_text(encoding="utf-8")
     assert "m 0.0" in text
-    assert read_labels(path).words is None
+    assert label_files.read_labels(path).words is None
     path.write_text(text.replace("m 0.0", "said by Anna"), encoding="utf-8")
-    assert [span.label.confidence for span in read_phones(path)] == [None]
+    assert [span.label.confidence for span in label_files.read_phones(path)] == [None]
 
 
 def test_others_read_it(tmp_path: Path) -> None:
@@ -332,7 +325,7 @@ def test_both_forms_in_every_encoding(tmp_path):
         marked = "\ufeff" if encoding == "utf-16-be" else ""
         text = form(TIERS | {"näher": [(0, 2, "…")]}).replace("\n", ends)
         path.write_bytes((marked + text).encode(encoding))
-        found = read_labels(path)
+        found = label_files.read_labels(path)
         assert found.words == ("say", "hi", "bob")
         assert found.phones is not None
         assert [(s.start_s, s.end_s, s.label.phone) for s in found.phones] == [
@@ -347,7 +340,7 @@ def test_every_file_that_breaks_off_is_refused(tmp_path):
     for count in range(3, len(tokens) - 1):
         path.write_text("\n".join(tokens[:count]))
         with pytest.raises(InputError, match=r"a\.TextGrid: (the header|tier .*) is damaged: .*save it again in Praat"):
-            read_labels(path)
+            label_files.read_labels(path)
 
 
 def test_two_tiers_of_phones_and_binary_grids_are_refused(tmp_path):
@@ -359,15 +352,15 @@ def test_two_tiers_of_phones_and_binary_grids_are_refused(tmp_path):
     ):
         (tmp_path / "a.TextGrid").write_bytes(content)
         with pytest.raises(InputError, match=message):
-            read_labels(tmp_path / "a.TextGrid")
+            label_files.read_labels(tmp_path / "a.TextGrid")
 
 
 @pytest.mark.recordings
 def test_a_real_one(recordings: Path):
-    found = read_labels(recordings / "speech-open" / "61-70968-0000.TextGrid")
+    found = label_files.read_labels(recordings / "speech-open" / "61-70968-0000.TextGrid")
     assert found.words is not None
     assert found.words[:4] == ("he", "began", "a", "confused")
-    assert found.words == read_labels(recordings / "speech-open" / "61-70968-0000.lab").words
+    assert found.words == label_files.read_labels(recordings / "speech-open" / "61-70968-0000.lab").words
     assert found.phones is None
 
 
@@ -393,7 +386,7 @@ def test_what_cannot_be_used_is_named_in_one_short_line(tmp_path, old, new, word
     assert old in text
     (tmp_path / "a.TextGrid").write_text(text.replace(old, new))
     with pytest.raises(InputError, match=re.escape(words)) as caught:
-        read_labels(tmp_path / "a.TextGrid")
+        label_files.read_labels(tmp_path / "a.TextGrid")
     assert len(str(caught.value)) < 500 or "the phones are" in words
     assert "\n" not in str(caught.value)
 
@@ -411,7 +404,7 @@ def test_comments_are_passed_over_and_a_grid_may_have_no_tiers(tmp_path: Path) -
     text = short_form(TIERS).replace("<exists>", "<exists> ! are there 7 tiers?")
     assert [tier.name for tier in parse_interval_tiers(text, "a")] == ["words", "phones"]
     (tmp_path / "a.TextGrid").write_text('File type = "ooTextFile"\n"TextGrid"\n0\n1\n<absent>\n')
-    found = read_labels(tmp_path / "a.TextGrid")
+    found = label_files.read_labels(tmp_path / "a.TextGrid")
     assert (found.words, found.phones) == (None, None)
 
 
@@ -420,7 +413,7 @@ def test_a_word_that_is_said_again_stays_another_word(tmp_path):
     said = "S DX IY S T IH SIL SIL IY".split()
     phones: list[Interval] = [(n / 10, (n + 1) / 10, phone) for n, phone in enumerate(said)]
     (tmp_path / "a.TextGrid").write_text(short_form({"words": words, "phones": phones}))
-    units = read_phones(tmp_path / "a.TextGrid")
+    units = label_files.read_phones(tmp_path / "a.TextGrid")
     assert [span.label for span in group_words(units)] == ["city", "city", "", "city"]
     assert [span.label.again for span in units] == [n == 3 for n in range(9)]
 
@@ -429,5 +422,56 @@ def test_vowels_are_reduced_word_by_word(tmp_path):
     words: list[Interval] = [(i, i + 1, "about") for i in range(40)]
     phones: list[Interval] = [(n / 4, (n + 1) / 4, phone) for n, phone in enumerate(["AH", "B", "AW", "T"] * 40)]
     (tmp_path / "a.TextGrid").write_text(short_form({"words": words, "phones": phones}))
-    found = read_labels(tmp_path / "a.TextGrid").phones
+    found = label_files.read_labels(tmp_path / "a.TextGrid").phones
     assert [span.label.phone for span in found] == ["ax", "b", "aw", "t"] * 40
+
+
+ROWS = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 3599.9996, "dh", "r&d <the>")]
+UNITS = Timeline(tuple(Span(start, end, Unit(phone, "", word)) for start, end, phone, word in ROWS))
+FIRST, SECOND, THIRD = "00:00:00.310 --> 00:00:00.520", "00:00:00.520 --> 01:00:00.000", "00:00:00.310 --> 00:00:00.400"
+WEBVTT = f"WEBVTT\n\n{FIRST}\nma\n\n{SECOND}\nr&amp;d &lt;the&gt;\n"
+WEBVTT_PHONES = f"WEBVTT\n\n{THIRD}\nm\n\n00:00:00.400 --> 00:00:00.520\naa\n\n{SECOND}\ndh\n"
+
+
+def as_subrip(webvtt: str) -> str:
+    """Return cues with numbers, and commas in their times."""
+    cues = webvtt.replace(".", ",").rstrip().split("\n\n")[1:]
+    return "".join(f"{number}\n{cue}\n\n" for number, cue in enumerate(cues, 1))
+
+
+@pytest.mark.parametrize("suffix", [".srt", ".vtt"])
+def test_words_and_phones_are_written_and_words_come_back(tmp_path: Path, suffix: str) -> None:
+    def text(units: Timeline[Unit], name: str) -> str:
+        label_files.write_labels(tmp_path / name, units)
+        return (tmp_path / name).read_text(encoding="utf-8")
+
+    words, phones = WEBVTT, WEBVTT_PHONES
+    if suffix == ".srt":
+        words, phones = as_subrip(html.unescape(words)), as_subrip(phones)
+    assert text(UNITS, f"a{suffix}") == words
+    assert text(UNITS, f"a.phones{suffix.upper()}") == phones
+    plain = Timeline((*UNITS.spans[:3], Span(0.52, 3599.9996, Unit("dh", "", "there"))))
+    text(plain, f"a{suffix}")
+    transcript = label_files.read_labels(tmp_path / f"a{suffix}").transcript
+    assert [(line.start_s, line.end_s) for line in transcript.lines] == [(0.31, 0.52), (0.52, 3600.0)]
+    assert transcript.words == ("ma", "there")
+    silence = text(Timeline((Span(0.0, 1.0, Unit("sil")),)), f"b{suffix}")
+    assert silence.strip() == ("WEBVTT" if suffix == ".vtt" else "")
+
+
+def test_webvtt_py_reads_it(tmp_path: Path) -> None:
+    """Oracle: webvtt-py."""
+    webvtt = pytest.importorskip("webvtt")
+    label_files.write_labels(tmp_path / "a.vtt", UNITS)
+    found = [(cue.start, cue.end, cue.text) for cue in webvtt.read(str(tmp_path / "a.vtt"))]
+    assert found[0] == ("00:00:00.310", "00:00:00.520", "ma")
+    assert found[1][:2] == ("00:00:00.520", "01:00:00.000")
+
+
+def test_a_word_that_is_said_twice_is_written_twice_whatever_the_capitals_of_the_suffix(tmp_path: Path) -> None:
+    big = tuple(Span(n / 10, (n + 1) / 10, Unit(phone, word="big")) for n, phone in enumerate("b ih g b ih g".split()))
+    for name, start, said in (("a.vtt", "WEBVTT", "big"), ("a.TEXTGRID", "File type", '"big"')):
+        label_files.write_labels(tmp_path / name, Timeline(big))
+        text = (tmp_path / name).read_text()
+        assert text.startswith(start)
+        assert text.count(said) == 2

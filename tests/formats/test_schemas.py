@@ -2,6 +2,7 @@
 
 import json
 import re
+import zipfile
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lipmotion
-from lipmotion.formats.cues import CUE_FORMATS
-from lipmotion.pipeline.batch import batch
-from lipmotion.pipeline.edit_files import create_edit_file, write_edits
-from lipmotion.pipeline.model import read_header
 from lipmotion_studio.folder import open_folder
 from study.small_study import small_study
 
@@ -64,29 +60,28 @@ def test_what_does_not_fit(name, wrong):
         check(wrong, SCHEMAS[name])
 
 
-def test_motion_cues_and_edits(tmp_path, toy_model, toy_speech):
+def test_motion_cues_and_edits(run, tmp_path, toy_model_file, toy_speech):
     files = [tmp_path / name for name in ("a.json", "a.npz", "a.cues.json", "b.edits.json")]
-    request = lipmotion.Request(toy_speech)
-    session = lipmotion.Session(toy_speech, model=toy_model)
-    lipmotion.write(session.generate(), files[:3], speech=toy_speech)
-    assert "json" in CUE_FORMATS
-    edits = create_edit_file(request, session)[0].then("pin opening 0.02 at 0.5", "pin opening 0.03 at 0.7").undo()
-    write_edits(edits, files[3])
+    assert run("animate", toy_speech, "--model", toy_model_file, "-o", *files[:3]).code == 0
+    edits = ("pin opening 0.02 at 0.5", "pin opening 0.03 at 0.7")
+    assert run("edit", files[3], *edits, "--of", toy_speech, "--model", toy_model_file).code == 0
+    assert run("edit", files[3], "--undo", 1).code == 0
     check(read(files[3]), SCHEMAS["edits"])
     check(read(files[0]), SCHEMAS["motion"])
     check(json.loads(str(np.load(files[1])["document"])), SCHEMAS["motion of .npz"])
     check(read(files[2]), SCHEMAS["cues"])
 
 
-def test_folders(tmp_path, toy_corpus, toy_model_file, toy_speech):
+def test_folders(run, tmp_path, toy_corpus, toy_model_file, toy_speech):
     check(read(toy_corpus.path / "corpus.json"), SCHEMAS["corpus"])
     for entry in toy_corpus.path.glob("utterances/*/entry.json"):
         check(read(entry), SCHEMAS["utterance"])
-    check(read_header(toy_model_file), SCHEMAS["model"])
+    with zipfile.ZipFile(toy_model_file) as model:
+        check(json.loads(model.read("header.json")), SCHEMAS["model"])
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "broken.wav").write_bytes(b"RIFF")
     (tmp_path / "in" / "good.wav").write_bytes(toy_speech.read_bytes())
-    batch(tmp_path / "in", tmp_path / "out", lipmotion.Job(lipmotion.Request(model=toy_model_file)), jobs=1)
+    run("batch", tmp_path / "in", "--out", tmp_path / "out", "--model", toy_model_file, "--jobs", 1)
     rows = (tmp_path / "out" / "batch.jsonl").read_text("utf-8").splitlines()
     assert len(rows) == 2
     for row in rows:

@@ -1,13 +1,15 @@
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from formats.examples import of_motion, written
+from lipmotion import read_motion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats import read_motion
 from lipmotion.formats.tables import CURVES, SPEECH_CURVES, is_live_link, speech_curves, timecode
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
+from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, with_mouth
+from lipmotion.meshes.model.shape_names import ARKIT_52, ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
 from meshes.live_link_app import COLUMNS, HEAD, write_take
 
@@ -21,15 +23,6 @@ def test_the_table_is_as_specified(tmp_path, generation):
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     assert table[:, 0] == pytest.approx(np.arange(101) / 100)
     assert table[:, 1:] == pytest.approx(generation.motion.values, abs=5.1e-6)
-
-
-def test_a_table_saved_by_a_spreadsheet_is_read(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_bytes("\ufefftime_s,opening\r\n0,0.1\r\n0.04,0.2\r\n".encode())
-    motion, units = read_motion(path)
-    assert motion.rate_hz == 25
-    assert motion["opening"].tolist() == [0.1, 0.2]
-    assert len(units) == 0
 
 
 WRONG = [
@@ -84,19 +77,6 @@ def test_names_that_other_separators_would_part_are_refused_and_odd_ones_come_ba
     for name in ("jaw open", "Mouth (L)", "a=b", "p1.x", "öffnen", "a|b", "x-y", "'x"):
         write(name)
         assert read_motion(path)[0].names == (name,)
-
-
-@pytest.mark.parametrize(
-    ("head", "times"),
-    [("time", [5.0, 5.5, 6.0]), ("Timestamp", [0, 0.5, 1.0]), ("time_ms", [100, 600, 1100]), (" t ", [0, 0.5, 1])],
-)
-def test_tables_of_other_programs_begin_with_their_first_row(tmp_path, head, times):
-    path = tmp_path / "a.csv"
-    path.write_text(f"{head}, jawOpen,chin\n" + "".join(f"{t},{n},{n}\n" for n, t in enumerate(times)))
-    motion, _ = read_motion(path)
-    assert motion.rate_hz == pytest.approx(2.0)
-    assert motion.channels == (Channel("jawOpen", "weight"), Channel("chin"))
-    assert motion["chin"].tolist() == [0, 1, 2]
 
 
 def test_uneven_times_of_other_programs_are_evened_out(tmp_path):
@@ -221,25 +201,6 @@ def test_uneven_times_and_lost_frames_are_evened_out(tmp_path, curves):
     assert np.abs(motion.values[inner] - curves.values[inner]).mean() < 0.002
 
 
-@pytest.mark.parametrize(("before", "first"), [("00:00:59", 2), ("00:09:59", 0)])  # none is left out at each tenth
-def test_drop_frame_timecode_is_real_time(tmp_path, before, first):
-    """At 29.97 frames a second, 00:00:59;29 is followed by 00:01:00;02."""
-    after = f"00:{int(before[3:5]) + 1:02d}:00"
-    codes = [f"{before};{n:02d}" for n in range(30)] + [f"{after};{n:02d}" for n in range(first, 30)]
-    motion = read(tmp_path, "\n".join([HEAD, *(row(code, n / 100) for n, code in enumerate(codes))]))
-    assert motion.rate_hz == pytest.approx(30 / 1.001, abs=1e-3)
-    assert motion["eyeBlinkLeft"] == pytest.approx(np.arange(len(codes)) / 100)
-
-
-def test_rows_without_a_face_are_bridged_and_a_short_take_has_the_rate_of_the_app(tmp_path):
-    lines = [row(f"10:00:0{n // 60}:{n % 60:02d}.000", 0.01 * n) for n in range(90)]
-    lines[10:13] = [lines[10].split(",")[0] + ",0", lines[11].split(",")[0] + ",0,,,", lines[12].split(",")[0] + ",0"]
-    motion = read(tmp_path, "\n".join([HEAD + ",", *lines]) + "\n")
-    np.testing.assert_allclose(motion["eyeBlinkLeft"], 0.01 * np.arange(90), atol=1e-9)
-    motion = read(tmp_path, "\n".join([HEAD, *(row(f"10:00:00:{n:02d}.000") for n in range(10, 21))]))
-    assert motion.rate_hz == 60.0
-
-
 def test_curves_that_speech_moves(curves, tmp_path):
     write_take(tmp_path / "take.csv", curves)
     kept = speech_curves(read_motion(tmp_path / "take.csv")[0])
@@ -279,3 +240,61 @@ def test_what_is_wrong_in_a_take_is_said(tmp_path):
     (tmp_path / "take.csv").write_bytes(HEAD.encode() + b"\n\xff\xfe\x00")
     with pytest.raises(InputError, match="not a table of"):
         read_motion(tmp_path / "take.csv")
+
+
+OWN = {"exportFps": 30, "trackPath": "talk.wav", "numPoses": 4, "numFrames": 2}
+OWN |= {"facsNames": ["jawDrop", "jawDropLipTowards", "lipCornerPullerL", "eyesCloseR"], "joints": ["jaw"]}
+OWN |= {"weightMat": [[0.0, 0.0, 0.25, 0.0], [0.5, 0.25, 0.0, 1.0]], "rotations": [[[0, 0, 0, 1]], [[0, 0, 0, 1]]]}
+
+
+def file(folder: Path, document: object, name: str = "a.json") -> Path:
+    (folder / name).write_text(json.dumps(document), encoding="utf-8")
+    return folder / name
+
+
+def test_its_members_are_those_of_the_program(tmp_path: Path) -> None:
+    draw = np.random.default_rng(3)
+    moved = Motion(draw.random((61, 2)), 60.0, (Channel("jawOpen", WEIGHT), Channel("eyeBlinkLeft", WEIGHT)))
+    path = written(tmp_path / "a.a2f.json", of_motion(moved), path="b/talk.wav")
+    document = json.loads(path.read_text(encoding="utf-8"))
+    assert {name: document[name] for name in ("exportFps", "trackPath", "numPoses", "numFrames")} == {
+        "exportFps": 60, "trackPath": "b/talk.wav", "numPoses": 52, "numFrames": 61,
+    }  # fmt: skip
+    assert document["facsNames"] == list(ARKIT_52)
+    assert (document["facsNames"][0], document["facsNames"][17], len(set(ARKIT_52))) == ("eyeBlinkLeft", "jawOpen", 52)
+    assert np.array(document["weightMat"])[:, 17] == pytest.approx(moved["jawOpen"], abs=1e-5)
+    for name in ("a.a2f.json", "talk_bsweight.json"):
+        (tmp_path / name).write_text(json.dumps(document), encoding="utf-8")
+        again, units = read_motion(tmp_path / name)
+        assert (again.rate_hz, len(units), again.names) == (60.0, 0, ARKIT_52)
+        assert again["eyeBlinkLeft"] == pytest.approx(moved["eyeBlinkLeft"], abs=1e-5)
+
+
+def test_the_names_of_its_own_solver_are_understood(tmp_path: Path) -> None:
+    motion, _ = read_motion(file(tmp_path, OWN))
+    known = arkit_weights(motion)
+    assert {name: curve.tolist() for name, curve in known.items() if curve.any()} == {
+        "jawOpen": [0.0, 0.75], "mouthClose": [0.0, 0.25], "mouthSmileLeft": [0.25, 0.0], "eyeBlinkRight": [0.0, 1.0],
+    }  # fmt: skip
+    assert with_mouth(motion)["lip_gap"][0] == 0 < with_mouth(motion)["lip_gap"][1]
+
+
+ERRORS = {
+    "no rate": ({**OWN, "exportFps": None}, r"a\.json: the file of Audio2Face is damaged"),
+    "no names": ({**OWN, "facsNames": 3}, "facsNames is 3, required a list"),
+    "a name too many": (
+        {**OWN, "facsNames": ["jawDrop"]}, r"'weightMat' has \(2, 4\) rows and columns, required a column for each"),
+    "uneven rows": ({**OWN, "weightMat": [[0.0], [0.0, 1.0]]}, "row 2 of the values is not a list of as many numbers"),
+    "a name twice": ({**OWN, "facsNames": ["a", "a", "b", "c"]}, "motion channel names repeat"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_damaged_files_are_refused(tmp_path: Path, name: str) -> None:
+    document, message = ERRORS[name]
+    with pytest.raises(InputError, match=message):
+        read_motion(file(tmp_path, document))
+    text = json.dumps(OWN).replace('"exportFps"', '"fps"')
+    (tmp_path / "b.a2f.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="exportFps is missing"):
+        read_motion(tmp_path / "b.a2f.json")

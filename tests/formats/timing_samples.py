@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 
-def lines(*values: Any) -> str:
+def json_lines(*values: Any) -> str:
     return "".join(json.dumps(value, ensure_ascii=False) + "\n" for value in values)
 
 
@@ -12,7 +12,7 @@ def polly(kind: str, time: int, value: str, **more: int) -> dict[str, Any]:
     return {"time": time, "type": kind, **more, "value": value}
 
 
-POLLY = lines(
+POLLY = json_lines(
     polly("sentence", 0, "Mama bites.", start=0, end=11),
     polly("word", 60, "Mama", start=0, end=4),
     *(polly("viseme", time, name) for time, name in ((0, "sil"), (60, "p"), (120, "a"), (210, "p"), (300, "@"))),
@@ -38,7 +38,7 @@ ELEVENLABS = {
         "character_end_times_seconds": [0.0] * 8 + [0.6, 0.7, 0.8, 1.1, 1.2],
     },
 }
-CARTESIA = lines(
+CARTESIA = json_lines(
     {"type": "chunk", "data": "AAAA", "done": False},
     {"type": "timestamps", "word_timestamps": {"words": ["Hi", "you"], "start": [0, 0.5], "end": [0.4, 0.9]}},
     {"type": "phoneme_timestamps", "phoneme_timestamps": {

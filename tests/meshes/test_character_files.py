@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzz.character_floods import CHARACTER_FLOODS
+from fuzz.floods import CHARACTER_FLOODS
 from fuzz.inputs import lay_out
 from lipmotion import errors, types
 from lipmotion_faces.characters import character_files, file_limits, gltf_writer

@@ -1,22 +1,19 @@
 import json
+import struct
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from lipmotion import errors, formats, read_motion, types
 from lipmotion.errors import InputError
-from lipmotion_faces.characters import gltf_scene, meshopt
-from meshes.gltf import (
-    OPEN,
-    POSITIONS,
-    WIDE,
-    data_uri,
-    document,
-    glb,
-    packed_attributes,
-    with_array,
-    with_skin,
-)  # fmt: skip
-from meshes.heads import shaped
+from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.characters import character_files, gltf_document, gltf_scene, gltf_writer, meshopt
+from meshes import gltf
+from meshes.gltf import OPEN, POSITIONS, WIDE, data_uri, document, glb, packed_attributes, with_array, with_skin
+from meshes.heads import head, shaped, write_glb
 
 
 def _read(tmp_path, content, binary=None, name="head.glb"):
@@ -194,3 +191,266 @@ def test_damaged_streams_are_refused():
     for decode in (meshopt.decode_triangles, meshopt.decode_indices):
         with pytest.raises(InputError):
             decode(b"\xe1\xff\xff" + b"\x80" * 20, 300)
+
+
+NAMES = ["jawOpen", "mouthWide"]
+
+
+def animated(tmp_path: Path, time_s: list[float], values: Any, *how: Any, name: str = "a.glb") -> Path:
+    """Write the square of two targets with one animation, of some interpolation and target."""
+    (tmp_path / name).write_bytes(gltf.glb(*gltf.animated_document(time_s, values, *how)))
+    return tmp_path / name
+
+
+@pytest.mark.parametrize("kind", ["LINEAR", "STEP"])
+def test_even_keys_are_the_frames(tmp_path: Path, kind: str) -> None:
+    """Also where the single precision of a key's time puts it after its frame."""
+    rows = np.random.default_rng(2).random((600, 2))
+    motion, units = read_motion(animated(tmp_path, [n / 29.97 for n in range(600)], rows, kind))
+    assert (motion.rate_hz, len(units), list(motion.names)) == (pytest.approx(30000 / 1001), 0, NAMES)
+    assert motion.values == pytest.approx(rows, abs=1e-6)
+    assert {channel.unit for channel in motion.channels} == {WEIGHT}
+
+
+def test_what_is_written_of_a_character_is_read(tmp_path: Path) -> None:
+    moved = Motion(np.random.default_rng(3).random((40, 2)), 60.0, tuple(map(Channel, ("jawOpen", "mouthPucker"))))
+    write_glb(tmp_path / "a.glb", head(), moved)
+    motion, _ = read_motion(tmp_path / "a.glb")
+    assert motion.rate_hz == 60
+    for name in moved.names:
+        assert motion[name] == pytest.approx(moved[name], abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "expected"),
+    [
+        ("LINEAR", [[0, 1], [1, 0], [0.5, 0]], {0.0: (0, 1), 0.25: (0, 1), 0.75: (0.5, 0.5), 1.5: (0.75, 0)}),
+        ("STEP", [[0, 1], [1, 0], [0.5, 0]], {0.0: (0, 1), 0.75: (0, 1), 1.0: (1, 0), 2.0: (0.5, 0)}),
+        (
+            "CUBICSPLINE",
+            [[[0, 0], [0, 1], [2, 0]], [[0, 0], [1, 0], [0, 0]], [[0, 0], [0.5, 0], [0, 0]]],
+            {0.5: (0, 1), 0.75: (0.5 + 0.125, 0.5), 1.0: (1, 0), 2.0: (0.5, 0)},
+        ),
+    ],
+)
+def test_uneven_keys_are_sampled(
+    tmp_path: Path, kind: str, values: Any, expected: dict[float, tuple[float, float]]
+) -> None:
+    motion, _ = read_motion(animated(tmp_path, [0.5, 1.0, 2.0], values, kind))
+    assert motion.rate_hz == 60
+    for time_s, row in expected.items():
+        assert motion.values[round(60 * time_s)] == pytest.approx(row, abs=1e-6)
+
+
+def test_expressions_of_a_vrm_animation(tmp_path: Path) -> None:
+    rows = [[0, 0, 0], [0.75, 0, 0], [1, 0, 0]]
+    target = {"node": 1, "path": "translation"}
+    motion, _ = read_motion(animated(tmp_path, [0, 1 / 30, 2 / 30], rows, "LINEAR", target, name="a.vrma"))
+    assert (motion.rate_hz, motion.names) == (30, ("eyeBlinkLeft", "eyeBlinkRight"))
+    assert motion["eyeBlinkRight"] == pytest.approx([0, 0.75, 1], abs=1e-6)
+    assert {".glb", ".gltf", ".vrma"} <= {*formats.readable_suffixes()}
+
+
+def test_what_moves_no_face_or_is_damaged_is_refused(tmp_path: Path) -> None:
+    cases = {
+        r"a\.glb: it has no animation of morph targets or expressions": animated(tmp_path, [0, 1], [[0, 0]] * 2),
+        r"b\.glb: the times of an animation do not rise": animated(tmp_path, [0, 0], [[0, 0]] * 2, name="b.glb"),
+        r"c\.glb: an array of 2 elements, required 4": animated(tmp_path, [0, 1], [[0, 0]], name="c.glb"),
+        r"d\.glb: no glTF document": tmp_path / "d.glb",
+    }
+    content, binary = gltf.document()
+    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
+    (tmp_path / "d.glb").write_bytes(b"no")
+    for message, file in cases.items():
+        with pytest.raises(errors.InputError, match=message):
+            read_motion(file)
+
+
+def test_turns_of_neck_and_head_are_against_their_rest(tmp_path: Path) -> None:
+    """The head of a VRM animation whose bones are not along the axes at rest."""
+    from scipy.spatial.transform import Rotation
+
+    vowel = [[0, 0, 0], [0.5, 0, 0], [1, 0, 0]]
+    content, binary = gltf.animated_document([0, 0.05, 0.1], vowel, target={"node": 1, "path": "translation"})
+    rest = [Rotation.from_euler("xyz", angles) for angles in ((0.3, 0.2, -0.1), (-0.2, 0.4, 0.3))]
+    neck, head = len(content["nodes"]), len(content["nodes"]) + 1
+    for name, turned in zip(("J_Bip_C_Neck", "J_Bip_C_Head"), rest, strict=True):
+        content["nodes"].append({"name": name, "rotation": turned.as_quat().tolist()})
+    content["nodes"][neck]["children"] = [head]
+    content["scenes"][0]["nodes"].append(neck)
+    world = (rest[0], rest[0] * rest[1])
+    turns = [Rotation.from_rotvec(np.outer(angles, (0, 1, 0))) for angles in ((0, 0.1, 0.2), (0, 0.2, 0.4))]
+    animation = content["animations"][1]
+    for number, parent, at_rest, turn in zip((neck, head), (Rotation.identity(), world[0]), world, turns, strict=True):
+        local = (parent.inv() * turn * at_rest).as_quat().astype("<f4")
+        binary, output = gltf.with_array(content, binary, local, "VEC4")
+        animation["samplers"].append({"input": 4, "output": output})
+        target = {"node": number, "path": "rotation"}
+        animation["channels"].append({"sampler": len(animation["samplers"]) - 1, "target": target})
+    content["buffers"] = [{"byteLength": len(binary)}]
+    (tmp_path / "a.vrma").write_bytes(gltf.glb(content, binary))
+    motion, _ = read_motion(tmp_path / "a.vrma")
+    assert motion["headYaw"] == pytest.approx([0, 0.3, 0.6], abs=1e-5)
+    assert motion.values[:, -2:] == pytest.approx(np.zeros((3, 2)), abs=1e-5)
+
+
+@pytest.mark.parametrize("pointer", ["/nodes/0/weights", "/meshes/0/weights", "/nodes/0/weights/0"])
+def test_pointers_name_weights(tmp_path: Path, pointer: str) -> None:
+    rows = np.random.default_rng(4).random((25, 1 if pointer.endswith("0") else 2))
+    content, binary = gltf.animated_document([n / 30 for n in range(25)], rows)
+    pointed = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
+    content["animations"][1]["channels"][0]["target"] = pointed
+    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
+    motion, _ = read_motion(tmp_path / "a.glb")
+    assert motion.names == tuple(NAMES[: rows.shape[1]])
+    assert motion.values == pytest.approx(rows, abs=1e-6)
+
+
+def test_names_of_targets(tmp_path: Path) -> None:
+    """Of the mesh, of a primitive after one without targets, of the arrays; what has none is numbered."""
+    content, binary = gltf.animated_document([n / 30 for n in range(5)], [[0, 1]] * 5)
+    mesh = content["meshes"][0]
+    bare = {"attributes": {"POSITION": 0}, "indices": 3}
+    content["accessors"][1]["name"], content["accessors"][2]["name"] = "jawOpen", "mouthPucker"
+    for extras, own, expected in (
+        ({"targetNames": ["a.001", "b"]}, {}, ("a.001", "b")),
+        ({"targetNames": ["a"]}, {}, ("a", "target 1")),
+        ({"targetNames": ["a", "a"]}, {}, ("a", "target 1")),
+        ({}, {"extras": {"targetNames": ["c", "d"]}}, ("c", "d")),
+        ({}, {}, ("jawOpen", "mouthPucker")),
+    ):
+        content["meshes"][0] = {"primitives": [bare, mesh["primitives"][0] | own], "extras": extras}
+        (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
+        assert read_motion(tmp_path / "a.glb")[0].names == expected
+
+
+def test_the_animation_that_moves_the_mouth_is_read(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    rows = np.random.default_rng(5).random((5, 2))
+    content, binary = gltf.animated_document([n / 30 for n in range(5)], rows)
+    talk = content["animations"][1]
+    binary, still = gltf.with_array(content, binary, np.zeros(10, "<f4"), "SCALAR")
+    idle = {"name": "idle", "channels": talk["channels"], "samplers": [{"input": 4, "output": still}]}
+    content["animations"] = [idle, talk]
+    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
+    assert read_motion(tmp_path / "a.glb")[0].values == pytest.approx(rows, abs=1e-6)
+    assert "2 animations move the face: idle, talk; read: talk" in caplog.text
+
+
+def test_a_mesh_comes_back(tmp_path):
+    mesh = head()
+    write_glb(tmp_path / "head.glb", mesh)
+    read = character_files.read_character(tmp_path / "head.glb")
+    assert read.shape_names == mesh.shape_names
+    for name in ("jawOpen", "mouthSmileLeft", "eyeBlinkLeft"):
+        written, again = shaped(mesh, {name: 1.0})[mesh.triangles], shaped(read, {name: 1.0})[read.triangles]
+        np.testing.assert_allclose(again, written, atol=1e-5)
+
+
+def test_colours_of_vertices_are_written_and_a_channel_that_is_no_shape_is_refused(tmp_path):
+    other = types.Motion(np.zeros((3, 1)), 25.0, (types.Channel("opening"),))
+    with pytest.raises(errors.ExportError, match="no blendshape 'opening'"):
+        write_glb(tmp_path / "head.glb", head(), other)
+    assert not list(tmp_path.iterdir())
+    mesh = head(shapes=False)
+    colours = np.random.default_rng(0).random(mesh.vertices.shape)
+    write_glb(tmp_path / "head.glb", replace(mesh, colours=colours))
+    document = gltf_document.read_gltf_document(tmp_path / "head.glb")
+    assert "COLOR_0" in document.json["meshes"][0]["primitives"][0]["attributes"]
+
+
+@pytest.mark.parametrize(
+    ("extras", "found"),
+    [(gltf_writer.sound_extras("../a b/#1 50%.wav", 0.5), "../a b/#1 50%.wav"),
+     ({"audio": {"uri": "ä.wav"}}, "ä.wav"),
+     (gltf_writer.sound_extras("a.wav", 2**63), None),
+     ({"audio": {"uri": "https://example.org/a.wav"}}, None),
+     ({"audio": {"uri": "file:a.wav"}}, None),
+     ({"audio": {"uri": "/a.wav"}}, None),
+     ({"audio": {"uri": "a%00.wav"}}, None),
+     ({"audio": {"uri": 7}}, None),
+     ({"audio": "a.wav"}, None),
+     (["audio"], None)],
+)  # fmt: skip
+def test_paths_from_the_folder_of_the_file_count(tmp_path, extras, found):
+    text = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"extras": extras}]})
+    (tmp_path / "a.gltf").write_text(text, encoding="utf-8")
+    named = gltf_writer.find_named_sound(tmp_path / "a.gltf")
+    assert (named and named[0]) == (found and tmp_path / found)
+
+
+def weights(*names: str) -> types.Motion:
+    values = np.random.default_rng(4).random((9, len(names)))
+    return types.Motion(values, 30.0, tuple(types.Channel(name, types.WEIGHT) for name in names))
+
+
+@pytest.fixture
+def original(tmp_path: Path) -> Path:
+    """A head of which things are known that this program does not know, and with an animation already."""
+    write_glb(tmp_path / "first.glb", head(), weights("mouthPucker"))
+    content = (tmp_path / "first.glb").read_bytes()
+    (size,) = struct.unpack_from("<I", content, 12)
+    document = json.loads(content[20 : 20 + size])
+    document["images"] = [{"name": "skin", "mimeType": "image/png", "bufferView": 0}]
+    document["asset"]["extras"] = {"by": "somebody – Größe"}
+    document["animations"][0]["name"] = "dance"
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    body = content[20 + size :]
+    header = struct.pack("<4sII", b"glTF", 2, 20 + len(text) + len(body))
+    path = tmp_path / "original.glb"
+    path.write_bytes(header + struct.pack("<II", len(text), 0x4E4F534A) + text + body)
+    return path
+
+
+def test_everything_stays_and_the_animation_comes_first(original: Path, tmp_path: Path) -> None:
+    assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", original, weights("jawOpen", "mouthFunnel"), "a.wav")
+    before, after = gltf_document.read_gltf_document(original), gltf_document.read_gltf_document(tmp_path / "a.glb")
+    for name in ("images", "meshes", "materials", "nodes"):
+        assert after.items(name) == before.items(name)
+    assert after.json["asset"] == before.json["asset"]
+    assert [each["name"] for each in after.json["animations"]] == ["speech", "dance"]
+    assert after.json["accessors"][: len(before.json["accessors"])] == before.json["accessors"]
+    assert after.buffers[0][: len(before.buffers[0])] == before.buffers[0]
+    assert after.json["scenes"][0]["extras"] == {"audio": {"uri": "a.wav", "start_s": 0.0}}
+    assert character_files.read_character(tmp_path / "a.glb").shape_names == head().shape_names
+
+
+def written_curves(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return the times of the first animation of a head, and its weights by name."""
+    document = gltf_document.read_gltf_document(path)
+    sampler, arrays = document.json["animations"][0]["samplers"][0], gltf_document.GltfArrays(document)
+    times_s = arrays.floats(sampler["input"], 1)[:, 0]
+    stored = arrays.floats(sampler["output"], 1).reshape(len(times_s), -1)
+    return times_s, dict(zip(head().shape_names, stored.T, strict=True))
+
+
+@pytest.mark.parametrize("added", [True, False])
+def test_the_animation_has_the_weights(original: Path, tmp_path: Path, added: bool) -> None:
+    moved = weights("jawOpen", "mouthFunnel")
+    if added:
+        assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", original, moved)
+    else:
+        write_glb(tmp_path / "a.glb", head(), moved)
+    times_s, stored = written_curves(tmp_path / "a.glb")
+    assert times_s == pytest.approx(moved.time_s, abs=1e-6)
+    for name, curve in stored.items():
+        assert curve == pytest.approx(moved[name] if name in moved.names else np.zeros(9), abs=1e-6)
+
+
+def test_held_weights_change_at_once(original: Path, tmp_path: Path) -> None:
+    moved = types.Motion(np.array([[0.0], [0.0], [1.0]]), 10.0, (types.Channel("jawOpen", types.WEIGHT),))
+    assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", original, moved, stepped=["jawOpen"])
+    times_s, stored = written_curves(tmp_path / "a.glb")
+    assert times_s == pytest.approx([0, 0.1, 0.199, 0.2])
+    assert stored["jawOpen"] == pytest.approx([0, 0, 0, 1])
+
+
+def test_what_is_no_morph_target_and_buffers_elsewhere_are_left_to_another_writer(
+    original: Path, tmp_path: Path
+) -> None:
+    content, binary = gltf.document()
+    content["buffers"][0]["uri"] = gltf.data_uri(binary)
+    (tmp_path / "elsewhere.gltf").write_text(json.dumps(content))
+    for path, moved in ((original, weights("jawOpen", "vowel_aa")), (tmp_path / "elsewhere.gltf", weights("target 0"))):
+        assert not gltf_writer.write_animated_gltf(tmp_path / "a.glb", path, moved)
+        assert not (tmp_path / "a.glb").exists()

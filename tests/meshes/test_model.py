@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 
 from lipmotion import errors, types
+from lipmotion.errors import InputError
 from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model import shape_names, surface
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
+from lipmotion.meshes.model.rig_tables import apply_rig, read_rig_table
 from lipmotion_faces.characters.scene import HeadTurn, Scene, compute_shading_normals
 from meshes.heads import head, shaped
 
@@ -163,3 +165,43 @@ def test_names_as_files_spell_them():
     vowels = {"Fcl_MTH_A": "aa", "Fcl_MTH_O.003": "oh", "aa": "aa", "う": "ou", "oh": "oh"}
     vowels |= {"Fcl_MTH_Angry": None, "Alpha": None}
     assert {spelled: shape_names.vowel_name(spelled) for spelled in vowels} == vowels
+
+
+SOURCES = {"jawOpen": np.array([0.0, 0.5, 1.0]), "mouthPucker": np.array([0.0, 1.0, 0.0])}
+
+
+def _table(tmp_path, text):
+    (tmp_path / "rig.csv").write_text(text)
+    return read_rig_table(tmp_path / "rig.csv")
+
+
+def test_controls_follow_their_sources_or_are_constant(tmp_path):
+    text = (
+        "control,source,gain,offset,low,high\nJaw.rz,jawOpen,-25,,-20,0\nLips,mouthPucker,0.5\nLips,jawOpen,-0.25,0.1\n"
+    )
+    motion = apply_rig(_table(tmp_path, text), SOURCES, 25.0)
+    assert motion.names == ("Jaw.rz", "Lips")
+    np.testing.assert_allclose(motion["Jaw.rz"], [0, -12.5, -20])
+    np.testing.assert_allclose(motion["Lips"], [0.1, 0.475, -0.15])
+    motion = apply_rig(_table(tmp_path, "control,source,offset\n# a comment\nBrow,,0.3\n\n"), SOURCES, 25.0)
+    np.testing.assert_allclose(motion["Brow"], 0.3)
+    with pytest.raises(InputError, match="'Jaw' follows 'jawopen', which is no curve; nearest: jawOpen"):
+        apply_rig(_table(tmp_path, "control,source\nJaw,jawopen\n"), SOURCES, 25.0)
+
+
+DAMAGED_TABLES = [
+    ("", "required control,source"),
+    ("control,from\nJaw,jawOpen\n", "required control,source"),
+    ("control,source\n", "0 rows"),
+    ("control,source,gain\nJaw,jawOpen,much\n", "line 2"),
+    ("control,source,gain\nJaw,jawOpen,nan\n", "line 2: the number is"),
+    ("control,source,gain\nJaw,jawOpen,1e9\n", "required at most"),
+    ("control,source,low,high\nJaw,jawOpen,2,1\n", "goes from 2 to 1"),
+    ("control,source\n,jawOpen\n", "without a control"),
+]
+
+
+def test_damaged_tables_are_refused(tmp_path):
+    for text, message in DAMAGED_TABLES:
+        with pytest.raises(InputError, match=message):
+            _table(tmp_path, text)

@@ -1,11 +1,14 @@
-"""Hostile requests to a studio, the same every time: wrong paths, methods, bodies, headers and tokens."""
+"""Hostile requests to a studio, the same every time, and what they get of one that is served."""
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from random import Random
 
 from lipmotion_studio.requests import TOKEN_HEADER
+from studio.served import Served
 from study.hostile import Hostile
+from study.served import raw_reply, send_junk
 
 FOREIGN = "nobody may read this"
 LINES = ("1", "2", "0", "-1", "01", "1.0", "9" * 500, "../1", "%2e%2e", "1/../../foreign", "é", "1%00", "true")
@@ -81,3 +84,34 @@ def hostile_requests(count: int, host: str, token: str) -> Iterator[Hostile]:
         if chance.random() < 0.1:
             headers["x-lipmotion-transcript"] = chance.choice(("%ff%fe", "a" * 5000, "%00", "../../foreign.txt"))
         yield Hostile(chance.choice(METHODS), path, chance.choice(BODIES), headers)
+
+
+def attacked(server: Served, folder: Path, count: int) -> set[int]:
+    """Send hostile requests to a server, and return the statuses of its replies.
+
+    folder : where files lie that no reply may hold: beside the recording, and its project
+    Raises AssertionError: a reply holds what it may not, or is that of a bug.
+    """
+    for foreign in (
+        folder / "foreign.txt",
+        folder / "foreign.wav",
+        *(each / "foreign.txt" for each in folder.glob("*.studio")),
+    ):
+        foreign.write_text(FOREIGN, encoding="utf-8")
+    statuses, before = set(), {path for path in folder.rglob("*") if path.name.startswith("foreign")}
+    for hostile in hostile_requests(count, f"127.0.0.1:{server.port}", server.token):
+        try:
+            answered = raw_reply(server.port, hostile)
+        except ValueError:  # nothing that can be sent
+            continue
+        if answered is None:
+            continue
+        reply, body = answered
+        statuses.add(reply.status)
+        assert reply.status in (501, 503) or reply.status < 500, hostile
+        assert FOREIGN.encode() not in body, hostile
+        assert b"root:" not in body, hostile
+        assert b'"format": "lipmotion' not in body, hostile
+    send_junk(server.port)
+    assert {path for path in folder.rglob("*") if path.name.startswith("foreign")} == before
+    return statuses

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.sound import write_sound
 from lipmotion.storage.files import portable_name
 from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, project_path
 from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, parse_project, project_document
 from lipmotion_studio.votes import Side, Vote, read_votes, tally, votes_text
+from pipeline.made import write_sound
 from testing.toy import ToySentence
 
 LINE = {"number": 1, "name": "a", "sound": "a.wav", "sha256": "0"}

@@ -161,10 +161,16 @@ def test_talking_head_gets_sound_with_its_blendshapes(capsys):
 
 
 @pytest.fixture
-def studio(monkeypatch, tmp_path):
-    """Give a stand-in for VTube Studio: its address, and the requests that it gets."""
+def token(monkeypatch, tmp_path):
+    """Returns where the token of VTube Studio is kept, which is asked again soon."""
     monkeypatch.setattr(vtube, "AGAIN_S", 0.01)
-    monkeypatch.setattr(vtube, "cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(vtube, "cache_folder", lambda: tmp_path)
+    return tmp_path / "vtube-studio.token"
+
+
+@pytest.fixture
+def studio():
+    """Give a stand-in for VTube Studio: its address, and the requests that it gets."""
     requests: Queue[dict[str, Any]] = Queue()
     injections = []
 
@@ -208,10 +214,8 @@ def studio(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("wrong", ["{", "[5]", '{"requestID": ID}', '{"requestID": ID, "messageType": "a", "data": 5}'])
-def test_what_does_not_reply_as_vtube_studio_is_asked_again(monkeypatch, tmp_path, wrong):
-    monkeypatch.setattr(vtube, "AGAIN_S", 0.01)
-    monkeypatch.setattr(vtube, "cache_folder", lambda: tmp_path)
-    (tmp_path / "vtube-studio.token").write_bytes(b"\xff")  # damaged
+def test_what_does_not_reply_as_vtube_studio_is_asked_again(token, wrong):
+    token.write_bytes(b"\xff")  # damaged
     requests: Queue[dict[str, Any]] = Queue()
 
     def handle(connection):
@@ -225,7 +229,7 @@ def test_what_does_not_reply_as_vtube_studio_is_asked_again(monkeypatch, tmp_pat
             assert {requests.get(timeout=30)["messageType"] for _ in range(3)} == {"AuthenticationTokenRequest"}
 
 
-def test_vtube_studio_is_asked_once_and_gets_the_newest_frame(studio, tmp_path):
+def test_vtube_studio_is_asked_once_and_gets_the_newest_frame(studio, token):
     port, requests = studio
 
     def kinds_until_injected(take, shown):
@@ -250,7 +254,7 @@ def test_vtube_studio_is_asked_once_and_gets_the_newest_frame(studio, tmp_path):
         kinds, values = kinds_until_injected(take, frame(2, jawOpen=1.0))  # VTube Studio was started again
         assert kinds[0] == "AuthenticationRequest"
         assert "AuthenticationTokenRequest" not in kinds
-        assert (tmp_path / "cache" / "vtube-studio.token").read_text("ascii") == "a-token"
+        assert token.read_text("ascii") == "a-token"
 
 
 def test_the_window_sends_sound_with_its_time_and_a_head_that_turns():

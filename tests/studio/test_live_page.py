@@ -14,7 +14,7 @@ import programs
 from children import LIPMOTION, PIPE, child, wait_until
 from lipmotion import Stream
 from lipmotion.live.consumers import LiveSound, open_consumer
-from lipmotion.speech.sound.audio_files import read_audio
+from pipeline.made import read_welcome
 from study.browser import check_screens
 from study.firefox import BOTH
 
@@ -23,7 +23,6 @@ pytest.importorskip("websockets", reason="the extra 'live' is not installed")
 from lipmotion_studio.live.talking_head import TalkingHead
 
 pytestmark = pytest.mark.long
-WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SCREENS = ((1200, 800, "light"), (900, 700, "dark"), (320, 560, "light"))
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required")
 LIMIT_S = 240.0
@@ -66,7 +65,7 @@ def is_connected(window):
 @pytest.mark.parametrize("opens", BOTH)
 def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
     command = [*LIPMOTION, "live", "-i", "-", "--rate", 16000, "--to", "window:0", "--to", tmp_path / "a.csv"]
-    sound = (read_audio(WELCOME).samples[: 16000 * SPOKEN_S] * 32767).astype("<i2").tobytes()
+    sound = (read_welcome().samples[: 16000 * SPOKEN_S] * 32767).astype("<i2").tobytes()
     (tmp_path / "home").mkdir()
     with opens(tmp_path / "home", *WEBGL) as window:
         with child(command, stdin=PIPE, stderr=PIPE) as process:
@@ -117,7 +116,7 @@ def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
     package = programs.node_package("@met4citizen/talkinghead")
     if package is None:
         pytest.skip("no TalkingHead: npm install @met4citizen/talkinghead, LIPMOTION_NODE_MODULES")
-    audio = read_audio(WELCOME)
+    audio = read_welcome()
     stream, about = Stream(audio.rate_hz), LiveSound(audio.rate_hz)
     with (
         ThreadingHTTPServer(("127.0.0.1", 0), partial(Modules, directory=str(Path(package).parents[1]))) as server,

@@ -12,12 +12,8 @@ import numpy as np
 import pytest
 
 from children import LIPMOTION, child, wait_until
-from lipmotion import load_model, save_model
+from lipmotion import load_model, read_motion, save_model
 from lipmotion.pipeline.model import shipped_path
-from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.sources import sha256_of
-from lipmotion_faces.characters.gltf_weights import read_gltf_motion
-from lipmotion_faces.video.mp4 import write_mp4
 from studio.test_recorded_videos import shifted
 from study.browser import (
     CONTROL,
@@ -35,9 +31,11 @@ from study.browser import (
     check_screens,
 )
 from study.firefox import BOTH, Opens
+from study.small_study import sha256_of
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 from lipmotion_studio.votes import read_votes
+from testing.toy import write_film
 
 pytestmark = pytest.mark.long
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
@@ -379,7 +377,7 @@ def test_the_weights_of_the_page_are_those_of_the_exported_file(page):
         """const done = arguments[0], { server, store } = studio;
         server.post(`lines/${store.recordingId}/export`, { preset: "web" }).then(() => done());"""
     )
-    read, _ = read_gltf_motion(page.project / "exports" / "welcome.glb")
+    read, _ = read_motion(page.project / "exports" / "welcome.glb")
     shared = [name for name in read.names if name in names]
     assert len(shared) > 20
     assert "jawOpen" in shared
@@ -540,7 +538,7 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
     (tmp_path / "home").mkdir()
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
-    write_mp4(tmp_path / "in step.mp4", pictures, fps=25, audio=read_audio(sound))
+    write_film(tmp_path / "in step.mp4", pictures, sound)
     shifted(tmp_path / "in step.mp4", sound.with_suffix(".mp4"), sound_s=0.2)
     other = tmp_path / shipped_path().name  # another file, of the same name
     model = load_model()

@@ -4,11 +4,10 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.recorded_videos import MP4, find_real_video, media_type, sound_begins_s, write_playable
-from testing.toy import ToySentence
+from pipeline.made import write_sound
+from testing.toy import ToySentence, write_film
 
 LATE_S = 0.3
 
@@ -17,7 +16,7 @@ LATE_S = 0.3
 def video(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("videos") / "line.mp4"
     pictures = (np.full((32, 48, 3), 40 + 5 * number, np.uint8) for number in range(25))
-    write_mp4(path, pictures, fps=25, audio=toy_sentence.audio)
+    write_film(path, pictures, toy_sentence.audio)
     return path
 
 

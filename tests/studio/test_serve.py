@@ -11,7 +11,7 @@ from lipmotion.pipeline.edits import STEPS, parse_step
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
-from studio.attack import attacked
+from studio.hostile import attacked
 from studio.served import edits_of_all_kinds, lost_edits, served, undone_edits
 from study.small_study import small_study
 

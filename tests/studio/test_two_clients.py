@@ -9,7 +9,7 @@ import pytest
 
 from lipmotion import Model
 from lipmotion.pipeline.edit_files import read_edits, write_edits
-from lipmotion.storage.sources import sha256_of
+from study.small_study import sha256_of
 from testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.formats.sound import write_sound
+from pipeline.made import write_sound
 from testing.toy import toy_motion, toy_sentences
 
 SENTENCES = 4

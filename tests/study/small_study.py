@@ -12,6 +12,10 @@ SENTENCES = ("one", "two", "three", "four", "five", "six")
 VALUES = {PAIRED: "first", MOS: "3", RANKING: "70"}
 
 
+def sha256_of(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()
+
+
 def small_study(
     folder: Path, kind: str = PAIRED, *, sentences: tuple[str, ...] = SENTENCES, content: bytes = b"a video of "
 ) -> manifest.Study:

@@ -1,22 +1,30 @@
+"""``lipmotion study serve`` as a process: many scripted raters, kills in the middle, and hostile requests."""
+
+import socket
+import sqlite3
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 
+from children import wait_until
 from lipmotion.errors import InputError
+from lipmotion_studio.study import conduct, store
 from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, RANKING, read_answers
+from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, RateLimit, check_sheet, study_application
 from lipmotion_studio.study.conduct import export_answers, forget_rater
-from lipmotion_studio.study.manifest import Study, check_videos, order_trials
+from lipmotion_studio.study.manifest import VIDEOS, Study, check_videos, order_trials
 from lipmotion_studio.study.store import AnswerSheet, StudyStore
+from lipmotion_studio.web.replies import HEADERS
 from study.asgi import Application, ask
+from study.hostile import FOREIGN, hostile_requests
+from study.served import Connection, ScriptedRater, raw_reply, send_junk, served
 from study.small_study import scripted_answer, small_study
 
 starlette = pytest.importorskip("starlette", reason="the extra 'study' is not installed")
 
-from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, RateLimit, check_sheet, study_application  # noqa: E402
-from lipmotion_studio.web.replies import HEADERS  # noqa: E402
 
 PAGE = ("", "study.css", "study.js", "media.js", "icon.svg")
 SENT = {"trial": 4, "values": ["second"], "plays": [1, 2], "seconds": 1.25}
@@ -200,7 +208,7 @@ def test_every_scale_and_every_slider_has_a_value(tmp_path):
     sent = {"trial": 0, "values": ["01", "2", "3", "4", "5"], "plays": [1], "seconds": 0.5}
     sheet = check_sheet(opinions, order_trials(opinions, 1), 1, sent)
     assert sheet.values == ("1", "2", "3", "4", "5")
-    for values in (["1"] * 4, ["0", "2", "3", "4", "5"], ["6", "2", "3", "4", "5"]):
+    for values in (["1"] * 4, ["0", "2", "3", "4", "5"], ["6", "2", "3", "4", "5"], ["٣", "2", "3", "4", "5"]):
         with pytest.raises(InputError):
             check_sheet(opinions, order_trials(opinions, 1), 1, sent | {"values": values})
     sent = {"trial": 0, "values": ["0", "50", "100", "7"], "plays": [1] * 4, "seconds": 2.0}
@@ -227,3 +235,90 @@ def test_nothing_is_kept_of_those_who_have_gone():
         now_s[0] += 0.01
         assert limit.allows(asker)
     assert len(limit._full_at_s) < 3000
+
+
+pytest.importorskip("uvicorn", reason="the extra 'study' is not installed")
+RATERS, KILLS = 20, 3
+
+
+@pytest.mark.long
+def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path):
+    """Whatever was acknowledged is in the database, once; every rater comes to the end."""
+    folder, errors = tmp_path / "study", tmp_path / "errors.txt"
+    study = small_study(folder)
+    with ExitStack() as stack:
+        servers = [stack.enter_context(served(folder, errors))]
+        port = servers[0].port
+        raters = [ScriptedRater(study, port, number, 0.02) for number in range(RATERS)]
+        for rater in raters:
+            rater.start()
+        for kill in range(KILLS):
+            enough = (kill + 1) * RATERS * len(study.trials) // (KILLS + 2)
+            wait_until(lambda enough=enough: sum(len(rater.acknowledged) for rater in raters) >= enough)  # type: ignore[misc]
+            servers[-1].kill()
+            known = [dict(rater.acknowledged) for rater in raters]
+            with closing(sqlite3.connect(folder / store.ANSWERS)) as database:
+                stored = database.execute("SELECT rater, trial, value FROM answers").fetchall()
+            values = {(rater, trial): value for rater, trial, value in stored}
+            assert len(values) == len(stored) >= sum(map(len, known))
+            servers.append(stack.enter_context(served(folder, errors, port)))
+        for rater in raters:
+            rater.join(120)
+        assert [rater.failure for rater in raters] == [None] * RATERS
+        assert not any(rater.is_alive() for rater in raters)
+        servers[-1].kill()
+    rows = conduct.collect_answers(folder)
+    assert len(rows) == RATERS * len(study.trials)
+    assert len({(row.rater, row.trial, row.question) for row in rows}) == len(rows)
+    by_rater = sorted(
+        [row.value for row in sorted(rows, key=lambda row: row.trial) if row.rater == name]
+        for name in {row.rater for row in rows}
+    )
+    sent = sorted([rater.acknowledged[trial] for trial in range(len(study.trials))] for rater in raters)
+    assert by_rater == sent
+    assert "Traceback" not in errors.read_text(encoding="utf-8")
+
+
+@pytest.mark.long
+def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
+    folder, errors = tmp_path / "study", tmp_path / "errors.txt"
+    study = small_study(folder)
+    for foreign in (folder / "foreign.mp4", folder / VIDEOS / "foreign.mp4", tmp_path / "foreign.mp4"):
+        foreign.write_text(FOREIGN, encoding="utf-8")
+    with served(folder, errors) as server:
+        connection = Connection(server.port)
+        token = connection.ask_until_answered("/api/raters", {"agrees": True})["token"]
+        video = study.videos[0].file
+        shown = {(folder / VIDEOS / each.file).read_bytes() for each in study.videos}
+        manifest = (folder / "study.json").read_bytes()
+        statuses = set()
+        for hostile in hostile_requests(500, video, token):
+            answered = raw_reply(server.port, hostile)
+            if answered is None:
+                continue
+            reply, body = answered
+            statuses.add(reply.status)
+            assert FOREIGN.encode() not in body
+            assert manifest[:200] not in body
+            assert b"SQLite format" not in body
+            assert b"root:" not in body
+            assert reply.status < 500, hostile
+            if reply.getheader("content-type") == "video/mp4" and reply.status == 200 and body:
+                assert body in shown
+        assert {404, 405, 401, 400} <= statuses
+        send_junk(server.port)
+        connection.close()
+        later = Connection(server.port, token)
+        wait_until(lambda: later.ask("/api/state")[0] == 200, 60)  # the limit on its requests has passed
+        later.close()
+        server.kill()
+    assert "Traceback" not in errors.read_text(encoding="utf-8")
+    assert conduct.collect_answers(folder) == []
+
+
+def test_a_port_that_is_taken_is_said(tmp_path):
+    small_study(tmp_path / "study")
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(InputError, match="another --port"):
+        conduct.serve_study(tmp_path / "study", port=taken.getsockname()[1])
+    with pytest.raises(InputError, match="another --port"):
+        conduct.serve_study(tmp_path / "study", port=70_000)

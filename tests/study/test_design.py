@@ -1,4 +1,6 @@
+from collections import Counter
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import av
@@ -8,12 +10,13 @@ import pytest
 from lipmotion import errors, types
 from lipmotion.pipeline import job, request
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.sources import sha256_of
 from lipmotion_faces.video import mp4, synthetic_mark
+from lipmotion_studio.study import answers, manifest
 from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
 from lipmotion_studio.study.design import design_study, encode_video, make_condition, parse_conditions, read_sentences
 from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
 from lipmotion_studio.study.settings import Region, StudySettings
+from study.small_study import CONDITIONS, SENTENCES, sha256_of, small_study
 
 DRAWN = job.Job(request.Request(), request.Outputs(face="portrait"))
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)
@@ -199,3 +202,85 @@ def test_models_and_job_files_speak_the_sentences(tmp_path):
     assert full["model_sha256"] == weak["model_sha256"] == late["model_sha256"]
     assert weak["job_sha256"] == sha256_of(tmp_path / "still.toml")
     assert {video.sentence for video in study.videos} == {"welcome"}
+
+
+SHOWN = {(sentence, name): n for n, (sentence, name) in enumerate((s, c) for s in SENTENCES for c in CONDITIONS)}
+
+
+def test_the_trials_of_hofer_2008():
+    """Three conditions and six sentences: every pair in both orders, 36 trials, no two alike."""
+    trials = manifest.main_trials(answers.PAIRED, CONDITIONS, SENTENCES, SHOWN)
+    assert len({trial.videos for trial in trials}) == len(trials) == 36
+    names = {number: key for key, number in SHOWN.items()}
+    shown = Counter(tuple(names[number] for number in trial.videos) for trial in trials)
+    for sentence in SENTENCES:
+        for first, second in permutations(CONDITIONS, 2):
+            assert shown[(sentence, first), (sentence, second)] == 1
+    firsts = Counter(names[trial.videos[0]][1] for trial in trials)
+    assert set(firsts.values()) == {12}
+
+
+def test_every_video_once_for_opinions():
+    late = SHOWN | {("two", answers.ANCHOR): 99}
+    trials = manifest.main_trials(answers.MOS, CONDITIONS, SENTENCES, late)
+    assert sorted(trial.videos[0] for trial in trials) == sorted(late.values())
+
+
+def test_the_condition_in_step_is_expected_first_and_second():
+    late = SHOWN | {("one", answers.ANCHOR): 100, ("two", answers.ANCHOR): 101}
+    first, second = manifest.anchor_trials("phones", ("one", "two"), late)
+    assert (first.videos, first.expected) == ((SHOWN["one", "phones"], 100), "first")
+    assert (second.videos, second.expected) == ((101, SHOWN["two", "phones"]), "second")
+
+
+@pytest.mark.parametrize("kind", [answers.PAIRED, answers.MOS, answers.RANKING])
+def test_a_check_of_attention_tells_the_answer_that_it_expects(kind):
+    trials = manifest.main_trials(kind, CONDITIONS, SENTENCES, SHOWN)
+    checks = manifest.attention_trials(kind, trials, 2, seed=1)
+    assert len({check.expected for check in checks}) == 2
+    for check in checks:
+        assert check.expected in check.note
+
+
+def test_each_rater_has_an_order_that_stays(tmp_path):
+    study = small_study(tmp_path / "study")
+    orders = [manifest.order_trials(study, rater) for rater in range(1, 30)]
+    assert orders == [manifest.order_trials(study, rater) for rater in range(1, 30)]
+    assert len({tuple(trial.videos for trial in order) for order in orders}) == 29
+    for order in orders:
+        assert order[0].practice
+        assert Counter(order) == Counter(study.trials)
+
+
+def test_orders_are_balanced_over_raters(tmp_path):
+    """A trial comes as often in the first half as chance has it: of 400 raters, 200 ± 4 standard deviations of 10."""
+    study = small_study(tmp_path / "study")
+    counted = [trial for trial in study.trials if not trial.practice]
+    early = Counter(
+        trial for rater in range(400) for trial in manifest.order_trials(study, rater)[1 : 1 + len(counted) // 2]
+    )
+    assert all(160 <= early[trial] <= 240 for trial in counted)
+
+
+def test_every_order_of_three_is_equally_likely():
+    """Of 6000, 1000 each: chi-squared of five degrees of freedom is under 20.5 in 99.9 % of draws."""
+    counts = Counter("".join(manifest.shuffled("abc", "seed", n)) for n in range(6000))
+    assert len(counts) == 6
+    assert sum((count - 1000) ** 2 / 1000 for count in counts.values()) < 20.5
+
+
+def test_a_ranking_shuffles_the_videos_of_a_page(tmp_path):
+    study = small_study(tmp_path / "study", answers.RANKING)
+    pages = {manifest.order_trials(study, rater)[0].videos for rater in range(40)}
+    assert len(pages) > 10
+    assert len({tuple(sorted(page)) for page in pages}) == 1
+
+
+def test_what_is_asked_names_the_conditions_as_they_are_shown(tmp_path):
+    paired, opinions = small_study(tmp_path / "p"), small_study(tmp_path / "m", answers.MOS)
+    trial = paired.trials[3]
+    assert manifest.list_questions(paired, trial) == [
+        ("preference", *(video.condition for video in paired.shown(trial)))
+    ]
+    asked = manifest.list_questions(opinions, opinions.trials[0])
+    assert [question for question, _, _ in asked] == ["smoothness", "closure", "protrusion", "turning", "overall"]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +9,13 @@ import pytest
 
 from children import wait_until
 from lipmotion.types import Audio
-from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.study import conduct, manifest
 from lipmotion_studio.study.answers import MOS, PAIRED, RANKING, Answer
 from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screens
 from study.firefox import BOTH, Opens
 from study.served import Server, served
-from study.small_study import CONDITIONS, planned
+from study.small_study import CONDITIONS, planned, sha256_of
+from testing.toy import write_film
 
 pytest.importorskip("uvicorn", reason="the extra 'study' is not installed")
 pytestmark = [pytest.mark.long, pytest.mark.parametrize("opens", BOTH)]
@@ -32,8 +31,8 @@ def shown_study(folder: Path, kind: str) -> manifest.Study:
     for n, condition in enumerate((*CONDITIONS, "anchor")):
         frames = [np.full((120, 160, 3), (60 * n, 16 * step, 128), np.uint8) for step in range(12)]
         path = folder / manifest.VIDEOS / "made.mp4"
-        write_mp4(path, frames, fps=25, audio=sound)
-        digest = sha256(path.read_bytes()).hexdigest()
+        write_film(path, frames, sound)
+        digest = sha256_of(path)
         path.rename(path.with_name(f"{digest[:32]}.mp4"))
         videos.append(manifest.StudyVideo(f"{digest[:32]}.mp4", "one", condition, 0.5, digest, {"made": "test"}))
     return planned(folder, kind, ("one",), videos)

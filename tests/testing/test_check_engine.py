@@ -130,48 +130,47 @@ def broken(**methods: Any) -> TrainedEngine:
     return TrainedEngine(type("Changed", (MeanPoses,), methods)(Settings()))
 
 
-def test_pins_that_are_ignored_are_noticed():
-    def generate(self: Any, model: Any, speech: Any, constraints: Any = None) -> Generation:  # noqa: ARG001
-        return MeanPoses.generate(self, model, speech)
-
-    for check in ("pins are exact", "wrong pins are input errors"):
-        with pytest.raises(ContractError):
-            ENGINE_CHECKS[check](broken(generate=generate))
+def ignoring_pins(self: Any, model: Any, speech: Any, constraints: Any = None) -> Generation:  # noqa: ARG001
+    return MeanPoses.generate(self, model, speech)
 
 
-def test_arrays_that_are_not_checked_are_noticed():
-    def from_arrays(_: Any, arrays: Any) -> Any:
-        return learned_motion_from_arrays(arrays), arrays["means"]
-
-    with pytest.raises(ContractError, match=r"'means' missing: KeyError .* required ModelFormatError"):
-        ENGINE_CHECKS["damaged arrays are format errors"](broken(from_arrays=from_arrays))
+def unchecked(_: Any, arrays: Any) -> Any:
+    return learned_motion_from_arrays(arrays), arrays["means"]
 
 
-def test_arrays_of_nobody_are_noticed():
-    def from_arrays(self: Any, arrays: Any) -> Any:
-        known = {name: array for name, array in arrays.items() if name in (*LEARNED_MOTION_ARRAYS, *MEANS)}
-        return MeanPoses.from_arrays(self, known)
-
-    with pytest.raises(ContractError, match="an unknown array"):
-        ENGINE_CHECKS["damaged arrays are format errors"](broken(from_arrays=from_arrays))
+def ignoring_others(self: Any, arrays: Any) -> Any:
+    known = {name: array for name, array in arrays.items() if name in (*LEARNED_MOTION_ARRAYS, *MEANS)}
+    return MeanPoses.from_arrays(self, known)
 
 
-def test_a_model_that_does_not_come_back_is_noticed():
-    def to_arrays(self: Any, model: Any) -> Any:
-        return MeanPoses.to_arrays(self, (model[0], model[1] + 0.1))
-
-    with pytest.raises(ContractError):
-        ENGINE_CHECKS["a model comes back from arrays"](broken(to_arrays=to_arrays))
+def changing(self: Any, model: Any) -> Any:
+    return MeanPoses.to_arrays(self, (model[0], model[1] + 0.1))
 
 
-def test_learning_from_frames_that_are_not_valid_is_noticed():
-    def fit(self: Any, examples: Any, monitor: Any, checkpoint: Any = None) -> Any:
-        everything = [replace(one, valid=np.ones_like(one.valid)) for one in examples]
-        return MeanPoses.fit(self, everything, monitor, checkpoint)
+def learning_from_all(self: Any, examples: Any, monitor: Any, checkpoint: Any = None) -> Any:
+    everything = [replace(one, valid=np.ones_like(one.valid)) for one in examples]
+    return MeanPoses.fit(self, everything, monitor, checkpoint)
 
-    for check in ("frames that are not valid teach nothing", "nothing to learn from is a corpus error"):
-        with pytest.raises(ContractError):
-            ENGINE_CHECKS[check](broken(fit=fit))
+
+BROKEN: list[tuple[dict[str, Any], str, str | None]] = [
+    ({"generate": ignoring_pins}, "pins are exact", None),
+    ({"generate": ignoring_pins}, "wrong pins are input errors", None),
+    (
+        {"from_arrays": unchecked},
+        "damaged arrays are format errors",
+        r"'means' missing: KeyError .* required ModelFormatError",
+    ),
+    ({"from_arrays": ignoring_others}, "damaged arrays are format errors", "an unknown array"),
+    ({"to_arrays": changing}, "a model comes back from arrays", None),
+    ({"fit": learning_from_all}, "frames that are not valid teach nothing", None),
+    ({"fit": learning_from_all}, "nothing to learn from is a corpus error", None),
+]
+
+
+@pytest.mark.parametrize(("methods", "check", "message"), BROKEN)
+def test_a_method_that_breaks_the_contract_is_noticed(methods, check, message):
+    with pytest.raises(ContractError, match=message):
+        ENGINE_CHECKS[check](broken(**methods))
 
 
 @pytest.mark.parametrize("error", [InputError, CorpusError, ModelFormatError])

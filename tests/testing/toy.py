@@ -1,6 +1,6 @@
 """The toy corpus: sentences of a synthesiser, and a drawn face; words, times of phones and motion are known exactly."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.motion.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
+from lipmotion.motion import mouth_region
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import is_silent
@@ -160,12 +160,12 @@ def _speak_sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.ra
 def _utterance(sentence: ToySentence) -> Utterance:
     motion = toy_motion(sentence.units, CAMERA_HZ)
     opening, width, outer = (
-        motion[name][:, None, None] * EYE_DISTANCE_PX / 2 for name in ("opening", "width", "outer")
+        motion[name][:, None, None] * mouth_region.EYE_DISTANCE_PX / 2 for name in ("opening", "width", "outer")
     )
-    x = np.arange(WIDTH)[None, None, :] + 0.5 - WIDTH / 2
-    y = np.arange(HEIGHT)[None, :, None] + 0.5 - HEIGHT / 2
-    shade = 1 - SHADE * np.arange(HEIGHT)[:, None, None] / HEIGHT
-    picture = np.broadcast_to(np.array(SKIN) * shade, (len(motion.values), HEIGHT, WIDTH, 3))
+    x = np.arange(mouth_region.WIDTH)[None, None, :] + 0.5 - mouth_region.WIDTH / 2
+    y = np.arange(mouth_region.HEIGHT)[None, :, None] + 0.5 - mouth_region.HEIGHT / 2
+    shade = 1 - SHADE * np.arange(mouth_region.HEIGHT)[:, None, None] / mouth_region.HEIGHT
+    picture = np.broadcast_to(np.array(SKIN) * shade, (len(motion.values), mouth_region.HEIGHT, mouth_region.WIDTH, 3))
     for colour, across, down in ((LIPS, width, outer), (INSIDE, INNER_WIDTH * width, opening)):
         across, down = np.maximum(across, THINNEST_PX), np.maximum(down, THINNEST_PX)  # noqa: PLW2901
         radius = np.hypot(x / across, y / down)
@@ -189,11 +189,18 @@ def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.f
     return targets
 
 
+def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], sound: Audio | Path, fps: float = CAMERA_HZ) -> None:
+    """Write pictures with a sound, or with that of a file, as a video."""
+    from lipmotion.speech.sound.audio_files import read_audio
+    from lipmotion_faces.video.mp4 import write_mp4
+
+    write_mp4(path, frames, fps=fps, audio=read_audio(sound) if isinstance(sound, Path) else sound)
+
+
 def write_toy_recordings(directory: Path, *, sentences: int = 12, fps: float = CAMERA_HZ) -> list[Path]:
     """Write the toy corpus as recordings: ``toy00.mp4``, ``toy00.txt``, ..., and the three lists; return the videos."""
     from lipmotion_faces.base import Staging
     from lipmotion_faces.portrait import Woman
-    from lipmotion_faces.video.mp4 import write_mp4
 
     spoken = toy_sentences(sentences)
     directory.mkdir(exist_ok=True)
@@ -202,7 +209,7 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, fps: float = C
         motion = toy_motion(sentence.units, MOTION_HZ)
         silence = Timeline(tuple(span for span in sentence.units if is_silent(span.label.phone)))  # no shapes of phones
         video = directory / f"{sentence.name}.mp4"
-        write_mp4(video, face.render(motion, silence, fps=fps), fps=fps, audio=sentence.audio)
+        write_film(video, face.render(motion, silence, fps=fps), sentence.audio, fps)
         video.with_suffix(".txt").write_text(" ".join(sentence.words) + "\n")
     for split in ("train", "val", "test"):
         names = [sentence.name for sentence in spoken if sentence.split == split]

@@ -1,6 +1,6 @@
 """A face mesh that answers as a test tells it to."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion_faces.tracking.trackers import TRACKED_POINTS, FaceBox, LandmarkTracker
+from lipmotion_faces.tracking.trackers import TRACKED_POINTS, TRACKERS, FaceBox, LandmarkTracker
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 
@@ -49,18 +49,22 @@ class NoFinder(Opened):
         return []
 
 
-def script(monkeypatch: pytest.MonkeyPatch, answers: Sequence[NDArray[np.float64] | None]) -> None:
+class Scripted(LandmarkTracker):
+    """The faces that ``script`` was given."""
+
+    answers: Iterator[NDArray[np.float64] | None] = iter(())
+
+    def versions(self) -> dict[str, str]:
+        return {"mediapipe": "scripted"}
+
+    def points(self, most: int = 1) -> ScriptedMesh:
+        return ScriptedMesh(self.answers, most)
+
+    def boxes(self) -> NoFinder:
+        return NoFinder()
+
+
+def script(monkeypatch: pytest.MonkeyPatch, answers: Iterable[NDArray[np.float64] | None]) -> None:
     """Let the faces of the next video be these, one answer a frame."""
-    answered = iter(answers)
-
-    class Scripted(LandmarkTracker):
-        def versions(self) -> dict[str, str]:
-            return {"mediapipe": "scripted"}
-
-        def points(self, most: int = 1) -> ScriptedMesh:
-            return ScriptedMesh(answered, most)
-
-        def boxes(self) -> NoFinder:
-            return NoFinder()
-
-    monkeypatch.setattr("lipmotion_faces.tracking.trackers.make_tracker", lambda _: Scripted())
+    Scripted.answers = iter(answers)
+    monkeypatch.setitem(TRACKERS.built_in, "mediapipe", f"{__name__}:Scripted")  # type: ignore[arg-type]

@@ -1,18 +1,20 @@
+import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lipmotion.errors import MissingDependencyError
+from lipmotion_faces.tracking import face_follower, mediapipe, trackers
 from lipmotion_faces.tracking import face_follower as follow
-from lipmotion_faces.tracking.face_follower import JUMP, LOST_FRAMES, MOST_THUMBNAILS, FaceFollower
-from lipmotion_faces.tracking.trackers import EYE_CORNERS, TRACKED_POINTS, FaceBox, LandmarkTracker
 from vision.scripted import Opened
 
-pytestmark = pytest.mark.video
-
 HEIGHT, WIDTH = 240, 320
-EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
+EYES = [trackers.TRACKED_POINTS.index(index) for index in trackers.EYE_CORNERS]
 Face = tuple[str, float, float, float]  # who, x and y between the eyes, distance between them
 
 
@@ -31,7 +33,7 @@ def picture(faces: Sequence[Face], place: int = 0) -> NDArray[np.uint8]:
 
 def points(face: Face) -> NDArray[np.float64]:
     _, x, y, unit = face
-    found = np.full((len(TRACKED_POINTS), 3), (x, y, 0.0))
+    found = np.full((len(trackers.TRACKED_POINTS), 3), (x, y, 0.0))
     found[EYES] = [(x - unit / 2, y, 0), (x + unit / 2, y, 0)]
     return found
 
@@ -55,11 +57,11 @@ class Mesh(Opened):
 class Finder(Opened):
     """Stands for the detector: finds all faces of the frame that is being shown, those in capitals too."""
 
-    def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
-        return [FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
+    def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[trackers.FaceBox]:  # noqa: ARG002
+        return [trackers.FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
 
 
-class Shown(LandmarkTracker):
+class Shown(trackers.LandmarkTracker):
     """Finds the faces of the frame that is being shown."""
 
     def versions(self) -> dict[str, str]:
@@ -77,7 +79,7 @@ class SmallMesh:
 
     open = 0
 
-    def __init__(self, box: FaceBox, _: LandmarkTracker) -> None:
+    def __init__(self, box: trackers.FaceBox, _: trackers.LandmarkTracker) -> None:
         self.x = box.x
 
     def __enter__(self) -> "SmallMesh":
@@ -94,21 +96,21 @@ class SmallMesh:
         return [points(face) for face in near[:1]]
 
 
-Show = Callable[..., tuple[FaceFollower, list[float | None]]]
+Show = Callable[..., tuple[face_follower.FaceFollower, list[float | None]]]
 
 
 @pytest.fixture
 def show(monkeypatch: pytest.MonkeyPatch) -> Show:
     """Shows frames (faces, place); returns the follower, and where the face was followed to."""
     pytest.importorskip("cv2")
-    monkeypatch.setattr("lipmotion_faces.tracking.trackers.make_tracker", lambda _: Shown())
+    monkeypatch.setitem(trackers.TRACKERS.built_in, "mediapipe", f"{__name__}:Shown")
     monkeypatch.setattr(follow, "WindowedMesh", SmallMesh)
 
     def run(
         frames: Sequence[tuple[Sequence[Face], int]], person: Sequence[NDArray[np.float64]] = ()
-    ) -> tuple[FaceFollower, list[float | None]]:
+    ) -> tuple[face_follower.FaceFollower, list[float | None]]:
         followed: list[float | None] = []
-        with FaceFollower(person) as follower:
+        with face_follower.FaceFollower(person) as follower:
             for faces, place in frames:
                 Mesh.shown = faces
                 found = follower.points(picture(faces, place))
@@ -130,7 +132,9 @@ def test_a_moving_face_is_one_scene(show: Show) -> None:
     assert followed == [150.0 + n for n in range(30)]
     assert follower.person().all()
     assert follower.cuts() == []
-    assert len(show([([ANNA], 0)] * 110)[0].thumbnails()) == MOST_THUMBNAILS  # later looks are kept when they are new
+    assert (
+        len(show([([ANNA], 0)] * 110)[0].thumbnails()) == face_follower.MOST_THUMBNAILS
+    )  # later looks are kept when they are new
 
 
 def test_the_one_shown_longest_is_the_person(show: Show) -> None:
@@ -148,7 +152,7 @@ def test_she_is_known_again_elsewhere(show: Show) -> None:
 
 def test_a_face_that_jumps_is_looked_at_again(show: Show) -> None:
     """Without a cut in the picture, the mesh goes over to somebody else."""
-    there = moved(BELLA, 1.5 * JUMP * 64)
+    there = moved(BELLA, 1.5 * face_follower.JUMP * 64)
     follower, _ = show([([ANNA], 0)] * 12 + [([there], 0)] * 4 + [([ANNA], 0)] * 4)
     assert follower.person().tolist() == [True] * 12 + [False] * 4 + [True] * 4
 
@@ -173,13 +177,6 @@ def test_a_small_face_that_is_lost_is_searched_where_it_was(show: Show) -> None:
     assert SmallMesh.open == 0
     assert show([([hidden], 0)] * 6)[1] == [None] * 6  # of which the mesh is unsure is nobody's
     assert SmallMesh.open == 0
-
-
-def test_who_leaves_and_returns_elsewhere_is_known_again(show: Show) -> None:
-    gone = [([], 0)] * (LOST_FRAMES + 5)
-    follower, followed = show([([SMALL_ANNA], 0)] * 12 + gone + [([moved(SMALL_ANNA, -120)], 0)] * 6)
-    assert followed == [220.0] * 12 + [None] * len(gone) + [100.0] * 6
-    assert np.flatnonzero(follower.person()).tolist() == [*range(12), *range(len(followed) - 6, len(followed))]
 
 
 def test_of_several_small_ones_the_largest_then_the_known_one(show: Show) -> None:
@@ -222,8 +219,176 @@ def test_after_a_cut_to_several_the_known_one_is_taken(show: Show) -> None:
 
 
 def test_away_for_long_is_compared_again(show: Show) -> None:
-    gone = [([], 0)] * (LOST_FRAMES + 2)
+    gone = [([], 0)] * (face_follower.LOST_FRAMES + 2)
     for after, is_known in ((BELLA, False), (ANNA, True)):
         follower, followed = show([([ANNA], 0)] * 8 + gone + [([moved(after, 15)], 0)] * 4)
         assert [x is None for x in followed] == [False] * 8 + [True] * len(gone) + [False] * 4
         assert follower.person().tolist() == [True] * 8 + [False] * len(gone) + [is_known] * 4
+
+
+pytest.importorskip("cv2")
+
+
+def dot(height: int, width: int, x: int, y: int) -> NDArray[np.uint8]:
+    """Return a picture with a bright square of 8 px, its upper left corner at a position."""
+    image = np.zeros((height, width, 3), np.uint8)
+    image[max(y, 0) : y + 8, max(x, 0) : x + 8] = 255
+    return image
+
+
+def middle_of_bright(image: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Return x, y and 0 of the middle of what is bright, as landmarks are counted: 0 is the edge of the picture."""
+    rows, columns = np.nonzero(image[..., 0] > 127)
+    return np.array([columns.mean() + 0.5, rows.mean() + 0.5, 0.0])
+
+
+def test_positions_in_the_window_are_those_in_the_picture():
+    for side in (96, 384, 800):
+        window = face_follower.FaceWindow.around(500, 300, side)
+        shown = window.cut(dot(720, 1280, 480, 310))
+        assert shown.shape == (face_follower.SIZE_PX, face_follower.SIZE_PX, 3)
+        np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [484, 314, 0], atol=0.6)
+    scaled = face_follower.FaceWindow(10, 20, 2 * face_follower.SIZE_PX).to_picture(
+        np.array([[3.0, 4.0, 5.0]])
+    )  # depth is scaled, too
+    np.testing.assert_allclose(scaled, [[16.0, 28.0, 10.0]])
+
+
+def test_beyond_the_edges_it_is_black():
+    for x, y in ((4, 4), (1270, 4), (4, 710), (1270, 710)):
+        window = face_follower.FaceWindow.around(x, y, 300)
+        shown = window.cut(dot(720, 1280, x - 4, y - 4))
+        np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [x, y, 0], atol=3)
+        assert (shown == 0).mean() > 0.9
+    assert not face_follower.FaceWindow(2000, 0, 100).cut(np.full((72, 128, 3), 255, np.uint8)).any()
+
+
+class BrightMesh:
+    """Stands for the face mesh: a face is the box around what is bright."""
+
+    shapes: list[tuple[int, ...]] = []  # noqa: RUF012
+    closed = 0
+
+    def __exit__(self, *_: object) -> None:
+        BrightMesh.closed += 1
+
+    def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+        rows, columns = np.nonzero(image[..., 0] > 127)
+        if not rows.size:
+            return []
+        return [np.array([[columns.min(), rows.min(), 0.0], [columns.max() + 1.0, rows.max() + 1.0, 0.0]])]
+
+
+def square(x: int, side: int) -> NDArray[np.uint8]:
+    image = np.zeros((720, 1280, 3), np.uint8)
+    image[300 : 300 + side, x : x + side] = 255
+    return image
+
+
+def test_the_window_goes_along_and_grows_with_the_face():
+    with face_follower.WindowedMesh(
+        trackers.FaceBox(230, 330, 60, 0.9), cast(trackers.LandmarkTracker, SimpleNamespace(points=BrightMesh))
+    ) as mesh:
+        for n in range(40):  # it moves much further than a window's side, and becomes twice as large
+            x, side = 200 + 20 * n, 60 + 2 * n
+            (found,) = mesh.faces(square(x, side))
+            np.testing.assert_allclose(found[:, :2], [[x, 300], [x + side, 300 + side]], atol=2)
+        assert mesh._window.side == pytest.approx(face_follower.REACH * side, rel=0.3)
+        assert mesh.faces(np.zeros((720, 1280, 3), np.uint8)) == []
+        assert len(mesh.faces(square(x, side))) == 1
+    assert BrightMesh.closed == 1
+
+
+Box = tuple[float, float, float, float]  # left, top, side, score, px of a picture of 1280 × 720
+
+
+class Detector:
+    """Stands for MediaPipe's: finds a bright square if it takes a fiftieth of the picture's longer side."""
+
+    def __init__(self) -> None:
+        self.shapes: list[tuple[int, ...]] = []
+
+    def process(self, image: NDArray[np.uint8]) -> SimpleNamespace:
+        self.shapes.append(image.shape[:2])
+        rows, columns = np.nonzero(image[..., 0] > 200)
+        if not rows.size or np.ptp(columns) + 1 < max(image.shape) / 50:
+            return SimpleNamespace(detections=None)
+        height, width = image.shape[:2]
+        sides = {"width": (np.ptp(columns) + 1) / width, "height": (np.ptp(rows) + 1) / height}
+        box = SimpleNamespace(xmin=columns.min() / width, ymin=rows.min() / height, **sides)
+        data = SimpleNamespace(relative_bounding_box=box)
+        return SimpleNamespace(detections=[SimpleNamespace(location_data=data, score=[0.8])])
+
+    def close(self) -> None:
+        pass
+
+
+def bright(height: int, width: int, left: int, top: int, side: int) -> NDArray[np.uint8]:
+    image = np.zeros((height, width, 3), np.uint8)
+    image[top : top + side, left : left + side] = 255
+    return image
+
+
+@pytest.fixture
+def finder() -> mediapipe.FaceFinder:
+    found = mediapipe.FaceFinder()
+    found._running = Detector()
+    return found
+
+
+def test_the_whole_picture_is_enough(finder):
+    boxes = finder.boxes(bright(720, 1280, 300, 100, 80))
+    assert [(box.x, box.y, box.side) for box in boxes] == [pytest.approx((340, 140, 80))]
+    assert finder._running.shapes == [(720, 1280)]
+
+
+def test_what_is_smaller_is_found_in_a_part_once(finder):
+    image = bright(720, 1280, 400, 300, 20)  # in the left part and in the middle one
+    assert [(box.x, box.y, box.side) for box in finder.boxes(image)] == [pytest.approx((410, 310, 20))]
+    assert finder._running.shapes[1:] == [(720, 720)] * 3
+    assert finder.boxes(image, thorough=False) == []
+    finder._running.shapes.clear()
+    finder.boxes(np.zeros((288, 360, 3), np.uint8))
+    assert finder._running.shapes == [(288, 360)]  # a small picture has no parts
+
+
+def test_a_large_picture_is_reduced_and_the_box_is_not(finder):
+    pytest.importorskip("cv2")
+    boxes = finder.boxes(bright(2160, 3840, 900, 600, 300))
+    assert finder._running.shapes == [(720, 1280)]
+    assert (boxes[0].x, boxes[0].y, boxes[0].side) == pytest.approx((1050, 750, 300), abs=3)
+
+
+@pytest.mark.parametrize(("height", "width"), [(720, 1280), (1280, 720), (600, 600)])
+def test_parts_cover_the_picture(height, width):
+    covered = np.zeros((height, width), bool)
+    for left, top, side in mediapipe.parts(height, width):
+        assert 0 <= left <= width - side
+        assert 0 <= top <= height - side
+        covered[top : top + side, left : left + side] = True
+    assert covered.all()
+
+
+def test_missing_mediapipe_is_named_when_it_is_first_needed(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
+    with mediapipe.FaceFinder() as finder, pytest.raises(MissingDependencyError):
+        finder.boxes(np.zeros((48, 64, 3), np.uint8))
+
+
+@pytest.mark.video
+@pytest.mark.recordings
+@pytest.mark.parametrize("scale", [1.0, 0.4])
+def test_a_face_in_a_large_picture(recordings: Path, scale: float):
+    """The outer eye corners of this face are 66 px apart: 26 at the smaller scale."""
+    pytest.importorskip("mediapipe")
+    cv2 = pytest.importorskip("cv2")
+    from vision.variants import frames_of
+
+    frame = cv2.resize(frames_of(recordings / "grid-s1" / "clips" / "bbaf2n.mkv")[0], None, fx=scale, fy=scale)
+    image = np.full((720, 1280, 3), 128, np.uint8)
+    image[100 : 100 + frame.shape[0], 700 : 700 + frame.shape[1]] = frame
+    with mediapipe.FaceFinder() as finder:
+        boxes = finder.boxes(image)
+    assert len(boxes) == 1
+    assert boxes[0].x == pytest.approx(700 + 157 * scale, abs=12)
+    assert boxes[0].y == pytest.approx(100 + 175 * scale, abs=20)

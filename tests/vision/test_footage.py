@@ -1,16 +1,21 @@
+import sys
 from dataclasses import replace
+from itertools import count, repeat
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from children import run_child
 from lipmotion.errors import InputError
+from lipmotion.types import Motion, Track
 from lipmotion_faces.tracking import video_scan
-from lipmotion_faces.tracking.footage import footage_frames, footage_groups, read_video_frames, track_footage
-from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.tracking.track import track
-from vision.scripted import Opened, face
+from lipmotion_faces.tracking.footage import Footage, footage_frames, footage_groups, read_video_frames, track_footage
+from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
+from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
+from lipmotion_faces.tracking.track import CHANNELS, measure_motion, track
+from lipmotion_faces.tracking.trackers import JAW_POINTS, LIP_POINTS
+from vision.scripted import COLUMN, face
 from vision.variants import write_frames
 
 OPENINGS = 0.1 + 0.05 * np.sin(np.arange(20) / 3)
@@ -137,33 +142,6 @@ def test_untracked_frames_hold_the_last_picture(write_video):
         assert levels(frames) == wanted
 
 
-class Follower(Opened):
-    """Stands for the follower of faces: counts what it is shown."""
-
-    share = 1.0
-    shown: ClassVar[list[int]] = []
-
-    def __init__(self, tracker: str) -> None:
-        assert tracker == "mediapipe"
-        self.shown.clear()
-
-    def points(self, image: np.ndarray) -> None:
-        self.shown.append(int(image.mean()))
-
-    def share_of_person(self) -> float:
-        return Follower.share
-
-    def thumbnails(self) -> list[np.ndarray]:
-        return [np.ones((24, 36, 3))]
-
-
-@pytest.fixture
-def followed(monkeypatch):
-    pytest.importorskip("cv2")
-    monkeypatch.setattr(video_scan, "FaceFollower", Follower)
-    Follower.share = 1.0
-
-
 def scenes(path: Path, cuts: list[int], count: int = 120) -> Path:
     """Write a video of patterns that change at some frames."""
     draw = np.random.default_rng(0)
@@ -175,8 +153,8 @@ def scenes(path: Path, cuts: list[int], count: int = 120) -> Path:
     return write_frames(path, pictures)
 
 
-@pytest.mark.usefixtures("followed")
-def test_times_and_cuts(tmp_path):
+def test_times_and_cuts(tmp_path, scripted):
+    scripted(repeat(None))
     shares: list[float] = []
     found = video_scan.scan_video(scenes(tmp_path / "a.mp4", [30, 77], 260), shares.append)
     np.testing.assert_allclose(found.times_s, np.arange(260) / 25, atol=1e-6)
@@ -186,23 +164,259 @@ def test_times_and_cuts(tmp_path):
     assert shares == [pytest.approx(0.96, abs=0.01)]
 
 
-@pytest.mark.usefixtures("followed")
-def test_faces_are_looked_for_every_two_seconds(tmp_path):
+def test_faces_are_looked_for_every_two_seconds(tmp_path, scripted):
+    looks = count()
+    scripted(FACES[n % 2] for n in looks)
     video_scan.scan_video(write_frames(tmp_path / "a.mp4", [np.full((48, 64, 3), n, np.uint8) for n in range(120)]))
-    assert Follower.shown == pytest.approx([0, 50, 100], abs=2)
+    assert next(looks) == 3
 
 
-@pytest.mark.usefixtures("followed")
-def test_the_person_matters_only_where_there_are_others(tmp_path):
-    path = scenes(tmp_path / "a.mp4", [])
-    assert video_scan.scan_video(path).person == ()
-    Follower.share = 0.6
-    assert len(video_scan.scan_video(path).person) == 1
+def test_the_person_matters_only_where_there_are_others(tmp_path, scripted):
+    """After a cut, somebody else is where the face was."""
+    for cuts, is_alone in (([], True), ([100], False)):
+        scripted(repeat(FACES[0]))
+        found = video_scan.scan_video(scenes(tmp_path / "a.mp4", cuts, 260))
+        assert (found.person == ()) == is_alone
 
 
-@pytest.mark.usefixtures("followed")
-def test_a_video_that_is_cut_short_is_told(tmp_path):
+def test_a_video_that_is_cut_short_is_told(tmp_path, scripted):
+    scripted(repeat(None))
     content = write_frames(tmp_path / "a.mkv", [np.full((48, 64, 3), n, np.uint8) for n in range(120)]).read_bytes()
     assert video_scan.scan_video(tmp_path / "a.mkv").damage == ()
     (tmp_path / "a.mkv").write_bytes(content[: round(0.6 * len(content))])
     assert video_scan.scan_video(tmp_path / "a.mkv").damage[-1].startswith("cut short: pictures up to ")
+
+
+def test_channels_are_named_and_ordered():
+    names = [channel.name for channel in CHANNELS]
+    assert names[:6] == ["opening", "width", "outer", "x_61", "y_61", "z_61"]
+    assert names[-1] == f"z_{JAW_POINTS[-1]}"
+    assert len(names) == 3 + 3 * (len(LIP_POINTS) + len(JAW_POINTS)) == len(set(names))
+    assert {channel.unit for channel in CHANNELS} == {"eye_distance"}
+
+
+def test_distances_are_measured_in_the_image_plane():
+    points = np.stack([face(0.2)])
+    points[0, COLUMN[14], 2] += 100  # depth has no part in them
+    width = np.linalg.norm(points[0, COLUMN[61], :2] - points[0, COLUMN[291], :2]) / 60
+    assert measure_motion(points)[0, :2] == pytest.approx([0.2, width])
+
+
+def test_frames_without_a_face_are_marked_and_interpolated(write_video, scripted):
+    unseen = [0, 1, 9, 19]
+    scripted([None if n in unseen else face(opening) for n, opening in enumerate(OPENINGS)])
+    result = track(write_video(ticks=range(20)), crops=False)
+    assert np.flatnonzero(~result.seen).tolist() == unseen
+    opening = result.motion["opening"]
+    np.testing.assert_allclose(opening[[0, 1, 19]], OPENINGS[[2, 2, 18]], atol=1e-9)
+    assert opening[9] == pytest.approx(OPENINGS[9], abs=2e-3)
+    assert np.isfinite(result.motion.values).all()
+
+
+def test_a_part_of_a_video_begins_at_zero(write_video, scripted):
+    scripted([face(OPENINGS[n]) for n in range(5, 15)])
+    result = track(write_video(ticks=range(20)), crops=False, span=VideoSpan(0.2, 0.6))
+    np.testing.assert_allclose(result.motion["opening"], OPENINGS[5:15], atol=1e-9)
+    assert result.seen.all()
+    scripted([])
+    with pytest.raises(InputError, match=r"no picture from 5\.00 to 6\.00 s"):
+        track(write_video(ticks=range(20)), span=VideoSpan(5.0, 6.0))
+
+
+def test_a_small_face_is_noted(write_video, scripted):
+    scripted([0.4 * face(opening) for opening in OPENINGS])
+    notes = track(write_video(ticks=range(20)), crops=False).notes
+    assert notes == ("the face is small: 24 px between the eyes, 35 give a good track; film closer",)
+
+
+def test_dropped_frames_are_put_in_their_place(write_video, scripted):
+    ticks = [n for n in range(20) if n not in (6, 13)]
+    scripted([face(OPENINGS[n]) for n in ticks])
+    result = track(write_video(ticks=ticks), crops=False)
+    np.testing.assert_allclose(result.motion["opening"], OPENINGS, atol=2e-3)
+    np.testing.assert_allclose(result.motion["opening"][ticks], OPENINGS[ticks], atol=1e-9)
+    assert np.flatnonzero(~result.seen).tolist() == [6, 13]
+
+
+def test_too_few_faces_are_refused_with_counts(write_video, scripted):
+    scripted([face(0.1) if n < 15 else None for n in range(20)])
+    with pytest.raises(InputError, match=r"no face in 5 of 20 frames; required: a face in at least 80%"):
+        track(write_video(ticks=range(20)), crops=False)
+
+
+def test_broken_time_stamps_are_refused(write_video, scripted):
+    scripted([face(0.1)] * 20)
+    with pytest.raises(InputError, match=r"20 frames span 40\.\d s.*constant frame rate"):
+        track(write_video("clip.mkv", ticks=[*range(19), 1000]), crops=False)
+
+
+@pytest.mark.parametrize(("step", "rate", "told"), [(1000, 25, "0.025"), (1, 4000, "4000")])
+def test_no_lips_are_seen_at_such_a_rate(write_video, scripted, step, rate, told):
+    scripted([face(0.1)] * 20)
+    with pytest.raises(InputError, match=rf"{told} pictures a second, required 1 to 1000; export the video again"):
+        track(write_video("clip.mp4", ticks=range(0, 20 * step, step), rate=rate), crops=False)
+
+
+@pytest.mark.video
+def test_unseen_frames_show_the_nearest_mouth(write_video, scripted):
+    pytest.importorskip("cv2")
+    unseen = [0, 1, 9, 19]
+    scripted([None if n in unseen else face(0.1) for n in range(20)])
+    result = track(write_video(ticks=range(20)))
+    assert result.crops is not None
+    assert result.crops.shape == (20, 56, 72, 3)
+    shown = result.crops.mean(axis=(1, 2, 3))  # frame n is a flat grey of 10 n
+    np.testing.assert_allclose(shown, [20, 20, *range(20, 90, 10), 80, *range(100, 190, 10), 180], atol=3)
+
+
+@pytest.mark.video
+@pytest.mark.recordings
+class TestRealRecordings:
+    @pytest.fixture(autouse=True)
+    def _packages(self):
+        pytest.importorskip("mediapipe")
+
+    def test_a_clip_is_tracked_the_same_twice(self, recordings: Path):
+        path = recordings / "grid-s1" / "clips" / "brwa3s.mkv"
+        first, second = track(path), track(path)
+        assert first.motion.values.shape == (75, len(CHANNELS))
+        assert first.motion.rate_hz == 25
+        assert first.seen.all()
+        np.testing.assert_array_equal(first.motion.values, second.motion.values)
+        np.testing.assert_array_equal(first.crops, second.crops)
+        assert first.motion["opening"][:10].max() < 0.02  # silence
+        assert 0.1 < first.motion["opening"].max() < 0.3
+        assert 0.4 < first.motion["width"].mean() < 0.7
+
+    def test_two_encodings_of_a_clip_agree(self, recordings: Path):
+        one = track(recordings / "grid-s1" / "clips" / "bbal8p.mkv", crops=False).motion
+        two = track(recordings / "grid-s1" / "original" / "bbal8p.mpg", crops=False).motion
+        for name, least in (("opening", 0.98), ("width", 0.9), ("y_17", 0.98), ("y_152", 0.95)):
+            assert np.corrcoef(one[name], two[name])[0, 1] > least
+
+    def test_nothing_is_printed(self, recordings: Path):
+        path = recordings / "grid-s1" / "clips" / "brwa3s.mkv"
+        code = f"from pathlib import Path; from lipmotion_faces.tracking.track import track; track(Path({str(path)!r}))"
+        done = run_child([sys.executable, "-c", code], check=True)
+        assert (done.stdout, done.stderr) == ("", "")
+
+
+STILL = np.array([[0.8, 0, 100], [0, 0.8, 60]])
+MOUTH = np.array([0.0, 76.0, 1.0])
+RATE_HZ = 25.0
+
+
+def at(places) -> np.ndarray:
+    """Maps of a face at some places, px [shape=(T, 2, 3)]."""
+    maps = np.repeat(STILL[None], len(places), axis=0)
+    maps[:, :, 2] += places
+    return maps
+
+
+def trembling(size: float, count: int = 60) -> np.ndarray:
+    return np.random.default_rng(3).normal(scale=size, size=(count, 2))
+
+
+def spread(maps) -> float:
+    return float(np.sqrt(np.square(np.diff(maps @ MOUTH, axis=0)).sum(axis=1).mean()))
+
+
+def test_small_trembling_is_taken_away():
+    maps = at(trembling(0.15))
+    maps[:, :, :2] += np.random.default_rng(4).normal(scale=0.002, size=(60, 2, 2))
+    assert spread(steady_maps(maps, RATE_HZ)) < 0.5 * spread(maps)
+
+
+def test_a_quick_nod_stays():
+    nod = np.zeros((60, 2))
+    nod[30:36, 1] = [3, 9, 14, 14, 9, 3]
+    moved = (steady_maps(at(nod), RATE_HZ) @ MOUTH)[:, 1]
+    true = (at(nod) @ MOUTH)[:, 1]
+    assert np.abs(moved - true).max() < 0.25
+    assert np.abs(moved[[20, 45]] - true[[20, 45]]).max() < 0.01
+
+
+def test_less_is_taken_away_where_less_is_noise():
+    maps = at(trembling(0.3))
+    tracked, registered = steady_maps(maps, RATE_HZ), steady_maps(maps, RATE_HZ, noise_px=REGISTERED_NOISE_PX)
+    assert spread(tracked) < 0.8 * spread(registered) < 0.95 * spread(maps)
+
+
+def test_a_face_that_moves_evenly_is_not_held_back():
+    places = np.arange(60)[:, None] * np.array([1.5, 0.5])
+    np.testing.assert_allclose(steady_maps(at(places), RATE_HZ)[4:-4], at(places)[4:-4], atol=1e-6)
+    for few in (1, 2):  # frames suffice
+        still = at(np.zeros((few, 2)))
+        np.testing.assert_allclose(steady_maps(still, RATE_HZ), still, atol=1e-9)
+
+
+def test_nothing_runs_over_a_cut():
+    places = np.concatenate([trembling(0.1, 30), 50 + trembling(0.1, 30)])
+    together = steady_maps(at(places), RATE_HZ, cuts=(30,))
+    apart = [steady_maps(at(part), RATE_HZ) for part in (places[:30], places[30:])]
+    np.testing.assert_array_equal(together, np.concatenate(apart))
+
+
+class TestRegistration:
+    """A textured picture that moves by known fractions of a pixel, under maps that tremble."""
+
+    @pytest.fixture(autouse=True)
+    def _packages(self):
+        pytest.importorskip("cv2")
+
+    @pytest.fixture
+    def scene(self, tmp_path):
+        from cv2 import GaussianBlur
+        from scipy.ndimage import shift
+
+        def make(places, tremble, cuts=(), seen=None, contrast=4) -> Footage:
+            texture = GaussianBlur(np.random.default_rng(1).uniform(0, 255, (120, 170)), (0, 0), 2.0)
+            texture = 128 + contrast * (texture - texture.mean())
+            frames = [
+                np.repeat(
+                    np.clip(shift(texture, place[::-1], mode="reflect"), 0, 255).astype(np.uint8)[..., None], 3, 2
+                )
+                for place in places
+            ]
+            path = write_frames(tmp_path / "scene.mkv", frames, options={"qp": "0"})
+            count = len(places)
+            shown = np.ones(count, bool) if seen is None else seen
+            track = Track(Motion(np.zeros((count, 0)), RATE_HZ, ()), shown)
+            times_s = np.arange(count) / RATE_HZ
+            maps = at(np.asarray(places) + tremble)
+            return Footage(path, WHOLE, track, maps, times_s, tuple(cuts), (120, 170), RATE_HZ)
+
+        return make
+
+    def test_trembling_of_the_tracker_is_corrected(self, scene):
+        places = np.stack([3 * np.sin(np.arange(30) / 5), 2 * np.cos(np.arange(30) / 7)], axis=1)
+        footage = scene(places, trembling(0.4, 30))
+        wrong, right = (maps[:, :, 2] - at(places)[:, :, 2] for maps in (footage.face_to_image, register_maps(footage)))
+        before, after = (np.sqrt(np.square(np.diff(error, axis=0)).mean()) for error in (wrong, right))
+        assert before > 0.4
+        assert after < 0.15 * before
+
+    def test_steps_over_a_cut_and_of_unseen_frames_are_left_out(self, scene):
+        places = np.zeros((30, 2))
+        places[15:] = 6
+        wrong = np.where(np.arange(30)[:, None] < 15, 0.0, -6.0)  # the tracker has not noticed that the face moved
+        seen = np.ones(30, bool)
+        noticed = register_maps(scene(places, wrong))
+        assert np.abs(noticed - scene(places, wrong).face_to_image).max() > 2
+        for footage in (
+            scene(places, wrong, cuts=(15,)),
+            replace(scene(places, wrong, seen=seen & (places[:, 0] < 1))),
+        ):
+            np.testing.assert_allclose(register_maps(footage), footage.face_to_image, atol=0.05)
+
+    def test_what_an_unseen_frame_shows_moves_nothing(self, scene):
+        """Somebody walks by, and the tracker's places are interpolated."""
+        places, seen = np.zeros((30, 2)), np.ones(30, bool)
+        places[12:17], seen[12:17] = 6, False
+        footage = scene(places, -places, seen=seen)
+        np.testing.assert_allclose(register_maps(footage), footage.face_to_image, atol=0.05)
+
+    def test_a_region_without_texture_stays(self, scene):
+        footage = scene(np.zeros((5, 2)), 0.0, contrast=0)
+        with np.errstate(invalid="raise"):
+            np.testing.assert_array_equal(register_maps(footage), footage.face_to_image)

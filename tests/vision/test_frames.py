@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.formats.sound import write_sound
 from lipmotion.types import Audio
 from lipmotion_faces.tracking import frames
 from lipmotion_faces.tracking.frames import (
@@ -21,6 +20,7 @@ from lipmotion_faces.tracking.frames import (
     open_video,
     resample_to_constant_rate,
 )
+from pipeline.made import write_sound
 from vision.variants import write_frames
 
 
@@ -116,22 +116,6 @@ def test_rotations_turn_the_corner(write_video):
         turned = np.rot90(picture, rotation // 90)
         assert image.shape == turned.shape
         np.testing.assert_allclose(image, turned, atol=60)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda path: path.with_suffix(".mkv").touch(), "no such file"),
-        (lambda path: path.mkdir(), "is a folder"),
-        (lambda path: path.write_bytes(b""), "empty"),
-        (lambda path: path.write_text("words, not pictures\n" * 50), "not a readable video"),
-    ],
-)
-def test_says_what_is_wrong(tmp_path, make, message):
-    path = tmp_path / "clip.mp4"
-    make(path)
-    with pytest.raises(InputError, match=message), open_video(path):
-        pass
 
 
 def test_sound_alone_is_not_a_video(tmp_path):

@@ -3,10 +3,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from lipmotion_faces.tracking.head_pose import fit_similarities, remove_head_motion
-from lipmotion_faces.tracking.trackers import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
+from lipmotion_faces.tracking import head_pose, image_similarity, trackers
 
-COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
+COLUMN = {index: n for n, index in enumerate(trackers.TRACKED_POINTS)}
 FRAMES = 40
 
 
@@ -14,10 +13,10 @@ FRAMES = 40
 def speech() -> NDArray[np.float64]:
     """A head that keeps still while lips and jaw move [shape=(FRAMES, N, 3)]."""
     rng = np.random.default_rng(5)
-    face = rng.uniform(-1, 1, (len(TRACKED_POINTS), 3))
+    face = rng.uniform(-1, 1, (len(trackers.TRACKED_POINTS), 3))
     face[[COLUMN[33], COLUMN[263], COLUMN[10], COLUMN[168]]] = [[-0.5, 0, 0], [0.5, 0, 0], [0, 1, -0.1], [0, 0.1, 0.3]]
     frames = np.repeat(face[None], FRAMES, axis=0)
-    spoken = [COLUMN[index] for index in (*LIP_POINTS, *JAW_POINTS)]
+    spoken = [COLUMN[index] for index in (*trackers.LIP_POINTS, *trackers.JAW_POINTS)]
     frames[:, spoken] += 0.2 * rng.normal(size=(FRAMES, len(spoken), 3))
     return frames
 
@@ -31,8 +30,8 @@ def moved(speech) -> NDArray[np.float64]:
 
 
 def test_head_motion_is_removed_and_speech_is_not(speech, moved):
-    still = remove_head_motion(speech, TRACKED_POINTS)
-    np.testing.assert_allclose(remove_head_motion(moved, TRACKED_POINTS), still, atol=1e-6)
+    still = head_pose.remove_head_motion(speech, trackers.TRACKED_POINTS)
+    np.testing.assert_allclose(head_pose.remove_head_motion(moved, trackers.TRACKED_POINTS), still, atol=1e-6)
     np.testing.assert_allclose(  # distances within a frame, in eye distances, are those of the speech
         np.linalg.norm(still[:, COLUMN[13]] - still[:, COLUMN[14]], axis=1),
         np.linalg.norm(speech[:, COLUMN[13]] - speech[:, COLUMN[14]], axis=1),
@@ -41,11 +40,11 @@ def test_head_motion_is_removed_and_speech_is_not(speech, moved):
 
 
 def test_the_axes_are_those_of_the_head(moved):
-    head = remove_head_motion(moved, TRACKED_POINTS)
-    right, left = (head[:, COLUMN[index]].mean(axis=0) for index in EYE_CORNERS)
+    head = head_pose.remove_head_motion(moved, trackers.TRACKED_POINTS)
+    right, left = (head[:, COLUMN[index]].mean(axis=0) for index in trackers.EYE_CORNERS)
     np.testing.assert_allclose(right, [-0.5, 0, 0], atol=1e-6)
     np.testing.assert_allclose(left, [0.5, 0, 0], atol=1e-6)
-    forehead, nasion = head[0, COLUMN[10]], head[0, COLUMN[NASION]]
+    forehead, nasion = head[0, COLUMN[10]], head[0, COLUMN[trackers.NASION]]
     assert forehead[1] > nasion[1] > 0
     assert nasion[2] > 0
     lean = np.rad2deg(np.arctan2(nasion[2] - forehead[2], forehead[1] - nasion[1]))
@@ -53,31 +52,20 @@ def test_the_axes_are_those_of_the_head(moved):
 
 
 def test_noise_of_the_rigid_points_hardly_reaches_the_lips(speech, moved):
-    clean = remove_head_motion(speech, TRACKED_POINTS)
+    clean = head_pose.remove_head_motion(speech, trackers.TRACKED_POINTS)
     noise = np.random.default_rng(7).normal(size=moved.shape)
-    noise[:, [COLUMN[index] for index in LIP_POINTS]] = 0
-    noisy = remove_head_motion(moved + 0.5 * noise, TRACKED_POINTS)  # under 1 % of the distance between the eyes
-    lips = [COLUMN[index] for index in LIP_POINTS]
+    noise[:, [COLUMN[index] for index in trackers.LIP_POINTS]] = 0
+    noisy = head_pose.remove_head_motion(
+        moved + 0.5 * noise, trackers.TRACKED_POINTS
+    )  # under 1 % of the distance between the eyes
+    lips = [COLUMN[index] for index in trackers.LIP_POINTS]
     assert np.sqrt(np.square(noisy - clean)[:, lips].mean()) < 0.01
-
-
-def test_similarity_agrees_with_scipy_where_only_rotation_is_asked():
-    rng = np.random.default_rng(8)
-    target = rng.normal(size=(12, 3))
-    points = rng.normal(size=(5, 12, 3))
-    turn, scale, shift = fit_similarities(points, target)
-    for n in range(5):
-        centred = points[n] - points[n].mean(axis=0)
-        oracle, _ = Rotation.align_vectors(target - target.mean(axis=0), centred)
-        np.testing.assert_allclose(turn[n], oracle.as_matrix(), atol=1e-9)
-        moved = scale[n] * points[n] @ turn[n].T + shift[n]
-        np.testing.assert_allclose(moved.mean(axis=0), target.mean(axis=0), atol=1e-9)
 
 
 def test_similarity_is_the_least_squares_solution_and_no_reflection():
     rng = np.random.default_rng(9)
     target, points = rng.normal(size=(12, 3)), rng.normal(size=(1, 12, 3))
-    turn, scale, shift = fit_similarities(points, target)
+    turn, scale, shift = head_pose.fit_similarities(points, target)
 
     def cost(turned: NDArray[np.float64], scaled: float, shifted: NDArray[np.float64]) -> float:
         return float(np.square(scaled * points[0] @ turned.T + shifted - target).sum())
@@ -86,7 +74,164 @@ def test_similarity_is_the_least_squares_solution_and_no_reflection():
     for _ in range(50):
         other = Rotation.from_rotvec(0.01 * rng.normal(size=3)).as_matrix() @ turn[0]
         assert cost(other, scale[0] * (1 + 0.01 * rng.normal()), shift[0] + 0.01 * rng.normal(size=3)) > best
-    mirrored, _, _ = fit_similarities(points * (-1, 1, 1), points[0])
+    mirrored, _, _ = head_pose.fit_similarities(points * (-1, 1, 1), points[0])
     assert np.linalg.det(mirrored[0]) == pytest.approx(1)
-    assert not {*RIGID_POINTS} & {*LIP_POINTS, *JAW_POINTS}
-    assert (len({*LIP_POINTS}), len({*JAW_POINTS})) == (40, 12)
+    assert not {*trackers.RIGID_POINTS} & {*trackers.LIP_POINTS, *trackers.JAW_POINTS}
+    assert (len({*trackers.LIP_POINTS}), len({*trackers.JAW_POINTS})) == (40, 12)
+
+
+cv2 = pytest.importorskip("cv2")
+
+
+def ramp(width: int, height: int) -> np.ndarray:
+    """Red rises to the right and green downwards, one a pixel centre."""
+    image = np.zeros((height, width, 3), np.uint8)
+    image[..., 0] = np.arange(width)
+    image[..., 1] = np.arange(height)[:, None]
+    return image
+
+
+def test_an_upright_face_of_the_right_size_is_cut_out_as_it_is():
+    eyes = np.array([[60.0, 50.0], [150.0, 50.0]])  # 90 px apart, the middle at 105, 50
+    image = ramp(256, 200)
+    np.testing.assert_array_equal(
+        head_pose.crop_mouth(image, head_pose.eyes_to_image(eyes)), image[98 : 98 + 56, 69 : 69 + 72]
+    )
+
+
+def test_the_eyes_of_the_turned_head_become_level():
+    angle = np.deg2rad(20)
+    half = 45 * np.array([np.cos(angle), np.sin(angle)])
+    crop = head_pose.crop_mouth(ramp(256, 200), head_pose.eyes_to_image(np.array([130, 80]) + np.stack([-half, half])))
+    along = np.diff(crop[28].astype(int), axis=0).mean(axis=0)
+    np.testing.assert_allclose(along[:2], [np.cos(angle), np.sin(angle)], atol=0.03)
+
+
+def test_a_large_face_is_averaged_not_skipped_and_outside_of_the_image_its_edge_repeats():
+    image = np.random.default_rng(0).integers(0, 256, (2000, 2000, 3)).astype(np.uint8)
+    crop = head_pose.crop_mouth(
+        image, head_pose.eyes_to_image(np.array([[600.0, 600.0], [1320.0, 600.0]]))
+    )  # eight times the size
+    assert crop.shape == (56, 72, 3)
+    assert crop.std() < 20  # of noise with a deviation of 74
+    flat = np.full((100, 160, 3), 77, np.uint8)
+    assert (head_pose.crop_mouth(flat, head_pose.eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77).all()
+
+
+def nodding(frames: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A head that nods, turns and comes nearer while it speaks: points in its own frame, then where it is."""
+    column = {index: n for n, index in enumerate(trackers.TRACKED_POINTS)}
+    draw = np.random.default_rng(4)
+    face = draw.uniform(-0.8, 0.8, (len(trackers.TRACKED_POINTS), 3))
+    slope = np.deg2rad(trackers.FOREHEAD_SLOPE_DEG)
+    face[[column[33], column[263], column[10], column[168]]] = [
+        [-0.5, 0, 0],
+        [0.5, 0, 0],
+        [0, 0.1 + np.cos(slope), 0.3 - np.sin(slope)],
+        [0, 0.1, 0.3],
+    ]
+    head = np.repeat(face[None], frames, axis=0)
+    head[:, [column[index] for index in trackers.LIP_POINTS], :2] += 0.1 * draw.normal(
+        size=(frames, len(trackers.LIP_POINTS), 2)
+    )
+    turns = Rotation.from_rotvec(0.3 * draw.normal(size=(frames, 3))).as_matrix()
+    return head, turns, draw.uniform(50, 200, frames), draw.uniform(100, 300, (frames, 3))
+
+
+def test_the_lips_are_found_whatever_the_head_does():
+    head, turns, sizes, places = nodding()
+    points = (sizes[:, None, None] * head @ turns.transpose(0, 2, 1) + places[:, None]) * (1, -1, -1)
+    depth = head[:, [trackers.TRACKED_POINTS.index(index) for index in trackers.LIP_POINTS], 2].mean()
+    maps = head_pose.face_to_image(points)
+    for turn, size, place, to_image in zip(turns, sizes, places, maps, strict=True):
+        for x, y in ((0, 0), (-36, 48), (36, 104), (12, 70)):  # px of the region, y down
+            seen = size * turn @ np.array([x / 90, -y / 90, depth]) + place
+            np.testing.assert_allclose(to_image @ [x, y, 1], [seen[0], -seen[1]], atol=1e-6)
+
+
+def test_a_face_straight_ahead_is_cut_out_as_by_its_eyes():
+    head, *_ = nodding()
+    points = (head * 75 + (120, -90, 0)) * (1, -1, -1)
+    eyes = points[0][[trackers.TRACKED_POINTS.index(33), trackers.TRACKED_POINTS.index(263)], :2]
+    np.testing.assert_allclose(head_pose.face_to_image(points)[0], head_pose.eyes_to_image(eyes), atol=1e-9)
+    image = np.random.default_rng(1).integers(0, 256, (220, 260, 3)).astype(np.uint8)
+    crops = [
+        head_pose.crop_mouth(image, to_image)
+        for to_image in (head_pose.face_to_image(points)[0], head_pose.eyes_to_image(eyes))
+    ]
+    assert np.abs(np.subtract(*crops, dtype=int)).max() <= 1
+
+
+DRAW = np.random.default_rng(5)
+COARSE = DRAW.uniform(40, 215, (9, 12, 3))
+
+
+@pytest.fixture(autouse=True)
+def _opencv():
+    pytest.importorskip("cv2")
+
+
+def picture(scale: int) -> np.ndarray:
+    """Squares of many colours, on a grid of 12 by 9."""
+    return np.kron(COARSE, np.ones((scale, scale, 1))).astype(np.uint8)
+
+
+def test_a_scene_is_small_and_its_brightness_does_not_count():
+    image = picture(20)
+    assert image_similarity.scene_thumbnail(image).shape == (24, 32, 3)
+    np.testing.assert_allclose(
+        image_similarity.scene_thumbnail(image), image_similarity.scene_thumbnail(image + np.uint8(30)), atol=1
+    )
+    assert abs(image_similarity.scene_thumbnail(image).mean()) < 1e-9
+
+
+def test_a_face_looks_the_same_from_nearer_and_turned():
+    far, near = picture(10), picture(30)
+    eyes = np.array([[40.0, 40.0], [80.0, 40.0]])
+    upright = image_similarity.face_thumbnail(far, eyes)
+    assert image_similarity.image_correlation(upright, image_similarity.face_thumbnail(near, 3 * eyes)) > 0.95
+    turned = image_similarity.face_thumbnail(np.rot90(far), np.stack([eyes[:, 1], far.shape[1] - eyes[:, 0]], axis=1))
+    assert image_similarity.image_correlation(upright, turned) > 0.95
+    assert (
+        image_similarity.image_correlation(upright, image_similarity.face_thumbnail(far, eyes + np.array([20, 25])))
+        < 0.6
+    )
+
+
+def test_likeness_is_a_correlation_without_tint():
+    one, other = DRAW.uniform(0, 255, (2, 6, 5, 3))
+    assert image_similarity.image_correlation(one, 0.5 * one + (10, 20, 30)) == pytest.approx(1)
+    assert image_similarity.image_correlation(one, 200 - one) == pytest.approx(-1)
+    assert image_similarity.image_correlation(one, np.full_like(one, 90)) == 0
+    assert image_similarity.image_correlation(np.stack([one, other])[:, None], np.stack([one, other])).shape == (2, 2)
+
+
+def mouths(count: int = 40) -> np.ndarray:
+    usual = np.kron(DRAW.uniform(60, 190, (7, 9, 3)), np.ones((8, 8, 1)))
+    frames = usual + DRAW.normal(0, 8, (count, *usual.shape))
+    return np.stack([image_similarity.mouth_thumbnail(frame.clip(0, 255).astype(np.uint8)) for frame in frames])
+
+
+def test_boxes_and_other_textures_are_strange_at_any_shift():
+    for value in (0, 255, None):
+        frames = mouths()
+        frames[10:18] = DRAW.integers(0, 255, frames[10:18].shape) if value is None else value
+        assert np.flatnonzero(image_similarity.find_occluded_mouths(frames)).tolist() == list(range(10, 18))
+
+
+def test_where_the_usual_look_is_flat_nothing_is_strange():
+    frames = np.full((20, 14, 18, 3), 100, np.uint8)
+    frames[3] = 250
+    assert not image_similarity.find_occluded_mouths(frames).any()
+
+
+def test_neither_usual_mouths_nor_other_light_nor_a_nod_are_strange():
+    usual = mouths()
+    assert not image_similarity.find_occluded_mouths(usual).any()
+    dark = usual.copy()
+    dark[10:18] //= 2
+    assert not image_similarity.find_occluded_mouths(dark).any()
+    for rows in (-4, -2, 3):
+        nodded = usual.copy()
+        nodded[10:18] = np.roll(nodded[10:18], rows, axis=1)
+        assert not image_similarity.find_occluded_mouths(nodded).any()

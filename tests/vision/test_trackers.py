@@ -81,17 +81,6 @@ def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
         assert "Python < 3.13" in str(caught.value)
 
 
-def test_versions_need_the_packages(monkeypatch):
-    from importlib import metadata
-
-    def missing(name: str) -> str:
-        raise metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(metadata, "version", missing)
-    with pytest.raises(errors.MissingDependencyError, match="mediapipe"):
-        trackers.make_tracker().versions()
-
-
 def test_native_messages_are_dropped_only_inside(capfd):
     with mediapipe.quiet_stderr():
         os.write(2, b"noise")

@@ -1,15 +1,11 @@
-import io
-import json
 import re
-import zipfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lipmotion.errors import ExportError, InputError, ModelFormatError
+from lipmotion.errors import ExportError, ModelFormatError
 from lipmotion.storage.archive import read_archive, read_archive_header, write_archive
 from lipmotion_faces.appearance.person import APPEARANCE, PARTS
 from lipmotion_faces.coded_video import STORED_VIDEO
@@ -220,40 +216,3 @@ HEADERS: list[tuple[dict[str, object], str]] = [
     ({"channels": [{"name": "opening", "unit": "a"}] * 3}, "repeat"),
     ({"channels": 7}, "the face is damaged"),
 ]
-
-
-def files(face: Path) -> Iterator[tuple[str, bytes]]:
-    content = face.read_bytes()
-    yield "text", b"a face\n" * 100
-    yield "truncated", content[: len(content) // 2]
-    yield "without its end", content[:-1]
-    yield "without its beginning", content[100:]
-    for place in (len(content) // 3, len(content) // 2):
-        yield f"changed at {place}", content[:place] + bytes([content[place] ^ 0x55]) + content[place + 1 :]
-    header = json.dumps({"format": "lipmotion.face", "version": VERSION})
-    for what, name, text in (
-        ("a header alone", "header.json", header), ("a list", "header.json", "[1, 2]"), ("a zip", "other.txt", "face")
-    ):  # fmt: skip
-        made = io.BytesIO()
-        with zipfile.ZipFile(made, "w") as file:
-            file.writestr(name, text)
-        yield what, made.getvalue()
-
-
-def test_what_is_no_face(filmed_face_file: Path, tmp_path: Path, toy_model_file: Path) -> None:
-    path = tmp_path / "a.face"
-    for what, content in (*files(filmed_face_file), ("a model", toy_model_file.read_bytes())):
-        path.write_bytes(content)
-        with pytest.raises(ModelFormatError) as caught:
-            load_face(path)
-        message = str(caught.value)
-        assert message.startswith(f"{path}: "), what
-        assert "\n" not in message, what
-        assert "build" in message, (what, message)
-    with pytest.raises(InputError, match=r"missing\.face: no such file"):
-        load_face(tmp_path / "missing.face")
-    path.write_bytes(b"")
-    with pytest.raises(InputError, match="the file is empty; give a face"):
-        load_face(path)
-    with pytest.raises(InputError, match="is a folder"):
-        load_face(tmp_path)

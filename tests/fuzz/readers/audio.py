@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import LONGEST_S, require
+from fuzz.plausible import LONGEST_S, require
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from speech.sounds import tone, write_sound

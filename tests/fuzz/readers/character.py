@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require
+from fuzz.plausible import require
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion_faces.characters.binding_files import save_binding, write_weights
 from lipmotion_faces.characters.character_files import load_character, read_character

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fuzz.inputs import Files, Good, picked_up
-from fuzz.readers.plausible import check_motion, require
+from fuzz.plausible import check_motion, require
 from lipmotion import Corpus
 from lipmotion.types import Audio, Motion, Span, Timeline, Track, Unit, Utterance
 from pipeline.made import features_of

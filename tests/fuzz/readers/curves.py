@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from formats.examples import of_motion, written
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require, short_speech
+from fuzz.plausible import require, short_speech
 from lipmotion import Corpus, CueSheet
 from lipmotion.corpora.captured_faces import read_channels
 from lipmotion.corpora.source_recordings import MotionFile

@@ -7,7 +7,7 @@ import numpy as np
 
 from faces.test_cut_out import draw
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require
+from fuzz.plausible import require
 from lipmotion.types import Channel, Motion, Timeline
 from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.cut_out import read_cut_out

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require
+from fuzz.plausible import require
 from lipmotion import load_face, save_face
 from lipmotion.types import Motion
 from lipmotion_faces.film.filmed_video import make_film

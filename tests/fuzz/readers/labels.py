@@ -9,7 +9,7 @@ from formats.test_reported_cases import LINES, OTHERS, SERVICES, SPEAKERS
 from formats.test_transcripts import OF_LINES, OF_WORDS
 from formats.timing_samples import SAMPLES
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require
+from fuzz.plausible import require
 from lipmotion.corpora.folder import read_aligned_words
 from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording, assign_splits
 from lipmotion.formats.label_files import read_labels

@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require
+from fuzz.plausible import require
 from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch.ledger import LEDGER, Place, open_ledger, write_receipt
 from lipmotion.pipeline.batch.report import MARKS, read_marks, write_marks, write_reports

@@ -16,14 +16,10 @@ import numpy as np
 from websockets.sync.client import connect
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require, short_speech
-from lipmotion import Stream
-from lipmotion.errors import InputError
-from lipmotion.live.face import LiveFrame
-from lipmotion.storage.archive import array_in
-from lipmotion.storage.json_text import from_json
-from lipmotion_studio.live.servers import Server, open_server
-from lipmotion_studio.live.vtube import VTubeStudio
+from fuzz.plausible import require, short_speech
+from lipmotion import LiveFrame, Stream, errors
+from lipmotion.storage import archive, json_text
+from lipmotion_studio.live import servers, vtube
 
 REPLIES: dict[str, dict[str, Any]] = {
     "AuthenticationRequest": {"data": {"authenticated": True}},
@@ -74,16 +70,16 @@ def read(folder: Path, good: Good) -> None:
 def _parsed(content: bytes) -> Any:
     """Return what a program sends that parses JSON."""
     try:
-        return from_json(content)
+        return json_text.from_json(content)
     except ValueError as error:
-        raise InputError(str(error)) from error
+        raise errors.InputError(str(error)) from error
 
 
 def _array(content: bytes) -> Any:
     try:
-        array = array_in(content)
+        array = archive.array_in(content)
     except ValueError as error:
-        raise InputError(str(error)) from error
+        raise errors.InputError(str(error)) from error
     return array if array.size < 1e6 else array.ravel()[:1_000_000]
 
 
@@ -97,8 +93,8 @@ def _stream() -> Stream:
 
 
 def _send(content: bytes) -> None:
-    server = Server("hello")
-    with open_server("websocket:127.0.0.1:0", 0, server):
+    server = servers.Server("hello")
+    with servers.open_server("websocket:127.0.0.1:0", 0, server):
         host, _, port = server.address.rpartition(":")
         with socket.create_connection((host, int(port)), timeout=5) as client, suppress(OSError):
             client.sendall(content)
@@ -138,7 +134,7 @@ class _Studio:
 
 async def _converse(replies: Any) -> None:
     with tempfile.TemporaryDirectory() as folder, ExitStack() as patches:
-        studio, connection = VTubeStudio("ws://nowhere", Path(folder) / "token"), _Studio(replies)
+        studio, connection = vtube.VTubeStudio("ws://nowhere", Path(folder) / "token"), _Studio(replies)
         patches.enter_context(mock.patch("websockets.asyncio.client.connect", return_value=connection))
         patches.enter_context(mock.patch("lipmotion_studio.live.vtube.AGAIN_S", 0.0))
         studio(copy.deepcopy(_stream()).push(np.zeros(8000, np.float32))[-1])

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import good_model, refuse_constant, require, short_speech
+from fuzz.plausible import good_model, refuse_constant, require, short_speech
 from lipmotion_studio.requests import TOKEN_HEADER
 from lipmotion_studio.study.application import study_application
 from lipmotion_studio.study.manifest import check_videos

@@ -8,7 +8,7 @@ from shutil import copyfile
 from tempfile import TemporaryDirectory
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require
+from fuzz.plausible import require
 from lipmotion import Edits, Job, Request
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits

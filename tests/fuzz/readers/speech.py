@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 from fuzz.inputs import Files, Good, Reader
-from fuzz.readers.plausible import check_generation, good_model, require, short_speech
+from fuzz.plausible import check_generation, good_model, require, short_speech
 from lipmotion import Request, animate, load_model, read_motion, write
 from lipmotion.units import PHONES, Lexicon
 from robustness.motion_cases import GOOD

@@ -10,7 +10,7 @@ import av
 import numpy as np
 
 from fuzz.inputs import Files, Good
-from fuzz.readers.plausible import require
+from fuzz.plausible import require
 from lipmotion_faces.tracking.frames import nominal_rate_hz, open_video
 from speech.sounds import tone, write_pictures, write_sound
 
