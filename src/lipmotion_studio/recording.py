@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from copy import copy
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -17,7 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.analysis.transcribe import guess_pronunciations
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file
-from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, parse_step
+from lipmotion.pipeline.edits import Step, WordIs, WordSaid, WordStep, parse_step
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
@@ -87,12 +85,6 @@ class OpenRecording:
             self._others[key] = OpenRecording(self.file, self.folder, self.number, model, self.audio, onto)
         self._others[key].file = self.file
         return self._others[key]
-
-    def with_edits(self, sentences: Sequence[str]) -> OpenRecording:
-        """Return it with other edits; to be read only. Raises InputError: an edit is refused."""
-        other = copy(self)
-        other.file, other.settled = replace(self.file, edits=Edits().then(*sentences), undone=()), True
-        return other
 
     @property
     def generation(self) -> Generation:

@@ -59,15 +59,6 @@ def print_usage(text: str, *, is_wanted: bool) -> None:
             _discard_pending(sys.stderr)  # nobody can be told
 
 
-def print_note(text: object) -> None:
-    """Print one line for people on standard error, if it is a terminal: programs find the same in files.
-
-    An empty text is not printed.
-    """
-    if text and sys.stderr is not None and sys.stderr.isatty():
-        print_error(text)
-
-
 def with_program_name(text: object) -> str:
     """Return a text as one printable line that begins with the program's name."""
     return f"lipmotion: {printable(text)}"

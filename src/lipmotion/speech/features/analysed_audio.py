@@ -120,7 +120,11 @@ class AnalysedAudio(Audio):
             energy = log_energy(samples)
             tones = find_tones(samples, energy)
             passages = [] if tones else find_passages(energy)
-            cuts = _silences_beside(passages, samples)
+            silent = np.asarray(~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1))
+            for first, end in passages:
+                silent[first:end] = False
+            runs = find_sound_runs(silent, 1) if passages else []
+            cuts = [(first + end) // 2 * HOP for first, end in runs if end - first >= SEPARATE_FRAMES]
             if tones:
                 waiting.append((start, samples.copy()))
             for tone in tones:
@@ -282,15 +286,6 @@ def _heard(samples: NDArray[np.float32]) -> slice:
     """Return the samples without digital silence before and after them; none where there is nothing else."""
     sound = samples != 0
     return slice(int(sound.argmax()), len(sound) - int(sound[::-1].argmax())) if sound.any() else slice(0, 0)
-
-
-def _silences_beside(passages: Sequence[Stretch], samples: NDArray[np.float32]) -> list[int]:
-    """Return a sample of each digital silence before, after and between passages that is long enough to part them."""
-    silent = np.asarray(~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1))
-    for first, end in passages:
-        silent[first:end] = False
-    runs = find_sound_runs(silent, 1) if passages else []
-    return [(first + end) // 2 * HOP for first, end in runs if end - first >= SEPARATE_FRAMES]
 
 
 @dataclass(frozen=True, eq=False)
