@@ -7,8 +7,8 @@ from lipmotion.engines import engine_named
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion import generation as module
 from lipmotion.motion.closure import find_closable_ranges
+from lipmotion.motion.generation import LARGEST_FACTOR, VarianceScaling
 from lipmotion.motion.modulation_filter import REACH, ModulationFilter
-from lipmotion.motion.variance_scaling import LARGEST_FACTOR, VarianceScaling
 from lipmotion.testing import PHONES, examples, speech, timeline
 from lipmotion.types import Constraints, Pin, silent_monitor
 

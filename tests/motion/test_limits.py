@@ -12,8 +12,7 @@ from lipmotion.motion.closure import (
     estimate_closure,
     find_closable_ranges,
 )
-from lipmotion.motion.limits import MotionLimits, check_poses, check_rest, check_spread, measure_limits
-from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, check_rest, check_spread, measure_limits
 from lipmotion.stats.pca import Pca
 from lipmotion.testing import PHONES, examples, speech
 from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit, silent_monitor

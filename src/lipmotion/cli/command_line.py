@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.arguments.paths import check_paths
 from lipmotion.cli.terminal.events import Events, Stopper
-from lipmotion.cli.terminal.printing import flush_output, print_usage, with_program_name
+from lipmotion.cli.terminal.progress import flush_output, print_usage, with_program_name
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
 from lipmotion.types.values import parse_number, parse_whole

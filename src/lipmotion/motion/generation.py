@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,9 @@ from lipmotion.motion.closure import (
     fit_closure,
     is_never_negative,
 )
-from lipmotion.motion.limits import MotionLimits, measure_limits
 from lipmotion.motion.modulation_filter import ModulationFilter
-from lipmotion.motion.space import MotionSpace, fit_reduced_motion
+from lipmotion.motion.space import MotionLimits, MotionSpace, fit_reduced_motion, measure_limits
 from lipmotion.motion.unseen_speaker import UnseenSpeaker, choose_closing_reach, widen_range
-from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,
@@ -36,6 +35,44 @@ from lipmotion.types import (
     check_magnitude,
     frame_of,
 )
+
+Array = NDArray[np.float64]
+LARGEST_FACTOR = 2.0
+"""No factor is larger: a dimension that hardly depends on speech would be scaled too far."""
+MIN_DEVIATION = 1e-6
+
+
+def fit_scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Array]) -> Array:
+    """Return the factors by which generated movements are scaled to vary as much as recorded ones [shape=(Q,)].
+
+    recorded, generated : motion of each clip [each shape=(T_i, Q)]; at least one clip
+    A factor is the mean over clips of the recorded standard deviations divided by that of the generated ones, from 1 to
+    ``LARGEST_FACTOR``.
+    """
+    wanted, made = (np.mean([clip.std(axis=0) for clip in clips], axis=0) for clips in (recorded, generated))
+    ratio = wanted / np.maximum(made, MIN_DEVIATION)
+    return np.clip(ratio, 1.0, LARGEST_FACTOR)
+
+
+class VarianceScaling(NamedTuple):
+    """Factors by which movements away from the rest pose are scaled, dimension by dimension.
+
+    factors : from ``fit_scaling_factors`` [shape=(Q,)]
+    rest    : the rest pose [shape=(Q,)]
+    """
+
+    factors: Array
+    rest: Array
+
+    def apply(self, means: Array, precisions: Array) -> tuple[Array, Array]:
+        """Return means and precisions of the scaled movements [each shape=(T, 3, Q)].
+
+        means, precisions : of static value, Δ and Δ² [each shape=(T, 3, Q)]
+        """
+        scaled = means * self.factors
+        scaled[:, 0] += self.rest * (1 - self.factors)
+        return scaled, precisions / (self.factors * self.factors)
+
 
 BLOCK_FRAMES, MARGIN_FRAMES = 6000, 500
 """Frames of a block, and frames before and after it that are generated with it and then dropped: frames that are

@@ -129,7 +129,7 @@ def find_person(model: Model, request: Request) -> SpeakerMap | None:
                 "the name out"
             )
         return person
-    from lipmotion.motion.transfer_map import compose_maps
+    from lipmotion.motion.speaker_maps import compose_maps
 
     onto = load_provided("map_onto")(
         model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request

@@ -21,10 +21,10 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.formats import motion_suffixes
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
+from lipmotion.pipeline.batch import BatchLine, batch, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
-from lipmotion.pipeline.batch.one_line import LineWork, finish_line
+from lipmotion.pipeline.batch.run import LineWork, check_line_job, finish_line
 from lipmotion.pipeline.workers import WorkerDiedError
 from lipmotion.types import Item
 
@@ -147,8 +147,8 @@ def test_what_no_line_could_do_ends_it_before_the_first_line(sounds, settings, t
 def test_silence_can_have_every_form_that_speech_can(settings):
     kinds = tuple(suffix.removeprefix(".") for suffix in motion_suffixes())
     late = Delivery(offset_ms=-5000, stepped=True)
-    one_line.check_line_job(replace(settings, outputs=Outputs(kinds=kinds, articulation=True), delivery=late), "first")
-    one_line.check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)), "second")
+    check_line_job(replace(settings, outputs=Outputs(kinds=kinds, articulation=True), delivery=late), "first")
+    check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)), "second")
 
 
 @pytest.mark.long
@@ -242,7 +242,7 @@ def test_a_bug_that_one_line_meets_does_not_end_the_batch(sounds, settings, tmp_
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division")
 
-    monkeypatch.setattr("lipmotion.pipeline.batch.one_line._write_line", broken)
+    monkeypatch.setattr("lipmotion.pipeline.batch.run._write_line", broken)
     found = batch(sounds, tmp_path / "out", settings, jobs=1)
     assert found.failed == 3
     assert "unexpected ZeroDivisionError: float division" in ledger_rows(tmp_path / "out")[0]["error"]

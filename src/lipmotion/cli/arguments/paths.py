@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from lipmotion.cli.terminal.printing import write_bytes
+from lipmotion.cli.terminal.progress import write_bytes
 from lipmotion.storage.sources import Source, check_apart, is_folder
 
 

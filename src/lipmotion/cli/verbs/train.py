@@ -13,7 +13,7 @@ from lipmotion.pipeline.request import Request
 if TYPE_CHECKING:
     from lipmotion.engines import Engine
     from lipmotion.pipeline.model import Model
-from lipmotion.cli.terminal.printing import print_line
+from lipmotion.cli.terminal.progress import print_line
 
 FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 NONE = "none"

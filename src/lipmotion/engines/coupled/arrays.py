@@ -19,9 +19,9 @@ from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays, motion_to_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from_arrays
-from lipmotion.motion.limits import check_poses, check_rest
 from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
+from lipmotion.motion.space import check_poses, check_rest
 from lipmotion.stats.bigram import check_sums_to_one
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.storage.schema import (

@@ -25,12 +25,10 @@ from lipmotion.engines.coupled.conversion.em_conversion import (
 from lipmotion.engines.coupled.conversion.mean_regression import RegressionInputs, VisualRegression
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
-from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.limits import MotionLimits, measure_limits
+from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
 from lipmotion.motion.predictors import Predictor
-from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.variance_scaling import VarianceScaling
+from lipmotion.motion.space import MotionLimits, MotionSpace, measure_limits
 from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, Speech, option
 from lipmotion.units import UnitSet
 

@@ -31,8 +31,7 @@ from lipmotion.motion.arrays import (
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
-from lipmotion.motion.generation import LearnedMotion, Statistics
-from lipmotion.motion.limits import MotionLimits, check_poses, measure_limits
+from lipmotion.motion.generation import LearnedMotion, Statistics, VarianceScaling, fit_scaling_factors
 from lipmotion.motion.modulation_filter import (
     MODULATION,
     STRENGTH,
@@ -42,8 +41,7 @@ from lipmotion.motion.modulation_filter import (
     learn_filter,
     select_resting_motion,
 )
-from lipmotion.motion.space import MotionSpace, fit_reduced_motion
-from lipmotion.motion.variance_scaling import VarianceScaling, fit_scaling_factors
+from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, fit_reduced_motion, measure_limits
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import arrays_under, format_errors, refuse_undeclared
 from lipmotion.types import (

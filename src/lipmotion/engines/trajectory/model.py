@@ -32,8 +32,7 @@ from lipmotion.motion.context_window import (
     acoustic_context_to_arrays,
 )
 from lipmotion.motion.frame_labels import FullContextState, StateLayout
-from lipmotion.motion.generation import LearnedMotion, Statistics
-from lipmotion.motion.limits import MotionLimits, check_poses, check_spread, measure_limits
+from lipmotion.motion.generation import LearnedMotion, Statistics, VarianceScaling
 from lipmotion.motion.modulation_filter import MODULATION, ModulationFilter, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import (
     ADDED,
@@ -43,8 +42,7 @@ from lipmotion.motion.predictors import (
     predictor_to_arrays,
 )
 from lipmotion.motion.rest import rate_phones
-from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.variance_scaling import VarianceScaling
+from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, check_spread, measure_limits
 from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays, trees_to_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Speech
