@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.storage.media import MAX_PIXELS, bound_allocations, x264_instructions
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.sources import MAX_PIXELS, bound_allocations, x264_instructions
 
 Frame = NDArray[np.uint8]
 ReadFrames = Callable[[int, int], Iterable[Frame]]

@@ -28,9 +28,8 @@ from lipmotion.units import Pronunciation, group_words, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.film.filmed_video import write_film
 from lipmotion_faces.filmed.face import FilmedFace
-from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, read_sound
+from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, SessionPictures, read_sound
 from lipmotion_faces.outputs.scenes import delivered_scene
-from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.folder import ProjectFolder, check_revision, revision_of, summary_of

@@ -18,8 +18,7 @@ from lipmotion.storage.archive import read_archive
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.report.sections import xie_liu_section
 from lipmotion_lab.xie_liu2007 import six_systems, systems
-from lipmotion_lab.xie_liu2007.plots import PLOT_FILES
-from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
+from lipmotion_lab.xie_liu2007.six_systems import PLOT_FILES, ComparisonOptions, xieliu2007
 from lipmotion_lab.xie_liu2007.systems import (
     ALL_PATHS,
     BEST_PATH,

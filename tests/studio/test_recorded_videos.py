@@ -7,7 +7,7 @@ import pytest
 from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion_faces.video.mp4 import write_mp4
-from lipmotion_studio.recorded_videos import MP4, find_real_video, media_type, sound_begins_s, write_playable
+from lipmotion_studio.studio import MP4, find_real_video, media_type, sound_begins_s, write_playable
 from testing.toy import ToySentence
 
 LATE_S = 0.3

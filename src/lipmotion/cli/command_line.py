@@ -14,8 +14,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
+from lipmotion.cli.arguments.declared import check_paths
 from lipmotion.cli.arguments.options import Version
-from lipmotion.cli.arguments.paths import check_paths
 from lipmotion.cli.terminal.events import Events, Stopper
 from lipmotion.cli.terminal.progress import flush_output, print_usage, with_program_name
 from lipmotion.errors import ExportError, LipMotionError

@@ -21,8 +21,7 @@ from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.media import open_media, stated_duration_s, video_streams
-from lipmotion.storage.sources import check_source, sha256_of
+from lipmotion.storage.sources import check_source, open_media, sha256_of, stated_duration_s, video_streams
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance

@@ -18,8 +18,7 @@ from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Mark, Outputs
 from lipmotion.speech.sound.pauses import levels_db_at
-from lipmotion.storage.media import has_video
-from lipmotion.storage.sources import check_source
+from lipmotion.storage.sources import check_source, has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
 from lipmotion.types.progress import with_reports
 from lipmotion_faces.appearance.person import FaceCodes

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from lipmotion.cli.arguments.declared import add_input, add_output
 from lipmotion.cli.arguments.options import add_execution
-from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.progress import print_line
 
 

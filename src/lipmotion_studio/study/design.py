@@ -22,8 +22,7 @@ from lipmotion.pipeline.outputs.output import write
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import atomic_folder
-from lipmotion.storage.media import has_video, open_media
-from lipmotion.storage.sources import read_text_file, sha256_of
+from lipmotion.storage.sources import has_video, open_media, read_text_file, sha256_of
 from lipmotion.types import Audio, Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
 from lipmotion_faces.tracking.footage import read_video_frames

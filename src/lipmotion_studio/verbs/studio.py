@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.cli.arguments.declared import add_input, add_output
 from lipmotion.cli.terminal.progress import flush_output, print_line
 
 

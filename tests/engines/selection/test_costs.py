@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engines.selection.drawn_units import PHONE_S, array, costs_of, inventory, target_of, timeline, with_stress
-from lipmotion.engines.selection import concatenation, search, windows
+from lipmotion.engines.selection import concatenation, windows
 from lipmotion.engines.selection.costs import (
     ABUTTING_JOIN,
     FRACTIONS,
@@ -15,6 +15,7 @@ from lipmotion.engines.selection.costs import (
     Costs,
     SelectionConfig,
     Target,
+    select,
 )
 from lipmotion.types import Span, Timeline, Unit
 
@@ -173,6 +174,6 @@ def test_by_default_units_merge_in_a_vowel_rather_than_abut_behind_a_plosive() -
     units = inventory("s p", "uw n", "s p uw", "uw n")
     costs = costs_of(units, SelectionConfig())
     target = target_of(costs, "s p uw n")
-    pieces = concatenation.pieces_of(costs, target, search.select(costs, target).units)
+    pieces = concatenation.pieces_of(costs, target, select(costs, target).units)
     assert ABUTTING_JOIN not in [piece.join for piece in pieces[1:]]
     assert (pieces[0].unit, pieces[0].stop + (pieces[1].join == JOIN_AFTER)) == (4, 3)

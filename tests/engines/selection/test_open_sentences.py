@@ -11,9 +11,8 @@ import pytest
 
 from engines.selection.drawn_units import costs_of, inventory, recorded, sentence, target_of, with_stress
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
-from lipmotion.engines.selection.costs import ABUTTING_JOIN, MINNIS_2000, SelectionConfig
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, MINNIS_2000, SelectionConfig, select
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import phone_windows
 from lipmotion.types import Timeline, Unit
 

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from engines.selection.conftest import SETTINGS
 from lipmotion import errors, types
 from lipmotion.engines.selection.concatenation import TimeMap, concatenated, pieces_of, shown_units
-from lipmotion.engines.selection.costs import ABUTTING_JOIN, Costs, Target
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, Costs, Target, select
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
 from lipmotion.testing.examples import OPENINGS, example, speech, timeline

@@ -8,11 +8,10 @@ import pytest
 from engines.selection.drawn_units import costs_of, inventory, timeline
 from lipmotion import engines, types
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
-from lipmotion.engines.selection.costs import MINNIS_2000, SelectionConfig, Target
+from lipmotion.engines.selection.costs import MINNIS_2000, SelectionConfig, Target, select
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.engines.selection.windows import TABLE_1, phone_windows
 from lipmotion.testing.examples import examples, speech

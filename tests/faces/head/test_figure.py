@@ -3,10 +3,9 @@ import pytest
 
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.base import rotate_head
-from lipmotion_faces.head.lips import VISIBLE_RINGS
 from lipmotion_faces.head.part import MOUTH_Y, head
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import REST
+from lipmotion_faces.head.skin import REST, VISIBLE_RINGS
 from lipmotion_faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh, mouth_weights
 from meshes.heads import shaped
 

@@ -4,17 +4,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion_faces.head.inside import LOWER_EDGE, lower_drop, lower_teeth, upper_teeth
-from lipmotion_faces.head.lips import (
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.skin import (
     ARCH,
     COLUMNS,
     TEETH_EDGE,
     TEETH_Z,
     VISIBLE_RINGS,
     lip_surface,
+    move_jaw,
     section_points,
 )
-from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import move_jaw
 from lipmotion_faces.head.stage import figure
 
 MEET, FRONT = 4, 15

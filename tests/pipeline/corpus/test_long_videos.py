@@ -25,8 +25,7 @@ from lipmotion_faces.corpus.long_videos import (
     utterance_spans,
 )
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
-from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.video_scan import VideoScan
+from lipmotion_faces.tracking.track import VideoScan, track
 from pipeline.made import replace_tracking
 
 RATE = 16_000

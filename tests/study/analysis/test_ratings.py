@@ -3,11 +3,12 @@ import pytest
 from scipy import stats
 
 from lipmotion_studio.study.analysis.analyse import power_of, raters_needed, rating_power, share_power
-from lipmotion_studio.study.analysis.crossed import Components, crossed_mean
-from lipmotion_studio.study.analysis.ratings import (
+from lipmotion_studio.study.analysis.crossed import (
     RANKS,
     SCALES,
+    Components,
     RatingTable,
+    crossed_mean,
     rating_figures,
     rating_table,
     relative_improvement,

@@ -9,8 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.declared import add_options
-from lipmotion.cli.arguments.paths import add_output, is_pipe
+from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe
 from lipmotion.cli.terminal.progress import outcome, print_lines
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable

@@ -5,9 +5,18 @@ from __future__ import annotations
 import argparse
 import sys
 
-from lipmotion.cli.arguments.declared import OF_ANIMATE, add_job_file, add_options, add_outputs, part_of
+from lipmotion.cli.arguments.declared import (
+    OF_ANIMATE,
+    add_job_file,
+    add_options,
+    add_outputs,
+    add_pipe_format,
+    is_pipe,
+    part_of,
+    read_pipe,
+    write_pipe,
+)
 from lipmotion.cli.arguments.options import add_execution, animate_one_by_one, worker_count
-from lipmotion.cli.arguments.paths import add_pipe_format, is_pipe, read_pipe, write_pipe
 from lipmotion.cli.terminal.progress import print_error
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Outputs, Request

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.paths import add_input
+from lipmotion.cli.arguments.declared import add_input
 from lipmotion.cli.terminal.progress import flush_output, print_line
 from lipmotion.errors import InputError, MissingDependencyError
 

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import StreamGroup
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
-from lipmotion.engines.coupled.chains.model import Chains
+from lipmotion.engines.coupled.chains.model import Chains, VisualStream
 from lipmotion.engines.coupled.chains.product import Grammar, Transitions, reachable
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, Structure
-from lipmotion.engines.coupled.chains.visual_streams import VisualStream
 from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.errors import InputError, ModelFormatError

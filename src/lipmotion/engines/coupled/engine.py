@@ -15,10 +15,9 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
 from lipmotion.engines.coupled.chains.densities import Single, component_posteriors
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
-from lipmotion.engines.coupled.chains.model import Chains, Inference
+from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
-from lipmotion.engines.coupled.chains.visual_streams import VisualStream
 from lipmotion.engines.coupled.conversion.em_conversion import convert, group_index, path_means
 from lipmotion.engines.coupled.conversion.mean_regression import regression_weights
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single
-from lipmotion.engines.coupled.chains.model import Chains, Inference
+from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream, speech_observations
 from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, unit_sets
-from lipmotion.engines.coupled.chains.visual_streams import EIGENLIPS, VisualStream, speech_observations
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     SOFT,

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.concatenation import Chosen, concatenated, motion_of_units, pieces_of
-from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target
+from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import Guide, SelectionModel, at_points, fit_guide
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser

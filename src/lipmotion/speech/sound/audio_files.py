@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.media import open_media, stated_duration_s, video_streams
-from lipmotion.storage.sources import check_source, is_text
+from lipmotion.storage.sources import check_source, is_text, open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio
 
 HOLE_S = 0.04

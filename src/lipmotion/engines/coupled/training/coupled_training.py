@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Fit
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
-from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.structures import HMM, Structure, unit_sets
-from lipmotion.engines.coupled.chains.visual_streams import (
+from lipmotion.engines.coupled.chains.model import (
     EIGENLIPS,
     GEOMETRY,
+    Chains,
     VisualStream,
     fit_visual_streams,
     speech_observations,
 )
+from lipmotion.engines.coupled.chains.structures import HMM, Structure, unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import without_visual_streams
 from lipmotion.engines.coupled.conversion.mean_regression import (
     RegressionInputs,
