@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
+from copy import copy
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -15,7 +17,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.analysis.transcribe import guess_pronunciations
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file
-from lipmotion.pipeline.edits import Step, WordIs, WordSaid, WordStep, parse_step
+from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, parse_step
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
@@ -28,8 +30,9 @@ from lipmotion.units import Pronunciation, group_words, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.film.filmed_video import write_film
 from lipmotion_faces.filmed.face import FilmedFace
-from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, SessionPictures, read_sound
+from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, read_sound
 from lipmotion_faces.outputs.scenes import delivered_scene
+from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.folder import ProjectFolder, check_revision, revision_of, summary_of
@@ -84,6 +87,12 @@ class OpenRecording:
             self._others[key] = OpenRecording(self.file, self.folder, self.number, model, self.audio, onto)
         self._others[key].file = self.file
         return self._others[key]
+
+    def with_edits(self, sentences: Sequence[str]) -> OpenRecording:
+        """Return it with other edits; to be read only. Raises InputError: an edit is refused."""
+        other = copy(self)
+        other.file, other.settled = replace(self.file, edits=Edits().then(*sentences), undone=()), True
+        return other
 
     @property
     def generation(self) -> Generation:

@@ -6,7 +6,6 @@ import logging
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack
-from copy import copy
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from threading import Lock
@@ -21,7 +20,7 @@ from lipmotion.errors import InputError, LipMotionError, shorten
 from lipmotion.extensions import installed_version
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import write_edits
-from lipmotion.pipeline.edits import FORMS, Edits, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, parse_step
+from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, parse_step
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
@@ -408,10 +407,7 @@ class Studio:
         Raises InputError: there is no such version or model, or it cannot make an edit.
         """
         if by not in ("", OTHER):
-            sentences = self.folder.recording(number).version(by).steps
-            other = copy(recording)
-            other.file, other.settled = replace(recording.file, edits=Edits().then(*sentences), undone=()), True
-            return self.vary(number, other, "", face)
+            return self.vary(number, recording.with_edits(self.folder.recording(number).version(by).steps), "", face)
         model = self._model_called(by).model
         onto = self.faces.shown(face).other_person(model, recording.file.named.speaker) if face else None
         return recording if model is self.used.model and onto is None else recording.with_model(model, onto)

@@ -17,13 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.expression import PREFIX
-from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.base import MotionFormat
-from lipmotion.formats.keys import with_jumps
+from lipmotion.errors import InputError
 from lipmotion.formats.steady_rate import choose_columns, exact_rate
-from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, bone_kind, head_angles, head_quaternions
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, VRM_VOWELS, arkit_name, spoken_name
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
+from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, bone_kind, head_angles
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
+from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.types.motion import RADIAN
 from lipmotion_faces.characters.gltf_document import (
@@ -32,10 +30,8 @@ from lipmotion_faces.characters.gltf_document import (
     place_nodes,
     plain_name,
     read_gltf_document,
-    write_container,
 )
 from lipmotion_faces.characters.gltf_scene import name_mesh_targets
-from lipmotion_faces.characters.gltf_writer import GltfBuffer, sound_extras
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
@@ -227,71 +223,3 @@ def _track(arrays: GltfArrays, sampler: dict[str, Any], names: tuple[str, ...], 
     values = arrays.floats(sampler["output"], width, rows * len(times))[:, : width if turns else 1]
     shape = (len(times), 3, len(names)) if kind == CUBIC else (len(times), len(names))
     return _Track(names, times, values.reshape(shape), kind)
-
-
-EXTENSION = "VRMC_vrm_animation"
-BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
-BONES = {"hips": 1.0, "spine": 0.1, "head": 0.5}
-"""The bones, each the parent of the next, and how far above its parent each is, in metres."""
-
-
-def check(motion: Motion) -> None:
-    """Raise ExportError if motion has no vowel, or fewer than two frames."""
-    if not {*VRM_VOWELS} & {*motion.names} or len(motion.values) < 2:
-        raise ExportError("the motion has none of the vowels aa ih ou ee oh, or no two frames; write .json or .csv")
-
-
-def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
-    """Write a binary glTF without a mesh: bones, a node for each expression, and one animation of them."""
-    motion, buffer = generation.motion, GltfBuffer()
-    curves = {name: motion[name].astype(np.float64) for name in (*VRM_VOWELS, *VRM_EMOTIONS) if name in motion.names}
-    if all(name in motion.names for name in BLINKS):
-        left, right = (motion[name].astype(np.float64) for name in BLINKS)
-        same = np.array_equal(left, right)
-        curves |= {"blink": left} if same else {"blinkLeft": left, "blinkRight": right}
-    curves = {name: np.clip(curve, 0, 1) for name, curve in curves.items()}
-    stepped = [bool({*(BLINKS if name.startswith("blink") else (name,))} & {*generation.stepped}) for name in curves]
-    time_s, rows = with_jumps(motion.time_s, np.stack(list(curves.values()), axis=1), stepped)
-    nodes = [
-        {"name": name, "translation": [0.0, up, 0.0], "children": [n + 1]} for n, (name, up) in enumerate(BONES.items())
-    ]
-    del nodes[-1]["children"]
-    samplers: list[dict[str, Any]] = []
-    channels: list[dict[str, Any]] = []
-
-    def add(times: int, values: Array, kind: str, node: int, path: str) -> None:
-        samplers.append({"input": times, "output": buffer.add(values, kind), "interpolation": "LINEAR"})
-        channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
-
-    shared = buffer.add(time_s, "SCALAR", limits=True)
-    preset: dict[str, dict[str, int]] = {}
-    for name, column in zip(curves, rows.T, strict=True):
-        preset[name] = {"node": len(nodes)}
-        add(shared, np.pad(column[:, None], ((0, 0), (0, 2))), "VEC3", len(nodes), "translation")
-        nodes.append({"name": f"expression {name}"})
-    if all(name in motion.names for name in ANGLES):
-        angles = np.stack([motion[name] for name in ANGLES], axis=1).astype(np.float64)
-        frames = shared if len(time_s) == len(angles) else buffer.add(motion.time_s, "SCALAR", limits=True)
-        add(frames, head_quaternions(angles), "VEC4", list(BONES).index("head"), "rotation")
-    bones = {name: {"node": number} for number, name in enumerate(BONES)}
-    scene: dict[str, Any] = {"nodes": [0, *range(len(BONES), len(nodes))]}
-    if source.get("path"):
-        scene["extras"] = sound_extras(source["path"], float(source.get("start_s", 0.0)))
-    document = {
-        "asset": {"version": "2.0", "generator": "lipmotion"},
-        "extensionsUsed": [EXTENSION],
-        "extensions": {
-            EXTENSION: {"specVersion": "1.0", "humanoid": {"humanBones": bones}, "expressions": {"preset": preset}}
-        },
-        "scene": 0,
-        "scenes": [scene],
-        "nodes": nodes,
-        "animations": [{"name": "speech", "channels": channels, "samplers": samplers}],
-        "buffers": [{"byteLength": buffer.size}],
-        "bufferViews": buffer.views,
-        "accessors": buffer.accessors,
-    }
-    write_container(path, document, b"".join(buffer.chunks))
-
-
-MOTION_FORMAT = MotionFormat(write, read_gltf_motion, check, curves="vowels", names_sound=True)

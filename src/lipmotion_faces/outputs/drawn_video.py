@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
-from threading import RLock
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError, InputError
-from lipmotion.kernels.compiler import numba_works, one_thread
+from lipmotion.errors import ExportError
+from lipmotion.kernels.compiler import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
-from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.outputs.deliver import deliver_to_face
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_prosody, shift_prosody
-from lipmotion.pipeline.session import Cache, Session
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_prosody
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline, frame_of
+from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
-from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, DrawsSingly, Face, Picture, Staging
+from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, Face, Staging
 from lipmotion_faces.film.filmed_video import RENDERING
 from lipmotion_faces.portrait import DrawnFace
 from lipmotion_faces.registry import stage_face
@@ -153,56 +148,3 @@ def load_drawing(face: Face) -> None:
     if isinstance(face, DrawnFace) and numba_works():
         closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
         list(face.with_staging(Staging(size=SMALLEST_PX)).render(closed, Timeline(())))
-
-
-class SessionPictures:
-    """Pictures of drawn faces with the motion of a session; what of a face does not move is painted once.
-
-    >>> import lipmotion
-    >>> pictures = lipmotion.SessionPictures(lipmotion.Session("examples/welcome.flac"))
-    >>> pictures.picture(1.2, lipmotion.Edits().then("set size 64")).shape
-    (64, 64, 3)
-    """
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        self._one_at_a_time = RLock()
-        self._cache = Cache()
-
-    def picture(
-        self, time_s: float, edits: Edits | None = None, *, face: str | Face = "portrait", fps: float = DRAWN_HZ
-    ) -> Picture:
-        """Return the picture of a drawn face that is shown at a time in a video [shape as of ``Face.render``].
-
-        edits : of the motion, its delivery and its staging; None: there are none
-        fps   : frames a second of the video
-        Raises InputError: as ``Session.generate``; a time outside the recording, or a face that cannot draw single
-        pictures.
-        """
-        edits = edits or Edits()
-        staging, delivery = edits.staging(), edits.delivery()
-
-        def make_drawing() -> DrawsSingly:
-            drawing = stage_face(face, staging, shift_prosody(self._prosody, delivery))
-            if not isinstance(drawing, DrawsSingly):
-                raise InputError(f"the face {face!r} draws no single pictures; write a video")
-            return drawing
-
-        def draw() -> DrawnMotion[Any]:
-            generation = self._session.generate(edits)
-            prosody = shift_prosody(self._prosody, delivery) if generation.curve_edits else None
-            seen = deliver_to_face(generation, delivery, fps, None, staging, prosody)
-            return self._cache.cached("face", (face, staging, delivery), make_drawing).draw(
-                seen.motion, seen.units, fps=fps
-            )
-
-        with self._one_at_a_time, one_thread():
-            pictures = self._cache.cached("drawn", (edits.steps, face, fps, self._session.is_sketching), draw)
-            frame = frame_of(time_s, len(pictures), fps)
-            if frame is None:
-                raise InputError(f"{time_s} s lies outside the video (0 to {(len(pictures) - 1) / fps:.2f} s)")
-            return pictures.picture(frame)
-
-    @cached_property
-    def _prosody(self) -> Prosody:
-        return measure_prosody(read_sound(self._session.request.recording))
