@@ -68,7 +68,6 @@ class FrameGroups:
         self._groups[group] = list(self._read(self._starts[group], self._starts[group + 1]))
 
     def _largest(self) -> int:
-        """Return the bytes of the largest group that is kept."""
         return max(sum(frame.nbytes for frame in group) for group in self._groups.values())
 
 

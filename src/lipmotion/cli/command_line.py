@@ -194,8 +194,7 @@ class WrongCommandLineError(LipMotionError):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Raises an error for a wrong command line, as one line that says where help is; reports help that cannot be
-    printed."""
+    """Raises an error for a wrong command line, as one line that says where help is; reports help it cannot print."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)

@@ -1,6 +1,4 @@
-"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``,
-Whisper's table of lines (``.tsv``), and lyrics (``.lrc``).
-"""
+"""Subtitles: SubRip, WebVTT, SubStation Alpha, YouTube's ``.sbv``, Whisper's table of lines, and lyrics."""
 
 from __future__ import annotations
 

@@ -13,8 +13,7 @@ from lipmotion.stats.pca import find_principal_axes
 from lipmotion.storage.schema import LARGEST_MEAN, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
-"""Frames whose features are used, relative to the frame whose motion is predicted: up to 240 ms before and after it,
-denser near it."""
+"""Frames whose features are used, relative to the predicted one: up to 240 ms before and after, denser near it."""
 SCALE = 12.0
 """Root mean square length of a reduced feature vector: ridge parameters are relative to it."""
 MIN_DEVIATION = 1e-3
@@ -41,10 +40,7 @@ class AcousticContext:
     basis: NDArray[np.float32]
 
     def __call__(self, features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:
-        """Return the reduced features around some frames of a recording [shape=(N, F)].
-
-        features : of the whole recording [shape=(T, D)]; beyond its ends, the first and last frame are repeated
-        """
+        """Return the reduced features around some frames of a recording [shape=(N, F)]; beyond its ends they repeat."""
         inputs = (_stack(features, frames) - self.mean) / self.scale
         return np.asarray(inputs @ self.basis, np.float32)
 

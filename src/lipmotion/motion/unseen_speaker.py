@@ -30,11 +30,9 @@ SOUND_SHARES = (0.75, 0.35)
 """Share of the motion that the general network hears, after all that is done for such a voice, where training knows it
 half or less: where phones cannot be relied on at all, and where they can (docs/results/voices.md)."""
 NOISY_SHARE = 0.3
-"""The same of a voice that training knows, where noise makes its phones unreliable; it has none where they can be
-relied on."""
+"""The same of a voice that training knows, where noise makes its phones unreliable; none where they are reliable."""
 CONFIRMED = -0.5
-"""A p, b or m that cannot be relied on closes the lips where the general network hears them less open than this, in
-standard deviations."""
+"""An unreliable p, b or m closes the lips where the general network hears them less open than so many deviations."""
 NEAR_FRAMES = 20
 """Frames before and after speech in which that holds: elsewhere the mouth rests."""
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5

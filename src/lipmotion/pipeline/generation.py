@@ -359,7 +359,6 @@ def _join_rows(
 
 
 def _join_traces(parts: Sequence[SpeechPart], made: Sequence[Generation], rest: Generation, frames: int) -> StateTrace:
-    """Return the states of all passages in their places, and that of rest between them."""
     states = tuple(dict.fromkeys(state for each in (rest, *made) for state in each.trace.states))
     number = {state: n for n, state in enumerate(states)}
     trace = np.full(frames, number[rest.trace.states[rest.trace.frames[REST_FRAMES // 2]]], np.intp)

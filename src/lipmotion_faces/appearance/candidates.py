@@ -299,9 +299,7 @@ class Refiner:
             )
 
     def refine(self, coefficients: Levels) -> Pictures:
-        """Return the pictures [shape=(T, H, W, 3)] at eigenlips [shape=(T, 3·K)] of a video. Raises InputError: as
-        ``choose``.
-        """
+        """Return the pictures [shape=(T, H, W, 3)] at eigenlips [shape=(T, 3·K)]. Raises InputError: as ``choose``."""
         return self.pictures(coefficients, self.choose(coefficients))
 
     def choose(self, coefficients: Levels) -> Index:

@@ -154,7 +154,6 @@ class EyePainter:
 
 
 def _lid_edges(design: Design, lids: LidPose) -> tuple[Knots, Knots]:
-    """Return the edges of the upper and the lower lid of the right eye."""
     shut, (wide, squint, slant, *_) = lids.shut / LID_POSITIONS, (steps / MOOD_LIDS for steps in lids[1:])
     upper, lower = design.eyes.upper, design.eyes.lower
     if lids[1:] != (0,) * len(lids[1:]):  # the corners stay

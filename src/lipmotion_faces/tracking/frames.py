@@ -150,7 +150,6 @@ def _pictures_from(container: Any, stream: Any, first_s: float, damage: list[str
 
 
 def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
-    """Yield the pictures that are not damaged."""
     import av
 
     packets = container.demux(stream)

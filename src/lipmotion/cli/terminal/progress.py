@@ -246,8 +246,7 @@ def outcome(error: BaseException) -> tuple[int, str] | None:
 
 
 def one_line(message: object) -> str:
-    """Return a message as a printable line of limited length; the middle of a longer one is left out, for its end says
-    what to do."""
+    """Return a message as a printable line of limited length; of a longer one, the middle is left out."""
     line = printable(message)
     return (
         line

@@ -78,7 +78,6 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _open_sound(options: argparse.Namespace) -> tuple[int, Iterator[Any]]:
-    """Return the rate of the sound, and its pieces, as they come."""
     from lipmotion.speech.sound.audio_files import read_audio
 
     if options.input == "-":

@@ -194,7 +194,6 @@ def _most_probable(names: Sequence[str], probability: NDArray[np.floating]) -> t
 
 
 def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:
-    """Return the Gaussian of a stream with the largest posterior in a frame."""
     chains = model.chains
     number = group_index(chains, stream)
     group, responsibilities = chains.groups[number], inference.emissions.responsibilities[number]
@@ -272,9 +271,7 @@ def _regression_name(structure: Structure, chain: int, regression_of_state: NDAr
 def _channel_values(
     model: CoupledModel, stream: VisualStream, means: Array, variances: Array
 ) -> Mapping[str, ChannelValue]:
-    """Return the values and standard deviations of the channels of a stream, by name, from its means and variances
-    [shape=(q,)].
-    """
+    """Return values and standard deviations of the channels of a stream, by name, from means and variances."""
     space = model.space
     values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)
     values[:, stream.columns], variance[:, stream.columns] = means, variances

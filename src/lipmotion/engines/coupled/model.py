@@ -262,9 +262,7 @@ class CoupledModel:
         return self.regression[0](inference.observations.streams[0], inference.posteriors.chains[0])
 
     def is_away_from_speech(self, posterior: Single) -> NDArray[np.bool_]:
-        """Return whether each frame is silence away from speech, by posteriors of the first chain [shapes=(T,), (T,
-        N)].
-        """
+        """Return whether each frame is silence away from speech [shape=(T,)], by posteriors of the first chain."""
         structure = self.chains.structure
         silent = np.repeat([structure.chains[0].silent(unit) for unit in structure.units[0]], structure.states)
         speech = posterior @ (~silent).astype(np.float32) > LARGEST_SPEECH_POSTERIOR

@@ -244,9 +244,7 @@ class JointEngine(Engine[JointModel]):
         return Fit(self._with_filter(model, examples), {"frames": frames, **figures})
 
     def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
-        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``. Raises
-        as that.
-        """
+        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``."""
         learning = self._learning(self._with_channels(examples))
         classes = learning.units.classes()
         for hmm in grow_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor):
@@ -361,7 +359,6 @@ class JointEngine(Engine[JointModel]):
     def _recognised(
         self, model: JointModel, observations: StreamObservations, duration_s: float
     ) -> tuple[Timeline[Unit], StatePath]:
-        """Return the recognised units in time, and the state sequence from which motion is generated."""
         segments = joint_recogniser(model.hmm).recognise(observations)
         units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
         bounds = np.array([*(segment.first for segment in segments), observations.frames])

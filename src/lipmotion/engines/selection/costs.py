@@ -152,8 +152,7 @@ PER_S = 10.0
 """Costs of the guide are given for a tenth of a second."""
 LEAST_S = 0.01
 ABUTTING_JOIN, JOIN_BEFORE, JOIN_AFTER, NO_JOIN = 0, 1, 2, 3
-"""Kinds of a join: units abut; they overlap in the phone before it; in the phone after it; they were recorded in
-succession, so that nothing is joined."""
+"""Kinds of a join: units abut, overlap in the phone before or after it, or were recorded in succession."""
 _CONSONANTS = frozenset(PHONES) - frozenset(CLASSES["vowel"]) - frozenset(CLASSES["silence"])
 
 
@@ -250,18 +249,14 @@ class Costs:
         return costs
 
     def join_costs(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> Array:
-        """Return the costs of joining units of one phone with those of phone ``number`` [shape=(len(left),
-        len(right))].
-        """
+        """Return the costs of joining units of one phone with those of phone ``number`` [shape=(left, right)]."""
         costs = np.minimum.reduce(self._joins(target, number, left, right))
         np.minimum(costs, self.config.most, out=costs)
         costs[self._succeed(left, right)] = 0
         return costs
 
     def join_kind(self, target: Target, number: int, left: int, right: int, *, may_be_before: bool = True) -> int:
-        """Return how a unit is joined with that of phone ``number``; ``may_be_before``: they may overlap in the phone
-        before.
-        """
+        """Return how a unit is joined with that of phone ``number``; ``may_be_before``: in the phone before."""
         pair = np.array([left]), np.array([right])
         if self._succeed(*pair)[0, 0]:
             return NO_JOIN if self.inventory.windows.adjoins[left] else ABUTTING_JOIN

@@ -123,9 +123,7 @@ def fit_selection(
 
 
 def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
-    """Return the inventory of some examples, from motion in the motion space. Raises CorpusError: no phone was measured
-    whole.
-    """
+    """Return the inventory of some examples, from reduced motion. Raises CorpusError: no phone was measured whole."""
     timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
     windows = phone_windows(timelines)
     first = np.concatenate([[0], np.cumsum([len(x) for x in values])]).astype(np.intp)

@@ -329,9 +329,7 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
 def model_from_arrays(
     arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str, *, filtered: bool
 ) -> TrajectoryModel:
-    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: an array is missing or
-    wrong.
-    """
+    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: a missing or wrong array."""
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
         others = list_predictor_arrays(arrays)

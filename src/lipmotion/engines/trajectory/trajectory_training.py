@@ -236,11 +236,7 @@ def _share_of_predictor(
     layout: StateLayout,
     direct: int,
 ) -> float:
-    """Return the weight of a predictor beside the states, by cross-validation: 0 to 1.
-
-    direct      : number of channels that are modelled as they are; the weight is chosen for them
-    The states are trained on the same folds. With a single clip, the predictor has all the weight.
-    """
+    """Return the weight of a predictor beside the states, by cross-validation over the same folds: 0 to 1."""
     if len(clips) < 2:
         return 1.0
     products = squares = 0.0

@@ -178,7 +178,6 @@ def _write_line(work: LineWork) -> Generation:
 
 
 def _describe_motion(generation: Generation) -> Record:
-    """Return what the report says of generated motion."""
     outlook, motion, confidence = generation.outlook, generation.motion, generation.confidence
     record: Record = {"duration_s": round(max(len(motion.values) - 1, 0) / motion.rate_hz, 3)}
     record["heard"] = " ".join(word.label for word in group_words(generation.units) if word.label)

@@ -202,7 +202,6 @@ def known_names(mesh: Mesh) -> dict[str, str]:
 def _make_set(
     motion: Motion, units: Timeline[Unit], name: str, staging: Staging | None, prosody: Prosody | None
 ) -> Motion:
-    """Return the curves of one of ``SHAPE_SETS``."""
     if name == ARKIT:
         return solve_shape_weights(motion, units, arkit_mouth())
     motion = with_mouth(motion)

@@ -399,10 +399,7 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
 
 
 def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return samples without a constant offset, which would make pauses as loud as speech; digital silence stays.
-
-    It is that of the quietest sound between digital silences, and taken off where it is most of what is heard there.
-    """
+    """Return samples without the offset of their quietest sound, where that is most of it; digital silence stays."""
     count = len(samples) // HOP if samples.ndim == 1 else 0
     sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
     for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():

@@ -21,9 +21,7 @@ MOST_ARCS = 200_000
 
 
 class JointState(NamedTuple):
-    """The unit of each chain, its state within the unit, and whether it has left the unit that others are in
-    (``ahead``).
-    """
+    """The unit of each chain, its state within the unit, and whether it has left the unit of the others (``ahead``)."""
 
     units: tuple[int, ...]
     states: tuple[int, ...]
@@ -341,9 +339,7 @@ class Transitions:
         return current
 
     def tied(self, frames: NDArray[Any]) -> Transitions:
-        """Return the transitions with one shared row for joint states, of an own state and asynchrony, with few frames
-        [shape=(S,)].
-        """
+        """Return the transitions with one shared row for joint states, of one state and asynchrony, of few frames."""
         rows, advance = [], []
         for chain, own in enumerate(self.rows):
             blocks = self.advance[chain].reshape(self._blocks(chain), -1)
@@ -376,9 +372,7 @@ class Transitions:
         return np.clip(share, LEAST_ADVANCE, 1 - LEAST_ADVANCE)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
-        """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs
-        [shape=(E,)].
-        """
+        """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs."""
         row, moves = self._arc_rows(chain), self.product.moves[chain]
         size = len(self.advance[chain])
         entries = []
@@ -395,9 +389,7 @@ class Transitions:
 
 
 def initial_transitions(product: Product) -> Transitions:
-    """Return the transitions before training: in tables of coupled chains each joint state has a row of its own; in
-    those of other chains each state of the chain has one.
-    """
+    """Return untrained transitions, in coupled chains with a row for each joint state, in others for each state."""
     coupled = product.structure.kind == COUPLED
     own = np.arange(len(product.joint_states))
     rows = [own if coupled else states for states in product.chain_states]

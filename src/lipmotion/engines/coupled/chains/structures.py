@@ -132,9 +132,7 @@ class Structure:
 
 
 def unit_sets(names: str) -> tuple[UnitSet, ...]:
-    """Return the unit sets named, or read from files, in a text with blanks between. Raises InputError: none, or no
-    such set.
-    """
+    """Return the unit sets named, or read from files, in a text. Raises InputError: none, or no such set."""
     sets = tuple(load_unit_set(name) for name in names.split())
     if not sets:
         raise InputError("no chains were given; required the unit set of each, as in 'phone viseme'")

@@ -154,9 +154,7 @@ def _printed_statistics(chains: Chains, inference: Inference, stream: int) -> tu
 def _weighted_precisions(
     group: StreamGroup, stream: int, densities: NDArray[np.intp], weight: Single
 ) -> tuple[Array, Array]:
-    """Return the sums of weighted [shape=(T, M, G')] precisions, and of these times means, of a stream [each shape=(T,
-    D)].
-    """
+    """Return the sums of weighted precisions, and of these times means, of a stream [each shape=(T, D)]."""
     mixtures = group.stream_mixtures(stream).select(densities)
     precision = (1 / mixtures.variances).transpose(1, 0, 2)
     weighted = precision * mixtures.means.transpose(1, 0, 2)

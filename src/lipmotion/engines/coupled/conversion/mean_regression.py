@@ -55,9 +55,7 @@ class RegressionInputs:
     basis: Single
 
     def __call__(self, features: Single, posterior: Single) -> Single:
-        """Return the regression inputs [shape=(T, F + 1)], constant last, of features [shape=(T, 39)] and posteriors
-        [shape=(T, N)].
-        """
+        """Return the regression inputs [shape=(T, F + 1)], constant last, of features and posteriors [shape=(T, N)]."""
         return self._projected(_context(self.acoustic, features, posterior @ self.posterior_basis))
 
     def observed_frames(self, utterance: RegressionUtterance) -> Single:
@@ -84,9 +82,7 @@ class VisualRegression:
     variances: Single
 
     def means(self, inputs: Single, posterior: Single) -> Array:
-        """Return the expected means [shape=(T, D)] for regression inputs [shape=(T, F + 1)] and posteriors [shape=(T,
-        N_v)].
-        """
+        """Return the expected means [shape=(T, D)] for regression inputs and posteriors [shape=(T, N_v)]."""
         weights = regression_weights(posterior, self.regression_of_state, len(self.coefficients))
         means = np.zeros((len(inputs), self.coefficients.shape[2]))
         for weight, matrix in zip(weights.T, self.coefficients, strict=True):
@@ -100,9 +96,7 @@ class VisualRegression:
 
 
 def regression_weights(posterior: Single, regression_of_state: NDArray[np.intp], count: int) -> Single:
-    """Return the weight of each regression [shape=(T, count)], rows summing to 1, by posteriors of states [shape=(T,
-    N)].
-    """
+    """Return the weight of each regression [shape=(T, count)], rows summing to 1, by posteriors of states."""
     weight = posterior @ np.eye(count, dtype=np.float32)[regression_of_state]
     weight[weight < LEAST_WEIGHT] = 0
     return weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
@@ -127,9 +121,7 @@ class RegressionUtterance:
 
 
 def posterior_axes(posteriors: Iterable[Single]) -> Single:
-    """Return the principal axes of posteriors [each shape=(T, N)] as columns [shape=(N, R)]. Raises CorpusError: no
-    posteriors.
-    """
+    """Return the principal axes of posteriors as columns [shape=(N, R)]. Raises CorpusError: no posteriors."""
     total: Array | None = None
     for posterior in posteriors:
         products = (posterior.T @ posterior).astype(float)

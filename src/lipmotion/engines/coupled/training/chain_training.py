@@ -177,9 +177,7 @@ def _reestimated_along(
 def _with_borrowed_densities(
     group: StreamGroup, learned: NDArray[np.bool_], structure: Structure, chain: int
 ) -> StreamGroup:
-    """Return the group in which states without data have the densities of the most similar unit (``learned``
-    [shape=(G,)]).
-    """
+    """Return the group in which states that were not ``learned`` have the densities of the most similar unit."""
     units, unit_set = structure.units[chain], structure.chains[chain]
     source = np.arange(len(learned))
     for state in np.flatnonzero(~learned):

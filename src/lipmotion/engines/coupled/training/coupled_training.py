@@ -134,9 +134,7 @@ def fit_coupled(
 def growing_models(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor, work: Checkpoint = THREADS
 ) -> Iterator[Callable[[], Fit[CoupledModel]]]:
-    """Yield functions that return the models of 1, 2, 4, … Gaussians on the way to that of ``fit_coupled``. Raises as
-    that.
-    """
+    """Yield functions that return the models of 1, 2, 4, … Gaussians on the way to that of ``fit_coupled``."""
     structure = config.structure_with(unit_sets(config.chains))
     moving = [example for example in examples if mark_known_dynamics(example.valid).any()]
     space, values = fit_reduced_motion(moving or examples, config.components)

@@ -193,7 +193,6 @@ def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map
 
 
 def _placed(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
-    """Yield what is found in a passage, in its own frames of the recording."""
     for (first, end), posteriors in found:
         start, stop = max(passage.first + first, passage.own.start), min(passage.first + end, passage.own.stop)
         skipped = -(-(start - passage.first - first) // POSTERIOR_STEP)
