@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.shape_names import arkit_name, is_known
-from lipmotion.motion.rest import find_runs
+from lipmotion.motion.frame_labels import find_runs
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion.types.motion import RADIAN
 

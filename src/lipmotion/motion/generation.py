@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior, unseen_share
+from lipmotion.motion.articulation import (
+    ArticulationPrior,
+    UnseenSpeaker,
+    choose_closing_reach,
+    fit_articulation_prior,
+    unseen_share,
+    widen_range,
+)
 from lipmotion.motion.closure import (
     Closure,
     choose_closed_frames,
@@ -21,7 +28,6 @@ from lipmotion.motion.closure import (
 )
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionLimits, MotionSpace, fit_reduced_motion, measure_limits
-from lipmotion.motion.unseen_speaker import UnseenSpeaker, choose_closing_reach, widen_range
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,
@@ -136,7 +142,7 @@ class LearnedMotion:
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
         Voices that training does not know part their lips to speak and have typical talkers' range; they, and known
-        ones in noise, follow what the general network hears (``motion.unseen_speaker``).
+        ones in noise, follow what the general network hears (``motion.articulation``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals
+from lipmotion.motion.frame_labels import find_runs, is_away_from_speech, list_speech_intervals
 from lipmotion.stats.curves import measure_modulation_spectrum
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Rule

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, estimate_closed_opening, find_closable_ranges
-from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
+from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion, Timeline, Unit
 from lipmotion.units import VISEME_OF, VISEMES

@@ -17,10 +17,10 @@ from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
+from lipmotion.motion.frame_labels import find_runs, is_away_from_speech, list_speech_intervals, rate_phones
 from lipmotion.motion.generation import fit_motion
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import PredictorTraining, choose_predictor, load_predictor
-from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals, rate_phones
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.archive import Checkpoint

@@ -31,7 +31,7 @@ from lipmotion.motion.context_window import (
     acoustic_context_from_arrays,
     acoustic_context_to_arrays,
 )
-from lipmotion.motion.frame_labels import FullContextState, StateLayout
+from lipmotion.motion.frame_labels import FullContextState, StateLayout, rate_phones
 from lipmotion.motion.generation import LearnedMotion, Statistics, VarianceScaling
 from lipmotion.motion.modulation_filter import MODULATION, ModulationFilter, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import (
@@ -41,7 +41,6 @@ from lipmotion.motion.predictors import (
     predictor_from_arrays,
     predictor_to_arrays,
 )
-from lipmotion.motion.rest import rate_phones
 from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, check_spread, measure_limits
 from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays, trees_to_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared

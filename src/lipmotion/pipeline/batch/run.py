@@ -24,7 +24,7 @@ from lipmotion.extensions import describe_failed_extension, load_provided
 from lipmotion.formats.base import motion_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, find_closable_ranges
-from lipmotion.motion.rest import list_speech_intervals
+from lipmotion.motion.frame_labels import list_speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.batch.ledger import (

@@ -51,10 +51,10 @@ from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
+from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.generation import fit_scaling_factors
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import Predictor, PredictorTraining, load_predictor
-from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.curves import mark_known_dynamics
 from lipmotion.stats.em import EmResult
