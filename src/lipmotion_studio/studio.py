@@ -34,7 +34,7 @@ from lipmotion.types.delivery import MANNERS, MOODS, Delivery, Staging
 from lipmotion.units import PHONES, is_silent, split_words
 from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound
-from lipmotion_faces.tracking.footage import read_video_frames
+from lipmotion_faces.tracking.track import read_video_frames
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revision, revision_of
 from lipmotion_studio.meshes import Faces

@@ -7,9 +7,8 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion_faces.tracking import track as video_scan
-from lipmotion_faces.tracking.footage import footage_frames, footage_groups, read_video_frames, track_footage
 from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.track import footage_frames, footage_groups, read_video_frames, track, track_footage
 from vision.scripted import Opened, face
 from vision.variants import write_frames
 

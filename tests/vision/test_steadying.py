@@ -6,9 +6,9 @@ import pytest
 
 from lipmotion.types import Motion, Track
 from lipmotion_faces.tracking import steadying
-from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE
 from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
+from lipmotion_faces.tracking.track import Footage
 
 STILL = np.array([[0.8, 0, 100], [0, 0.8, 60]])
 MOUTH = np.array([0.0, 76.0, 1.0])

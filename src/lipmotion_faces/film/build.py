@@ -29,9 +29,8 @@ from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import best_background, chin_px
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
-from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
 from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.tracking.track import UNSEEN_LIMIT
+from lipmotion_faces.tracking.track import UNSEEN_LIMIT, Footage, footage_frames, track_footage
 
 MOST_FOOTAGE_S = 240.0
 """Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""

@@ -26,7 +26,7 @@ from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import open_background, open_stored_background
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, BATCH, STITCHING, Stitcher
-from lipmotion_faces.tracking.footage import read_video_frames
+from lipmotion_faces.tracking.track import read_video_frames
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_faces.video.synthetic_mark import mark_frames, mark_metadata
 

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.training import em_steps
+from lipmotion.engines.coupled.training import chain_training as em_steps
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream import multistream_training
 from lipmotion.pipeline import workers

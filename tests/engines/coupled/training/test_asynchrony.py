@@ -11,8 +11,7 @@ from lipmotion.engines.coupled.chains import densities, model
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, MULTISTREAM, Structure
 from lipmotion.engines.coupled.conversion.em_conversion import EXACT, VITERBI, ConversionSettings, convert
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
-from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, growing_chains
-from lipmotion.engines.coupled.training.em_steps import lattice_utterance
+from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, growing_chains, lattice_utterance
 from lipmotion.measures.curves import pooled_correlation
 from lipmotion.types import Span, Timeline, Unit
 

@@ -11,7 +11,8 @@ from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
-from lipmotion.engines.coupled.training import alignment, coupled_training, em_steps
+from lipmotion.engines.coupled.training import alignment, coupled_training
+from lipmotion.engines.coupled.training import chain_training as em_steps
 from lipmotion.engines.coupled.training.chain_training import CONVERGENCE_GAIN, MixtureSchedule, growing_chains
 from lipmotion.testing.examples import examples
 from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit, silent_monitor

@@ -11,7 +11,7 @@ from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import Structure, unit_sets
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
-from lipmotion.engines.coupled.training import chain_training, em_steps
+from lipmotion.engines.coupled.training import chain_training
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.coupled_training import train_on_speech
 from lipmotion.stats.mixture import Mixtures
@@ -80,7 +80,7 @@ def speech_posteriors(chains: Chains, one: AlignedUtterance) -> np.ndarray:
 
     Its states are the joint ones, its emissions those of speech, its moves the coupled ones.
     """
-    lattice, mixtures = em_steps.lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
+    lattice, mixtures = chain_training.lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
     x, product = one.observations.streams[0], chains.transitions.product
     log = np.full((len(x), len(mixtures.means)), -np.inf)
     for frame, density in np.ndindex(log.shape):
@@ -125,7 +125,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
     other = replace(own, observations=own.observations.without_stream(1))
     found = train_on_speech(chains, [own], [other], second_stage(2, 1, 49.0)).groups[0].mixtures
     gamma, x = 50 * speech_posteriors(chains, own), own.observations.streams[0]
-    before, (floor, _) = chains.groups[0].mixtures, em_steps.variance_floors([own.observations])
+    before, (floor, _) = chains.groups[0].mixtures, chain_training.variance_floors([own.observations])
     visited = np.flatnonzero(gamma.sum(axis=0) >= 3)
     assert len(visited) >= 3
     for density in visited:
@@ -166,8 +166,8 @@ def test_visual_densities_and_transitions_stay(kind: str) -> None:
 
 def test_a_weight_is_how_often_an_utterance_counts() -> None:
     chains, (one,) = trained(), aligned(examples(1))
-    twice = em_steps.e_step(chains, [em_steps.lattice_utterance(chains, one)] * 2)
-    heavy = em_steps.e_step(chains, [em_steps.lattice_utterance(chains, one, 2.0)])
+    twice = chain_training.e_step(chains, [chain_training.lattice_utterance(chains, one)] * 2)
+    heavy = chain_training.e_step(chains, [chain_training.lattice_utterance(chains, one, 2.0)])
     assert heavy.frames == twice.frames
     assert heavy.log_likelihood == pytest.approx(twice.log_likelihood)
     assert heavy.transition_counts == pytest.approx(twice.transition_counts, abs=1e-5)

@@ -37,16 +37,18 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
 from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.chain_training import (
+    ChainStatistics,
     MixtureSchedule,
     Report,
     TrainingStep,
     component_counts,
     growing_chains,
+    lattice_utterance,
     no_report,
     train_to_convergence,
+    variance_floors,
     with_split_components,
 )
-from lipmotion.engines.coupled.training.em_steps import ChainStatistics, lattice_utterance, variance_floors
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import fit_articulation_prior
