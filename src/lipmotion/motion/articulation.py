@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 Context = tuple[str, str, str]
 """The phone before, the phone, and the phone after."""
 Statistics = tuple[Array, Array]
+"""Means and precisions of successive frames [each shape=(T, 3, Q)], or values and variances [each shape=(T, Q)]."""
+Predict = Callable[[slice], Statistics]
 ARTICULATORS = ("opening", "width", "outer", "jaw", "upper_lip", "lower_lip", "protrusion", "inner_width")
 """The columns of the table (docs/articulation.md)."""
 TYPICAL_DEVIATIONS = (0.054, 0.051, 0.055, 0.047, 0.023, 0.032, 0.009, 0.041)
@@ -95,13 +97,8 @@ class ArticulationPrior:
         return smooth_steps(steps)[:, 0]
 
     def blend(
-        self,
-        statistics: Callable[[slice], Statistics],
-        units: Timeline[Unit],
-        frames: int,
-        reliability: Array | float,
-        voice: float = 1.0,
-    ) -> Callable[[slice], Statistics]:
+        self, statistics: Predict, units: Timeline[Unit], frames: int, reliability: Array | float, voice: float = 1.0
+    ) -> Predict:
         """Return means and precisions of ranges of frames, drawn towards the table where training saw little.
 
         statistics  : returns those of a model
@@ -114,12 +111,17 @@ class ArticulationPrior:
         of_voice = self.known_voice_share + unseen_share(voice) * (1 - self.known_voice_share)
         weight = of_voice * self.weight * (np.asarray(reliability) * unknown) ** POWER
         share = (weight / (1 + weight))[:, None, None]
+        return draw_towards(values, share, statistics)
 
-        def predict(chosen: slice) -> Statistics:
-            means, precisions = statistics(chosen)
-            return means + share[chosen] * (slice_dynamics(values, chosen) - means), precisions
 
-        return predict
+def draw_towards(values: Array, share: Array, statistics: Predict) -> Predict:
+    """Return a function that draws the means of ``statistics`` towards values [shape=(T, Q)], by a share of frames."""
+
+    def predict(chosen: slice) -> Statistics:
+        means, precisions = statistics(chosen)
+        return means + share[chosen] * (slice_dynamics(values, chosen) - means), precisions
+
+    return predict
 
 
 def slice_dynamics(values: Array, frames: slice) -> Array:
@@ -316,7 +318,6 @@ _MEASURES: dict[str, tuple[tuple[str, ...], Callable[[_Channel], Array]]] = {
 """Points that an articulator is measured on, and how: y is up, z out of the face, the nose does not move."""
 
 
-Predict = Callable[[slice], Statistics]
 SOUND_SHARES = (0.75, 0.35)
 """Share of the motion that the general network hears, after all that is done for such a voice, where training knows it
 half or less: where phones cannot be relied on at all, and where they can (docs/results/voices.md)."""
@@ -378,12 +379,7 @@ class UnseenSpeaker:
         share = strange * (unsure + reliability * (sure - unsure)) + (1 - strange) * NOISY_SHARE * (1 - reliability)
         share = share * smooth_steps(spoken)[:, :, None]
         heard = self.prior.centre + articulators @ self.prior.matrix
-
-        def predict(chosen: slice) -> Statistics:
-            means, precisions = statistics(chosen)
-            return means + share[chosen] * (slice_dynamics(heard, chosen) - means), precisions
-
-        return predict
+        return draw_towards(heard, share, statistics)
 
     def confirm_closures(self, ranges: Sequence[slice], articulators: Array) -> list[slice]:
         """Return the ranges of frames in which a p, b or m can be relied on, or the general network hears one.
@@ -430,13 +426,7 @@ class UnseenSpeaker:
         sure = min(sum(self.prior.contexts.values()) / SURE_PHONES, 1)
         strange = max(2 * np.sqrt(self.voice), 1.0) * unseen_share(self.voice) * sure
         share = strange * np.broadcast_to(self.reliability, self.frames)[:, None] * smooth_steps(before)
-        pose = np.stack([self.prior.centre, *np.zeros((2, len(self.prior.centre)))])
-
-        def predict(chosen: slice) -> Statistics:
-            means, precisions = statistics(chosen)
-            return means + share[chosen, :, None] * (pose - means), precisions
-
-        return predict
+        return draw_towards(np.tile(self.prior.centre, (self.frames, 1)), share[:, :, None], statistics)
 
 
 def choose_closing_reach(voice: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -13,6 +13,8 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import (
     ArticulationPrior,
+    Predict,
+    Statistics,
     UnseenSpeaker,
     choose_closing_reach,
     fit_articulation_prior,
@@ -88,8 +90,6 @@ DOUBLE_FRAMES = 60_000
 
 Pins = dict[tuple[int, int], float]
 """Pinned values by frame and dimension of the motion space."""
-Statistics = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Means and precisions of successive frames [each shape=(T, 3, Q)], or values and variances [each shape=(T, Q)]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ class LearnedMotion:
 
     def generate(  # noqa: PLR0913
         self,
-        statistics: Callable[[slice], Statistics],
+        statistics: Predict,
         frames: int,
         units: Timeline[Unit],
         constraints: Constraints | None = None,
@@ -236,14 +236,14 @@ def bend_through_pins(values: NDArray[np.float64], pins: Sequence[tuple[int, int
         values[frame, column] = value
 
 
-def find_pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
-    """Return the frame of a pin in motion. Raises InputError: a time outside of it, or a value that is not possible."""
+def find_pinned_frame(pin: Pin, frames: int, rate_hz: float = FRAME_RATE_HZ, *, is_weight: bool = False) -> int:
+    """Return the frame of a pin. Raises InputError: a time outside of the frames, or a value that is not possible."""
     if not np.isfinite(pin.value) or (is_weight and not 0 <= pin.value <= 1):
         required = "0 to 1" if is_weight else "a finite number"
         raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required {required}")
-    frame = frame_of(pin.time_s, len(motion.values), motion.rate_hz)
+    frame = frame_of(pin.time_s, frames, rate_hz)
     if frame is None:
-        last_s = (len(motion.values) - 1) / motion.rate_hz
+        last_s = (frames - 1) / rate_hz
         raise InputError(f"pin at {pin.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
     return frame
 
@@ -261,12 +261,7 @@ def resolve_pins(constraints: Constraints | None, space: MotionSpace, frames: in
             raise InputError(
                 f"cannot pin {shorten(repr(pin.channel))}; channels that can be pinned: {', '.join(names)}"
             )
-        frame = frame_of(pin.time_s, frames, FRAME_RATE_HZ)
-        if frame is None:
-            last_s = (frames - 1) / FRAME_RATE_HZ
-            raise InputError(f"pin at {pin.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
-        if not np.isfinite(pin.value):
-            raise InputError(f"pin at {pin.time_s} s has the value {pin.value}, required a finite number")
+        frame = find_pinned_frame(pin, frames)
         column = names.index(pin.channel)
         check_magnitude(space.channels[space.direct[column]], pin.value, pin.value)
         if is_never_negative(space.channels[space.direct[column]]) and pin.value < 0:

@@ -315,7 +315,7 @@ def generate_passages(
     else:
         spread = _join_rows(parts, [each.variance for each in made], rest.variance, like)
     motion = replace(rest.motion, values=values)
-    held = [(find_pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
+    held = [(find_pinned_frame(pin, len(values)), motion.column(pin.channel), pin.value) for pin in pins]
     bend_through_pins(values, held, REACH_FRAMES)  # those in silence; the others hold but for the way to rest
     clip_at_zero(motion)
     if held and isinstance(spread, ReducedVariance):

@@ -24,8 +24,8 @@ from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, Cou
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.articulation import slice_dynamics, unseen_share
-from lipmotion.motion.generation import Statistics, split_into_blocks
+from lipmotion.motion.articulation import Statistics, slice_dynamics, unseen_share
+from lipmotion.motion.generation import split_into_blocks
 from lipmotion.printable import printable
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import (

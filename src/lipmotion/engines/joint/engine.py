@@ -28,10 +28,10 @@ from lipmotion.motion.arrays import (
     scaling_from_arrays,
     scaling_to_arrays,
 )
-from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
+from lipmotion.motion.articulation import ArticulationPrior, Statistics, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
-from lipmotion.motion.generation import LearnedMotion, Statistics, VarianceScaling, fit_scaling_factors
+from lipmotion.motion.generation import LearnedMotion, VarianceScaling, fit_scaling_factors
 from lipmotion.motion.modulation_filter import (
     MODULATION,
     STRENGTH,

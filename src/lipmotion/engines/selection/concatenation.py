@@ -17,8 +17,8 @@ from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_AFTER, JOIN_BE
 from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.windows import PROTECTED_PHONES
+from lipmotion.motion.articulation import Statistics
 from lipmotion.motion.frame_labels import find_digital_silence, find_runs, is_away_from_speech, list_speech_intervals
-from lipmotion.motion.generation import Statistics
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.types import FRAME_RATE_HZ, Constraints, Motion, ReducedVariance, Speech, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent

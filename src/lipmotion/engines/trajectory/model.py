@@ -21,6 +21,7 @@ from lipmotion.motion.articulation import (
     KNOWN_VOICE_SHARE,
     TABLE_WEIGHT_WITH_PREDICTOR,
     ArticulationPrior,
+    Statistics,
     slice_dynamics,
     unseen_share,
 )
@@ -32,7 +33,7 @@ from lipmotion.motion.context_window import (
     acoustic_context_to_arrays,
 )
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, rate_phones
-from lipmotion.motion.generation import LearnedMotion, Statistics, VarianceScaling
+from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import MODULATION, ModulationFilter, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import (
     ADDED,

@@ -200,25 +200,28 @@ class AnalysedAudio(Audio):
             passage.audio.mfcc_of_warps(warps)  # the spectra are computed once for all
         return [Features(self.joined(partial(_mfcc_values, warp=warp)), self.duration_s) for warp in warps]
 
+    def _kind(self, of_audio: Callable[[AnalysedAudio], NDArray[Any]], *silence: float) -> NDArray[Any]:
+        return self.joined(of_audio, *silence)
+
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
         """The natural logarithm of the energy of every frame [shape=(T,)], each passage at the same level."""
-        return self.joined(lambda audio: audio.log_energy, SILENT_ENERGY)
+        return self._kind(lambda audio: audio.log_energy, SILENT_ENERGY)
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
         """The features of the general models [shape=(T, 39)], as of ``speech.recognition.general``."""
-        return self.joined(lambda audio: audio.general_features)
+        return self._kind(lambda audio: audio.general_features)
 
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
         """The normalised log mel spectrum [shape=(T, 40)], as of ``speech.features.mfcc``."""
-        return self.joined(lambda audio: audio.spectrum)
+        return self._kind(lambda audio: audio.spectrum)
 
     @cached_property
     def encoding(self) -> NDArray[np.float16]:
         """What the speech encoder makes of every frame [shape=(T, 64)], as of ``speech.features.encoding``."""
-        return self.joined(lambda audio: audio.encoding)
+        return self._kind(lambda audio: audio.encoding)
 
     def stretch(self, first: int, stop: int) -> AnalysedAudio:
         """Return some frames of the recording, with the features that they have in the whole."""
@@ -366,21 +369,8 @@ class _Stretch(AnalysedAudio):
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
         return [Features(self._rows(each.values), self.duration_s) for each in self.whole.mfcc_of_warps(warps)]
 
-    @cached_property
-    def log_energy(self) -> NDArray[np.float32]:
-        return self._rows(self.whole.log_energy)
-
-    @cached_property
-    def general_features(self) -> NDArray[np.float32]:
-        return self._rows(self.whole.general_features)
-
-    @cached_property
-    def spectrum(self) -> NDArray[np.float32]:
-        return self._rows(self.whole.spectrum)
-
-    @cached_property
-    def encoding(self) -> NDArray[np.float16]:
-        return self._rows(self.whole.encoding)
+    def _kind(self, of_audio: Callable[[AnalysedAudio], NDArray[Any]], *_: float) -> NDArray[Any]:
+        return self._rows(of_audio(self.whole))
 
     def _rows(self, rows: NDArray[FloatT]) -> NDArray[FloatT]:
         return rows[self.first : self.first + len(self.samples) // HOP + 1]
