@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, REACH_S
-from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals, with_neighbours
+from lipmotion.motion.frame_labels import frames_away, list_speech_intervals, with_neighbours
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
@@ -93,7 +93,7 @@ class ArticulationPrior:
                 count = self.contexts.get((_merged(left), _merged(span.label.phone), _merged(right)), 0)
                 first, stop = frames_of(span, frames)
                 steps[first:stop] = count / (count + HALF_FAMILIAR_COUNT)
-        steps[is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), REST_S)] = 1
+        steps[frames_away(units, frames, REST_S)] = 1
         return smooth_steps(steps)[:, 0]
 
     def blend(

@@ -52,6 +52,11 @@ def list_speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
     return [(span.start_s, span.end_s) for span in units if not is_silent(span.label.phone)]
 
 
+def frames_away(units: Timeline[Unit], frames: int, margin_s: float) -> NDArray[np.bool_]:
+    """Return which frames are further than ``margin_s`` seconds from all speech, before and after it [shape=(T,)]."""
+    return is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), margin_s)
+
+
 def find_digital_silence(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
     """Return the frames of digital silence, in which the mouth rests: without even a breath [shape=(T,)].
 
@@ -63,8 +68,7 @@ def find_digital_silence(features: NDArray[np.floating], units: Timeline[Unit]) 
     silent = np.zeros(len(energy), bool)
     for first, stop in find_runs(at_floor):
         silent[first:stop] = stop - first >= MIN_SILENCE_S * FRAME_RATE_HZ
-    time_s = np.arange(len(energy)) / FRAME_RATE_HZ
-    return silent & is_away_from_speech(time_s, list_speech_intervals(units), BEFORE_SPEECH_S)
+    return silent & frames_away(units, len(energy), BEFORE_SPEECH_S)
 
 
 def rate_phones(speech: Speech, distortion: Array | None, frames: int) -> Array:
@@ -186,7 +190,7 @@ def label_full_context(units: Timeline[Unit], frames: int, layout: StateLayout) 
         if span.label.phone not in PHONES:
             raise InputError(describe_unknown_phone(span.label.phone, f" at {span.start_s} s"))
     result = [layout.rest] * frames
-    away = is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), layout.rest_s)
+    away = frames_away(units, frames, layout.rest_s)
     for left, span, right in with_neighbours(units):
         first, stop = frames_of(span, frames)
         time_s = np.arange(first, stop) / FRAME_RATE_HZ

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, estimate_closed_opening, find_closable_ranges
-from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals
+from lipmotion.motion.frame_labels import frames_away, list_speech_intervals
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion, Timeline, Unit
 from lipmotion.units import VISEME_OF, VISEMES
@@ -281,13 +281,11 @@ def measure_person(examples: Sequence[Example], column: int | None) -> PersonSta
     """
     silent, silence, spoken, measured, smallest = [], [], [], [], []
     for example in examples:
-        values, valid = np.asarray(example.motion.values, float), example.valid
-        time_s = np.arange(len(values)) / FRAME_RATE_HZ
-        speech_s = list_speech_intervals(example.speech.units)
-        silent.append(values[valid & is_away_from_speech(time_s, speech_s, FAR_FROM_SPEECH_S)])
-        silence.append(values[valid & is_away_from_speech(time_s, speech_s, NEAR_SPEECH_S)])
+        values, valid, units = np.asarray(example.motion.values, float), example.valid, example.speech.units
+        silent.append(values[valid & frames_away(units, len(values), FAR_FROM_SPEECH_S)])
+        silence.append(values[valid & frames_away(units, len(values), NEAR_SPEECH_S)])
         measured.append(values[valid])
-        spoken.append(values[valid & np.logical_not(is_away_from_speech(time_s, speech_s, 0.0))])
+        spoken.append(values[valid & ~frames_away(units, len(values), 0.0)])
         if column is not None:
             ranges = find_closable_ranges(example.speech.units, len(values))
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
@@ -424,9 +422,5 @@ def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> 
 
 def count_speech_s(examples: Sequence[Example]) -> float:
     """Return the seconds of speech in which the motion of some examples was measured."""
-    frames = 0
-    for example in examples:
-        time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
-        spoken = ~is_away_from_speech(time_s, list_speech_intervals(example.speech.units), 0.0)
-        frames += int((example.valid & spoken).sum())
-    return frames / FRAME_RATE_HZ
+    spoken = (each.valid & ~frames_away(each.speech.units, len(each.valid), 0.0) for each in examples)
+    return sum(int(frames.sum()) for frames in spoken) / FRAME_RATE_HZ

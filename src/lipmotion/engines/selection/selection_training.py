@@ -17,7 +17,7 @@ from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
-from lipmotion.motion.frame_labels import find_runs, is_away_from_speech, list_speech_intervals, rate_phones
+from lipmotion.motion.frame_labels import find_runs, frames_away, rate_phones
 from lipmotion.motion.generation import fit_motion
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import PredictorTraining, choose_predictor, load_predictor
@@ -157,21 +157,19 @@ def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int
     """Return the ranges of rows that are stored: not the middle of long silences, nor what was not measured."""
     ranges = list[list[int]]()
     for example, begin in zip(examples, first[:-1].tolist(), strict=True):
-        time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
-        near = example.valid & ~is_away_from_speech(time_s, list_speech_intervals(example.speech.units), KEPT_SILENCE_S)
+        near = example.valid & ~frames_away(example.speech.units, len(example.valid), KEPT_SILENCE_S)
         ranges += (find_runs(near) + begin).tolist()
     return ranges
 
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:
     """Return the mean pose in silence away from speech, or that of the least open frames [shape=(Q,)]."""
-    resting = []
-    for example, x in zip(examples, values, strict=True):
-        time_s = np.arange(len(x)) / FRAME_RATE_HZ
-        resting.append(
-            x[example.valid & is_away_from_speech(time_s, list_speech_intervals(example.speech.units), REST_AWAY_S)]
-        )
-    poses = np.concatenate(resting)
+    poses = np.concatenate(
+        [
+            x[example.valid & frames_away(example.speech.units, len(x), REST_AWAY_S)]
+            for example, x in zip(examples, values, strict=True)
+        ]
+    )
     if len(poses) < LEAST_REST_FRAMES:
         poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
         if OPENING in space.direct_names:

@@ -14,6 +14,7 @@ from lipmotion.engines.coupled.model import CoupledConfig
 from lipmotion.engines.coupled.training import alignment, coupled_training
 from lipmotion.engines.coupled.training import chain_training as em_steps
 from lipmotion.engines.coupled.training.chain_training import CONVERGENCE_GAIN, MixtureSchedule, growing_chains
+from lipmotion.motion.frame_labels import frames_away
 from lipmotion.testing.examples import examples
 from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit, silent_monitor
 from oracles import coupled as oracle
@@ -136,7 +137,7 @@ def test_floors_are_of_observed_frames():
 
 def test_frames_away_from_speech_are_silence():
     units = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 0.7, Unit("aa")), Span(0.7, 1.5, Unit("sil"))))
-    away = coupled_training.frames_away_from_speech(units, 151)
+    away = frames_away(units, 151, 0.45)
     assert away[:4].all()
     assert not away[6:114].any()
     assert away[116:].all()

@@ -53,7 +53,7 @@ from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
-from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals
+from lipmotion.motion.frame_labels import frames_away
 from lipmotion.motion.generation import fit_scaling_factors
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import Predictor, PredictorTraining, load_predictor
@@ -61,7 +61,7 @@ from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.curves import mark_known_dynamics
 from lipmotion.stats.em import EmResult
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
+from lipmotion.types import Example, Monitor, Progress, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
 
 
@@ -193,11 +193,6 @@ def growing_models(
         yield partial(finished, grown)
 
 
-def frames_away_from_speech(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
-    """Return whether each frame is silence, further than 0.45 s from every phone [shape=(T,)]."""
-    return is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), AWAY_FROM_SPEECH_S)
-
-
 def _observations(
     example: Example, values: Array, valid: NDArray[np.bool_], visual: Sequence[VisualStream]
 ) -> AudioVisualObservations:
@@ -231,7 +226,7 @@ def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[Traini
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
     """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)]."""
     silent_poses = [
-        x[mask & frames_away_from_speech(example.speech.units, len(x))]
+        x[mask & frames_away(example.speech.units, len(x), AWAY_FROM_SPEECH_S)]
         for example, x, mask in zip(examples, values, valid, strict=True)
     ]
     poses = np.concatenate(silent_poses)
