@@ -143,7 +143,7 @@ class Absent(Loud):
 def loud(monkeypatch: pytest.MonkeyPatch) -> str:
     registry = posteriors.PHONE_RECOGNISERS
     monkeypatch.setattr(
-        type(registry), "load", lambda _, name: {"loud": Loud, "absent": Absent, "odd": dict}.get(name, posteriors.Hama)
+        type(registry), "_find", lambda _, name: {"loud": Loud, "absent": Absent, "odd": dict}.get(name, posteriors.Hama)
     )
     monkeypatch.setattr(posteriors, "installed_phone_recogniser", lambda: "loud")
     posteriors.phone_recogniser.cache_clear()
@@ -182,7 +182,7 @@ def test_a_long_recording_is_cut(loud: str) -> None:
 def test_a_recogniser_that_is_not_installed_or_is_none_is_refused() -> None:
     with pytest.raises(errors.MissingDependencyError, match="pip install absent"):
         posteriors.phone_recogniser("absent")
-    with pytest.raises(errors.InputError, match="required a PhoneRecogniser"):
+    with pytest.raises(errors.InputError, match="required a class of PhoneRecogniser"):
         posteriors.phone_recogniser("odd")
 
 

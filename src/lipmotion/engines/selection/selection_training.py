@@ -20,7 +20,7 @@ from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import find_runs, frames_away, rate_phones
 from lipmotion.motion.generation import fit_motion
 from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import PredictorTraining, choose_predictor, load_predictor
+from lipmotion.motion.predictors import PREDICTORS, PredictorTraining, choose_predictor
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.archive import Checkpoint
@@ -86,7 +86,7 @@ def fit_selection(
         recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     guide = None
     if config.guide:
-        kind = choose_predictor(config.predictor, examples) or load_predictor("prior")
+        kind = choose_predictor(config.predictor, examples) or PREDICTORS.load("prior")
         direct, of_guide = len(motion.space.direct), sub_monitor(monitor, 0.3, 0.9)
         training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
         guide = fit_guide(kind.fit(training).predictor, examples, values)

@@ -56,7 +56,7 @@ from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.frame_labels import frames_away
 from lipmotion.motion.generation import fit_scaling_factors
 from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import Predictor, PredictorTraining, load_predictor
+from lipmotion.motion.predictors import PREDICTORS, Predictor, PredictorTraining
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.curves import mark_known_dynamics
 from lipmotion.stats.em import EmResult
@@ -157,7 +157,7 @@ def growing_models(
     prior = fit_articulation_prior(space, values, moving) if config.articulation else None
     encoding: Predictor | None = None
     if config.uses_encoding and all(example.speech.encoding is not None for example in moving):
-        encoding = load_predictor("encoding").fit(PredictorTraining(moving, values, len(space.direct))).predictor
+        encoding = PREDICTORS.load("encoding").fit(PredictorTraining(moving, values, len(space.direct))).predictor
     first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
     def finished(grown: EmResult[Chains, ChainStatistics]) -> Fit[CoupledModel]:
