@@ -48,13 +48,8 @@ def inset_box(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, in
     factor = min(WIDTH_SHARE * width / picture[1], HEIGHT_SHARE * height / picture[0])
     rows, columns = (max(1, round(length * factor)) for length in picture)
     bottom, right = (length - round(MARGIN_SHARE * shorter) for length in frame)
-    border = border_px(frame)
+    border = max(1, round(BORDER_SHARE * min(frame)))
     return right - columns - 2 * border, bottom - rows - 2 * border, right, bottom
-
-
-def border_px(frame: tuple[int, int]) -> int:
-    """Return the width of the border in a frame of some height and width, px."""
-    return max(1, round(BORDER_SHARE * min(frame)))
 
 
 def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Frame]:
@@ -65,7 +60,7 @@ def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Fr
     for frame, picture in zip(frames, pictures, strict=False):
         size = (frame.shape[0], frame.shape[1])
         left, top, right, bottom = inset_box(size, (picture.shape[0], picture.shape[1]))
-        border = border_px(size)
+        border = max(1, round(BORDER_SHARE * min(size)))
         rows, columns = bottom - top - 2 * border, right - left - 2 * border
         steps = picture.shape[1] / columns, picture.shape[0] / rows
         to_picture = np.array([[steps[0], 0, steps[0] / 2 - 0.5], [0, steps[1], steps[1] / 2 - 0.5]])

@@ -63,10 +63,6 @@ class TranscriptFit:
         """The words that seem not to be said."""
         return self.evidence.unsaid if self.evidence is not None else ()
 
-    def with_evidence(self, evidence: TranscriptEvidence) -> TranscriptFit:
-        """Return the fit as a phone recogniser judges it."""
-        return replace(self, missing=evidence.gaps, evidence=evidence)
-
     @property
     def missing_s(self) -> float:
         """Seconds that the stretches of ``missing`` last together."""
