@@ -7,16 +7,7 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.model import face_shapes, rig_tables
-from lipmotion.meshes.model.mesh import (
-    HEAD,
-    JAW,
-    LEFT_EYE,
-    NECK,
-    RIGHT_EYE,
-    Bone,
-    bone_kind,
-    merge_bones,
-)
+from lipmotion.meshes.model.mesh import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merge_bones
 from lipmotion.types.delivery import parse_moods
 from lipmotion_faces.characters import binding_files, gltf_scene
 from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw

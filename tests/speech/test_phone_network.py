@@ -142,9 +142,8 @@ class Absent(Loud):
 @pytest.fixture
 def loud(monkeypatch: pytest.MonkeyPatch) -> str:
     registry = posteriors.PHONE_RECOGNISERS
-    monkeypatch.setattr(
-        type(registry), "_find", lambda _, name: {"loud": Loud, "absent": Absent, "odd": dict}.get(name, posteriors.Hama)
-    )
+    kinds = {"loud": Loud, "absent": Absent, "odd": dict}
+    monkeypatch.setattr(type(registry), "_find", lambda _, name: kinds.get(name, posteriors.Hama))
     monkeypatch.setattr(posteriors, "installed_phone_recogniser", lambda: "loud")
     posteriors.phone_recogniser.cache_clear()
     return "loud"

@@ -12,11 +12,7 @@ from lipmotion import Model
 from lipmotion.errors import CorpusError, MissingDependencyError
 from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline.training import other_speakers as module
-from lipmotion.pipeline.training.other_speakers import (
-    align_recordings,
-    is_held_out_speaker,
-    synthesise_sentences,
-)
+from lipmotion.pipeline.training.other_speakers import align_recordings, is_held_out_speaker, synthesise_sentences
 from lipmotion.speech.sound.acoustic_conditions import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice

@@ -43,7 +43,7 @@ class CoupledConfig(Configuration):
     structure  : ``hmm``, ``multistream``, ``factorial`` or ``coupled`` (``presets`` has the paper's six systems)
     chains     : the unit set of each chain, separated by blanks: names or table files; the first chain emits speech
     states     : states per unit, left to right, no skips
-    asynchrony : number of states that chains may be apart; -1: no limit
+    asynchrony : number of states that chains may be apart; -1: no limit, of two factorial chains
     cross_units : let chains leave a unit at different times
     start_asynchrony, unseen_loss : of factorial chains without a limit: how far apart the chains may be while the first
                  densities are learned, and the nats that rare joint states lose (``chains.structures.Structure``)
@@ -116,7 +116,7 @@ class CoupledConfig(Configuration):
 
     def structure_with(self, chains: tuple[UnitSet, ...]) -> Structure:
         """Return the structure of chains of these unit sets. Raises InputError: as ``Structure``."""
-        limit = None if self.asynchrony < 0 else self.asynchrony
+        limit = self.asynchrony if self.asynchrony >= 0 else None if len(chains) > 1 else 0
         others = self.start_asynchrony, self.unseen_loss, self.moves_together
         return Structure(self.structure, chains, self.states, limit, self.cross_units, *others)
 

@@ -57,12 +57,11 @@ def test_expected_precisions_and_means(kind, sets, limit):
 
 def test_decoupled_tables_without_a_limit_are_the_product_of_hmms():
     """γ of each chain, and the likelihood, are those of the chains alone."""
-    model = made(COUPLED, (THREE, TWO), None)
+    model = made(FACTORIAL, (THREE, TWO), None)
     product = model.transitions.product
     draw = np.random.default_rng(5)
     own = [draw.uniform(0.2, 0.8, count) for count in product.structure.state_counts]
-    advance = tuple(own[c][product.chain_states[c]] for c in range(2))
-    decoupled = Transitions(product, model.transitions.rows, advance)
+    decoupled = Transitions(product, model.transitions.rows, tuple(own))
     coupled = type(model)(model.streams, decoupled, model.groups)
     data = observations(6)
     result = coupled.posteriors(coupled.emission_log_densities(data, coupled.full_lattice), coupled.full_lattice)

@@ -41,8 +41,7 @@ def sentences(count=6, frames_each=9, seed=0) -> list[alignment.AlignedUtterance
 
 
 @pytest.mark.parametrize(
-    ("kind", "sets"),
-    [(COUPLED, (THREE, TWO)), (FACTORIAL, (THREE, TWO)), (MULTISTREAM, (THREE,)), (HMM, (THREE,))],
+    ("kind", "sets"), [(COUPLED, (THREE, TWO)), (FACTORIAL, (THREE, TWO)), (MULTISTREAM, (THREE,)), (HMM, (THREE,))]
 )
 def test_the_likelihood_rises_at_every_step(kind, sets):
     steps = []
