@@ -5,8 +5,8 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.characters.textures import decode_srgb
+from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, flat, gradient
 from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches
-from lipmotion_faces.rendering.rasteriser import Camera, Canvas, flat, gradient
 
 CAMERA = Camera(120, 100, (0.5, -0.25), across=2.0, distance=8.0)
 

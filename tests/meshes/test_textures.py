@@ -7,8 +7,7 @@ from PIL import Image
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart, Texture
 from lipmotion_faces.characters import character_files, gltf_scene, textures
-from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
-from lipmotion_faces.rendering.rasteriser import Camera, flat
+from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, drawn_surface, flat
 from meshes.gltf import UV, document, glb, textured_document, with_colours
 
 QUARTERS = np.array([[[255, 0, 0, 255], [0, 255, 0, 255]], [[0, 0, 255, 255], [255, 255, 255, 0]]], np.uint8)

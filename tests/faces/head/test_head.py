@@ -8,7 +8,7 @@ from lipmotion import Staging, errors
 from lipmotion_faces import head, make_face, testing
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.stage import Stage, camera_for
-from lipmotion_faces.rendering.rasteriser import Camera
+from lipmotion_faces.rendering.drawn_surface import Camera
 
 
 def test_the_head_is_a_face_like_all_others_and_an_unusable_size_is_refused_at_once():
