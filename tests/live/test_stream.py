@@ -295,8 +295,9 @@ def test_steps_are_those_of_the_whole_network(sound: np.ndarray) -> None:
     steps = rows[: len(rows) // 2 * 2].reshape(len(rows) // 2, -1)
     hears = CausalSteps(live.network, silent_step(typical))
     one_by_one = np.stack([hears.push(step) for step in steps])
-    heard = np.concatenate([np.tile(silent_step(typical), (live.network.reach, 1)), steps])
-    assert one_by_one == pytest.approx(live.network(heard)[: len(steps)], abs=1e-4)
+    reach = live.network.reach
+    heard = np.concatenate([np.tile(silent_step(typical), (2 * reach, 1)), steps])
+    assert one_by_one == pytest.approx(live.network(heard)[reach : reach + len(steps)], abs=1e-4)
 
 
 def frame(number: int = 3) -> LiveFrame:

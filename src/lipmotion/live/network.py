@@ -7,6 +7,7 @@ takes the later answer. It was taught by what ``animate`` makes of whole recordi
 
 from __future__ import annotations
 
+import copy
 from collections import deque
 from functools import cache
 from importlib import resources
@@ -208,7 +209,7 @@ def silent_step(typical: Array) -> Array:
 class CausalSteps:
     """A convolutional network that is run step by step: each layer keeps the inputs that it will still need.
 
-    It begins after as much silence as it hears: steps of ``silent`` [shape=(82,)].
+    It begins as after silence for ever: steps of ``silent`` [shape=(82,)].
     """
 
     def __init__(self, network: ConvolutionalNetwork, silent: Array) -> None:
@@ -219,8 +220,13 @@ class CausalSteps:
             for width, dilation in zip(widths, network.dilations, strict=True)
         ]
         self._steps = 0
-        for _ in range(network.reach):
+        for _ in range(2 * network.reach):
             self.push(silent)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> CausalSteps:
+        result = copy.copy(self)
+        result._waiting = [deque(each, each.maxlen) for each in self._waiting]
+        return result
 
     def push(self, inputs: Array) -> Array:
         """Return the answers of this step: the network's outputs where it has heard all of it."""
@@ -271,9 +277,12 @@ def live_network() -> LiveNetwork:
 
 
 @cache
+def silent_steps() -> CausalSteps:
+    """Return the network of the package after nothing but silence; to be copied."""
+    return CausalSteps(live_network().network, silent_step(live_network().typical))
+
+
+@cache
 def answer_silence() -> Array:
     """Return the answers of the network of the package after nothing but silence [shape=(5 · 23,)]."""
-    live = live_network()
-    step = silent_step(live.typical)
-    hears = CausalSteps(live.network, step)
-    return [hears.push(step) for _ in range(live.network.reach)][-1]
+    return copy.deepcopy(silent_steps()).push(silent_step(live_network().typical))

@@ -20,14 +20,13 @@ from lipmotion.live.network import (
     LAGS,
     STEP_FRAMES,
     STEP_S,
-    CausalSteps,
     LiveNetwork,
     Resampler,
     SoundFeatures,
     answer_silence,
     live_network,
     mono_samples,
-    silent_step,
+    silent_steps,
 )
 from lipmotion.live.timings import GivenPhones
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VISEMES_15
@@ -43,11 +42,13 @@ from lipmotion.units.lexicon import Lexicon
 
 Array = NDArray[np.float64]
 LONGEST_LOOK_AHEAD_MS = 640.0
-SPOKEN, SILENT = 0.4, 0.6
+SPOKEN, SILENT = 0.8, 0.9
 """Probability of silence under which the mouth speaks, and from which on it goes to rest."""
+AHEAD_STEPS = 8
+"""Lips part before they are heard: as far as so many steps are known, 160 ms, it rests only if all are silent."""
 REST_STEPS, START_STEPS = 5, 3
 """Steps in which it rests, 100 ms, and in which it begins to speak."""
-CLOSED = (0.07, 0.18)
+CLOSED = (0.1, 0.3)
 """Probabilities of p, b and m from which on the lips begin to close, and are closed."""
 CLOSING_STEPS, OPENING_STEPS = 2, 4
 """Steps in which they close, also where it is seen late, and in which they open again: 40 and 80 ms."""
@@ -58,7 +59,7 @@ TIMED_SHARE = 0.3
 CORRELATED_STEPS = 0.02
 """The network's errors are alike for about so many steps."""
 KEPT_STEPS, SHOWN_FRAMES = LAGS[-1] + 3, 500
-OPENING_ROW = ARTICULATORS.index("opening")
+OPENING_ROW, SILENT_ROW = ARTICULATORS.index("opening"), VISEMES_15.index("sil")
 LOWEST_RATE_HZ, HIGHEST_RATE_HZ = 4_000, 384_000
 
 
@@ -217,7 +218,7 @@ class Stream:
         """Begin to hear, as after silence; how loud and how coloured the sound is stays known."""
         self._resampler = Resampler(self.sample_rate)
         self._features.restart()
-        self._steps = CausalSteps(live_network().network, silent_step(live_network().typical))
+        self._steps = copy.deepcopy(silent_steps())
         self._rows: list[NDArray[np.float32]] = []
         self._answers = deque([self._smoother.silent] * KEPT_STEPS, KEPT_STEPS)
         self._heard = 0  # steps
@@ -242,17 +243,18 @@ class Stream:
 
     def _speak(self) -> tuple[Array, Array]:
         """Return pose and weights of the frame that is known now."""
-        smooth, said = self._smoother.solve(self._answers, self._before)
+        smooth, known = self._smoother.solve(self._answers, self._before)
+        said, silent = known[0], float(known[: AHEAD_STEPS + 1, SILENT_ROW].min())
         self._before = [smooth, self._before[0]]
         given = self._given.row(self._next)
         share = 0.0
         if given is not None:
             self._told, said = np.split(given, [len(ARTICULATORS)])
-            share = TIMED_SHARE * (1 - float(said[VISEMES_15.index("sil")]))
+            silent = float(said[SILENT_ROW])
+            share = TIMED_SHARE * (1 - silent)
         step = TIMED_SHARE / START_STEPS
         self._timed += float(np.clip(share - self._timed, -step, step))
         smooth = smooth + self._timed * (self._told - smooth)
-        silent = float(said[VISEMES_15.index("sil")])
         change = 1 / REST_STEPS if silent > SILENT else -1 / START_STEPS if silent < SPOKEN else 0.0
         self._resting = float(np.clip(self._resting + change, 0, 1))
         wanted = float(np.interp(said[VISEMES_15.index("PP")], CLOSED if given is None else (0, 1), (0, 1)))
@@ -325,7 +327,7 @@ class _Smoother:
         self.rest = self.silent[-1, : len(ARTICULATORS)].astype(float)
 
     def solve(self, answers: deque[NDArray[np.float32]], before: list[Array]) -> tuple[Array, Array]:
-        """Return articulators [shape=(8,)] and visemes [shape=(15,)] of the frame that is known now.
+        """Return articulators [shape=(8,)] of the frame that is known now, and visemes from it on [shape=(N, 15)].
 
         answers : of the last steps [each shape=(5, 23)]
         before  : articulators of the frame before, and of the one before that
@@ -335,4 +337,4 @@ class _Smoother:
         ).astype(float)
         wanted = rows[:, : len(ARTICULATORS)] * self._gains * self._of_answers
         previous = np.stack([before[1], before[0]]) * self._of_before
-        return wanted.sum(axis=0) + previous.sum(axis=0), rows[0, len(ARTICULATORS) :]
+        return wanted.sum(axis=0) + previous.sum(axis=0), rows[:, len(ARTICULATORS) :]
