@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.pca import find_principal_axes
+from lipmotion.stats.pca import find_principal_axes, measure_covariance
 from lipmotion.storage.schema import LARGEST_MEAN, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
@@ -51,16 +51,7 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     recordings : acoustic features of each [each shape=(T, D)]
     size       : number of components, or fewer where there are fewer inputs
     """
-    count, total, products = 0, np.zeros(0), np.zeros(0)
-    for features in recordings:
-        rows = _stack(features, slice(None)).astype(float)
-        if not count:
-            total, products = np.zeros(rows.shape[1]), np.zeros((rows.shape[1],) * 2)
-        count += len(rows)
-        total += rows.sum(axis=0)
-        products += rows.T @ rows
-    mean = total / count
-    covariance = products / count - np.outer(mean, mean)
+    mean, covariance = measure_covariance(_stack(features, slice(None)) for features in recordings)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + MIN_DEVIATION
     basis = np.ascontiguousarray(
         find_principal_axes(covariance / np.outer(scale, scale), size).T

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
+from lipmotion.stats.pca import find_principal_axes, measure_covariance
 from lipmotion.stats.trees import ridge, zero_statistics
 
 Array = NDArray[np.float64]
@@ -134,16 +135,9 @@ def posterior_axes(posteriors: Iterable[Single]) -> Single:
 def fit_regression_inputs(posterior_basis: Single, utterances: Sequence[RegressionUtterance]) -> RegressionInputs:
     """Return regression inputs along the principal axes of some utterances, with the basis of ``posterior_axes``."""
     acoustic = fit_acoustic_context((utterance.features for utterance in utterances), ACOUSTIC_AXES)
-    count, total, products = 0, np.zeros(0), np.zeros(0)
-    for utterance in utterances:
-        context = _context(acoustic, utterance.features, utterance.reduced_posteriors).astype(float)
-        if not count:
-            total, products = np.zeros(context.shape[1]), np.zeros((context.shape[1],) * 2)
-        count += len(context)
-        total += context.sum(axis=0)
-        products += context.T @ context
-    mean = total / count
-    basis = _principal_axes(products / count - np.outer(mean, mean), INPUT_AXES)
+    contexts = (_context(acoustic, each.features, each.reduced_posteriors) for each in utterances)
+    mean, covariance = measure_covariance(contexts)
+    basis = _principal_axes(covariance, INPUT_AXES)
     return RegressionInputs(acoustic, posterior_basis, mean.astype(np.float32), basis)
 
 
@@ -200,11 +194,7 @@ def _variances(
 
 
 def _principal_axes(covariance: Array, size: int) -> Single:
-    """Return at most ``size`` eigenvectors of the largest eigenvalues as columns; the largest number of each is > 0."""
-    _, vectors = np.linalg.eigh(covariance)
-    basis = vectors[:, ::-1][:, :size]
-    signs = np.where(basis[np.abs(basis).argmax(axis=0), np.arange(basis.shape[1])] < 0, -1.0, 1.0)
-    return (basis * signs).astype(np.float32)
+    return np.ascontiguousarray(find_principal_axes(covariance, size).T.astype(np.float32))
 
 
 def _context(acoustic: AcousticContext, features: Single, reduced_posteriors: Single) -> Single:
