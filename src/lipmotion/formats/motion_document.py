@@ -1,4 +1,22 @@
-"""JSON documents of motion: lipmotion's own, and weights of blendshapes as other programs store them."""
+"""Motion in JSON: lipmotion's own documents, and weights of blendshapes of other programs.
+
+``.json``: the document with its values, one row of values per line.
+``.npz``: the values without rounding, and the rest as JSON in a string array. Nothing is pickled.
+``.a2f.json``: weights of ARKit's 52 blendshapes as NVIDIA Audio2Face exports them.
+``.jsonl``: frames of weights as services and trackers give them: one document, a list, or one document a line.
+
+The document has ``format``, ``version``, ``rate_hz``, ``channels`` (name and unit), ``units`` (phones in time),
+``recognised`` (if phones were), ``outlook`` (if known), ``source`` and ``model``. The confidence of every frame is a
+member of it, or an array beside the values; the standard deviations are an array.
+
+Audio2Face's ``facsNames`` names the columns of ``weightMat``, one row a frame: ARKit's 52 names, or the 46 of its own
+solver, which ``meshes.model.shape_names`` understands. Frames are read alone. Azure's voices: ``{"FrameIndex": 0,
+"BlendShapes": [[55 weights], …]}``, 60 frames a second, alone or in the ``Animation`` of viseme events. MediaPipe's and
+Audio2Face-3D's: frames with a time and weights by name, or a list of categories with scores.
+
+Source: NVIDIA, "Audio2Face, Export" and "Blendshape conversion"; files of versions 2022 and 2023. Microsoft, "Get
+facial position with viseme"; results of these programs.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Subtitles: SubRip, WebVTT, SubStation Alpha, YouTube's ``.sbv``, Whisper's table of lines, and lyrics."""
+"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``,
+Whisper's table of lines (``.tsv``), and lyrics (``.lrc``)."""
 
 from __future__ import annotations
 

@@ -371,7 +371,7 @@ def fit_transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Sp
     - In silence away from speech the rest pose maps onto the target's. With S seconds of such silence that counts
       S / (S + 0.5): people rest with closed lips in one pause and with parted lips in the next.
     The map has no habits (``SpeakerMap.habits`` is 0).
-    Alternatives that were measured: docs/results/selection.md.
+    Source of the task: Minnis & Breen 2000, §7. Alternatives that were measured: docs/results/selection.md.
     """
     channels = source[0].motion.channels
     names = [channel.name for channel in channels]

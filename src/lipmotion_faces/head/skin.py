@@ -1,4 +1,9 @@
-"""The skin of the face with lips and eyelids: one surface, its binding to lips and jaw, and its places in a pose."""
+"""The skin of the face with lips and eyelids: one surface, its binding to lips and jaw, and its places in a pose.
+
+The lips are a closed loop of ``COLUMNS`` columns: the upper lip from the right corner to the left one, then the lower
+lip back. Every column runs through ``RINGS`` rings: from the skin over the lip into the mouth, and on along the wall of
+the mouth to the throat.
+"""
 
 from __future__ import annotations
 

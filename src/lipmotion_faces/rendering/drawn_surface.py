@@ -1,4 +1,4 @@
-"""Surfaces drawn as triangles: their pixels, looks, light and textures, from front to back."""
+"""Pictures of meshes without a graphics card: a camera, triangles with their textures, and what alone moves."""
 
 from __future__ import annotations
 

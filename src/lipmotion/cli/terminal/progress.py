@@ -1,4 +1,7 @@
-"""Progress and warnings of commands: on a terminal, as events (docs/long-work.md), or as Rhubarb has them."""
+"""Progress and warnings of commands: on a terminal, as events (docs/long-work.md), or as Rhubarb has them.
+
+Only this module writes to the standard streams: values become printable text, without terminal control characters.
+"""
 
 from __future__ import annotations
 
