@@ -35,7 +35,7 @@ class Side:
 
     @property
     def motion(self) -> tuple[str, str]:
-        """What tells it from other motions: the model, by its name where nothing else is known; the edits."""
+        """What identifies the motion: the model (its name where no digest is known), and the edits."""
         return self.model or self.name, self.edits
 
 
@@ -45,7 +45,7 @@ class Vote:
 
     shown  : the two motions, in the order in which they were shown
     better : place of the one that was found better, 0 or 1; None: neither
-    Raises InputError: these are not two, or the better one is neither.
+    Raises InputError: not two motions that differ, or ``better`` is none of them.
     """
 
     line: str
@@ -60,13 +60,13 @@ class Vote:
 
     @property
     def compared(self) -> tuple[tuple[str, str], ...]:
-        """What the two are, whatever the recording: edits that both have are those of it, and do not count."""
+        """The two, comparable over recordings: edits that both share belong to the recording and are left out."""
         first, second = (side.motion for side in self.shown)
         return ((first[0], ""), (second[0], "")) if first[1] == second[1] else (first, second)
 
 
 def tally(votes: Sequence[Vote], vote: Vote) -> dict[str, Any]:
-    """Return how often each of the two of a vote was ``better``, in its order, and ``neither``, of all votes."""
+    """Return how often all votes found each of the two in ``vote`` ``better``, in its order, and ``neither``."""
     better, neither = [0, 0], 0
     for each in votes:
         if set(each.compared) != set(vote.compared):
@@ -103,7 +103,7 @@ _NEW_VOTE = value_of(Vote, _VOTE, _VOTE)
 
 
 def _vote(row: Any) -> Vote:
-    """Return a vote; one from before digests were kept is of two names, with the digest of the edits."""
+    """Return a vote; older files have no digests of models: two names, and one digest of the edits."""
     if not isinstance(row, dict) or "edits" not in row:
         return _NEW_VOTE(row)
     known = _NAMED(row)

@@ -228,11 +228,6 @@ def test_a_mood_comes_and_goes_in_the_upper_face_and_grows_with_accents():
     assert lively.min() > 0.6 * usual
 
 
-def test_channels_are_named_by_mood():
-    assert expression.PREFIX + "happy" in expression.with_moods(motion(), parse_moods("happy")).names
-    assert not expression.is_mood("mood_hungry")
-
-
 @pytest.fixture(scope="module")
 def generation() -> Generation:
     return of_motion(motion(), units())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lipmotion.corpora.captured_faces import read_bare_motion, read_channels
-from lipmotion.corpora.folder import discover, read_aligned_words, read_grid, spell_name
+from lipmotion.corpora.folder import discover, read_aligned_words, spell_name
 from lipmotion.corpora.source_recordings import MotionFile, RecordingFolder, add_separate_sounds, read_offsets
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Channel
@@ -172,15 +172,6 @@ def test_reads_the_layout(grid):
     assert found.problems == {}
 
 
-def test_videos_and_times_directly_in_the_folder(tmp_path):
-    for name in ("brbk7n.mpg", "swwp2s.mpg"):
-        (tmp_path / name).touch()
-    (tmp_path / "swwp2s.align").write_text("0 9000 sil\n9000 20000 set\n")
-    found = discover(tmp_path)
-    assert found.kind == "GRID corpus"
-    assert found.recordings[1].words == ("set",)
-
-
 def test_bad_word_times_are_reported_and_the_rest_is_read(grid):
     (grid / "align" / "swiz9n.align").write_text("0 100 set\n100 two white\n")
     (grid / "align" / "lgazzp.align").write_text("0 74500 sil\n")
@@ -188,26 +179,6 @@ def test_bad_word_times_are_reported_and_the_rest_is_read(grid):
     assert [item.name for item in found.recordings] == ["brwa3s"]
     assert "line 2 is '100 two white'; required: start end word" in found.problems["swiz9n"]
     assert "holds no word" in found.problems["lgazzp"]
-
-
-def test_other_videos_are_not_grid(tmp_path):
-    (tmp_path / "holiday.mp4").touch()
-    assert read_grid(tmp_path) is None
-    assert discover(tmp_path).kind == "folder of videos"
-
-
-@pytest.mark.recordings
-def test_the_real_thing():
-    folder = Path(__file__).parents[2].parent / "shared" / "corpora" / "grid-s1"
-    if not folder.is_dir():
-        pytest.skip("the real recordings are not here")
-    found = discover(folder)
-    assert found.kind == "GRID corpus"
-    assert found.problems == {}
-    splits = [item.split for item in found.recordings]
-    assert {split: splits.count(split) for split in splits} == {"train": 452, "val": 22, "test": 50}
-    assert sum(item.words == spell_name(item.name) for item in found.recordings) >= 520
-    assert all(item.words is not None and len(item.words) == 6 for item in found.recordings)
 
 
 def test_speakers_by_their_folders(tmp_path):
@@ -344,13 +315,6 @@ def test_other_folders_are_read_as_before(tmp_path: Path) -> None:
     assert [each.speaker for each in found.recordings] == ["", "ben", "main", "s1"]
 
 
-def test_one_name_twice_is_left_out(tmp_path: Path) -> None:
-    touch(tmp_path, "s1/mpg_vcd/bbaf2n.mpg", "s1/mpg_6000/bbaf2n.mpg", "s2/mpg_vcd/bbaf2n.mpg")
-    found = discover(tmp_path)
-    assert [each.name for each in found.recordings] == ["s2-bbaf2n"]
-    assert "2 recordings share this name" in found.problems["s1-bbaf2n"]
-
-
 NAMES = np.array(["jaw", "smile", "brow"])
 CHANNELS = tuple(Channel(name, "weight") for name in NAMES.tolist())
 
@@ -475,12 +439,6 @@ def test_one_video_of_many_has_its_own_row(studio):
     assert "others" not in found.problems
 
 
-def test_without_them_nothing_changes(studio):
-    (studio / "a.recorder.flac").unlink()
-    found = add_separate_sounds(discover(studio), studio)
-    assert {(item.recorder, item.offset_s) for item in found.recordings} == {(None, None)}
-
-
 def test_a_spreadsheet_writes_its_own_marks(tmp_path):
     (tmp_path / "offsets.csv").write_text("sep=;\nname;offset_ms;\nanna/c;-12,5\n;\n", encoding="utf-8-sig")
     assert read_offsets(tmp_path / "offsets.csv") == {"anna-c": pytest.approx(-0.0125)}
@@ -498,8 +456,3 @@ def test_what_is_wrong_with_a_table_is_said(tmp_path):
         (tmp_path / "offsets.csv").write_text(text)
         with pytest.raises(CorpusError, match=message):
             read_offsets(tmp_path / "offsets.csv")
-
-
-def test_an_offset_of_a_day_is_refused(studio):
-    with pytest.raises(InputError, match="required within"):
-        add_separate_sounds(discover(studio), studio, 86_400.0)

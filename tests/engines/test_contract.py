@@ -6,9 +6,9 @@ import pytest
 
 from lipmotion import errors, types
 from lipmotion.engines import ENGINES, Engine, base, engine_named
-from lipmotion.testing.check_engine import ENGINE_CHECKS, SENTENCE, TrainedEngine
-from lipmotion.testing.examples import RATE_HZ, examples, speech, timeline
+from lipmotion.testing import ENGINE_CHECKS, TrainedEngine, examples, speech, timeline
 
+SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
 SYSTEMS = {
     **{name: (name, {}) for name in sorted(ENGINES.names)},
     "coupled": ("coupled", {"chains": "sVis 2vis", "mixtures": 2}),
@@ -97,7 +97,7 @@ def test_every_frame_has_an_explanation(trained):
 
 def test_pins_at_both_ends_are_inside(trained):
     spoken = speech(timeline(SENTENCE))
-    last_s = (len(spoken.features.values) - 1) / RATE_HZ
+    last_s = (len(spoken.features.values) - 1) / types.FRAME_RATE_HZ
     result = trained.generate(spoken, types.Pin(-0.004, "opening", 0.1), types.Pin(last_s + 0.004, "opening", 0.2))
     assert result.motion["opening"][[0, -1]].tolist() == [0.1, 0.2]
 

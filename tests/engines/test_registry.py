@@ -1,7 +1,7 @@
 import pytest
 
+from engines.coupled.tiny import SYSTEMS
 from lipmotion.engines import ENGINES, engine_from_settings, engine_named, preset_visual
-from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.errors import InputError
 
 
@@ -9,7 +9,6 @@ def test_settings_and_presets_are_options() -> None:
     for name in sorted(ENGINES.names):
         assert engine_from_settings(name) == engine_named(name, {})
     for system in SYSTEMS:
-        assert engine_from_settings(preset=system) == engine_named("coupled", SYSTEMS[system])
         assert engine_from_settings(preset=f"xieliu2007 {system}") == engine_from_settings(preset=system)
         assert preset_visual(f"xieliu2007 {system}") == preset_visual(system) == "eigenlips"
     assert engine_from_settings(preset="xieliu2007") == engine_from_settings(preset="ph-vi-CHMM")

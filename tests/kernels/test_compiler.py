@@ -1,14 +1,18 @@
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 from typing import Any, cast
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from children import environment, run_child
 from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
 from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward, normals
+from lipmotion.kernels.compiler import blas_kernels, one_thread
 from lipmotion_faces.kernels import affine, painting, raster, shading
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
@@ -177,3 +181,54 @@ def test_a_cache_that_takes_nothing_is_done_without(tmp_path: Path, monkeypatch:
         folder.touch()
     assert kernel(1.0, 2.0) == 3.0
     assert kernel.kernel.stats.cache_misses
+
+
+def threads() -> set[int]:
+    return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+
+@pytest.fixture
+def two_outside():
+    with threadpool_limits(2, user_api="blas"):
+        yield
+
+
+@pytest.mark.usefixtures("two_outside")
+def test_one_inside_and_as_before_afterwards_also_after_an_error():
+    with one_thread():
+        assert threads() == {1}
+        with one_thread():
+            assert threads() == {1}
+        assert threads() == {1}
+    assert threads() == {2}
+    with pytest.raises(KeyError), one_thread():
+        raise KeyError
+    assert threads() == {2}
+    counted = one_thread()(threads)
+    assert [counted(), counted()] == [{1}, {1}]
+
+
+@pytest.mark.usefixtures("two_outside")
+def test_blocks_that_overlap_in_threads_of_python_leave_nothing_behind():
+    """The second begins inside the first and ends after it."""
+    both_in, first_out = Barrier(2), Barrier(2)
+
+    def first():
+        with one_thread():
+            both_in.wait(20)
+        first_out.wait(20)
+
+    def second():
+        with one_thread():
+            both_in.wait(20)
+            first_out.wait(20)
+
+    with ThreadPoolExecutor(2) as pool:
+        for job in [pool.submit(first), pool.submit(second)]:
+            job.result()
+    assert threads() == {2}
+
+
+def test_kernels_are_named():
+    assert blas_kernels() == blas_kernels() == sorted(blas_kernels())
+    assert all(len(name.split()) >= 3 for name in blas_kernels())

@@ -14,7 +14,7 @@ from kernels.networks import arrays_of
 from lipmotion.kernels import factorial, forward_backward
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
 from lipmotion.kernels.network import ForwardBackwardNetwork
-from lipmotion.kernels.paths import NetworkArrays, Windows, best_path, cheapest_arrivals, trace_back
+from lipmotion.kernels.paths import NetworkArrays, Windows, best_path
 from oracles import factorial as factorial_oracle
 from oracles import paths
 
@@ -174,7 +174,7 @@ def of_chains(draw, spread, extreme):
     sizes = [(int(draw.integers(1, 7)), int(draw.integers(1, 5))) for _ in range(2)]
     alone = [chain(draw, *size, spread, extreme) for size in sizes]
     frames, states = np.array(sizes).T
-    log_emission = np.zeros((frames.max(), 2, states.max()))
+    log_emission = np.full((frames.max(), 2, states.max()), draw.choice([0.0, 50.0, -1e4, 1e4]))
     stay, move = np.zeros((2, 2, states.max()))
     for u, (emission, *moves) in enumerate(alone):
         log_emission[: frames[u], u, : states[u]] = emission
@@ -187,6 +187,8 @@ def of_chains(draw, spread, extreme):
         right &= near(found, wanted_log_likelihood, spread)
         right &= near(posterior[: frames[u], u, : states[u]], wanted, spread)
         right &= near(kept[u, : states[u]], wanted_kept, spread, times=int(frames[u]))
+        padded = posterior[frames[u] :, u], posterior[:, u, states[u] :], kept[u, states[u] :]
+        right &= not any(part.any() for part in padded)
     return bool(right)
 
 
@@ -202,7 +204,8 @@ def of_path(draw, spread, extreme, windowed=False):
     if windowed:
         first, end = np.sort(draw.integers(0, frames, states)), np.sort(draw.integers(1, frames + 1, states))
         windows = Windows(first, end)
-        path, score = best_path(lambda a, b: log_emission[a:b], frames, given, windows=windows)
+        block = int(draw.integers(1, 5))
+        path, score = best_path(lambda a, b: log_emission[a:b], frames, given, windows=windows, block_frames=block)
         moments = np.arange(frames)[:, None]
         of_states[(moments < first) | (moments >= end)] = -np.inf
     else:
@@ -218,21 +221,6 @@ def of_path(draw, spread, extreme, windowed=False):
     return bool(abs(own - best) <= rounding and abs(score - best) <= rounding)
 
 
-def of_trellis(draw, spread, extreme):
-    """The cheapest path through a trellis."""
-    states, frames = int(draw.integers(1, 4)), int(draw.integers(1, 6))
-    steps = -log_densities(draw, frames * states, states, spread).reshape(frames, states, states)
-    steps = np.ascontiguousarray(steps.transpose(1, 2, 0))
-    steps[range(states), range(states)] = np.minimum(steps[range(states), range(states)], 10 * spread)
-    start = -log_probabilities(draw, states, extreme)
-    start[0] = 0.0
-    arrival, pointers = cheapest_arrivals(start, steps)
-    _, best = paths.cheapest_path(start, steps)
-    path = trace_back(pointers, int(arrival.argmin()))
-    own = paths.path_cost([pointers[0, path[0]], *path], start, steps)
-    return near(arrival.min(), best, spread) and near(own, best, spread)
-
-
 RECURSIONS: dict[str, Callable[..., bool]] = {
     "network, double": of_network,
     "network, single": lambda *case: of_network(*case, np.float32),
@@ -246,7 +234,6 @@ RECURSIONS: dict[str, Callable[..., bool]] = {
     "chains": of_chains,
     "best path": of_path,
     "best path in windows": lambda *case: of_path(*case, True),
-    "trellis": of_trellis,
 }
 
 

@@ -1,10 +1,8 @@
 import numpy as np
 import pytest
 
-from kernels.networks import network_posteriors
 from lipmotion.kernels.factorial import factorial_posteriors
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
-from oracles import factorial as oracle
 
 
 def random_loop(draw, states: int, units: int) -> Loop:
@@ -22,25 +20,6 @@ def random_model(seed: int, frames: int, shapes=((2, 2), (2, 1)), spread: float 
     logs = (draw.normal(-20, spread, (frames, size)) for size in sizes)
     own = draw.normal(-38, spread, (frames, len(chosen)))
     return audio, visual, FactorialLogLikelihoods(*logs, own, np.stack(np.unravel_index(chosen, sizes), axis=1))
-
-
-def test_agrees_with_the_network_of_all_joint_states():
-    for precision in (np.float32, np.float64):
-        audio, visual, logs = random_model(2, 20, ((3, 5), (2, 4)), 5.0, 20)
-        logs = FactorialLogLikelihoods(*(part.astype(precision) for part in logs[:3]), logs.pairs)
-        found = factorial_posteriors(audio, visual, logs)
-        log_density, initial, final = oracle.joint_logs(audio, visual, logs)
-        arcs = sorted(oracle.joint_arcs(audio, visual).items(), key=lambda item: item[0][1])
-        sources, targets = np.array([arc for arc, _ in arcs]).T
-        arc_logs = np.log([probability for _, probability in arcs])
-        states = np.arange(log_density.shape[1])
-        starts = np.searchsorted(targets, states)
-        joint, _, log_likelihood = network_posteriors(log_density, states, sources, arc_logs, starts, initial, final)
-        joint = joint.reshape(20, 15, 8)
-        tolerance = 1e-9 if precision is np.float64 else 2e-5
-        assert found.audio == pytest.approx(joint.sum(axis=2), abs=tolerance)
-        assert found.visual == pytest.approx(joint.sum(axis=1), abs=tolerance)
-        assert found.log_likelihood == pytest.approx(log_likelihood, rel=1e-9 if precision is np.float64 else 1e-6)
 
 
 def test_posteriors_sum_to_one_and_counts_are_as_many_as_steps():

@@ -60,24 +60,3 @@ def test_chains_are_those_of_the_definition(seed, loudness):
         assert stay[u, :states] == pytest.approx(wanted_stay, abs=1e-8)
         found = log_likelihood[u] if log_likelihood[u] > LOG_ZERO / 2 else -np.inf
         assert found == pytest.approx(wanted_log_likelihood, rel=1e-12)
-
-
-SIZES = st.lists(st.tuples(st.integers(1, 7), st.integers(1, 3)), min_size=1, max_size=4)
-
-
-@given(seed=st.integers(0, 2**32 - 1), sizes=SIZES, padding=st.sampled_from([0.0, 50.0, -1e4, 1e4]))
-@settings(max_examples=40)
-def test_agrees_with_the_enumeration_of_all_paths(seed, sizes, padding):
-    batch, single = padded(seed, sizes, padding)
-    posterior, stay, log_likelihood = chain_posteriors(*batch)
-    for u, (frames, states) in enumerate(sizes):
-        wanted_posterior, wanted_stay, wanted_log_likelihood = paths.chain_posteriors(*single[u])
-        assert posterior[:frames, u, :states] == pytest.approx(wanted_posterior, abs=1e-10)
-        assert not posterior[frames:, u].any()
-        assert not posterior[:, u, states:].any()
-        assert stay[u, :states] == pytest.approx(wanted_stay, abs=1e-10)
-        assert not stay[u, states:].any()
-        if frames < states:
-            assert log_likelihood[u] <= LOG_ZERO / 2
-        else:
-            assert log_likelihood[u] == pytest.approx(wanted_log_likelihood, abs=1e-9)

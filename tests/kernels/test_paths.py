@@ -120,35 +120,6 @@ def test_a_wide_beam_drops_nothing_and_a_narrow_one_the_better_late_path():
     assert score == -30
 
 
-def random_windows(seed: int, states: int, frames: int) -> Windows:
-    draw = np.random.default_rng([seed, 2])
-    first = np.sort(draw.integers(0, max(frames // 2, 1), states))
-    return Windows(first, np.sort(draw.integers(0, frames + 2, states)))
-
-
-@pytest.mark.parametrize("block", [1, 3, None])
-def test_agrees_with_the_enumeration_of_all_paths_in_the_windows(block):
-    possible = 0
-    for frames in range(1, 6):
-        for seed in range(8):
-            arrays, arcs = random_network(seed, states=4, densities=3, density_of_arcs=0.6)
-            windows = random_windows(seed, 4, frames)
-            log_emission = random_emission(seed, frames, 3)
-            path, score = paths.best_path(*asked(log_emission), NetworkArrays(**arrays), None, windows, block)
-            moments = np.arange(frames)[:, None]
-            inside = (moments >= windows.first) & (moments < windows.end)
-            of_states = np.where(inside, log_emission[:, arrays["emission"]], -np.inf)
-            ends = arrays["log_initial"], arrays["log_final"]
-            wanted, best = oracle.best_path(of_states, np.arange(4), arcs, *ends)
-            if np.isinf(best):
-                assert score == -np.inf
-            else:
-                possible += 1
-                assert tuple(path) == wanted
-                assert score == pytest.approx(best, abs=1e-3)
-    assert possible > 15
-
-
 def test_wide_windows_change_nothing_and_narrow_ones_are_kept():
     states, frames = 60, 900
     log_emission, chain = random_emission(3, frames, 7), NetworkArrays(**left_to_right(states, 7))

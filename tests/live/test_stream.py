@@ -7,7 +7,6 @@ import socket
 import struct
 import tracemalloc
 from collections.abc import AsyncIterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +21,6 @@ from lipmotion.types import Audio
 from lipmotion_agents.conversation import Conversation
 from pipeline.made import read_welcome
 
-WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 STEP_S = 0.02
 
 
@@ -97,14 +95,6 @@ def test_it_rests_in_silence_and_within_100_ms_after_it(sound: np.ndarray) -> No
     assert opening.max() > 0.08
     still = values_of(all_of(Stream(seed=None), np.zeros(32_000, np.float32), [640]))[:, 2:]
     assert np.ptp(still, axis=0).max() < 1e-9
-
-
-def test_a_gain_changes_little(sound: np.ndarray) -> None:
-    loud, soft = (
-        np.array([frame["opening"] for frame in all_of(Stream(), sound * np.float32(gain), [640])])
-        for gain in (1.0, 0.1)
-    )
-    assert np.corrcoef(loud, soft)[0, 1] > 0.9
 
 
 @pytest.mark.parametrize("turns", [40, pytest.param(1000, marks=pytest.mark.long)])
@@ -358,18 +348,6 @@ def test_live_link_packets_are_read_as_by_the_app() -> None:
     values = dict(zip(ARKIT_52, struct.unpack(">61f", packet[62 + size :]), strict=False))
     assert values["jawOpen"] == pytest.approx(frame()["jawOpen"])
     assert values["eyeBlinkLeft"] == 0
-
-
-def test_packets_are_read_by_the_receivers_own_parsers() -> None:
-    reader = pytest.importorskip("pylivelinkface")
-    osc = pytest.importorskip("pythonosc.osc_bundle")
-    decoded, face = reader.PyLiveLinkFace.decode(live_link_packet(frame()))
-    assert decoded
-    assert face.get_blendshape(reader.FaceBlendShape.JawOpen) == pytest.approx(frame()["jawOpen"], abs=1e-3)
-    assert face.get_blendshape(reader.FaceBlendShape.JawLeft) == pytest.approx(frame()["jawLeft"], abs=1e-3)
-    messages = list(osc.OscBundle(vmc_packet(frame())))
-    assert messages[0].address == "/VMC/Ext/Blend/Val"
-    assert messages[0].params == ["A", pytest.approx(frame()["viseme_aa"])]
 
 
 def test_frames_reach_a_receiver() -> None:

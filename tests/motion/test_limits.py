@@ -1,10 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lipmotion import types
 from lipmotion.engines import engine_named
 from lipmotion.errors import ModelFormatError
+from lipmotion.kernels.banded import solve_mlpg
+from lipmotion.motion import generation as module
 from lipmotion.motion.closure import (
     Closure,
     choose_closed_frames,
@@ -12,9 +17,21 @@ from lipmotion.motion.closure import (
     estimate_closure,
     find_closable_ranges,
 )
-from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, check_rest, check_spread, measure_limits
+from lipmotion.motion.generation import LARGEST_FACTOR, VarianceScaling
+from lipmotion.motion.modulation_filter import REACH as TAPS
+from lipmotion.motion.modulation_filter import ModulationFilter
+from lipmotion.motion.space import (
+    MotionLimits,
+    MotionSpace,
+    check_poses,
+    check_rest,
+    check_spread,
+    fit_space,
+    measure_limits,
+    resample_to_model,
+)
 from lipmotion.stats.pca import Pca
-from lipmotion.testing import PHONES, examples, speech
+from lipmotion.testing import PHONES, examples, speech, timeline
 from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit, silent_monitor
 
 POSES = np.array([[0.0, 0.5], [0.3, 0.6], [0.1, 0.55]])
@@ -190,3 +207,198 @@ def test_lips_that_a_wrong_phone_shows_open_are_closed_as_far_as_the_frames_say(
     assert estimate_closed_opening([0.126], frames + 0.1, frames) == estimate_closed_opening([0.126], frames)
     assert estimate_closed_opening([-0.02], frames) == 0
     assert estimate_closed_opening([], np.empty(0)) == 0
+
+
+CHANNELS = tuple(map(Channel, ("x_1", "opening", "y_1", "jaw_open", "z_1")))
+
+
+def motion(frames: int = 50) -> np.ndarray:
+    return np.random.default_rng(1).normal(0.2, 1, (frames, 5)) * [1, 2, 0.5, 3, 0.1]
+
+
+def test_distances_are_modelled_as_they_are_and_points_in_components():
+    space = fit_space(CHANNELS, motion(), components=2)
+    assert space.direct_names == ("opening", "jaw_open")
+    assert space.reduce(motion()).shape == (50, 4)
+    assert np.array_equal(space.reduce(motion())[:, :2], motion()[:, [1, 3]])
+    values, _ = space.restore(space.reduce(motion()), np.ones((50, 4)))
+    least = np.linalg.eigvalsh(np.cov(motion()[:, [0, 2, 4]].T, bias=True))[0]  # that any two components lose
+    assert np.square(motion() - values).sum(axis=1).mean() == pytest.approx(least)
+
+
+def test_variance_is_carried_through_the_basis():
+    space = fit_space(CHANNELS, motion(), components=2)
+    variance = np.random.default_rng(2).uniform(0.1, 1, (1, 4))
+    _, spread = space.restore(np.zeros((1, 4)), variance)
+    assert spread[0, [1, 3]] == pytest.approx(variance[0, :2])
+    assert spread[0, [0, 2, 4]] == pytest.approx(
+        np.diag(space.points.basis.T @ np.diag(variance[0, 2:]) @ space.points.basis)
+    )
+
+
+def seen(count: int) -> np.ndarray:
+    return np.ones(count, bool)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    rate_hz=st.sampled_from([24.0, 25.0, 29.97, 30.0, 50.0, 60.0]),
+    count=st.integers(4, 40),
+)
+@settings(max_examples=30)
+def test_a_cubic_comes_back_exactly(seed, rate_hz, count):
+    cubic = np.polynomial.Polynomial(np.random.default_rng(seed).normal(0, 1, 4))
+    camera_s = np.arange(count) / rate_hz
+    frames = int(camera_s[-1] * 100) + 1
+    values, valid = resample_to_model(cubic(camera_s)[:, None], seen(count), rate_hz, frames, 100.0)
+    assert values[:, 0] == pytest.approx(cubic(np.arange(frames) / 100), abs=1e-9)
+    assert valid.all()
+
+
+def test_camera_frames_keep_their_values():
+    values = np.random.default_rng(1).normal(0, 1, (10, 3))
+    curves, _ = resample_to_model(values, seen(10), 25.0, 37, 100.0)
+    assert curves[::4] == pytest.approx(values, abs=1e-12)
+
+
+def test_frames_beyond_the_end_or_nearest_to_an_unseen_camera_frame_are_not_valid():
+    values = np.arange(5.0)[:, None]
+    curves, valid = resample_to_model(values, seen(5), 25.0, 30, 100.0)
+    assert curves[17:, 0] == pytest.approx(np.full(13, 4.0))  # the last value holds
+    assert np.nonzero(~valid)[0].tolist() == [*range(18, 30)]  # the last camera frame is at 16; 18 is half a frame on
+    mask = np.array([True, True, False, True, True])
+    _, valid = resample_to_model(values, mask, 25.0, 17, 100.0)
+    assert np.nonzero(~valid)[0].tolist() == [6, 7, 8, 9]
+
+
+def test_one_and_two_camera_frames():
+    for count, wanted in ((1, [7.0] * 9), (2, [7.0, 7.25, 7.5, 7.75, 8.0, 8.0, 8.0, 8.0, 8.0])):
+        curves, valid = resample_to_model(np.array([[7.0], [8.0]])[:count], seen(count), 25.0, 9, 100.0)
+        assert curves[:, 0] == pytest.approx(wanted)
+        assert valid.sum() == 4 * count - 2
+
+
+def test_curvature_does_not_jump():
+    """Linear interpolation would make the second difference 0 nearly everywhere, and large at camera frames."""
+    curves, _ = resample_to_model(np.sin(9 * np.arange(30) / 25)[:, None], seen(30), 25.0, 110, 100.0)
+    bend, wanted = (np.diff(curve, 2)[8:-8] for curve in (curves[:, 0], np.sin(9 * np.arange(110) / 100)))
+    assert bend == pytest.approx(wanted, abs=0.05 * np.abs(wanted).max())
+
+
+SENTENCE = speech(timeline(["sil", *(list(PHONES) * 30)[:40], "sil"]), seed=5)
+
+
+PINNED = Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1)))
+
+
+BEFORE = 5750
+"""Frames of silence after which the sentence lies on the border of two blocks."""
+
+
+def delayed():
+    """Return the sentence and its pins after as much silence that it lies in two blocks."""
+    assert BEFORE < module.BLOCK_FRAMES < BEFORE + 330
+    units = types.Timeline((types.Span(0.0, BEFORE / 100, types.Unit("sil")), *SENTENCE.units.shifted(BEFORE / 100)))
+    late = speech(units)
+    values = np.concatenate([late.features.values[:BEFORE], SENTENCE.features.values])
+    pins = Constraints(tuple(replace(pin, time_s=pin.time_s + BEFORE / 100) for pin in PINNED.pins))
+    return replace(late, features=replace(late.features, values=values)), pins
+
+
+def around(taps):
+    """Return a filter of these taps in all dimensions."""
+    reach = len(taps) // 2
+    values = np.zeros((2 * TAPS + 1, MODEL.space.dimensions))
+    values[TAPS - reach : TAPS + reach + 1] = np.array(taps)[:, None]
+    return ModulationFilter(values)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return ENGINE.generate(MODEL, SENTENCE, PINNED)
+
+
+def test_blocks_change_nothing(whole):
+    pieces, away = ENGINE.generate(MODEL, *delayed()), slice(100, None)
+    moved = pieces.motion.values[BEFORE:]
+    assert moved[away] == pytest.approx(whole.motion.values[away], abs=1e-7)  # a regression of single precision
+    assert pieces.variance[BEFORE:][away] == pytest.approx(whole.variance[away], abs=1e-9)
+    assert pieces.motion["opening"][BEFORE + 330] == 0.2
+    names = [[each.trace.states[state] for state in each.trace.frames] for each in (pieces, whole)]
+    assert names[0][BEFORE:][away] == names[1][away]
+
+
+def test_the_filter_is_weaker_for_voices_that_are_less_known():
+    learned = replace(MODEL.motion, modulation=around([-1.0, 3.0, -1.0]))
+    assert learned.for_voice(1.0).modulation.taps == pytest.approx(learned.modulation.taps)
+    assert replace(learned, modulation=None).for_voice(0.3).modulation is None
+    sides = learned.for_voice(0.75).modulation.taps[TAPS + 1]  # unseen_share: one half
+    width = MODEL.space.direct_names.index("width")
+    assert sides[width] == pytest.approx(-0.25)
+    assert np.delete(sides, width) == pytest.approx(-0.5)
+    unknown = learned.for_voice(0.0).modulation.taps
+    assert unknown[TAPS] == pytest.approx(1)
+    assert np.abs(unknown).sum(axis=0) == pytest.approx(1)
+
+
+def test_the_modulation_filter_keeps_pins_closures_and_blocks(whole):
+    model = replace(MODEL, modulation=around([-0.5, 0, 0, 2.0, 0, 0, -0.5]))  # sharpens
+    filtered, plain = ENGINE.generate(model, SENTENCE, PINNED).motion["opening"], whole.motion["opening"]
+    assert np.abs(np.diff(filtered, 3)).mean() > 1.5 * np.abs(np.diff(plain, 3)).mean()
+    assert filtered[330] == 0.2
+    assert filtered.min() >= 0
+    ranges = find_closable_ranges(SENTENCE.units, len(filtered))
+    assert len(ranges) > 5
+    for each in ranges:
+        assert filtered[each].min() <= plain[each].min()
+    assert ENGINE.generate(model, *delayed()).motion["opening"][BEFORE + 100 :] == pytest.approx(
+        filtered[100:], abs=1e-7
+    )
+
+
+OPTIONS = {"articulation": False, "states": 3, "silent_states": 7, "components": 2, "acoustic_components": 20}
+
+
+def test_the_trajectory_grows_about_rest_and_its_variance_with_it():
+    draw = np.random.default_rng(0)
+    means, precisions = draw.normal(size=(40, 3, 2)), draw.uniform(1, 9, (40, 3, 2))
+    gain, rest = np.array([1.5, 1.0]), np.array([0.3, -1.0])
+    plain, variance = solve_mlpg(means, precisions)
+    large, larger_variance = solve_mlpg(*VarianceScaling(gain, rest).apply(means, precisions))
+    assert large == pytest.approx(rest + gain * (plain - rest))
+    assert larger_variance == pytest.approx(variance * gain * gain)
+
+
+@pytest.fixture(scope="module")
+def noisy_clips():
+    """Clips in which every phone is said more or less wide, so that the mean of all is too small a movement."""
+    corpus = examples(10)
+    for number, one in enumerate(corpus):
+        waves = np.sin(np.arange(len(one.valid)) / (3 + number % 4)) * 0.02
+        one.motion.values[60:-60, 0] += waves[60:-60]
+    return corpus
+
+
+@pytest.mark.long
+def test_the_full_range_is_nearer_to_the_original(noisy_clips):
+    engines = [
+        engine_named("trajectory", {**OPTIONS, "variance_scaling": on, "closures": False}) for on in (False, True)
+    ]
+    learned = engines[0].fit(noisy_clips, silent_monitor).model
+    assert 1 < learned.variance_factors[0] <= LARGEST_FACTOR
+    spreads = [
+        np.mean([engine.generate(learned, one.speech).motion["opening"].std() for one in noisy_clips])
+        for engine in engines
+    ]
+    original = np.mean([one.motion["opening"].std() for one in noisy_clips])
+    assert spreads[0] < spreads[1]
+    assert abs(spreads[1] - original) < abs(spreads[0] - original)
+
+
+def test_pins_and_rest_stay_where_they_are(noisy_clips):
+    engine = engine_named("trajectory", OPTIONS)
+    learned = engine.fit(noisy_clips, silent_monitor).model
+    result = engine.generate(learned, speech(timeline(("t", "aa", "s"))), Constraints((Pin(0.8, "width", 0.61),)))
+    assert result.motion["width"][80] == 0.61
+    rest = learned.emission.means[-1, 0, 0]
+    assert result.motion["opening"][:20] == pytest.approx(np.full(20, rest), abs=2e-3)

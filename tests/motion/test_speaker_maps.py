@@ -8,7 +8,7 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion import speaker_maps
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals
-from lipmotion.motion.speaker_maps import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map, select_channels
+from lipmotion.motion.speaker_maps import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
 from testing.toy import toy_motion, toy_sentences
 
@@ -336,19 +336,3 @@ def test_two_maps_one_after_the_other() -> None:
     wanted = second.to_person(first.to_person(shifted, rest), rest)
     np.testing.assert_allclose(both.to_person(values + both.shift(values, weights), rest), wanted, atol=1e-12)
     assert compose_maps(None, second) is second
-
-
-def test_channels_in_the_order_of_a_model() -> None:
-    motion = Motion(np.arange(6.0).reshape(2, 3), 100.0, tuple(map(Channel, ("a", "b", "c"))))
-    assert select_channels(motion, (Channel("c"), Channel("a")), "x").values.tolist() == [[2.0, 0.0], [5.0, 3.0]]
-    with pytest.raises(InputError, match=r"x: .*no channel 'jaw' in the unit 'weight'.*1 of 2 are missing.*lipmotion"):
-        select_channels(motion, (Channel("a"), Channel("jaw", "weight")), "x")
-
-
-def test_seconds_of_measured_speech() -> None:
-    units = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 1.0, Unit("aa")), Span(1.0, 2.0, Unit("sil"))))
-    motion = Motion(np.zeros((200, 1)), 100.0, (Channel("opening"),))
-    valid = np.ones(200, bool)
-    valid[80:] = False
-    example = Example("x", Speech(Features(np.zeros((200, 39), np.float32), 2.0), units), motion, valid)
-    assert count_speech_s([example]) == pytest.approx(0.3, abs=0.011)

@@ -1,21 +1,27 @@
-"""What tests of several rooms make: corpora, sounds and their features, recognisers, and a character that is read."""
+"""What tests of several rooms make and read: corpora, sounds and their features, recognisers, characters, moods."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.io import wavfile
 
 from lipmotion import Corpus, Model
+from lipmotion.articulation.expression import with_moods
 from lipmotion.errors import MissingDependencyError
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Features, Timeline, Track, Unit, Utterance
+from lipmotion.types import Audio, Features, Generation, Motion, Timeline, Track, Unit, Utterance
+from lipmotion.types.delivery import parse_moods
+from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.corpus import prepare
+from lipmotion_faces.outputs.shown_faces import shown_face
 from testing.toy import toy_sentences, toy_utterances
 
 
@@ -65,13 +71,29 @@ def features_of(audio: Audio) -> Features:
     return analysed(audio).mfcc()
 
 
+def read_sound(sound: Path | Audio) -> AnalysedAudio:
+    return analysed(sound if isinstance(sound, Audio) else read_audio(sound))
+
+
 def read_welcome() -> AnalysedAudio:
     """Return real speech of five seconds, of a voice that the shipped model does not know."""
-    return analysed(read_audio(WELCOME))
+    return read_sound(WELCOME)
 
 
 def recogniser_of(model: Model, kind: str = "own") -> Recogniser:
     return Recogniser(model.phones, kind)
+
+
+def read_character(path: Path, points: Path | None = None) -> Any:
+    return load_character(path, points=points)
+
+
+def in_mood(motion: Motion, mood: str) -> Motion:
+    return with_moods(motion, parse_moods(mood))
+
+
+def performed(generation: Generation, face: str, **settings: Any) -> Performance:
+    return Performance(generation, OutputSettings(shown_face(face), **settings))
 
 
 def write_sound(path: Path, audio: Audio) -> None:

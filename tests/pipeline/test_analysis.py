@@ -1,6 +1,5 @@
 """Requests to analysed speech: what they name, their language, their words, and what engines are given."""
 
-import json
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -13,7 +12,6 @@ import lipmotion
 from lipmotion import Model, Request, animate, load_model
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.analysis import speech_analysis as pipeline_analysis
 from lipmotion.pipeline.analysis.language import (
     detect_english,
     format_words,
@@ -37,7 +35,6 @@ from lipmotion.pipeline.request import as_request
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
-from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import Audio, Span, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon
 from pipeline.made import features_of, read_welcome, recogniser_of
@@ -111,14 +108,8 @@ def test_a_recording_that_is_called_as_a_device_names_no_output(output):
     assert plan_outputs([Path("CON.wav")], ["../a.json"], ["json"]) == [["../a.json"]]
 
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 SILENCE = Audio(np.zeros(16_000, np.float32), 16_000)
 USER = Lexicon({"papa": (("p", "aa", "p", "aa"),), "2": (("m", "aa"),)})
-
-
-def test_english_stays_as_it_is():
-    request = Request(SILENCE, "two papas")
-    assert resolve_language(request) is request
 
 
 def test_another_language_has_its_own_words_and_lexicon(tmp_path):
@@ -129,7 +120,6 @@ def test_another_language_has_its_own_words_and_lexicon(tmp_path):
         )
         assert isinstance(request.transcript, TimedTranscript)
         assert request.transcript.words == ("papa", "2")
-        assert isinstance(request.lexicon, LanguageLexicon)
         assert request.lexicon.pronunciations("2") == (("m", "aa"),)
 
 
@@ -173,12 +163,6 @@ def test_mapped_phones_are_not_called_sure(toy_model, toy_sentence):
     outlook = lipmotion.animate(Request(toy_sentence.audio, foreign, recogniser="own"), model=toy_model).outlook
     assert outlook.words == "mapped transcript"
     assert outlook.confidence == pytest.approx(0.25)
-
-
-def test_the_option_reaches_the_request():
-    assert read_request(Request("a.wav", language="ko")).language == "ko"
-    assert as_request(Request(SILENCE, language="ko"), language="fr").language == "fr"
-    assert as_request(Request(SILENCE, language="ko")).language == "ko"
 
 
 @pytest.mark.long
@@ -229,16 +213,6 @@ def test_files_of_words_are_transcripts(found, tmp_path, suffix):
     assert all(abs(a - b) < 0.05 for a, b in starts)
 
 
-def test_json_has_times_and_confidences(found, tmp_path):
-    write_words(found.words, [tmp_path / "words.json"])
-    document = json.loads((tmp_path / "words.json").read_text())
-    assert document["text"].startswith("please speak")
-    first = document["result"][0]
-    assert set(first) == {"word", "start", "end", "conf"}
-    assert 0.4 < first["start"] < first["end"] < 1.0
-    assert all(0 <= word["conf"] <= 1 for word in document["result"])
-
-
 def test_files_that_cannot_be_written(found, tmp_path):
     for name in ("words.srt", "words", "nowhere/words.txt"):
         with pytest.raises(ExportError):
@@ -258,9 +232,9 @@ def test_speech_is_as_reliable_as_its_words(found):
 
 
 @pytest.mark.long
-def test_words_do_not_depend_on_the_processes(monkeypatch, found):
-    monkeypatch.setattr("lipmotion.speech.recognition.word_search.SHORT_FRAMES", 0)
-    assert recognise_words(WELCOME, workers=2).words == found.words
+def test_words_do_not_depend_on_the_processes():
+    long = Audio(np.tile(read_welcome().samples, 7), 16_000)  # of more than half a minute
+    assert recognise_words(long, workers=2).words == recognise_words(long).words
 
 
 @dataclass(frozen=True)
@@ -368,7 +342,8 @@ def test_times_decide_where_words_alone_do_not(toy_model, toy_sentence):
 
 def test_words_of_an_installed_recogniser_are_aligned(toy_model, toy_sentence, monkeypatch):
     said = [group_words(toy_sentence), None]
-    monkeypatch.setattr(pipeline_analysis, "recognise_words", lambda _, kind: said.pop(0) if kind == "vosk" else None)
+    place = "lipmotion.pipeline.analysis.speech_analysis.recognise_words"
+    monkeypatch.setattr(place, lambda _, kind: said.pop(0) if kind == "vosk" else None)
     request = Request(toy_sentence.audio, recogniser="vosk")
     found = analyse(toy_model, request)
     words = tuple(span.label.word for span in found.units if span.label.word)

@@ -190,16 +190,6 @@ def test_where_nothing_is_likely_there_is_a_picture_all_the_same():
     assert draw_posteriors(generated(), [posteriors("phone", np.zeros((FRAMES, 3)))]).height > 0
 
 
-def test_the_asynchrony_is_a_panel_of_its_own():
-    lead = np.tile([0.1, 0.3, 0.6], (FRAMES, 1))
-    alone = draw_posteriors(generated(), [posteriors("phone", halves())])
-    both = draw_posteriors(generated(), [posteriors("phone", halves()), posteriors("viseme", halves(), lead)])
-    assert both.height > alone.height + 6 * ROW_PX
-    shown = pixels(both)
-    column = shown[:, LEFT_PX + 300].sum(axis=1)
-    assert column[-(5 * TITLE_PX + 120) - 3 * ROW_PX :].min() < 700  # something is drawn above the opening
-
-
 def test_recordings_of_any_length():
     for frames, columns in {1: MIN_COLUMNS, 400: 800, 5_345: MAX_COLUMNS}.items():
         picture = draw_posteriors(generated(frames), [posteriors("phone", halves(frames))])
@@ -212,13 +202,3 @@ def test_a_column_of_a_long_recording_is_the_mean_of_its_frames():
     shown = pixels(draw_posteriors(generated(8 * MAX_COLUMNS), [posteriors("phone", probability)]))
     row = shown[2 * TITLE_PX + ROW_PX // 2, LEFT_PX + 10 : LEFT_PX + MAX_COLUMNS // 2 - 10]
     assert (row == [round(255 + 0.25 * (part - 255)) for part in COLOURS[0]]).all()
-
-
-def test_phones_are_written_where_there_is_room():
-    dense = Timeline(tuple(Span(s / 100, (s + 1) / 100, Unit("aa", "aa")) for s in range(FRAMES)))
-    strips = []
-    for units in (Timeline(()), dense, generated().units):
-        picture = draw_posteriors(replace(generated(), units=units), [posteriors("phone", halves())])
-        strips.append(pixels(picture.crop((LEFT_PX, 0, picture.width, TITLE_PX - 4))).min())
-    assert strips[:2] == [255, 255]
-    assert strips[2] < 200

@@ -10,24 +10,17 @@ import lipmotion
 from faces.test_cut_out import draw
 from lipmotion import Delivery
 from lipmotion.articulation.cue_sheets import list_frame_shapes
-from lipmotion.articulation.delivery import find_closed_times
-from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
-from lipmotion.formats.keys import Thinning
-from lipmotion.pipeline.outputs.output import OutputSettings, Performance
-from lipmotion.storage.files import sound_reference
 from lipmotion.types import Audio, Channel, Generation, Motion, Pin, Timeline
-from lipmotion.types.delivery import parse_moods
 from lipmotion_faces import Staging
 from lipmotion_faces.characters import fbx
-from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.skin import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, delivered_scene, head_scene, write_scene
-from lipmotion_faces.outputs.shown_faces import shown_face
 from meshes.heads import head, write_glb
+from pipeline.made import in_mood, performed, read_character
 from programs import gltf_report, gltf_validator, python_with, run_with
 
 TIMES_S = (0.0, 0.31, 0.555, 0.75, 0.95, 1.15, 1.62, 2.0)
@@ -43,7 +36,7 @@ def own_head(generation: Generation) -> Scene:
 def character(generation: Generation, tmp_path_factory: pytest.TempPathFactory) -> Scene:
     path = tmp_path_factory.mktemp("character") / "head.glb"
     write_glb(path, head())
-    return character_scene(generation, load_character(path))
+    return character_scene(generation, read_character(path))
 
 
 @pytest.fixture(scope="module", params=["own_head", "character"])
@@ -67,19 +60,6 @@ def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
     assert gap[(time_s > 0.7) & (time_s < 0.8)].max() > 0.15
 
 
-@pytest.mark.long
-def test_shapes_of_moods_are_in_the_head_where_a_mood_is(generation, own_head):
-    moody = replace(generation, motion=with_moods(generation.motion, parse_moods("angry:0.8, surprised at 1.0")))
-    scene = head_scene(moody, staging=Staging(brows=False))
-    added = {*scene.mesh.shape_names} - {*own_head.mesh.shape_names}
-    assert "browDownLeft" in added
-    weights = {name: scene.weights[name] for name in scene.weights.names}
-    assert weights["browDownLeft"][50] == pytest.approx(0.8)
-    assert weights["browDownLeft"][-1] == 0
-    assert weights["eyeWideRight"][-1] == pytest.approx(mood_table()["surprised"][5])
-    assert weights["browInnerUp"][-1] == 1
-
-
 def test_the_rate_is_that_of_the_keys(generation):
     made = head_scene(generation, 30.0)
     assert made.weights.rate_hz == pytest.approx(30.0)
@@ -93,7 +73,7 @@ def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
     values, spans, each_s = np.tile(generation.motion.values, (3, 1)), list(generation.units), 2.01
     units = [replace(s, start_s=s.start_s + n * each_s, end_s=s.end_s + n * each_s) for n in range(3) for s in spans]
     moved = replace(generation.motion, values=values)
-    moved = with_moods(moved, parse_moods(mood)) if mood else moved
+    moved = in_mood(moved, mood) if mood else moved
     pin = Pin(2.7, "jawOpen", 0.4)
     long = replace(
         generation, motion=moved, units=Timeline(tuple(units)), spread=np.zeros(moved.values.shape), curve_edits=(pin,)
@@ -101,7 +81,7 @@ def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
     scene = head_scene
     if own:
         write_glb(tmp_path / "own.glb", head())
-        scene = partial(character_scene, character=load_character(tmp_path / "own.glb"))
+        scene = partial(character_scene, character=read_character(tmp_path / "own.glb"))
     whole = scene(long)
     for frames in (slice(0, 30), slice(250, 310), slice(len(values) - 20, len(values))):
         part = scene(long, frames=frames)
@@ -111,24 +91,9 @@ def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
             assert np.abs(part.turn.rotations - whole.turn.rotations[frames]).max() < 1e-9
 
 
-def test_closures_between_two_keys_are_kept(generation, character, tmp_path):
-    path = tmp_path / "head.glb"
-    write_glb(path, head())
-    slow = character_scene(generation, load_character(path), 12.0)
-    assert character.weights is not None
-    parted = slow.weights["jawOpen"] - slow.weights["mouthClose"]
-    closed = (slow.weights.time_s > 0.45) & (slow.weights.time_s < 0.65)
-    assert parted[closed].min() < 0.02
-
-
 def test_a_motion_without_opening_is_refused(generation):
     with pytest.raises(InputError, match="no channel 'opening'"):
         head_scene(generation.selected(["x_13"]))
-
-
-def test_the_sound_is_named_from_the_folder_of_the_file(tmp_path):
-    assert sound_reference(tmp_path / "a.wav", tmp_path / "out.glb") == "a.wav"
-    assert sound_reference(tmp_path / "in" / "a b.wav", tmp_path / "out" / "a.glb") == "../in/a b.wav"
 
 
 def test_the_sound_is_in_the_extras_of_the_scene(character, tmp_path):
@@ -177,9 +142,9 @@ def test_held_weights_change_at_once_and_others_do_not(character, tmp_path):
 
 
 def test_keys_that_others_give_are_left_out(generation, tmp_path):
-    settings = OutputSettings(shown_face("head"), delivery=Delivery(key_tolerance=0.02))
-    scene = delivered_scene(Performance(generation, settings))
-    assert scene.thinning == Thinning(0.02, tuple(find_closed_times(generation)))
+    scene = delivered_scene(performed(generation, "head", delivery=Delivery(key_tolerance=0.02)))
+    assert scene.thinning.tolerance == 0.02
+    assert len(scene.thinning.closed_s) == 2  # m and p
     write_scene(tmp_path / "a.glb", scene)
     stored, rotation = GltfArrays(read_gltf_document(tmp_path / "a.glb")), len(scene.table())
     weights, turned = read_gltf_document(tmp_path / "a.glb").json["animations"][0]["samplers"]

@@ -10,7 +10,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.generate import speak as module
 from lipmotion.pipeline.generate.speak import REST_S, speak_from_corpus
 from lipmotion.speech.voices.installed import default_voice, installed_voices
-from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit
+from lipmotion.types import Span, SpokenText, Unit
 from lipmotion.units import LIP_CLOSING, Lexicon, is_silent
 from pipeline.made import corpus_of
 from speech import stand_in_voice
@@ -76,12 +76,6 @@ def test_the_sound_is_silent_where_the_units_are(spoken):
         for span in spoken.generation.units
     }
     assert loud["aa"] > 5 * loud["sil"]
-
-
-def test_pins_hold(stand_in: None, toy_model: Model) -> None:  # noqa: ARG001
-    told = Constraints((Pin(0.5, "opening", 0.07),))
-    result = speak(TEXT, model=toy_model, constraints=told).generation
-    assert result.motion["opening"][50] == pytest.approx(0.07)
 
 
 def test_files(spoken, toy_model, tmp_path):

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import lipmotion
 from lipmotion import (
     Corpus,
     Edits,
@@ -27,8 +26,7 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.closure import find_closable_ranges
 from lipmotion.pipeline.generate.explain import chain_posteriors
 from lipmotion.pipeline.request import Onto
-from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
+from lipmotion.types import Channel, Constraints, Motion, Pin, Track, Utterance
 from lipmotion_faces.tracking.frames import VideoSpan
 from pipeline import made
 from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
@@ -54,16 +52,6 @@ def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarra
     return animate(request(sentence, speaker), model=model).motion["opening"]
 
 
-@pytest.mark.long
-def test_each_person_moves_as_far_as_they_do(model, toy_sentence):
-    assert model.speakers.names == ("anna", "ben")
-    assert model.about["speakers"] == ["anna", "ben"]
-    anna, ben, mean = (opening(model, toy_sentence, name) for name in ("anna", "ben", ""))
-    assert anna.max() > mean.max() > ben.max()
-    assert np.ptp(ben) / np.ptp(anna) == pytest.approx(GAIN[0], abs=0.15)
-    assert np.corrcoef(anna, ben)[0, 1] > 0.97
-
-
 def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model, toy_sentence):
     ranges = find_closable_ranges(toy_sentence.units, len(opening(model, toy_sentence)))
     assert ranges
@@ -71,11 +59,6 @@ def test_lips_close_in_p_b_m_as_far_as_each_person_closes_them(model, toy_senten
         curve = opening(model, toy_sentence, name)
         for frames in ranges:
             assert curve[frames].min() < closed + 0.012
-
-
-def test_variances_are_in_the_units_of_the_person(model, toy_sentence):
-    mean, ben = (animate(request(toy_sentence, name), model=model) for name in ("", "ben"))
-    np.testing.assert_allclose(ben.variance, mean.variance * np.square(model.speakers.of("ben").gain))
 
 
 def test_pins_hold_in_the_units_of_the_person(model, toy_sentence):
@@ -96,13 +79,6 @@ def test_unknown_speakers_are_refused(model, toy_model, toy_sentence):
     with pytest.raises(InputError, match=r"tells no speakers apart.*'cleo'"):
         opening(toy_model, toy_sentence, "cleo")
     assert toy_model.speakers is None
-
-
-def test_maps_are_in_the_model_file(model, toy_sentence, tmp_path):
-    save_model(model, tmp_path / "people.lipmotion")
-    again = load_model(tmp_path / "people.lipmotion")
-    for name in ("anna", "ben"):
-        np.testing.assert_allclose(opening(again, toy_sentence, name), opening(model, toy_sentence, name), atol=1e-4)
 
 
 def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path):
@@ -132,13 +108,6 @@ def test_strangers_are_named_and_get_the_mean_person(two_people, model, tmp_path
     assert figures["strangers"] == ["cleo"]
     mean = evaluate(replace(model, speakers=None), corpus, selection=Selection(None), recogniser="own")
     assert figures["conditions"] == mean["conditions"]
-
-
-def test_an_explanation_is_in_the_units_of_the_person(model, toy_sentence):
-    motion = animate(request(toy_sentence, "ben"), model=model).motion
-    for explanation in explain(request(toy_sentence, "ben"), at=[0.0, 0.9], model=model):
-        for name, value in explanation.motion.items():
-            assert value.value == pytest.approx(motion[name][explanation.frame], abs=1e-9)
 
 
 def test_one_person_is_not_mapped(two_people):
@@ -231,21 +200,6 @@ def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) ->
         assert mapped.motion["opening"][frames].min() == pytest.approx(OFFSET[0], abs=0.02)
 
 
-@pytest.mark.long
-def test_onto_the_person_of_a_corpus(toy_model, toy_sentence, ben):
-    is_like_ben(toy_model, toy_sentence, ben.path)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("engine", ["coupled", "selection"])
-def test_every_engine(toy_corpus, toy_sentence, ben, engine):
-    settings: dict[str, object] = {"articulation": False}  # the toy's mouth does not move as English ones do
-    if engine == "coupled":
-        settings |= {"chains": "sVis 2vis", "mixtures": 2}
-    model, _ = train(toy_corpus, recogniser=SMALL, engine=engine_named(engine, settings))
-    is_like_ben(model, toy_sentence, ben)
-
-
 def test_variance_and_pins_and_explanations_are_of_the_person(toy_model, toy_sentence, ben):
     person = map_onto(toy_model, ben)
     own, mapped = (animate(request_onto(toy_sentence, onto), model=toy_model) for onto in (None, person))
@@ -327,18 +281,6 @@ def test_a_map_is_kept_in_a_model(toy_model, toy_sentence, ben, tmp_path):
             with_person(known, name, person)
 
 
-@pytest.mark.long
-def test_a_person_joins_those_of_a_model(two_model, toy_sentence, ben):
-    person = map_onto(two_model, ben)
-    known = with_person(two_model, "other", person)
-    found = animate(request_onto(toy_sentence, speaker="other"), model=known).motion
-    np.testing.assert_allclose(found.values, animate(request_onto(toy_sentence, person), model=two_model).motion.values)
-    anna, same = (
-        animate(request_onto(toy_sentence, speaker="anna"), model=model).motion.values for model in (known, two_model)
-    )
-    np.testing.assert_allclose(anna, same)
-
-
 def test_other_channels_are_refused(toy_model, toy_sentence, tmp_path):
     def weights(utterance: Utterance) -> Utterance:
         channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
@@ -359,20 +301,3 @@ def test_no_face_and_no_speech_are_refused(toy_model, toy_sentence, tmp_path):
         animate(request_onto(toy_sentence, corpus), model=toy_model)
     with pytest.raises(InputError, match="the corpus is empty"):
         animate(request_onto(toy_sentence, Corpus.create(tmp_path / "empty")), model=toy_model)
-
-
-@pytest.mark.recordings
-@pytest.mark.video
-def test_onto_a_real_person(recordings):
-    """A face that rests with parted lips: the third of a second of it counts for nearly half of the way."""
-    pytest.importorskip("mediapipe")
-    from lipmotion_faces.tracking.track import track
-
-    video = recordings / "grid-others" / "brbk7n.mpg"
-    rest = np.median(track(video, crops=False).motion["opening"][:8])
-    sound = read_audio(video)  # after a second of its room: before speech the mouth opens
-    audio = Audio(np.concatenate([np.resize(sound.samples[:1600], sound.rate_hz), sound.samples]), sound.rate_hz)
-    own, mapped = (
-        lipmotion.animate(Request(audio, onto=onto, pauses="natural")).motion["opening"] for onto in (None, video)
-    )
-    assert abs(np.median(mapped[:20]) - rest) < 0.7 * abs(np.median(own[:20]) - rest)

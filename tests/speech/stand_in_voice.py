@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from lipmotion import types, units
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, SynthesisedSentence, Synthesiser, SyntheticVoice
+from pipeline.made import read_sound
 from speech.sounds import write_wave
 from testing.formant_synthesiser import synthesise
 
@@ -27,7 +27,7 @@ def say(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedS
         audio, timeline = synthesise([(label, EACH_S) for label in labels], rate_hz=RATE_HZ, seed=len(voice))
         write_wave(path, np.round(np.clip(audio.samples, -1, 1) * 32_767).astype(np.int16), RATE_HZ)
         spans = tuple(types.Span(span.start_s, span.end_s, span.label.phone) for span in timeline)
-        yield SynthesisedSentence(read_audio(path), types.Timeline(spans), path)
+        yield SynthesisedSentence(read_sound(path), types.Timeline(spans), path)
 
 
 def install(monkeypatch: pytest.MonkeyPatch, voices: tuple[SyntheticVoice, ...] = VOICES) -> None:

@@ -49,7 +49,7 @@ def test_words_have_the_times_of_their_line_or_their_own():
 )
 def test_windows_are_the_times_and_the_tolerance(lines: list[TranscriptLine], first: list[int], end: list[int]):
     found = anchors.anchors_of(transcript(*lines))
-    windows = anchors.windows_of(found, found.tolerance_s, 3000)
+    windows = anchors.make_windows(found, found.tolerance_s, 3000)
     assert (windows.first.tolist(), windows.end.tolist()) == (first, end)
 
 
@@ -95,9 +95,9 @@ def found_words(*starts: int, fits: Sequence[float] | None = None) -> list[Place
 
 def test_words_that_begin_or_end_with_their_window_are_pressed():
     windows = Windows(np.array([0, 100, 200]), np.array([150, 300, 500]))
-    assert anchors.pressed_words(found_words(20, 120, 250), windows, 500).tolist() == [False, False, False]
-    assert anchors.pressed_words(found_words(20, 100, 250), windows, 500).tolist() == [False, True, False]
-    assert anchors.pressed_words(found_words(20, 150, 300), windows, 500).tolist() == [True, True, False]
+    assert anchors.find_pressed_words(found_words(20, 120, 250), windows, 500).tolist() == [False, False, False]
+    assert anchors.find_pressed_words(found_words(20, 100, 250), windows, 500).tolist() == [False, True, False]
+    assert anchors.find_pressed_words(found_words(20, 150, 300), windows, 500).tolist() == [True, True, False]
 
 
 class Search:
@@ -193,7 +193,7 @@ def test_a_shift_of_all_times_is_found(late_s, caplog):
     duration_s = spans[-1][1] + 1
     loud = loud_at(spans, duration_s)
     shifted = transcript(*(line("a", start_s + late_s, end_s + late_s) for start_s, end_s in spans))
-    assert anchors.lateness_s(shifted, loud) == pytest.approx(late_s, abs=0.05)
+    assert anchors.measure_lateness(shifted, loud) == pytest.approx(late_s, abs=0.05)
     corrected = anchors.fitted(shifted, loud, duration_s)
     assert [each.start_s for each in corrected.lines] == pytest.approx([start_s for start_s, _ in spans], abs=0.05)
     (record,) = caplog.records
@@ -208,11 +208,11 @@ def test_no_shift_is_found_where_there_is_none():
     loud = loud_at(spans, spans[-1][1] + 1)
     inexact = [(start_s + draw.normal(0, 0.6), end_s + draw.normal(0.5, 0.6)) for start_s, end_s in spans]
     lines = [line("a", start_s, max(start_s, end_s)) for start_s, end_s in inexact]
-    assert anchors.lateness_s(transcript(*lines), loud) == 0
+    assert anchors.measure_lateness(transcript(*lines), loud) == 0
     others = spoken_spans(seed + 100, 60)  # times of something else
-    assert anchors.lateness_s(transcript(*(line("a", *span) for span in others)), loud) == 0
-    assert anchors.lateness_s(transcript(line("a"), line("b")), loud) == 0
-    assert anchors.lateness_s(transcript(line("a", 1.0, 2.0)), np.zeros(0, bool)) == 0
+    assert anchors.measure_lateness(transcript(*(line("a", *span) for span in others)), loud) == 0
+    assert anchors.measure_lateness(transcript(line("a"), line("b")), loud) == 0
+    assert anchors.measure_lateness(transcript(line("a", 1.0, 2.0)), np.zeros(0, bool)) == 0
 
 
 def test_lines_after_the_end_are_left_out(caplog):
@@ -225,10 +225,3 @@ def test_lines_after_the_end_are_left_out(caplog):
     assert "goes on after the recording ends at 10.00 s; its last 1 lines are left out" in record.getMessage()
     with pytest.raises(InputError, match=r"begins at 20\.00 s, the recording ends at 10\.00 s; give the transcript"):
         anchors.fitted(transcript(line("a", 20.0, 22.0)), loud, 10.0)
-
-
-def test_widening_ends():
-    found = anchors.anchors_of(transcript(line(" ".join("a" * 50), 1.0, 1.1)))
-    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, np.full(50, 90, np.intp), 3, 3000)
-    assert np.all(np.isinf(tolerance_s))
-    assert (windows.first.max(), windows.end.min()) == (0, 3000)

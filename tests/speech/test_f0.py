@@ -1,12 +1,33 @@
+"""The slow, readable twin of the correlations of ``speech.features.f0``: one frame, one lag, one sample at a time.
+
+Written from its description: a windowed-sinc band pass of 255 taps from 50 to 1200 Hz that stops 0 Hz, every fourth
+sample; 160 of them centred on the frame, weighted by a Hann window; correlated with itself, normalised. A thousandth of
+the power of the slope of the full signal, 10 ms either side, counts as silence.
+"""
+
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
-from lipmotion.speech.features import analysed_audio, f0
+from lipmotion import Model
+from lipmotion.speech.features import f0
+from lipmotion.speech.features.speaker_similarity import (
+    WARPS,
+    mean_speaker_vector,
+    speaker_similarity,
+    speaker_vector,
+    voice_knowledge,
+)
+from lipmotion.speech.sound.acoustic_conditions import noisy_audio
 from lipmotion.types import Audio
-from speech import f0_oracle
+from pipeline.made import read_sound
+from speech.mfcc_oracle import sample
 from testing.formant_synthesiser import PHONE_TARGETS, synthesise
+from testing.toy import toy_sentences
 
 RATE_HZ = 16_000
 VOWELS = {"a": (730, 1090, 2440), "i": (290, 2200, 2950), "u": (320, 900, 2250)}
@@ -48,9 +69,9 @@ def test_correlations_are_their_slow_twin() -> None:
     assert f0.lags()[1::2].tolist() == list(range(10, 68))
     for n in (0, 5, 10):
         fast = f0.correlations(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
-        x = f0_oracle.frame(samples.astype(float), n)
-        silence = 1e-5 + f0_oracle.frication(samples.astype(float), n)
-        slow = [f0_oracle.correlation(x, int(lag), silence) for lag in f0.lags()[1::2]]
+        x = frame(samples.astype(float), n)
+        silence = 1e-5 + frication(samples.astype(float), n)
+        slow = [correlation(x, int(lag), silence) for lag in f0.lags()[1::2]]
         assert fast[1::2] == pytest.approx(slow, abs=1e-4)
 
 
@@ -68,7 +89,7 @@ def test_the_best_peaks_are_the_candidates() -> None:
 def test_the_number_of_frames_is_that_of_the_features() -> None:
     for count in (400, 479, 480, 559, 560, 561, 4001):
         result = f0.log_f0(Audio(noise(count), RATE_HZ))
-        assert result.shape == (len(analysed_audio.analysed(Audio(noise(count), RATE_HZ)).mfcc().values),)
+        assert result.shape == (len(read_sound(Audio(noise(count), RATE_HZ)).mfcc().values),)
         assert result.dtype == np.float32
 
 
@@ -165,3 +186,115 @@ def test_silence_is_quiet_and_without_pitch_and_a_level_is_the_mean_power_of_10_
     levels = f0.prosody_of(Audio(samples, 16_000)).level_db
     around = [samples[max(160 * n - 160, 0) : 160 * n + 160].astype(float) for n in range(11)]
     assert levels == pytest.approx([10 * np.log10(np.mean(part**2) + 1e-9) for part in around])
+
+
+def low_passed(samples: Array, at: int) -> float:
+    """Return the band-passed signal, reflected at both ends, at sample ``at``."""
+    return sum(tap * sample(samples, at + k) for k, tap in enumerate(TAPS, start=-127))
+
+
+def taps() -> list[float]:
+    hamming = [0.54 - 0.46 * math.cos(2 * math.pi * i / 254) for i in range(255)]
+    ideal = [sinc(1200, i - 127) - sinc(50, i - 127) for i in range(255)]
+    shaped = [a * b for a, b in zip(hamming, ideal, strict=True)]
+    return [value - sum(shaped) / sum(hamming) * weight for value, weight in zip(shaped, hamming, strict=True)]
+
+
+def sinc(hertz: float, i: int) -> float:
+    return 2 * hertz / 16_000 if i == 0 else math.sin(2 * math.pi * hertz * i / 16_000) / (math.pi * i)
+
+
+def window(position: float) -> float:
+    return math.sin(math.pi * (position + 0.5) / 160) ** 2 if -0.5 <= position <= 159.5 else 0.0
+
+
+TAPS = taps()
+
+
+def frame(samples: Array, n: int) -> Array:
+    """Return 160 low-passed samples, 0.25 ms apart, around 10 · n ms: the middle is between the two in the middle."""
+    return np.array([low_passed(samples, 160 * n + 4 * i - 318) for i in range(160)])
+
+
+def correlation(x: Array, lag: int, silence: float) -> float:
+    """Return the correlation of a frame with itself ``lag`` samples later."""
+    weights = [window(t) * window(t + lag) for t in range(160 - lag)]
+    pairs = list(zip(weights, x[: 160 - lag], x[lag:], strict=True))
+    product = sum(w * a * b for w, a, b in pairs)
+    energy = sum(w * a * a for w, a, _ in pairs), sum(w * b * b for w, _, b in pairs)
+    return product / (math.sqrt(energy[0] * energy[1]) + silence * sum(weights))
+
+
+def frication(samples: Array, n: int) -> float:
+    """Return the power that a frame's frication adds to silence."""
+    times = range(160 * n - 160, 160 * n + 160)
+    return sum((sample(samples, t) - sample(samples, t - 1)) ** 2 for t in times) / 320 / 1000
+
+
+def test_a_warped_voice_is_warped_back(toy_model: Model) -> None:
+    """Its spectra are those of the known voice, stretched."""
+    audio = toy_sentences(3)[0].audio
+    before = speaker_similarity(toy_model.phones, read_sound(audio)).score
+    for factor, expected in ((1.12, 0.88), (0.89, 1.12)):
+        positions = np.arange(0, len(audio.samples) - 1, factor)
+        other = Audio(np.interp(positions, np.arange(len(audio.samples)), audio.samples).astype(np.float32), 16_000)
+        similarity = speaker_similarity(toy_model.phones, read_sound(other))
+        assert abs(similarity.warp - expected) < 0.07
+        assert similarity.score < before
+
+
+def test_the_warp_chosen_is_the_most_similar(toy_model: Model) -> None:
+    audio = read_sound(toy_sentences(3)[1].audio)
+    similarity = speaker_similarity(toy_model.phones, audio)
+    (passage,) = audio.passages
+    fits = {warp: toy_model.phones.fit(passage.audio.mfcc(warp).values) for warp in WARPS}
+    assert similarity.warp == max(fits, key=lambda warp: fits[warp])
+    assert similarity.score == pytest.approx(max(fits.values()) - toy_model.phones.typical_fit)
+
+
+def test_a_recording_is_judged_by_its_longest_passage(toy_model: Model) -> None:
+    """Silence, and a short line by another voice, change nothing."""
+    line, other = (
+        sentence.audio.samples[: len(sentence.audio.samples) // 160 * 160] for sentence in toy_sentences(3)[:2]
+    )
+    silence = np.zeros(5 * 16_000, np.float32)
+    alone = speaker_similarity(toy_model.phones, read_sound(Audio(np.pad(line, 8000), 16_000)))
+    short = np.interp(np.arange(160 * 200) * 1.3, np.arange(len(other)), other)
+    for parts in ((silence, line, silence), (short, silence, line, silence), (silence, line, silence, short)):
+        audio = read_sound(Audio(np.concatenate(parts).astype(np.float32), 16_000))
+        found = speaker_similarity(toy_model.phones, audio)
+        assert found.warp == alone.warp
+        assert found.score == pytest.approx(alone.score, abs=1e-3)
+    assert (
+        speaker_similarity(toy_model.phones, read_sound(Audio(short.astype(np.float32), 16_000))).score != alone.score
+    )
+
+
+def test_voices_are_known_by_their_similarity(toy_model: Model) -> None:
+    audio, phones = read_sound(toy_sentences(3)[1].audio), replace(toy_model.phones, speaker=None)
+    score = speaker_similarity(phones, audio).score
+    shifted = [replace(phones, typical_fit=phones.typical_fit + score - other) for other in (-20, -9, -6, -3, 2)]
+    assert [voice_knowledge(hmm, audio) for hmm in shifted] == pytest.approx([0, 0, 0.5, 1, 1])
+
+
+def test_a_known_voice_in_noise_is_not_a_stranger(toy_model: Model) -> None:
+    """Noise makes it dissimilar to its training; its speaker vector says more, and never less."""
+    sounds = [read_sound(sentence.audio) for sentence in toy_sentences(6)]
+    mean = mean_speaker_vector(sounds[:5])
+    old, known, opposite = (replace(toy_model.phones, speaker=speaker) for speaker in (None, mean, -mean))
+    noisy = read_sound(noisy_audio(sounds[5], "white", 15))
+    assert voice_knowledge(old, sounds[5]) == voice_knowledge(known, sounds[5]) > 0.9
+    assert voice_knowledge(known, noisy) > voice_knowledge(old, noisy) + 0.3
+    assert voice_knowledge(opposite, noisy) == voice_knowledge(old, noisy)
+
+
+def test_a_speaker_vector_is_that_of_sound_alone() -> None:
+    sound = toy_sentences(3)[0].audio.samples
+    line = sound[: len(sound) // 320 * 320]
+    alone, longer, louder = (
+        speaker_vector(read_sound(Audio(samples.astype(np.float32), 16_000)))
+        for samples in (line, np.pad(line, 32_000), line / 8)
+    )
+    assert longer == pytest.approx(alone, abs=0.2)
+    assert louder == pytest.approx(alone, abs=0.05)
+    assert not speaker_vector(read_sound(Audio(np.zeros(16_000, np.float32), 16_000))).any()

@@ -1,22 +1,33 @@
 from collections.abc import Sequence
+from dataclasses import replace
 from difflib import SequenceMatcher
-from itertools import groupby, pairwise
+from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
-from lipmotion import Model, errors, load_model
-from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.pipeline.training.train import train_phone_models
-from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition import recogniser
-from lipmotion.speech.recognition import recogniser as module
+from lipmotion import Model, errors, load_model, types
+from lipmotion.speech.recognition import adaptation, recogniser
+from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
 from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
-from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Timeline, Unit, silent_monitor
-from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, split_words
-from lipmotion.units.phones import SHORT_PAUSE_S
+from lipmotion.speech.recognition.recognised_speech import (
+    SLIVER_FRAMES,
+    AlignedWords,
+    LabelledFrames,
+    RecognisedWord,
+    labels_of_words,
+    recognition_of,
+    spliced,
+)
+from lipmotion.speech.sound.voice_activity import Stretch
+from lipmotion.stats.constrained_mllr import log_determinant
+from lipmotion.types import Audio, Span, Timeline, Unit
+from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon
+from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
+from pipeline.made import features_of, read_sound
 from testing.formant_synthesiser import synthesise
 from testing.toy import WORDS, ToySentence, toy_sentences
 
@@ -27,18 +38,18 @@ def sentences() -> list[ToySentence]:
 
 
 @pytest.fixture(scope="module")
-def hmm(toy_model: Model) -> UnitHmm:
+def hmm(toy_model: Model) -> Any:
     return toy_model.phones
 
 
-def align(hmm: UnitHmm, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: str = "own") -> Timeline[Unit]:
-    heard = analysed(audio)
-    return recogniser.Recogniser(hmm, kind).align(heard, heard.mfcc(), words, lexicon)
+def align(hmm: Any, audio: Audio, words: Sequence[str], lexicon: Lexicon, kind: str = "own") -> Timeline[Unit]:
+    sound = read_sound(audio)
+    return recogniser.Recogniser(hmm, kind).align(sound, sound.mfcc(), words, lexicon)
 
 
-def recognise(hmm: UnitHmm, audio: Audio, kind: str = "own") -> Timeline[Unit]:
-    heard = analysed(audio)
-    return recogniser.Recogniser(hmm, kind).recognise(heard, heard.mfcc())
+def recognise(hmm: Any, audio: Audio, kind: str = "own") -> Timeline[Unit]:
+    sound = read_sound(audio)
+    return recogniser.Recogniser(hmm, kind).recognise(sound, sound.mfcc())
 
 
 def phones(units: Timeline[Unit]) -> list[str]:
@@ -57,7 +68,7 @@ def covers(units: Timeline[Unit], duration_s: float) -> bool:
     return edges_s == [*(span.start_s for span in units), duration_s]
 
 
-def test_the_words_are_found_where_they_are(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+def test_the_words_are_found_where_they_are(hmm: Any, sentences: list[ToySentence]) -> None:
     errors_s = []
     for sentence in sentences[::2]:
         found = align(hmm, sentence.audio, sentence.words, Lexicon())
@@ -71,14 +82,14 @@ def test_the_words_are_found_where_they_are(hmm: UnitHmm, sentences: list[ToySen
 
 def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after_and_silences_are_one() -> None:
     bounds = np.array([0, 10, 12, 40, 60, 80, 100])
-    found = module._timeline([(phone, "") for phone in ("sil", "p", "sil", "aa", "sil", "sil")], bounds, 1.0)
+    found = recogniser._timeline([(phone, "") for phone in ("sil", "p", "sil", "aa", "sil", "sil")], bounds, 1.0)
     assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
     assert covers(found, 1.0)
     assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
 
 
 def test_unknown_sentences_are_recognised_and_digital_silence_is_silence(
-    hmm: UnitHmm, sentences: list[ToySentence]
+    hmm: Any, sentences: list[ToySentence]
 ) -> None:
     for sentence in sentences[-3:]:
         found = recognise(hmm, sentence.audio)
@@ -92,7 +103,7 @@ def test_unknown_sentences_are_recognised_and_digital_silence_is_silence(
     assert covers(silent, 1.0)
 
 
-def test_silence_at_both_ends_is_silence_however_short(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+def test_silence_at_both_ends_is_silence_however_short(hmm: Any, sentences: list[ToySentence]) -> None:
     sentence = sentences[0]
     start, stop = sentence.units.spans[0].end_s - 0.08, sentence.units.spans[-1].start_s + 0.08
     samples = sentence.audio.samples[round(start * 16_000) : round(stop * 16_000)]
@@ -104,7 +115,7 @@ def test_silence_at_both_ends_is_silence_however_short(hmm: UnitHmm, sentences: 
     assert PAUSE not in (recognised[0], recognised[-1])
 
 
-def test_a_short_pause_between_words_is_a_pause(hmm: UnitHmm) -> None:
+def test_a_short_pause_between_words_is_a_pause(hmm: Any) -> None:
     found = recognise(hmm, with_pause(0.18))
     pauses = [span for span in found if span.label.phone == PAUSE]
     assert len(pauses) == 1
@@ -113,7 +124,7 @@ def test_a_short_pause_between_words_is_a_pause(hmm: UnitHmm) -> None:
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_a_long_pause_between_words_is_silence(hmm: UnitHmm, known: bool) -> None:
+def test_a_long_pause_between_words_is_silence(hmm: Any, known: bool) -> None:
     audio = with_pause(0.5)
     found = align(hmm, audio, ("papa", "mama"), Lexicon()) if known else recognise(hmm, audio)
     assert phones(found) == [SILENCE, *WORDS["papa"], SILENCE, *WORDS["mama"], SILENCE]
@@ -121,7 +132,7 @@ def test_a_long_pause_between_words_is_silence(hmm: UnitHmm, known: bool) -> Non
     assert found.spans[5].duration_s == pytest.approx(0.5, abs=0.12)
 
 
-def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: Any, sentences: list[ToySentence]) -> None:
     sentence = sentences[0]
     assert not {"z", "g"} & set(hmm.table.units)
     found = align(hmm, sentence.audio, sentence.words, Lexicon({"see": (("z", "ih"),)}))
@@ -130,9 +141,7 @@ def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: UnitHmm, se
     assert np.abs(errors_s).max() < 0.1
 
 
-def test_too_many_words_for_the_sound_and_an_unknown_kind_are_refused(
-    hmm: UnitHmm, sentences: list[ToySentence]
-) -> None:
+def test_too_many_words_for_the_sound_and_an_unknown_kind_are_refused(hmm: Any, sentences: list[ToySentence]) -> None:
     with pytest.raises(errors.AlignmentError, match=r"50 words take at least \d+ frames of 10 ms, found \d+"):
         align(hmm, sentences[0].audio, ["baby"] * 50, Lexicon())
     with pytest.raises(errors.InputError, match="'best'; required one of: auto, words, fast, own, general"):
@@ -146,7 +155,7 @@ def test_words_of_real_recordings_are_found_where_others_found_them(recordings: 
     for name in (grid / "test.txt").read_text().split()[::4][:12]:
         rows = [line.split() for line in (grid / "align" / f"{name}.align").read_text().splitlines()]
         words = [(int(start) / 25_000, word) for start, _, word in rows if word not in (SILENCE, PAUSE)]
-        audio = read_audio(grid / "clips" / f"{name}.mkv")
+        audio = read_sound(grid / "clips" / f"{name}.mkv")
         found = align(load_model().phones, audio, [word for _, word in words], Lexicon(), "auto")
         spoken = groupby((span for span in found if span.label.word), key=lambda span: span.label.word)
         starts_s = [next(spans).start_s for _, spans in spoken]
@@ -156,7 +165,7 @@ def test_words_of_real_recordings_are_found_where_others_found_them(recordings: 
 
 
 @pytest.mark.parametrize("kind", ["auto", "fast", "general"])
-def test_every_kind_gives_phones_from_start_to_end(hmm: UnitHmm, sentences: list[ToySentence], kind: str) -> None:
+def test_every_kind_gives_phones_from_start_to_end(hmm: Any, sentences: list[ToySentence], kind: str) -> None:
     sentence = sentences[0]
     found = recognise(hmm, sentence.audio, kind)
     assert covers(found, sentence.audio.duration_s)
@@ -166,35 +175,17 @@ def test_every_kind_gives_phones_from_start_to_end(hmm: UnitHmm, sentences: list
     assert np.median(np.abs(errors_s)) < 0.03
 
 
-def test_own_models_that_learned_little_do_not_align(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+def test_own_models_that_learned_little_do_not_align(hmm: Any, sentences: list[ToySentence]) -> None:
     """They still say what was said; where it was is left to the general models."""
-    assert hmm.mixtures.size[1] <= module.FEW_GAUSSIANS
+    assert hmm.mixtures.size[1] <= recogniser.FEW_GAUSSIANS
     said, lexicon = sentences[0], Lexicon()
     aligned = align(hmm, said.audio, said.words, lexicon, "auto")
     assert aligned == align(hmm, said.audio, said.words, lexicon, "general")
     assert aligned != align(hmm, said.audio, said.words, lexicon, "own")
     found = recognise(hmm, said.audio, "auto")
-    again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, analysed(said.audio).mfcc(), found)
+    again = recogniser.Recogniser(hmm, "general").align_phones(said.audio, features_of(said.audio), found)
     assert phones(found) == phones(again)
     assert [span.start_s for span in found] == pytest.approx([span.start_s for span in again], abs=0.011)
-
-
-@pytest.mark.recordings
-def test_speakers_and_words_beyond_all_training(recordings: Path) -> None:
-    """The general models find about twice as many phones as those of one GRID speaker."""
-    share = {}
-    for kind in ("own", "auto"):
-        right = count = 0
-        for name in ("61-70968-0000.flac", "sense_and_sensibility_01_austen_64kb-0880.wav"):
-            audio = read_audio(recordings / "speech-open" / name)
-            text = (recordings / "speech-open" / name).with_suffix(".txt" if name.endswith("wav") else ".lab")
-            spoken = phones(align(load_model().phones, audio, split_words(text.read_text()), Lexicon(), "general"))
-            matcher = SequenceMatcher(None, spoken, phones(recognise(load_model().phones, audio, kind)), autojunk=False)
-            right += sum(block.size for block in matcher.get_matching_blocks())
-            count += len(spoken)
-        share[kind] = right / count
-    assert share["auto"] > 0.5
-    assert share["auto"] > share["own"] + 0.15
 
 
 def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model) -> None:
@@ -225,25 +216,176 @@ def test_evidence_is_the_sum_of_both(toy_model: Model, trust: float) -> None:
     assert log_likelihoods.log_density(3, 7, some) == pytest.approx(wanted[3:7, some], abs=2e-3)
 
 
-SMALL = HmmConfig(mixtures=1, iterations=2)
+BASE = [LabelledFrames(0, "sil"), LabelledFrames(20, "aa"), LabelledFrames(50, "t"), LabelledFrames(70, "sil")]
+ALIGNED = AlignedWords(
+    words=("a", "boat"),
+    phones=("sil", "ax", "sp", "b", "ow", "t", "sil"),
+    of_word=np.array([-1, 0, -1, 1, 1, 1, -1]),
+    bounds=np.array([0, 10, 20, 22, 30, 50, 60, 80]),
+    densities=np.zeros(80, np.intp),
+)
 
 
-def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence]) -> None:
-    steps: list[tuple[str, float | None]] = []
-    spoken = [(sentence.audio, sentence.words) for sentence in sentences[:4]]
-    hmm = train_phone_models(spoken, Lexicon(), SMALL, lambda event: steps.append((event.stage, event.figure)))
-    assert {"flat start", "pronunciations"} <= {step for step, _ in steps}
-    for stage in ("flat start", "pronunciations"):
-        values = [value for step, value in steps if step == stage and value is not None]
-        assert all(before <= after + 1e-6 for before, after in pairwise(values))
-    said = {phone for sentence in sentences[:4] for word in sentence.words for phone in WORDS[word]}
-    assert set(hmm.table.units) == said | {SILENCE, PAUSE}
+def test_a_stretch_nothing_or_all_is_replaced() -> None:
+    part = (Stretch(30, 60), [LabelledFrames(30, "b", 0), LabelledFrames(45, "iy", 0)])
+    assert spliced(BASE, [part], 100) == [*BASE[:2], *part[1], LabelledFrames(60, "t"), BASE[3]]
+    assert spliced(BASE, [], 100) == BASE
+    whole = [LabelledFrames(0, "b", 0)]
+    assert spliced(BASE, [(Stretch(0, 100), whole)], 100) == whole
+    sliver = (Stretch(22, 69), [LabelledFrames(22, "b", 0)])
+    assert SLIVER_FRAMES > 2
+    assert [label.phone for label in spliced(BASE, [sliver], 100)] == ["sil", "b", "sil"]
 
 
-def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) -> None:
-    good = [(sentence.audio, sentence.words) for sentence in sentences[:3]]
-    bad = (good[0][0], ("five",) * 100)
-    hmm = train_phone_models([*good, bad], Lexicon(), SMALL, silent_monitor)
-    assert np.array_equal(hmm.mixtures.means, train_phone_models(good, Lexicon(), SMALL, silent_monitor).mixtures.means)
-    with pytest.raises(errors.CorpusError, match="none of 1 utterances has a transcript that fits into its recording"):
-        train_phone_models([bad], Lexicon(), SMALL, silent_monitor)
+def test_labels_are_those_of_the_words_that_are_believed() -> None:
+    ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([True, True]), 5)
+    assert frames == Stretch(100, 180)  # all
+    assert [label.word for label in labels] == [-1, 5, -1, 6, 6, 6, -1]
+    assert [label.first for label in labels] == [100, 110, 120, 122, 130, 150, 160]
+    ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, True]), 0)
+    assert frames == Stretch(122, 160)
+    assert [label.phone for label in labels] == ["b", "ow", "t"]
+    assert not list(labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, False]), 0))
+
+
+def test_fits_are_means_over_the_frames_of_each_word() -> None:
+    values = np.zeros((80, 2), np.float32)
+    values[:, 1] = 1.0
+    values[22:60, 1] = 3.0
+    fits, fit = ALIGNED.fits(values, np.ones(80, np.intp))
+    assert fits == pytest.approx([-1.0, -3.0])
+    assert fit == pytest.approx(-(42 + 38 * 3) / 80)
+
+
+def test_what_was_recognised() -> None:
+    labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
+    spans = ((0.0, 0.1, "sil", ""), (0.1, 0.2, "b", "bee"), (0.2, 0.4, "iy", "bee"), (0.4, 0.5, "z", ""))
+    units = Timeline(tuple(Span(start, end, Unit(phone, word=word)) for start, end, phone, word in spans))
+    found = recognition_of(units, labels, [RecognisedWord("bee", 0.8)], -7.0)
+    (word,) = found.words
+    assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
+    assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.1))
+    assert found.confidence == pytest.approx(0.8)
+    assert found.reliability == pytest.approx(1)
+    doubtful = recognition_of(units, labels, [RecognisedWord("bee", 0.3)], -7.0)
+    assert doubtful.reliability == pytest.approx(0)
+    shares = [replace(found, posterior=posterior).reliability for posterior in (0.6, 0.8, 0.95)]
+    assert shares == pytest.approx([0, 0.5, 1])
+    wordless = recognition_of(units, [LabelledFrames(0, "sil")], [], -7.0)
+    assert replace(wordless, posterior=0.575).reliability == pytest.approx(0.5)
+
+
+@pytest.fixture(scope="module")
+def audio() -> types.Audio:
+    return toy_sentences(3)[0].audio
+
+
+def some() -> adaptation.Adaptation:
+    draw = np.random.default_rng(0)
+    return adaptation.Adaptation(1.06, 0.25, draw.normal(size=(39, 40)), draw.normal(size=(3, 13, 14)))
+
+
+def test_own_features_are_warped_then_transformed_and_general_ones_stream_by_stream(audio: types.Audio) -> None:
+    sound, nothing, one = read_sound(audio), adaptation.identity_adaptation(1.0, 0.5), some()
+    plain = sound.general_features
+    assert np.array_equal(nothing.own_features(sound), sound.mfcc().values)
+    assert np.array_equal(nothing.general_features(sound), plain)
+    expected = sound.mfcc(1.06).values @ one.own[:, :-1].T + one.own[:, -1]
+    np.testing.assert_allclose(one.own_features(sound), expected, rtol=1e-4, atol=1e-3)
+    found = one.general_features(sound)
+    for number, transform in enumerate(one.general):
+        columns = slice(13 * number, 13 * number + 13)
+        expected = plain[:, columns] @ transform[:, :-1].T + transform[:, -1]
+        np.testing.assert_allclose(found[:, columns], expected, rtol=1e-3, atol=1e-3)
+
+
+def test_arrays_and_back_and_damaged_arrays() -> None:
+    one, broken = some(), np.eye(39, 40)
+    again = adaptation.adaptation_from_arrays(adaptation.adaptation_arrays(one))
+    assert (again.warp, again.own_weight) == (one.warp, one.own_weight)
+    assert np.array_equal(again.own, one.own)
+    assert np.array_equal(again.general, one.general)
+    broken.flat[3] = np.nan
+    for damage, says in (
+        ({"own": None}, "own"),
+        ({"general": np.zeros((13, 14))}, "general of shape"),
+        ({"numbers": np.array([1.0, 1.5])}, "a warp of 1.0 and a weight of the own models of 1.5"),
+        ({"numbers": np.array([0.0, 0.5])}, "a warp of 0.0"),
+        ({"numbers": np.array(["a", "b"])}, "numbers holds <U1, required fractions"),
+        ({"own": broken}, "own holds values that are not finite"),
+    ):
+        arrays = {
+            key: value for key, value in (adaptation.adaptation_arrays(one) | damage).items() if value is not None
+        }
+        with pytest.raises(errors.ModelFormatError, match=f"{says}.*adapt the model again"):
+            adaptation.adaptation_from_arrays(arrays)
+
+
+@pytest.fixture(scope="module")
+def voice() -> list[types.Audio]:
+    """Not those that the toy model was trained on, but of the same voice."""
+    return [sentence.audio for sentence in toy_sentences(12)[8:]]
+
+
+@pytest.fixture(scope="module")
+def same_speaker(toy_model: Model, voice: list[types.Audio]) -> EstimatedAdaptation:
+    return estimate_adaptation(toy_model.phones, voice)
+
+
+def through_a_telephone(audio: types.Audio) -> types.Audio:
+    samples = lfilter(*butter(2, [300 / 8000, 3000 / 8000], "band"), audio.samples)
+    return types.Audio(np.asarray(samples, np.float32), audio.rate_hz)
+
+
+def fit(model: Model, found: EstimatedAdaptation, audio: types.Audio) -> float:
+    adapted = found.adaptation.own_features(read_sound(audio))
+    return model.phones.fit(adapted) + log_determinant(found.adaptation.own)
+
+
+@pytest.mark.long
+def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
+    toy_model: Model, voice: list[types.Audio], same_speaker: EstimatedAdaptation
+) -> None:
+    one = same_speaker.adaptation
+    assert (one.warp, one.own_weight) == (1.0, 1.0)
+    assert 0.3 < same_speaker.speech_s / sum(audio.duration_s for audio in voice) < 1
+    before, after = (recogniser.Recogniser(toy_model.phones, "own", how) for how in (None, one))
+    for audio in voice:
+        features = features_of(audio)
+        changed = one.own_features(read_sound(audio)) - features.values
+        assert np.sqrt(np.square(changed).mean()) < 0.5
+        first, then = ([s.label.phone for s in recogniser.recognise(audio, features)] for recogniser in (before, after))
+        assert count_phone_edits(first, then) <= 2
+
+
+def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voice: list[types.Audio]) -> None:
+    """By features of a short recording that move apart from their deltas and these from theirs."""
+    one, other = (through_a_telephone(audio) for audio in voice[:2])
+    found = estimate_adaptation(toy_model.phones, [other])
+    plain = toy_model.phones.fit(read_sound(one).mfcc(found.adaptation.warp).values)
+    assert fit(toy_model, found, one) > plain + 0.5
+    block, own = np.arange(39) // 13, found.adaptation.own[:, :-1]
+    between = block[:, None] != block
+    assert not own[between].any()
+    assert np.abs(own[~between]).sum() > 39
+
+
+@pytest.mark.long
+def test_much_speech_moves_them_together(
+    same_speaker: EstimatedAdaptation, toy_model: Model, voice: list[types.Audio]
+) -> None:
+    long = estimate_adaptation(toy_model.phones, voice * 3)
+    assert long.speech_s == pytest.approx(3 * same_speaker.speech_s, rel=0.1)
+    assert long.speech_s > 10
+    assert np.abs(long.adaptation.own[:13, 13:39]).max() > 1e-3
+
+
+def test_too_little_speech(toy_model: Model, voice: list[types.Audio]) -> None:
+    loud = int(np.abs(voice[0].samples).argmax())
+    short = np.pad(voice[0].samples[max(loud - 4000, 0) : loud + 4000], 16_000)
+    for samples, message in (
+        (0.01 * np.random.default_rng(0).normal(size=32_000), "no speech found"),
+        (short, r"found 0.\d s of speech, required at least 1 s"),
+    ):
+        with pytest.raises(errors.InputError, match=message):
+            estimate_adaptation(toy_model.phones, [types.Audio(samples.astype(np.float32), 16_000)])

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion import Model, load_model
+from lipmotion import load_model
 from lipmotion.corpora.folder import spell_name
-from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition import agreement, general, recogniser
+from lipmotion.speech.recognition import agreement, general
 from lipmotion.speech.recognition import transcript_evidence as module
 from lipmotion.speech.recognition.transcript_evidence import (
     GAP_COST,
@@ -18,10 +17,9 @@ from lipmotion.speech.recognition.transcript_evidence import (
     label_evidence,
     transcript_evidence,
 )
-from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.installed import installed_voices, speak_sentences
 from lipmotion.types import Audio, Span, Timeline, Unit
-from lipmotion.units import PHONES, Lexicon, split_words
+from lipmotion.units import PHONES, Lexicon
+from pipeline.made import features_of, read_sound, recogniser_of
 from testing.toy import ToySentence, toy_sentences
 
 FRAME_S = 0.02
@@ -237,19 +235,6 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
     assert agreement.agreement_score(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
 
 
-@pytest.mark.long
-def test_right_words_agree_and_wrong_ones_do_not(sentences: list[ToySentence], toy_model: Model) -> None:
-    phones = recogniser.Recogniser(toy_model.phones, "auto")
-    for said in sentences:
-        features = analysed(said.audio).mfcc()
-        right, order, wrong = (
-            agreement.agreement_score(said.audio, phones.align(said.audio, features, words, Lexicon()))
-            for words in (said.words, said.words[::-1], ("squash", "six", "fish", "chefs"))
-        )
-        assert right > agreement.DOUBTFUL_SCORE - 0.8 > wrong  # one voice of espeak-ng has -4.9
-        assert right > order
-
-
 def test_loud_silence_is_missing_speech(sentences: list[ToySentence]) -> None:
     audio, units = sentences[0].audio, sentences[0].units
     fit = agreement.transcript_fit(audio, Timeline((Span(0.0, audio.duration_s, Unit("sil")),)))
@@ -302,12 +287,12 @@ def test_places_near_one_another_are_one_stretch() -> None:
 def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Path) -> None:
     """Docs/robustness.md."""
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[::4]
-    phones, whole, half = recogniser.Recogniser(load_model().phones, "auto"), 0, 0
+    phones, whole, half = recogniser_of(load_model(), "auto"), 0, 0
     for name in names:
-        audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), spell_name(name)
+        audio, words = read_sound(recordings / "grid-s1" / "clips" / f"{name}.mkv"), spell_name(name)
         assert words is not None
         for said, kept in ((words, True), (words[:3], False)):
-            units = phones.align(audio, analysed(audio).mfcc(), said, Lexicon())
+            units = phones.align(audio, features_of(audio), said, Lexicon())
             noticed = bool(agreement.transcript_fit(audio, units).missing)
             whole, half = whole + (kept and noticed), half + (noticed and not kept)
     assert whole == 0
@@ -318,29 +303,14 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
 def test_real_recordings(recordings: Path) -> None:
     """No false alarm, and most transcripts of other clips found (docs/robustness.md)."""
     names = (recordings / "grid-s1" / "val.txt").read_text().split()[::2]
-    phones = recogniser.Recogniser(load_model().phones, "auto")
+    phones = recogniser_of(load_model(), "auto")
     right, wrong = [], []
     for name, other in zip(names, [*names[7:], *names[:7]], strict=True):
-        audio = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv")
-        features = analysed(audio).mfcc()
+        audio = read_sound(recordings / "grid-s1" / "clips" / f"{name}.mkv")
+        features = features_of(audio)
         for clip, found in ((name, right), (other, wrong)):
             words = spell_name(clip)
             assert words is not None
             found.append(agreement.agreement_score(audio, phones.align(audio, features, words, Lexicon())))
     assert min(right) > agreement.DOUBTFUL_SCORE
     assert np.mean(np.array(wrong) < agreement.DOUBTFUL_SCORE) > 0.6
-
-
-@pytest.mark.long
-@pytest.mark.skipif(not installed_voices(), reason="no synthesiser is here")
-def test_synthetic_voices_are_believed() -> None:
-    """What they say in their own way does not decide alone: by the mean over frames most of them were doubted."""
-    texts = "Loyal boys voice their choice to employers.", "Sharp knives belong in the upper drawer."
-    phones = recogniser.Recogniser(load_model().phones, "auto")
-    for voice in installed_voices()[::2]:
-        audio, _ = next(speak_sentences([texts[0]], voice))
-        right, wrong = (
-            agreement.agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), split_words(text), Lexicon()))
-            for text in texts
-        )
-        assert right > agreement.DOUBTFUL_SCORE - 0.5 > wrong  # one voice of espeak-ng has -4.4

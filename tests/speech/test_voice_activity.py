@@ -1,17 +1,14 @@
 import tracemalloc
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion import animate
 from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, average_power, find_spoken_frames
 from lipmotion.speech.features import analysed_audio, mfcc
-from lipmotion.speech.sound import audio_files, pauses, voice_activity
+from lipmotion.speech.sound import pauses, voice_activity
 from lipmotion.types import Audio
-from lipmotion.units import is_silent
 from testing.toy import toy_sentences
 
 QUIET_ENERGY, CLOSURE_ENERGY, LOUD_ENERGY = -8.0, -5.0, 2.0
@@ -215,62 +212,6 @@ def test_a_voice_that_becomes_softer_is_raised() -> None:
     assert loudness_db(levelled, start) == pytest.approx(20 * np.log10(voice_activity.SAME_LEVEL), abs=0.1)
     assert loudness_db(falling, start) - loudness_db(falling, last) > 24
     assert loudness_db(levelled, start) - loudness_db(levelled, last) < 14
-
-
-VOICES = (
-    "speech-open/arctic_a0009.wav",
-    "speech-open/61-70968-0000.flac",
-    "speech-open/sense_and_sensibility_01_austen_64kb-0880.wav",
-    "speech-open/13697_11991_000000.opus",
-    "grid-others/lbax4n.mpg",
-)
-
-IN_NOISE = VOICES[:2]
-"""Of the others, one has an offset, which noise beside it hides, and one silent samples at its start: other frames."""
-
-
-def in_frames(path: Path) -> Samples:
-    samples = audio_files.read_audio(path).samples
-    return samples[: len(samples) // mfcc.HOP * mfcc.HOP]
-
-
-def assert_same_motion(line: Samples, samples: Samples, place: int, largest: float = 0.005) -> None:
-    """A line has the motion of the line alone, and the same phones within a frame; around it the mouth rests.
-
-    place : the frame in which the line begins
-    """
-    alone, found = (animate(Audio(each, RATE_HZ)) for each in (line, samples))
-    opening, other = alone.motion["opening"], found.motion["opening"][place:]
-    frames = min(len(opening), len(other))
-    difference = np.abs(opening[:frames] - other[:frames])
-    assert difference.max() < largest
-    assert difference.mean() < largest / 5
-    end_s = place / 100 + len(line) / RATE_HZ
-    sounds = [span for span in found.units if not is_silent(span.label.phone)]
-    sounds = [span for span in sounds if place / 100 - 0.05 <= span.start_s < end_s]
-    expected = [span for span in alone.units if not is_silent(span.label.phone)]
-    assert [span.label.phone for span in sounds] == [span.label.phone for span in expected]
-    for now, was in zip(sounds, expected, strict=True):
-        assert now.start_s - place / 100 == pytest.approx(was.start_s, abs=0.011)
-
-
-@pytest.mark.long
-@pytest.mark.recordings
-@pytest.mark.parametrize("voice", [voice for voice in VOICES if not voice.endswith(".opus")])  # is doubtful
-def test_silence_gain_and_another_line_change_no_motion_of_a_real_voice(recordings: Path, voice: str) -> None:
-    line, other = in_frames(recordings / voice), in_frames(recordings / VOICES[2 if voice == VOICES[1] else 1])
-    for seconds, units in ((0.5, 0), (5, 0), (20, 0), *([(5, 1)] if voice in IN_NOISE else [])):
-        around = noise(seconds, units)
-        samples = np.concatenate([around, line, around])
-        assert_same_motion(line, samples, round(100 * seconds), 0.04 if units else 0.005)  # docs/robustness.md
-        if seconds > 2:
-            assert np.ptp(animate(Audio(samples, RATE_HZ)).motion["opening"][: round(100 * seconds) - 60]) < 0.02
-    for decibels in (-40, -20):
-        assert_same_motion(line, louder(line, decibels), 0)
-    for gap_s, decibels in ((0.5, 0), (1, -30), (5, 30)):
-        before, after = louder(other, -max(decibels, 0)), louder(line, min(decibels, 0))
-        samples = np.concatenate([before, noise(gap_s, 0), after])
-        assert_same_motion(line, samples, len(other) // mfcc.HOP + round(100 * gap_s))
 
 
 def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:

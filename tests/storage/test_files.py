@@ -23,11 +23,10 @@ from lipmotion.storage.files import (
     confine,
     portable_name,
 )
-from lipmotion.storage.locks import LOCK, lock_folder, remove_unfinished, unfinished_work
+from lipmotion.storage.locks import LOCK, lock_folder, unfinished_work
 from lipmotion.storage.sources import Source, check_apart, check_kind
 
 Context = Callable[[Path], AbstractContextManager[Path]]
-TOO_LONG = "x" * 300 + ".json"
 
 
 def names(folder: Path) -> list[str]:
@@ -68,19 +67,6 @@ def test_a_failure_leaves_nothing(tmp_path: Path, context: Context) -> None:
     assert names(tmp_path) == []
 
 
-def test_writers_do_not_share_a_temporary_name(tmp_path: Path) -> None:
-    with atomic_file(tmp_path / "a.json") as one, atomic_file(tmp_path / "a.json") as two:
-        assert one != two
-        one.touch()
-        two.touch()
-
-
-def test_a_longer_name_is_refused_in_words(tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match="cannot be written: File name too long"):
-        fail(atomic_file(tmp_path / TOO_LONG), AssertionError())
-    assert names(tmp_path) == []
-
-
 def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
     with atomic_folder(tmp_path / "one") as unfinished:
         (unfinished / "entry.json").touch()
@@ -109,15 +95,6 @@ def test_targets_are_checked_before_work_begins(tmp_path: Path) -> None:
         with pytest.raises(ExportError, match=words):
             check_target(target)
     assert names(tmp_path) == ["file"]
-
-
-def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
-    (tmp_path / f"{TEMPORARY}1.json").touch()
-    (tmp_path / f"{TEMPORARY}2").mkdir()
-    (tmp_path / f"{TEMPORARY}2" / "entry.json").touch()
-    (tmp_path / "kept.json").touch()
-    remove_unfinished(tmp_path)
-    assert names(tmp_path) == ["kept.json"]
 
 
 def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_path: Path) -> None:
@@ -162,12 +139,6 @@ def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_pat
     with lock_folder(folder):
         assert (folder / LOCK).read_text() == str(os.getpid())
     assert names(folder) == []
-
-
-def test_a_folder_that_cannot_be_made_is_an_export_error(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(ExportError, match="file: is a file; give the name of a new"):
-        lock_folder(tmp_path / "file").__enter__()
 
 
 def test_finished_work_leaves_no_folder(tmp_path: Path) -> None:

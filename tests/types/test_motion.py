@@ -78,12 +78,6 @@ def test_it_says_what_does_not_fit() -> None:
             Motion(**(good | changes))
 
 
-def test_between_frames_it_is_linear_and_beyond_the_ends_constant() -> None:
-    values = motion().at(np.array([-1.0, 0.0, 0.25, 0.999, 1.0, 7.0]))
-    assert values[:, 0] == pytest.approx([0, 0, 2.5, 9.99, 10, 10])
-    assert values[:, 1] == pytest.approx(-2 * values[:, 0])
-
-
 @settings(max_examples=50)
 @given(st.integers(1, 30), st.floats(1, 120), st.lists(st.floats(-1, 5), max_size=20), st.integers(0, 1000))
 def test_at_is_what_numpy_interpolates(rows: int, rate_hz: float, time_s: list[float], seed: int) -> None:
@@ -150,18 +144,6 @@ def test_the_state_is_that_of_the_nearest_frame() -> None:
         for time_s, state in zip(after.motion.time_s, after.trace.frames, strict=True):
             nearest = np.abs(before.motion.time_s - time_s)
             assert state in before.trace.frames[nearest <= nearest.min() + 1e-9]
-
-
-def test_channels_are_selected_in_order() -> None:
-    before = generation()
-    names = before.motion.names[::-1][:2]
-    after = before.selected(names)
-    assert after.motion.names == names
-    for name in names:
-        assert np.array_equal(after.motion[name], before.motion[name])
-    assert after.variance.shape == after.motion.values.shape
-    with pytest.raises(InputError, match="no motion channel 'smile'"):
-        before.selected(["smile"])
 
 
 def test_variance_that_follows_from_few_dimensions_is_kept_as_such() -> None:

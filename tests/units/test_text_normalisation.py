@@ -5,12 +5,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.units import check_phones, check_text, check_words, spelling, split_words
+from lipmotion.units import (
+    check_phones,
+    check_text,
+    check_words,
+    find_words,
+    language_detection,
+    spelling,
+    split_words,
+    text_normalisation,
+)
 from lipmotion.units.text_normalisation import (
     ALWAYS_ALLOWED_CHARACTERS,
     ALWAYS_ALLOWED_PHONES,
     CHARACTERS_PER_S,
+    LONGEST_SENTENCE,
+    LONGEST_WORD,
+    MAX_CHARACTERS,
     PHONES_PER_S,
+    clean_text,
+    split_sentences,
 )
 from lipmotion.units.written_forms import ONES, SCALES, TENS, spell_number
 
@@ -127,3 +141,93 @@ def test_phones_are_no_more_than_frames() -> None:
     check_phones(most, 2.0)
     with pytest.raises(InputError, match=f"{most + 1} units in time, required at most {most} for 2.00 s of sound"):
         check_phones(most + 1, 2.0)
+
+
+def test_sentences() -> None:
+    for text, sentences in (
+        ("One. Two! Three? Four", ["One.", "Two!", "Three?", "Four"]),
+        ("Dr. Smith, e.g. J. Smith, came at 3 p.m. today.", ["Dr. Smith, e.g. J. Smith, came at 3 p.m. today."]),
+        ("It was I. Then he left.", ["It was I.", "Then he left."]),
+        ('He said "stop." Then (he) left.', ['He said "stop."', "Then (he) left."]),
+        ("3.5 per cent of a.b", ["3.5 per cent of a.b"]),
+        ("A title\n\nA text\nthat goes on", ["A title.", "A text that goes on"]),
+        ("One. ... !? Two.", ["One.", "Two."]),
+        ("你好。再见。", ["你好。", "再见。"]),
+        ("Wait... what?", ["Wait...", "what?"]),
+        ("a\x00b\x1b[31m c\ud800d\u2028e", ["a b [31m c d e"]),
+    ):
+        assert split_sentences(text) == sentences
+
+
+def test_a_long_sentence_is_divided_at_a_comma_else_between_words_else_anywhere() -> None:
+    clause = "a b c d e f g h " * 15
+    first, second = split_sentences(f"{clause}, {clause}.")
+    assert first.endswith("h ,")
+    assert second.endswith("h .")
+    parts = split_sentences("word " * 200)
+    assert max(map(len, parts)) <= LONGEST_SENTENCE
+    assert " ".join(parts) == ("word " * 200).strip()
+    assert [len(part) for part in split_sentences("好" * 900)] == [400, 400, 100]  # a script without blanks
+
+
+@settings(max_examples=50)
+@given(st.text(max_size=300))
+def test_no_word_is_lost_or_made(text: str) -> None:
+    words = find_words(clean_text(text))
+    if words:
+        parts = split_sentences(text)
+        assert tuple(word for part in parts for word in find_words(part)) == words
+    else:
+        with pytest.raises(InputError, match="holds no word"):
+            split_sentences(text)
+
+
+def test_what_cannot_be_said() -> None:
+    for text, message in (
+        ("", "'' holds no word; give the words to be spoken"),
+        (" \t\n", "holds no word"),
+        ("... 🙂 !", "holds no word"),
+        ("x" * (LONGEST_WORD + 1), "a word of 201 characters .*required at most 200"),
+        ("a " * MAX_CHARACTERS, "has 100000 characters, required at most 50000, about an hour of speech"),
+    ):
+        with pytest.raises(InputError, match=message):
+            split_sentences(text)
+
+
+TEXTS = {
+    "en": "bin blue at f two now", "es": "La sorpresa y el disgusto que produjo en los dos una noticia.",
+    "fr": "Il est dans le jardin et la maison n'est pas à vous.",
+    "de": "Die Katze ist nicht in der Küche, und das ist gut.", "it": "Il cane di Anna non è con gli altri.",
+    "pt": "O menino não foi com os amigos para a praia, e é uma pena.",
+    "nl": "De hond en het kind zijn niet in de tuin van oma.",
+    "ja": "東京は 寒い。", "ko": "밥을 먹고", "zh": "今天天气很好",
+    "": "привет мир 12",
+}  # fmt: skip
+ENGLISH = ["b l uw m", "k ax n f y uw z d", "w ih z axr d", "b ih hh ay n d", "k er t ax n", "l eh f t"]
+SPANISH = ["l eh s ao f", "k ow s t ow", "k ax s ih t iy", "p er ao t ax", "ih s ax l m", "m ae n iy f"]
+
+
+def test_of_a_text() -> None:
+    for language, text in TEXTS.items():
+        assert language_detection.detect_language(text_normalisation.split_written_words(text)) == language
+    assert language_detection.detect_language(("mandrusa", "kolpeti", "vastrini")) == ""
+
+
+@pytest.mark.long
+def test_of_speech() -> None:
+    english, spanish = ([tuple(word.split()) for word in words] for words in (ENGLISH, SPANISH))
+    assert language_detection.is_english(2 * english) is True
+    assert language_detection.is_english(2 * spanish) is False
+    assert language_detection.is_english(2 * english + 3 * spanish) is None
+    assert language_detection.is_english(english) is None  # too few
+
+
+def test_words_are_as_they_are_written_in_every_script() -> None:
+    for text, words in (
+        ("L’homme, peut-être!", "l'homme peut être"),
+        ("El 3 de mayo de 1984", "el 3 de mayo de 1984"),
+        ("你好吗？12个", "你 好 吗 12 个"),
+        ("こんにちは、ラーメン", "こんにちは ラーメン"),
+        ("हिन्दी 'ok'", "हिन्दी ok"),
+    ):
+        assert " ".join(text_normalisation.split_written_words(text)) == words

@@ -177,15 +177,6 @@ def test_the_table_in_the_document_is_one(tmp_path: Path) -> None:
     assert found.silence == ("closed",)
 
 
-def test_a_table_is_small_and_so_are_messages(tmp_path: Path) -> None:
-    with pytest.raises(errors.InputError, match="required at most 262144: is it a unit table"):
-        load_unit_set(written(tmp_path, "#" * 300_000))
-    for text in ("x " + "q" * 9000, "x" * 9000, "x" * 9000 + " b sil"):
-        with pytest.raises(errors.InputError) as caught:
-            load_unit_set(written(tmp_path, text))
-        assert len(str(caught.value)) < 500
-
-
 def test_what_is_spoken_has_the_unit_of_its_phone_or_else_its_own() -> None:
     units = UNIT_SETS["eVis"]
     assert units.unit_of(types.Unit("p", "sil-hidden+aa")) == "bilabial"

@@ -1,9 +1,8 @@
 import pytest
 
 from lipmotion import load_model
-from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.units import Lexicon, find_words, group_words, split_words, text_normalisation, written_forms
+from pipeline.made import features_of, recogniser_of
 from testing.formant_synthesiser import synthesise
 
 USUAL = (
@@ -125,7 +124,7 @@ def test_what_else_may_be_said_is_a_reading(text: str, said: str) -> None:
 
 @pytest.mark.long
 def test_the_sound_chooses_the_reading() -> None:
-    lexicon, recogniser = Lexicon(), Recogniser(load_model().phones, "general")
+    lexicon, recogniser = Lexicon(), recogniser_of(load_model(), "general")
     wrong = []
     for text, said in SAID:
         words = ("mother", "saw", *split_words(said), "to", "baby")
@@ -134,7 +133,7 @@ def test_the_sound_chooses_the_reading() -> None:
             [("sil", 0.2), *((phone, 0.09) for phone in phones), ("sil", 0.2)], rate_hz=16_000, seed=1
         )
         given = ("mother", "saw", *text_normalisation.tokenise(text), "to", "baby")
-        units = recogniser.align(audio, analysed(audio).mfcc(), given, lexicon)
+        units = recogniser.align(audio, features_of(audio), given, lexicon)
         found = tuple(span.label for span in group_words(units) if span.label)
         wrong += [(text, found)] if found != words else []
     assert not wrong

@@ -1,6 +1,6 @@
-"""How generated motion is delivered: earlier than the sound, later on a timeline, larger, or as held poses.
+"""Changes to generated motion on its way to an output: earlier than the sound, later on a timeline, larger, or held.
 
-Each function returns a new generation; the values are those of the engine until one of them is asked for.
+Each function returns a new generation; without options the motion stays as the engine made it.
 """
 
 from __future__ import annotations
@@ -25,12 +25,11 @@ def choose_holds(rows: NDArray[np.float64], hold: int, fixed: Sequence[int] = ()
     """Return the first frame of every held pose, in order, and the number of frames after them [B + 1 numbers].
 
     rows  : curves over time, scaled so that their differences count alike [shape=(T, D)]
-    hold  : least frames of a pose, > 0; with fewer frames in all, one pose has them all
-    fixed : frames whose pose must be shown: the pose that has one is that frame's, of several the mean of these
-    Every other pose is the mean of its frames. Of all divisions into poses of ``hold`` to 2 · ``hold`` - 1 frames, the
-    one with the least sum of squared differences between curves and poses (dynamic programming, no approximation).
-    Without fixed frames no other division is better: two poses are never worse than one of 2 · ``hold`` frames or
-    more. With them a longer pose can be: it shows the mean of several fixed frames, where two show each more exactly.
+    hold  : minimum frames of a pose, > 0; with fewer than 2 · ``hold`` frames in all, one pose has them all
+    fixed : frames to be shown as they are: a pose with one or several of them is their mean
+    Every other pose is the mean of its frames. Poses have ``hold`` to 2 · ``hold`` - 1 frames; of all such divisions
+    this has the smallest sum of squared differences between curves and poses (dynamic programming, exact).
+    Without fixed frames longer poses never do better, for two are never worse than one. With fixed frames they can.
     Cost: O(T · hold · D) time, O(T · D) memory.
     """
     frames = len(rows)
@@ -69,16 +68,16 @@ Curve = NDArray[np.float64]
 UNSCALED_GAP = 0.03
 """Lips that have just parted by less than this, in eye distances, move less than in proportion to the intensity."""
 GROWING = ("protrusion", "spread")
-"""The articulatory channels that grow with the intensity; the others say what touches what."""
-DECIDING = ("opening", "width", "outer")
+"""The articulatory channels that grow with the intensity; the others state what touches what."""
+POSE_CHANNELS = ("opening", "width", "outer")
 """The channels that decide where held poses begin, where the motion has them."""
 
 
 def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
-    """Return a generation whose mouth moves by the anticipation earlier, and all of it by the offset later.
+    """Return a generation whose mouth moves earlier by the anticipation, and everything later by the offset.
 
-    It lasts as long as before, and the offset longer. What is before time 0 is left out; where nothing is known, at the
-    edges, the nearest pose stays. A frame in which p, b or m closes the lips is kept as it is.
+    It becomes longer by the offset. What falls before time 0 is cut; missing frames at the edges repeat the nearest
+    pose. Frames are interpolated, but not those in which p, b or m closes the lips: these would open.
     Raises InputError: nothing is left.
     """
     motion, rate_hz = generation.motion, generation.motion.rate_hz
@@ -128,7 +127,7 @@ def _shift_edits(edits: Sequence[CurveEdit], by_s: float, duration_s: float) -> 
 
 
 def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Unit]:
-    """Return phones in time so many seconds later, from 0 to ``end_s``; silence at an edge goes to that edge."""
+    """Return phones later by ``by_s``, cut to 0 … ``end_s``; silence at an edge is stretched to it."""
     first, last = 0, len(units) - 1
     spans = []
     for number, span in enumerate(units):
@@ -184,7 +183,7 @@ ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", "oval", *GROWING, *E
 
 
 def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = ()) -> Generation:
-    """Return a generation whose poses are held, each for at least so many frames, and change at once.
+    """Return a generation whose poses are each held for at least ``frames`` frames, and then change at once.
 
     frames   : less than 2: the curves stay as they are
     closed_s : times in seconds at which the lips are closed in p, b and m (``find_closed_times``)
@@ -196,7 +195,7 @@ def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = 
     if frames < 2 or not count:
         return generation
     closed = np.unique([min(round(time_s * motion.rate_hz), count - 1) for time_s in closed_s]).astype(int)
-    deciding = [name for name in DECIDING if name in motion.names]
+    deciding = [name for name in POSE_CHANNELS if name in motion.names]
     others = [channel.name for channel in motion.channels if channel.unit != EYE_DISTANCE or not deciding]
     names = [*deciding, *(name for name in others if name not in deciding)]
     rows = np.stack([motion[name].astype(np.float64) for name in names], axis=1)
@@ -219,7 +218,7 @@ def hold_poses(generation: Generation, frames: int, closed_s: Sequence[float] = 
 
 
 def close_on_frame_grid(generation: Generation, rate_hz: float) -> Generation:
-    """Return a generation whose closures of p, b and m lie at times n / ``rate_hz`` s, where motion shows them."""
+    """Return a generation whose closures of p, b and m lie at times n / ``rate_hz`` s, where that rate shows them."""
     motion = generation.motion
     values = motion.values.copy()
     for frame, *_ in find_closures(motion, generation.units):
@@ -235,11 +234,11 @@ def find_closed_times(generation: Generation) -> list[float]:
 
 
 def delay_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:
-    """Return the phones in time of the sound, for label files: later by the offset, whatever the mouth anticipates."""
+    """Return the phones in the time of the sound, for label files: later by the offset, without the anticipation."""
     later_s = delivery.offset_ms / 1000
     return shift_units(units, later_s, max(_end_s(units), end_s) + later_s) if later_s else units
 
 
 def _end_s(units: Timeline[Unit]) -> float:
-    """Return the end of the last phone, which may be after the last frame; 0: there are none."""
+    """Return the end of the last phone, which may be after the last frame; 0 without phones."""
     return max((span.end_s for span in units), default=0.0)

@@ -46,20 +46,20 @@ FLAME_MARKERS = {
     **{"EYE_L": 1162, "EYE_R": 2431, "NASION": 3553},
     **{"LIP_0": 3541, "LIP_13": 3533, "LIP_14": 3504, "LIP_17": 3511, "LIP_61": 2845, "LIP_291": 1730, "JAW_152": 3414},
 }
-"""The vertices at the outer eye corners, at the root of the nose, and at points of the face mesh.
-Found by looking at a mesh of a face at rest: where the lips meet, the edges of their red, their corners, the chin."""
+"""Vertices at the outer eye corners, at the root of the nose, and at points of the face mesh, chosen by eye on a face
+at rest: where the lips meet, the edges of their red, their corners, the chin."""
 METRES = "m"
-LARGEST_HEADER_BYTES = 1 << 14
-LARGEST_MESH_BYTES = 1 << 26
+MAX_HEADER_BYTES = 1 << 14
+MAX_MESH_BYTES = 1 << 26
 MAX_MESHES = 1 << 20
 """Meshes of four hours."""
 NUMBER = re.compile(r"(\d+)$")
-TYPES = {
+PLY_TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
-ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+PLY_BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
 
 
 def read_vocaset(directory: Path) -> RecordingFolder | None:
@@ -92,8 +92,8 @@ def read_vocaset(directory: Path) -> RecordingFolder | None:
     return gather_recordings(KIND, by_name, read_recording, directory)
 
 
-def mesh_files(first: Path) -> list[Path]:
-    """Return the files of the sequence that a mesh is of: all beside it whose names differ in their last number."""
+def list_mesh_files(first: Path) -> list[Path]:
+    """Return the files of a mesh's sequence: all beside it whose names differ in the last number alone."""
     start = NUMBER.sub("", first.stem)
     return sorted(path for path in first.parent.glob(f"*{MESH}") if NUMBER.sub("", path.stem) == start)
 
@@ -104,7 +104,7 @@ def read_mesh_motion(first: Path, rate_hz: float) -> Motion:
     first   : one of its meshes; where numbers are missing, the motion is interpolated
     Raises InputError: a file that is no mesh with the vertices of FLAME, in metres.
     """
-    files = mesh_files(first)
+    files = list_mesh_files(first)
     numbers = [int(match[1]) if (match := NUMBER.search(path.stem)) else 1 for path in files]
     if not files or max(numbers) > MAX_MESHES:
         what = f"{len(files)} meshes up to number {max(numbers, default=0)}"
@@ -128,21 +128,21 @@ def read_vertices(path: Path, chosen: Sequence[int]) -> NDArray[np.float64]:
     Raises InputError: damaged, without ``x``, ``y``, ``z``, not finite, or not ``FLAME_VERTICES`` vertices.
     """
     size = path.stat().st_size
-    if size > LARGEST_MESH_BYTES:
-        raise InputError(f"{path}: {size} bytes, required at most {LARGEST_MESH_BYTES}: is it the mesh of a head?")
+    if size > MAX_MESH_BYTES:
+        raise InputError(f"{path}: {size} bytes, required at most {MAX_MESH_BYTES}: is it the mesh of a head?")
     head, mark, body = path.read_bytes().partition(b"end_header")
-    lines = [line.split() for line in head[:LARGEST_HEADER_BYTES].decode("ascii", "replace").splitlines()]
+    lines = [line.split() for line in head[:MAX_HEADER_BYTES].decode("ascii", "replace").splitlines()]
     try:
         if lines[:1] != [["ply"]]:
             raise ValueError("its first line is not 'ply'")
-        (order,) = (ORDERS[words[1]] for words in lines if words[:1] == ["format"])  # empty: as text
+        (order,) = (PLY_BYTE_ORDERS[words[1]] for words in lines if words[:1] == ["format"])  # empty: as text
         first, *others = [number for number, words in enumerate(lines) if words[:1] == ["element"]]
         _, element, count = lines[first]
         if element != "vertex" or int(count) != FLAME_VERTICES:
             wanted = f"{FLAME_VERTICES} vertices: of others, no lip points are known"
             raise ValueError(f"it begins with {count} of {element!r}, required {wanted}")
         properties = [words for words in lines[first + 1 : others[0] if others else None] if words[:1] == ["property"]]
-        columns = [(name, TYPES[kind]) for _, kind, name in properties]
+        columns = [(name, PLY_TYPES[kind]) for _, kind, name in properties]
         if not mark:
             raise ValueError("its header has no end")
         body = body[body.index(b"\n") + 1 :]
@@ -161,22 +161,22 @@ def read_vertices(path: Path, chosen: Sequence[int]) -> NDArray[np.float64]:
 
 
 FACEGOOD = "FACEGOOD blendshape weights"
-NAMES, VALUES = "*_bs_name.npy", "bs_value_"
+NAMES_FILE, VALUES_PREFIX = "*_bs_name.npy", "bs_value_"
 FACEGOOD_HZ = 30.0
-LICENCE_CHARACTERS = 10_000
-"""Characters of a licence file that are read for its name and its owner."""
+MAX_LICENCE_CHARACTERS = 10_000
+"""A licence file is read so far for its name and its owner."""
 
 
 def read_facegood(directory: Path) -> RecordingFolder | None:
-    """Return the recordings of such a folder, or None if it has no list of names or no arrays.
+    """Return the recordings of a folder of FACEGOOD, or None if it has no list of names or no arrays.
 
     Raises InputError: the list of names is damaged, or there are several.
     """
-    arrays, lists = sorted(directory.glob(f"{VALUES}*.npy")), sorted(directory.glob(NAMES))
+    arrays, lists = sorted(directory.glob(f"{VALUES_PREFIX}*.npy")), sorted(directory.glob(NAMES_FILE))
     if not arrays or not lists:
         return None
     if len(lists) > 1:
-        raise InputError(f"{directory}: {len(lists)} lists of channel names ({NAMES}); keep the one that belongs here")
+        raise InputError(f"{directory}: {len(lists)} lists of channel names ({NAMES_FILE}); keep the right one")
     channels = read_channels(lists[0])
     sounds: dict[str, list[Path]] = {}
     for path in directory.iterdir():
@@ -185,12 +185,12 @@ def read_facegood(directory: Path) -> RecordingFolder | None:
     ignored, rights, licence = frozenset(directory / name for name in LISTS), dict[str, str](), directory / "LICENSE"
     if licence.is_file():
         with licence.open(encoding="utf-8", errors="replace") as file:
-            lines = [line.strip() for line in file.read(LICENCE_CHARACTERS).splitlines() if line.strip()]
+            lines = [line.strip() for line in file.read(MAX_LICENCE_CHARACTERS).splitlines() if line.strip()]
         owners = [line for line in lines if line.lower().startswith("copyright")]
         rights = dict(zip(("licence", "attribution"), (*lines[:1], *owners[:1]), strict=False))
     recordings, problems = [], {}
     for path in arrays:
-        name = path.stem.removeprefix(VALUES)
+        name = path.stem.removeprefix(VALUES_PREFIX)
         same_name = sounds.get(name, [])
         try:
             if len(same_name) != 1:

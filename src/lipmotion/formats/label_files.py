@@ -32,7 +32,7 @@ from lipmotion.formats.label_tiers import (
 from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, subtitle_tier, write_subrip, write_webvtt
 from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_textgrid
 from lipmotion.formats.timed_lines import line_tiers
-from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, xml_tiers
+from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, read_xml_tiers
 from lipmotion.printable import is_line
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
@@ -262,7 +262,7 @@ def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
         if is_textgrid(text):
             tiers: list[LabelTier] | None = parse_seconds(parse_interval_tiers(text, where), where)
         elif (root := ROOT.match(text)) and root[1] in READ_ROOTS:
-            tiers = xml_tiers(text, where)
+            tiers = read_xml_tiers(text, where)
         elif is_subtitles(text):
             tiers = [subtitle_tier(text, where)]
         else:

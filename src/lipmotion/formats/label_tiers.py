@@ -262,12 +262,12 @@ def tier_transcript(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
 def _find_times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
     """Return the times of a label, None where they are not known: nothing is said before the sound begins."""
     if label.end_s < label.start_s:
-        raise _reversed(label, where)
+        raise _reverse(label, where)
     start_s, end_s = (time_s if EARLIEST_S < time_s < math.inf else None for time_s in (label.start_s, label.end_s))
     return start_s and max(start_s, 0.0), end_s and max(end_s, 0.0)
 
 
-def _reversed(label: TimedLabel, where: str) -> InputError:
+def _reverse(label: TimedLabel, where: str) -> InputError:
     return InputError(
         f"{where}: {label.position} ends at {label.end_s:g} s, before its start at {label.start_s:g} s; correct it"
     )
@@ -288,7 +288,7 @@ def phone_timeline(
         if not min(label.start_s, label.end_s) > EARLIEST_S:
             raise InputError(f"{where}: {label.position} has no time, required the start and the end of a phone")
         if label.end_s < label.start_s:
-            raise _reversed(label, where)
+            raise _reverse(label, where)
         late_s, which = label.start_s - reached_s, f"{where}: {label.position} starts at {label.start_s:g} s, "
         if late_s < -ROUNDING_S:
             raise InputError(f"{which}before the one ahead of it ends ({reached_s:g} s); labels must not overlap")

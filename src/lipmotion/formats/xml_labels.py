@@ -19,10 +19,10 @@ OFFSET_TIME = re.compile(r"(\d+(?:\.\d+)?)(h|ms|m|s|f|t)?")
 NEAR_S, DEEPEST = 0.01, 20
 
 
-def xml_tiers(text: str, where: str) -> list[LabelTier]:
+def read_xml_tiers(text: str, where: str) -> list[LabelTier]:
     """Return the tiers of an ``.eaf``, or the lines of captions.
 
-    Raises InputError: damaged XML, or a time that is none.
+    Raises InputError: damaged XML, or a time that cannot be read.
     """
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text, re.IGNORECASE):
         raise InputError(f"{where}: its XML declares entities, which are not read; save it without them")
@@ -37,7 +37,7 @@ def xml_tiers(text: str, where: str) -> list[LabelTier]:
 
 
 def _read_elan(root: Element, where: str) -> list[LabelTier]:
-    """Return the tiers of ELAN; annotations that divide another without times are one label with its time."""
+    """Return the tiers of ELAN. Annotations without times divide another one: they are one label with its time."""
     slots_s = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
     times_s = {name: _parse_seconds(f"{value}ms", {}, where) if value else math.nan for name, value in slots_s.items()}
     spans_s: dict[str | None, tuple[float, float]] = {}
@@ -92,7 +92,7 @@ def _read_captions(root: Element, where: str) -> LabelTier:
             if child is element or not {"begin", "t"} & child.attrib.keys():
                 continue
             text, times_s = "".join(child.itertext()), _read_times(child, start_s, end_s, per_s, where)
-            if glued and not text[:1].isspace():  # a syllable
+            if glued and not text[:1].isspace():  # no blank between spans: syllables of one word
                 text, times_s = parts[-1].text + text, (parts.pop().start_s, times_s[1])
             parts.append(TimedLabel(*times_s, text, place))
             glued = not f"{text}{child.tail or ''}"[-1:].isspace()
@@ -107,7 +107,7 @@ def _read_captions(root: Element, where: str) -> LabelTier:
 def _read_times(
     element: Element, start_s: float, end_s: float, per_s: dict[str, float], where: str
 ) -> tuple[float, float]:
-    """Return the start and the end of an element within those of its owner, to which its times are relative."""
+    """Return the start and the end of an element; times relative to its owner, or absolute if only so they fit."""
     stated = {name: element.get(name) for name in ("begin", "end", "dur", "start", "t", "d")}
     ms = {name: f"{stated[name]}ms" for name in ("t", "d") if stated[name]}
     texts = (stated["begin"] or stated["start"] or ms.get("t"), stated["end"], stated["dur"] or ms.get("d"))
@@ -121,7 +121,7 @@ def _read_times(
 
 
 def _parse_seconds(value: str, per_s: dict[str, float], where: str) -> float:
-    """Return a time of TTML: a clock, also with frames, or a number with its unit. Raises InputError: it is none."""
+    """Return a time of TTML: a clock, also with frames, or a number with its unit. Raises InputError: another text."""
     clock_s, offset = parse_clock(value, per_s.get("f", 0)), OFFSET_TIME.fullmatch(value.strip())
     if not math.isnan(clock_s):
         return clock_s

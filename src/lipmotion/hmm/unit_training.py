@@ -1,4 +1,4 @@
-"""Embedded training of unit models from transcripts without unit labels."""
+"""Embedded training of phone (unit) models from recordings and their words, without labels of phones."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def train_hmm(
 
     Stages: flat start with the first pronunciations; choice of pronunciations and pauses; mixtures by
     splitting; the choice again; states in context. Each stage is embedded Baum–Welch over whole utterances.
-    checkpoint : after every step, all that the next one needs is stored there; it distributes the work
+    checkpoint : stores after every step all that the next one needs, and distributes the work
     Raises CorpusError: no utterance, or none long enough for its transcript.
     """
     usable, sequences = [], []
@@ -127,7 +127,7 @@ class _Training:
         arrays = checkpoint.load(_CHECKPOINT)
         if arrays is None:
             self._done, self._sequences = 0, list(sequences)
-            self._hmm = _flat_start(self._data, sequences, inventory, config)
+            self._hmm = _make_flat_start(self._data, sequences, inventory, config)
         else:
             self._done, self._sequences = int(arrays["done"]), [tuple(s.split()) for s in arrays["said"].tolist()]
             stored = {name: array for name, array in arrays.items() if name not in ("done", "said")}
@@ -231,7 +231,7 @@ def _choose_sequences(
     return sequences
 
 
-def _flat_start(
+def _make_flat_start(
     data: Sequence[NDArray[np.float32]],
     sequences: Sequence[tuple[str, ...]],
     inventory: UnitInventory,

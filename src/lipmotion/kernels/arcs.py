@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 Index = NDArray[np.intp]
 
-LEAST_BLOCK = 8
-"""Least number of sources, and of targets, of a block."""
+MIN_BLOCK = 8
+"""Sources, and targets, that a block has at least."""
 PADDING_ROWS = 16
 """Rows of a block are padded to a multiple of this."""
 
@@ -49,23 +49,23 @@ class ArcWeights(NamedTuple):
     blocks: NDArray[Any]
 
 
-def arc_layout(arc_from: Index, arc_start: Index) -> ArcLayout:
-    """Return the layout of a network whose arcs are sorted by target."""
+def lay_out_arcs(arc_from: Index, arc_start: Index) -> ArcLayout:
+    """Return the layout of a network whose arcs are sorted by target: their sources, and each target's first arc."""
     states = len(arc_start)
     arc_to = np.repeat(np.arange(states), np.diff(arc_start, append=len(arc_from)))
-    groups = _groups(arc_from, arc_start)
+    groups = _group_states(arc_from, arc_start)
     blocked = np.zeros(len(arc_from), bool)
     for _, arcs in groups:
         blocked[arcs] = True
     rest = np.flatnonzero(~blocked)
-    order = _order(states, groups, arc_from[rest], arc_to[rest])
+    order = _order_states(states, groups, arc_from[rest], arc_to[rest])
     place = np.empty(states, np.intp)
     place[order] = np.arange(states)
-    runs, positions = _runs(place[arc_from[rest]], place[arc_to[rest]])
-    return ArcLayout(order, place, runs, rest[positions], *_blocks(groups, arc_from, place))
+    runs, positions = _find_runs(place[arc_from[rest]], place[arc_to[rest]])
+    return ArcLayout(order, place, runs, rest[positions], *_fill_blocks(groups, arc_from, place))
 
 
-def arc_weights(layout: ArcLayout, values: NDArray[Any], padding: float) -> ArcWeights:
+def arrange_weights(layout: ArcLayout, values: NDArray[Any], padding: float) -> ArcWeights:
     """Return the values of arcs [shape=(E,)] by run and by block; ``padding`` where a block is padded."""
     blocks = values[layout.block_arcs]
     blocks[layout.block_arcs < 0] = padding
@@ -76,23 +76,23 @@ _Groups = list[tuple[Index, Index]]
 """Each block's states with the same sources, and their arcs [shape=(sources, targets)]."""
 
 
-def _groups(arc_from: Index, arc_start: Index) -> _Groups:
+def _group_states(arc_from: Index, arc_start: Index) -> _Groups:
     members: dict[bytes, list[tuple[int, Index]]] = defaultdict(list)
     stops = np.append(arc_start[1:], len(arc_from))
-    for state in np.flatnonzero(stops - arc_start >= LEAST_BLOCK):
+    for state in np.flatnonzero(stops - arc_start >= MIN_BLOCK):
         arcs = np.arange(arc_start[state], stops[state])
         arcs = arcs[arc_from[arcs] != state]
         arcs = arcs[np.argsort(arc_from[arcs], kind="stable")]
-        if len(arcs) >= LEAST_BLOCK:
+        if len(arcs) >= MIN_BLOCK:
             members[arc_from[arcs].tobytes()].append((int(state), arcs))
     return [
         (np.array([state for state, _ in group], np.intp), np.stack([arcs for _, arcs in group], axis=1))
         for group in members.values()
-        if len(group) >= LEAST_BLOCK
+        if len(group) >= MIN_BLOCK
     ]
 
 
-def _order(states: int, groups: _Groups, source: Index, target: Index) -> Index:
+def _order_states(states: int, groups: _Groups, source: Index, target: Index) -> Index:
     """Return the states in their new order: the targets of each block, the states one arc after them, and so on."""
     if not groups:
         return np.arange(states)
@@ -106,7 +106,7 @@ def _order(states: int, groups: _Groups, source: Index, target: Index) -> Index:
     return np.lexsort((group, depth))
 
 
-def _runs(source: Index, target: Index) -> tuple[Index, Index]:
+def _find_runs(source: Index, target: Index) -> tuple[Index, Index]:
     """Return the runs, and the positions of arcs in order of the runs; sources and targets are places."""
     positions = np.lexsort((target, target - source))
     source, target = source[positions], target[positions]
@@ -116,7 +116,7 @@ def _runs(source: Index, target: Index) -> tuple[Index, Index]:
     return np.stack([target[firsts], source[firsts], lengths, firsts], axis=1).astype(np.intp), positions
 
 
-def _blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
+def _fill_blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
     total = sum(len(arcs) for _, arcs in groups)
     widest = max((-(-len(targets) // PADDING_ROWS) * PADDING_ROWS for targets, _ in groups), default=PADDING_ROWS)
     blocks, sources, matrix = (

@@ -41,7 +41,7 @@ class _SharedLimit:
 
     def __enter__(self) -> None:
         with self._lock:
-            self._limits.enter_context(_loaded_libraries(len(sys.modules)).limit(limits=1, user_api="blas"))
+            self._limits.enter_context(_list_libraries(len(sys.modules)).limit(limits=1, user_api="blas"))
             self._users += 1
 
     def __exit__(self, *_: object) -> None:
@@ -55,7 +55,7 @@ _LIMIT = _SharedLimit()
 
 
 @lru_cache(maxsize=1)
-def _loaded_libraries(_: int) -> Any:
+def _list_libraries(_: int) -> Any:
     """Return threadpoolctl's controller of the libraries in use; asked for again when modules have been imported."""
     from threadpoolctl import ThreadpoolController
 

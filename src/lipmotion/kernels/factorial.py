@@ -193,7 +193,7 @@ class _Scaled:
                 log_total += log
                 continue
             entering, after = self.audio[2].T @ before[-units:], np.empty_like(before)
-            moved = _moved_to_last(before, *self.audio[:2], entering, count)
+            moved = _move_to_last(before, *self.audio[:2], entering, count)
             total = _forward(
                 before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2],
                 density.audio, density.visual, density.pair, density.pair_audio, density.pair_visual,
@@ -219,7 +219,7 @@ class _Scaled:
         leaving  : of the frame after it
         """
         density, units, first = self.densities[t - self.start], len(self.audio[2]), backward[:, : len(self.visual[2])]
-        moved = _moved_back(backward, *self.visual[:2], first @ self.visual[2].T)
+        moved = _move_back(backward, *self.visual[:2], first @ self.visual[2].T)
         after, sums = np.empty_like(before), [np.empty(len(part)) for part in density[:3]]
         total = _backward(
             before, moved, *self.audio[:2], self.audio[2] @ moved[:units], density.audio, density.visual, density.pair,
@@ -335,7 +335,7 @@ def _zero_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -
 
 
 @compiled_to_rounding
-def _moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
+def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
     """Return the last columns of joint probabilities, moved one frame on along axis 0 by those of entering [shape=(U,
     M)].
     """
@@ -347,7 +347,7 @@ def _moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, c
 
 
 @compiled_to_rounding
-def _moved_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
+def _move_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
     """Return joint backward probabilities, moved a frame back along axis 1; ``left``: of leaving last states [shape=(N,
     U)].
     """

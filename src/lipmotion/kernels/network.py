@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, arc_layout, arc_weights
+from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, arrange_weights, lay_out_arcs
 from lipmotion.kernels.compiler import compiled_to_rounding
 from lipmotion.kernels.forward_backward import log_forward_backward
 
@@ -131,16 +131,16 @@ class ForwardBackwardNetwork(NamedTuple):
         log_final: NDArray[np.floating[Any]],
     ) -> ForwardBackwardNetwork:
         """Return a network prepared for forward–backward; parameters as in ``kernels.paths.NetworkArrays``."""
-        layout = arc_layout(arc_from, arc_start)
+        layout = lay_out_arcs(arc_from, arc_start)
         logs, initial, final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
-        return cls(arc_from, logs, arc_start, initial, final, layout, *_weighted(layout, logs))
+        return cls(arc_from, logs, arc_start, initial, final, layout, *_weigh(layout, logs))
 
     def with_arcs(
         self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]
     ) -> ForwardBackwardNetwork:
         """Return the network with other probabilities of arcs [shape=(E,)] and of beginnings [shape=(S,)]."""
         logs, initial = arc_log.astype(np.float64), log_initial.astype(np.float64)
-        best_arc, weights, transposed, chunks = _weighted(self.layout, logs)
+        best_arc, weights, transposed, chunks = _weigh(self.layout, logs)
         changed = self._replace(best_arc=best_arc, weights=weights, transposed=transposed, chunks=chunks)
         return changed._replace(arc_log=logs, log_initial=initial)
 
@@ -166,21 +166,21 @@ class ForwardBackwardNetwork(NamedTuple):
         times as slow.
         """
         precision = log_emissions[0].dtype
-        expected = self._scaled(log_emissions, columns, frames)
+        expected = self._scale(log_emissions, columns, frames)
         edges = np.append(0, np.cumsum(frames))
         for u in np.flatnonzero(np.isneginf(expected.log_likelihood)):
             of_recording = slice(edges[u], edges[u + 1])
             logs = [log[of_recording].astype(np.float64) for log in log_emissions]
             again = None
             if precision == np.float32:
-                again = self._scaled(logs, columns, frames[u : u + 1])
+                again = self._scale(logs, columns, frames[u : u + 1])
             if again is None or np.isneginf(again.log_likelihood[0]):
                 again = self._in_logs(_joint(logs, columns))
             expected.posterior[of_recording], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
             expected.counts[:] += again.counts
         return expected
 
-    def _scaled(
+    def _scale(
         self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
     ) -> NetworkPosteriors:
         """Return the posteriors of recordings by scaled probabilities, in the precision of ``log_emissions``.
@@ -265,16 +265,16 @@ def _probabilities(log: Array) -> tuple[Array, float]:
     return np.exp(log - best), best
 
 
-def _weighted(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
+def _weigh(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
     """Return the logarithm of the greatest probability of an arc, and the probabilities relative to that, in all forms
     that the kernels take.
     """
     relative, best = _probabilities(arc_log)
-    weights = arc_weights(layout, relative, 0.0)
-    return best, weights, _transposed(layout, weights), Chunks.of(layout, weights)
+    weights = arrange_weights(layout, relative, 0.0)
+    return best, weights, _transpose(layout, weights), Chunks.of(layout, weights)
 
 
-def _transposed(layout: ArcLayout, weights: ArcWeights) -> Array:
+def _transpose(layout: ArcLayout, weights: ArcWeights) -> Array:
     """Return the weights of all blocks, targets as rows, sources as columns, padded."""
     transposed = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDING_ROWS) * PADDING_ROWS))]
     for _, targets, first, sources in layout.blocks:

@@ -123,7 +123,7 @@ class _Block:
 
     def first_row(self, log_emission: LogEmission) -> Scores:
         """Return the scores of the states in the first frame of all."""
-        values = self._masked(log_emission(0, 1), 0)[0]
+        values = self._mask(log_emission(0, 1), 0)[0]
         return self.whole.log_initial[self.states] + (values[self.whole.emission] if self.windows is None else values)
 
     def row_after(self, before: _Block, last: Scores) -> Scores:
@@ -138,9 +138,9 @@ class _Block:
 
     def log_emission(self, log_emission: LogEmission) -> Scores:
         """Return the log densities as ``network`` numbers them: of every state, -inf outside its window."""
-        return self._masked(log_emission(self.start, self.stop), self.start)
+        return self._mask(log_emission(self.start, self.stop), self.start)
 
-    def _masked(self, values: Scores, start: int) -> Scores:
+    def _mask(self, values: Scores, start: int) -> Scores:
         if self.windows is None:
             return values
         values = values[:, self.whole.emission[self.states]]

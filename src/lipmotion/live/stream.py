@@ -48,7 +48,7 @@ AHEAD_STEPS = 8
 """Lips part before they are heard: as far as so many steps are known, 160 ms, it rests only if all are silent."""
 REST_STEPS, START_STEPS = 5, 3
 """Steps in which it rests, 100 ms, and in which it begins to speak."""
-CLOSED = (0.1, 0.3)
+CLOSED = (0.07, 0.18)
 """Probabilities of p, b and m from which on the lips begin to close, and are closed."""
 CLOSING_STEPS, OPENING_STEPS = 2, 4
 """Steps in which they close, also where it is seen late, and in which they open again: 40 and 80 ms."""

@@ -1,4 +1,4 @@
-"""A recurrent network in both directions of time, from sequences of vectors to sequences of vectors."""
+"""A bidirectional LSTM network, from sequences of vectors to sequences of vectors."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ SLOPES, OFFSETS = (np.array(values, np.float32)[:, None] for values in ((0.5, 0.
 FORGET_BIAS = 1.0
 """Bias of the forget gates before training: cells remember."""
 PIECE, REACH = 250, 50
-"""Long sequences are computed in pieces of so many time steps, side by side; so many steps before and after a piece are
-computed with it, for what its cells remember."""
+"""Long sequences are computed in pieces of PIECE time steps, side by side, each with REACH steps around it for what its
+cells remember."""
 PIECES = 16
 """Pieces computed at a time, so that the memory does not grow with the sequence."""
 
@@ -60,7 +60,7 @@ class _CellPass(NamedTuple):
 class RecurrentNetwork(SequenceNetwork):
     """Layers of long short-term memory cells, as many forward as backward in time, and a linear output.
 
-    Source: Graves & Schmidhuber 2005, without connections from cells to gates.
+    Source: Graves & Schmidhuber 2005, without connections from cells to gates (peepholes).
     """
 
     layers: tuple[RecurrentLayer, ...]
@@ -78,8 +78,8 @@ class RecurrentNetwork(SequenceNetwork):
             for place, each in enumerate(rows):
                 batch[place, : len(each)], inside[place, : len(each)] = each, True
             states, _ = self.forward(batch, inside, None)
-            for (first, start), each, found in zip(pieces, rows, states, strict=True):
-                result[start : start + PIECE] = found[start - first : min(start - first + PIECE, len(each))]
+            for (first, start), each, state in zip(pieces, rows, states, strict=True):
+                result[start : start + PIECE] = state[start - first : min(start - first + PIECE, len(each))]
         return result
 
     @property

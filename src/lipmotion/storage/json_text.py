@@ -96,7 +96,7 @@ def from_json(text: str | bytes) -> Any:
     Raises ValueError: it is none, has a key twice, is nested too deeply, or holds a number that is not finite.
     """
     try:
-        numbers: Any = {"parse_constant": _refused, "parse_float": finite, "parse_int": _whole}
+        numbers: Any = {"parse_constant": _refuse, "parse_float": finite, "parse_int": _whole}
         return json.loads(text, object_pairs_hook=_distinct_keys, **numbers)
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
@@ -123,13 +123,13 @@ def _distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return content
 
 
-def _refused(constant: str) -> NoReturn:
+def _refuse(constant: str) -> NoReturn:
     raise ValueError(f"the number {constant}, required a finite one")
 
 
 def _whole(text: str) -> int:
     if len(text) > LONGEST_WHOLE:
-        _refused(text[:20])
+        _refuse(text[:20])
     return int(text)
 
 
@@ -137,7 +137,7 @@ def finite(text: str) -> float:
     """Return the number of a text of JSON or TOML. Raises ValueError: it is not finite."""
     number = float(text)
     if not math.isfinite(number):
-        _refused(text[:20])
+        _refuse(text[:20])
     return number
 
 

@@ -1,7 +1,7 @@
-"""Values from outside: the one check of numbers, texts and documents, whichever file, option or request brings them.
+"""Checks of values from outside: numbers, texts and documents of files, options and requests.
 
-A schema is a function that returns a value as the code may use it, or raises ``SchemaError``. Tables of schemas say
-what is used of a document of JSON or TOML: its types and ranges.
+A schema is a function that returns a value as the code may use it, or raises ``SchemaError``. Tables of schemas
+state which members of a JSON or TOML document are used, with their types and ranges.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from lipmotion.errors import InputError, shorten
 
 Schema = Callable[[Any], Any]
 NAME_BYTES, PATH_BYTES = 255, 4096
-"""Most bytes of a name in a path, and of a path, that file systems take."""
+"""Maximum bytes of a name in a path, and of a path, on usual file systems."""
 _LEFT_OUT = object()
 _HALVES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
-"""Halves of characters; \\udc80 to \\udcff are bytes of names of files that are not UTF-8."""
+"""Halves of characters, without \\udc80 to \\udcff: Python has those for bytes of file names that are not UTF-8."""
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|(?i:nan|[-+]?inf)")
 _CLOCK = r"(?:([0-9]{1,6}):)?([0-9]{1,2}):([0-9]{1,2}(?:[.,][0-9]{1,9})?)"
 _WHOLE = re.compile("[-+]?[0-9]{1,18}")
 
 
 class SchemaError(InputError):
-    """A value has another type or range; says where it stands, and what is required there."""
+    """A value has another type or range; names its place, and what is required there."""
 
     def __init__(self, found: str, required: str, place: str = "") -> None:
         super().__init__(f"{shorten(place.removeprefix('.')) or 'the document'} is {found}, required {required}")
@@ -38,7 +38,7 @@ class SchemaError(InputError):
 
 
 def require(schema: Schema, value: Any, what: str) -> Any:
-    """Return a value as its schema does; ``what`` says what it is. Raises InputError: it does not fit."""
+    """Return a value as its schema does; ``what`` names it in the message. Raises InputError: it does not fit."""
     try:
         return schema(value)
     except SchemaError as error:
@@ -50,25 +50,25 @@ def parse_number(
 ) -> float:
     """Return the number that a text states in the digits 0 to 9, with a point.
 
-    finite : whether ``nan`` and ``inf`` are refused here; else the range that is required says it
+    finite : whether ``nan`` and ``inf`` are refused; False where the caller checks a range
     Raises InputError: another text, as ``1_0`` or digits of other scripts.
 
     >>> parse_number(" -1.5e3")
     -1500.0
     """
-    found = float(text) if _NUMBER.fullmatch(text.strip()) else None
-    if found is None or (finite and not math.isfinite(found)):
+    value = float(text) if _NUMBER.fullmatch(text.strip()) else None
+    if value is None or (finite and not math.isfinite(value)):
         raise InputError(f"{what} {describe_value(text)}, required {required}")
-    return found
+    return value
 
 
 def parse_clock(text: str, frames_per_s: float = 0) -> float:
-    """Return the seconds of a time as 1:02:03.5, 2:03,5 or, if frames have a rate, 00:02:03:12; NaN: it is none."""
-    found = re.fullmatch(rf"{_CLOCK}(?::(\d+(?:\.\d+)?))?", text.strip())
-    if found is None or (found[4] and not frames_per_s):
+    """Return the seconds of a time as 1:02:03.5, 2:03,5 or, if frames have a rate, 00:02:03:12; NaN: another text."""
+    match = re.fullmatch(rf"{_CLOCK}(?::(\d+(?:\.\d+)?))?", text.strip())
+    if match is None or (match[4] and not frames_per_s):
         return math.nan
-    seconds = float(found[3].replace(",", ".")) + float(found[4] or 0) / (frames_per_s or 1)
-    return int(found[1] or 0) * 3600 + int(found[2]) * 60 + seconds
+    seconds = float(match[3].replace(",", ".")) + float(match[4] or 0) / (frames_per_s or 1)
+    return int(match[1] or 0) * 3600 + int(match[2]) * 60 + seconds
 
 
 def parse_whole(text: str, what: str = "the number is", required: str = "a whole number") -> int:
@@ -86,7 +86,7 @@ def is_path(text: str) -> bool:
 
 
 def _fitting(fits: Callable[[Any], bool], required: str) -> Schema:
-    """Return the schema of a value that stays as it is, if it fits."""
+    """Return the schema of a value that is returned unchanged if ``fits`` holds."""
 
     def checked(value: Any) -> Any:
         if not fits(value):
@@ -123,7 +123,7 @@ truth = _fitting(lambda value: type(value) is bool, "true or false")
 
 
 def text(most: int) -> Schema:
-    """Return the schema of a text of at most so many letters, none of them half a character."""
+    """Return the schema of a text of at most ``most`` characters, none of them half a one."""
     required = f"a text of at most {most} letters"
     return _fitting(lambda value: type(value) is str and len(value) <= most and not _HALVES.search(value), required)
 
@@ -189,13 +189,13 @@ def members(table: Mapping[str, Schema], needed: Collection[str] = (), *, alone:
 
 
 def value_of(kind: Callable[..., Any], table: Mapping[str, Schema], needed: Collection[str] = ()) -> Schema:
-    """Return the schema of an object of which a class makes its value: the members are its fields, and no others."""
+    """Return the schema of an object that becomes an instance of a class: the members are its fields, and no others."""
     schema = members(table, needed, alone=True)
     return lambda value: kind(**schema(value))
 
 
 def number_or_text(read: Callable[[str], Any], schema: Schema) -> Schema:
-    """Return the schema of a number that may also be stated as a text, of which a function returns it."""
+    """Return the schema of a number that may also be a text, which ``read`` turns into the number."""
     return lambda value: schema(read(value) if isinstance(value, str) else value)
 
 
@@ -216,7 +216,7 @@ def any_members(schema: Schema) -> Schema:
 
 
 def if_fits(schema: Schema) -> Schema:
-    """Return the schema of an item or a member that is left out where it does not fit, as others read it as well."""
+    """Return the schema of an item or a member that is left out where it does not fit: other programs may use it."""
 
     def checked(value: Any) -> Any:
         try:
@@ -245,6 +245,6 @@ def describe_value(value: Any) -> str:
         return "an object" if isinstance(value, Mapping) else "a list"
     if value is None or type(value) is bool:
         return {None: "null", True: "true", False: "false"}[value]
-    if type(value) is int and value.bit_length() > 10_000:  # which Python does not spell
+    if type(value) is int and value.bit_length() > 10_000:  # which Python refuses to write out
         return "a whole number of thousands of digits"
     return shorten(repr(value[:100] if type(value) is str else value))

@@ -1,4 +1,4 @@
-"""What is a word, a sound or markup in labels, subtitles and recognised text: the one place that decides."""
+"""Tells words from sounds and markup in labels, subtitles, scripts and recognised text."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ SPEAKER = re.compile(
 )
 """What may be the name of a speaker: before a colon at the start of a line, perhaps with ``(V.O.)``."""
 CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]{1,20}\))?)[ \t]*\n(?=[^\n]*[a-z])")
-"""A name in capitals above what is said, as in screenplays."""
+"""A name in capitals above what that person says, as in screenplays."""
 DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
-"""A line of a screenplay that is not said."""
+"""A line of a screenplay that is not spoken."""
 SCRIPT = re.compile(r'[ \t]*(?:([a-z_]\w*)((?:[ \t]+[\w@-]+){0,3})[ \t]+)?"(?![a-z])(?:[^"\\\n]|\\.)*"[ \t]*')
 """A line of a game's script: who speaks, how he looks, and in quotes a sentence (``e happy "Hello"``)."""
 NO_TAGS = frozenset("i he she we they you it and then but so or said says".split())
@@ -45,11 +45,11 @@ SYMBOLS = re.compile(
 )
 """CHAT's sounds (``&=laughs``) and words that nobody understood; of hesitations (``%uh``) the mark alone."""
 SPEAKER_NAME_LINES = 3
-"""A name that begins so many lines is that of a speaker."""
+"""A name that begins this many lines is that of a speaker."""
 LONGEST_LINE = 1 << 18
-"""Most characters of a line: a label may hold four hours of speech."""
+"""Maximum characters of a line: a label may hold four hours of speech."""
 MAX_WORDS = 500_000
-"""Most words of a transcript: twelve hours of the fastest speech on record."""
+"""Maximum words of a transcript: twelve hours of the fastest speech on record."""
 
 
 class SpokenAs(Enum):
@@ -101,25 +101,25 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
     """
     left_out: list[str] = []
 
-    def without(found: re.Match[str]) -> str:
-        left_out.append(found[0].strip())
+    def leave_out(match: re.Match[str]) -> str:
+        left_out.append(match[0].strip())
         return ""
 
-    def said(found: re.Match[str]) -> str:
-        name = found[1] or found[2]
+    def leave_out_name(match: re.Match[str]) -> str:
+        name = match[1] or match[2]
         in_capitals = name == name.upper() != name.lower()
-        has_remark = found[1] or (found[3] and name[0].isupper())
+        has_remark = match[1] or (match[3] and name[0].isupper())
         numbered = re.fullmatch(r"[Ss]peaker[ _]?\w{1,3}", name)
-        return without(found) if in_capitals or has_remark or numbered or name in names else found[0]
+        return leave_out(match) if in_capitals or has_remark or numbered or name in names else match[0]
 
     cues = list(CUE.finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
-        text = DIRECTION.sub(without, CUE.sub(without, text))
-    text = SPEAKER.sub(said, text)
+        text = DIRECTION.sub(leave_out, CUE.sub(leave_out, text))
+    text = SPEAKER.sub(leave_out_name, text)
     lines = [SCRIPT.fullmatch(line) for line in text.splitlines() if line.strip()]
     tags = [line[1] for line in lines if line and line[1]]
     if tags and all(lines) and not NO_TAGS & {*tags} and (len(lines) > 1 or not (lines[0] and lines[0][2])):
-        text = re.sub(r'^[^"\n]+(?=")', without, text, flags=re.MULTILINE)
+        text = re.sub(r'^[^"\n]+(?=")', leave_out, text, flags=re.MULTILINE)
     return text, [name for name in left_out if name]
 
 
@@ -142,15 +142,15 @@ def read_line_words(text: str, where: str) -> tuple[str, ...]:
 def time_words(
     text: str, start_s: float | None = None, end_s: float | None = None, where: str = "the transcript"
 ) -> list[TimedWord]:
-    """Return the words of a line with times, shared by their letters. Raises InputError: as ``read_line_words``."""
+    """Return the words of a line with times, shared by letters. Raises InputError: as ``read_line_words``."""
     words = read_line_words(text, where)
     if len(words) < 2 or start_s is None or end_s is None:
         return [TimedWord(word, start_s, end_s) for word in words]
-    said = ["".join(list_readings(word)[0]) for word in words]
-    letters, done = sum(map(len, said)), 0
+    readings = ["".join(list_readings(word)[0]) for word in words]
+    letters, done = sum(map(len, readings)), 0
     timed = []
-    for word, usual in zip(words, said, strict=True):
-        first, done = done, done + len(usual)
+    for word, reading in zip(words, readings, strict=True):
+        first, done = done, done + len(reading)
         timed.append(TimedWord(word, *(start_s + (end_s - start_s) * share / letters for share in (first, done))))
     return timed
 

@@ -66,7 +66,7 @@ class UnitSet:
         if nameless:
             unit = shorten(self.unit_of_phone[nameless[0]])
             raise InputError(f"unit set {self.name}: the unit of {nameless[0]} is {unit!r}, not a word")
-        for unit in _mixed(self.unit_of_phone):
+        for unit in _mix(self.unit_of_phone):
             raise InputError(f"unit set {self.name}: {_ADVICE.format(shorten(unit))}")
 
     @cached_property
@@ -169,7 +169,7 @@ def read_unit_table(path: Path) -> UnitSet:
             if phone in phone_line:
                 raise InputError(f"{where}: phone {phone!r} has a unit in line {phone_line[phone]} already; keep one")
             phone_line[phone], unit_of_phone[phone] = number, unit
-    for unit in _mixed(unit_of_phone):
+    for unit in _mix(unit_of_phone):
         raise InputError(f"{path}, line {unit_line[unit]}: {_ADVICE.format(shorten(unit))}")
     try:
         return UnitSet(path.stem, unit_of_phone)
@@ -177,7 +177,7 @@ def read_unit_table(path: Path) -> UnitSet:
         raise InputError(f"{path}: {error}") from error
 
 
-def _mixed(of: Mapping[str, str]) -> list[str]:
+def _mix(of: Mapping[str, str]) -> list[str]:
     """Return the units, other than ``closed``, that hold silence and speech."""
     silent, spoken = ({unit for phone, unit in of.items() if is_silent(phone) is wanted} for wanted in (True, False))
     return sorted((silent & spoken) - {CLOSED_UNIT})

@@ -126,14 +126,14 @@ def _number(digits: str) -> Iterator[str]:
     if number > 100 and number % 100 and whole[0] != "0":
         spoken.append(f"{_cardinal(str(number - number % 100))} and {_cardinal(str(number % 100))}")
     if whole in ("911", "999", "411"):
-        yield _spelled(whole)
+        yield _spell(whole)
     if 1010 <= number <= 2099 and whole[1:3] != "00":
         yield pairs or plain
     yield from spoken
     yield pairs or plain
     yield _hundreds(whole) if len(whole) == 4 else plain
-    yield _spelled(whole)
-    yield _spelled(whole, "oh") if len(whole) > 2 or whole[0] == "0" else plain
+    yield _spell(whole)
+    yield _spell(whole, "oh") if len(whole) > 2 or whole[0] == "0" else plain
     if re.fullmatch("00[1-9]", whole):
         yield f"double oh {ONES[number]}"
     if number < 200 or not number % 1000:
@@ -143,7 +143,7 @@ def _number(digits: str) -> Iterator[str]:
 def _decimal(digits: str) -> Iterator[str]:
     whole, _, part = digits.replace(",", "").partition(".")
     for first in (_cardinal(whole), "oh", "") if whole == "0" else (_cardinal(whole),) if whole else ("", "zero"):
-        yield f"{first} point {_spelled(part)}"
+        yield f"{first} point {_spell(part)}"
     if part == "5" and int(whole or 0):
         yield f"{_cardinal(whole)} and a half"
     if len(part) == 2:
@@ -159,7 +159,7 @@ def _plain(digits: str) -> str:
     return _cardinal(str(int(digits)))
 
 
-def _spelled(digits: str, zero: str = "zero") -> str:
+def _spell(digits: str, zero: str = "zero") -> str:
     return " ".join(ONES[int(digit)] if int(digit) else zero for digit in digits)
 
 
@@ -203,9 +203,9 @@ def _usual(text: str) -> str:
 def _telephone(text: str) -> Iterator[str]:
     """Yield the readings of a telephone number: by its digits, ``800`` also as a hundred, the last four in pairs."""
     groups, plus = re.findall(r"\d+", text), "plus " if text[0] == "+" else ""
-    spelled = [_spelled(group, "oh") for group in groups]
+    spelled = [_spell(group, "oh") for group in groups]
     hundreds = [_cardinal(g) if re.fullmatch("[1-9]00", g) else s for g, s in zip(groups, spelled, strict=True)]
-    yield plus + " ".join(map(_spelled, groups))
+    yield plus + " ".join(map(_spell, groups))
     for said in (spelled, hundreds):
         yield plus + " ".join(said)
         if len(groups[-1]) == 4:

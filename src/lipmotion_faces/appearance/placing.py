@@ -1,4 +1,4 @@
-"""Placing an aligned patch into a frame in which the head is anywhere: affine resampling, feathering, blending."""
+"""Cutting an aligned patch, such as the mouth, out of a frame, and blending a new one in, wherever the head is."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from lipmotion_faces.kernels import affine
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
-MOST_SAMPLES = 16
-"""Most samples along each side of a pixel that are averaged where the frame is larger than the patch."""
+MAX_SAMPLES = 16
+"""Maximum samples along each side of a pixel that are averaged where the frame is larger than the patch."""
 
 
 def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int]) -> Floats:
@@ -24,14 +24,14 @@ def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int]) -> Flo
     frame    : uint8 array [shape=(H, W, 3)]; pixels outside it repeat its outermost ones
     to_frame : affine map [shape=(2, 3)] from the centre of a pixel of the patch to its position in the frame
     size     : height and width of the patch
-    Where a pixel of the patch covers 1.5 × 1.5 or more pixels of the frame, so many samples of it are averaged that no
+    Where a pixel of the patch covers 1.5 × 1.5 or more pixels of the frame, enough samples of it are averaged that no
     pixel of the frame is skipped.
     Raises InputError: not such a frame or map.
     """
     _check_frame(frame)
     _check_map(to_frame)
     turn = to_frame[:, :2]
-    samples = min(MOST_SAMPLES, max(1, round(np.sqrt(abs(np.linalg.det(turn))))))
+    samples = min(MAX_SAMPLES, max(1, round(np.sqrt(abs(np.linalg.det(turn))))))
     if samples == 1:
         return affine.resample(frame[None], to_frame, size)[0]
     first = to_frame[:, 2] + turn.sum(axis=1) * (0.5 / samples - 0.5)
@@ -46,7 +46,7 @@ def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int]) -> Flo
 
 
 def inverse_map(to_source: Array) -> Array:
-    """Return the affine map that leads back [shape=(2, 3)]. Raises InputError: a map that cannot be inverted."""
+    """Return the inverse of an affine map [shape=(2, 3)]. Raises InputError: a map that cannot be inverted."""
     _check_map(to_source)
     turn = np.linalg.inv(to_source[:, :2])
     return np.concatenate([turn, -turn @ to_source[:, 2:]], axis=1)

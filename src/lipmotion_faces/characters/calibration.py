@@ -1,4 +1,4 @@
-"""What was found in a character's files; and gains and offsets of its table, by values stated for some poses."""
+"""Descriptions of characters' files; gains and offsets of their tables, from control values that a user states."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ Sources = Mapping[str, Sequence[float]]
 """By the name of a curve its value in each of ``POSES``."""
 POSES = ("open", "closed", "rounded")
 PHONES = ("aa", "m", "uw")
-"""The phones whose mouths they are."""
+"""The phones that have these mouths."""
 OPENINGS, WIDTHS = (0.25, 0.0, 0.06), (1.0, 0.98, 0.85)
-"""Their openings, in eye distances (the first is as wide as talkers open their mouths), and widths, that at rest 1."""
+"""Their openings in eye distances (the first is as wide as talkers go), and widths relative to the mouth at rest."""
 RATE_HZ, PHONE_S, PAUSE_S = 100.0, 0.3, 0.5
 DIGITS = 6
 MIN_CHANGE = 1e-3
@@ -52,11 +52,11 @@ MIN_CHANGE = 1e-3
 
 
 def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:
-    """Return the rows of a table with gains and offsets by which controls have the stated values.
+    """Return the rows of a table with gains and offsets that give controls the stated values.
 
     sources : of the curves that the rows follow
-    stated  : by pose the values of some controls; what is not stated of a control stays as it is, as far as the line
-              through what is stated allows
+    stated  : by pose the values of some controls; a line is fitted to them; beside a single one
+              the pose that differs most from it stays as it is
     Raises InputError: no such control, or one that does not change between the poses.
     """
     values: dict[str, np.ndarray] = {}  # of each control in the poses, without its limits

@@ -184,7 +184,7 @@ def sound_offset(first: Audio, second: Audio) -> SoundOffset:
         raise InputError(f"sounds of {first.rate_hz} and {second.rate_hz} Hz, required one rate")
     levels = _levels(first), _levels(second)
     likeness = _Likeness(*levels)
-    hypotheses = _marked(sound_marks(first), sound_marks(second))
+    hypotheses = _mark(sound_marks(first), sound_marks(second))
     best_s, best, second_best = likeness.best()
     candidates = [
         (likeness.at(late_s) + MARK_SCORE * min(len(pairs), 2), late_s, pairs) for late_s, pairs in hypotheses
@@ -199,10 +199,10 @@ def sound_offset(first: Audio, second: Audio) -> SoundOffset:
             at_mark = _between_beeps if kind == BEEP else _between_claps
             fine_s = float(np.median([at_mark(first, second, *pair) for pair in pairs]))
             if kind == BEEP and alike >= WAVEFORM_CORRELATION:
-                fine_s = _refined(first, second, fine_s, FINE_BEEP_S)
+                fine_s = _refine(first, second, fine_s, FINE_BEEP_S)
             return SoundOffset(fine_s, kind, alike)
     if certain:
-        return SoundOffset(_refined(first, second, best_s, FINE_S), ALIKE, best)
+        return SoundOffset(_refine(first, second, best_s, FINE_S), ALIKE, best)
     marks = f"{len(candidates)} offsets fit claps or beeps" if candidates else "no clap and no beep is in both"
     raise InputError(
         f"the offset of the two sounds is not clear: {marks}, and their levels correlate by {best:.2f} at most, "
@@ -251,7 +251,7 @@ def _levels(audio: Audio) -> Array:
     return levels - levels.mean()
 
 
-def _marked(
+def _mark(
     first: tuple[SoundMark, ...], second: tuple[SoundMark, ...]
 ) -> list[tuple[float, list[tuple[SoundMark, SoundMark]]]]:
     """Return offsets at which marks of both fall together, each with the pairs of marks that do."""
@@ -275,7 +275,7 @@ def _marked(
 def _between_claps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
     """Return the offset of one clap in both recordings, by their waveforms around it."""
     span_s = (one.time_s - MARK_WINDOW_S[0], one.time_s + MARK_WINDOW_S[1])
-    return _matched(first, second, span_s, other.time_s - one.time_s, FINE_MARK_S)
+    return _match(first, second, span_s, other.time_s - one.time_s, FINE_MARK_S)
 
 
 def _between_beeps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
@@ -295,7 +295,7 @@ def _beginning_s(audio: Audio, beep: SoundMark) -> float:
     return (begin + int(np.argmax(loudness >= 0.5 * np.median(loudness[own[0] : own[1]])))) / rate
 
 
-def _refined(first: Audio, second: Audio, late_s: float, reach_s: float) -> float:
+def _refine(first: Audio, second: Audio, late_s: float, reach_s: float) -> float:
     """Return an offset, refined around its coarse value by the loudest part of what both have."""
     low, high = max(0.0, -late_s), min(first.duration_s, second.duration_s - late_s)
     if high - low > FINE_WINDOW_S:
@@ -305,10 +305,10 @@ def _refined(first: Audio, second: Audio, late_s: float, reach_s: float) -> floa
         width = round(FINE_WINDOW_S / STEP_S)
         low += int((sums[width:] - sums[:-width]).argmax()) * STEP_S
         high = low + FINE_WINDOW_S
-    return _matched(first, second, (low, high), late_s, reach_s)
+    return _match(first, second, (low, high), late_s, reach_s)
 
 
-def _matched(first: Audio, second: Audio, span_s: tuple[float, float], late_s: float, reach_s: float) -> float:
+def _match(first: Audio, second: Audio, span_s: tuple[float, float], late_s: float, reach_s: float) -> float:
     """Return the offset at which the waveforms of a span agree best, within ``reach_s`` of a coarse one.
 
     The spectra are whitened: rooms and microphones change how loud each frequency is, not its time.

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lipmotion.corpora.captured_faces import MESH, mesh_files, read_bare_motion, read_mesh_motion
+from lipmotion.corpora.captured_faces import MESH, list_mesh_files, read_bare_motion, read_mesh_motion
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
@@ -39,7 +39,7 @@ def source_digests(recording: SourceRecording) -> dict[str, str]:
         file = recording.motion_file.file
         digests["motion_file"] = file.name
         if file.suffix == MESH:  # a sequence of meshes
-            meshes = "\n".join(map(sha256_of, mesh_files(file)))
+            meshes = "\n".join(map(sha256_of, list_mesh_files(file)))
             digests["motion_sha256"] = hashlib.sha256(meshes.encode()).hexdigest()
         else:
             digests["motion_sha256"] = sha256_of(file)

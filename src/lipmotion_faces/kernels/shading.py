@@ -45,18 +45,18 @@ def shade(
         (open_sky, direct), finish = reaches[v], finishes[kinds[v]]
         up = 0.5 + 0.5 * ny
         cr, cg, cb = colours[v]
-        red = _bounced(open_sky, cr) * (up * lamps[4, 0] + (1.0 - up) * lamps[5, 0])
-        green = _bounced(open_sky, cg) * (up * lamps[4, 1] + (1.0 - up) * lamps[5, 1])
-        blue = _bounced(open_sky, cb) * (up * lamps[4, 2] + (1.0 - up) * lamps[5, 2])
+        red = _bounce(open_sky, cr) * (up * lamps[4, 0] + (1.0 - up) * lamps[5, 0])
+        green = _bounce(open_sky, cg) * (up * lamps[4, 1] + (1.0 - up) * lamps[5, 1])
+        blue = _bounce(open_sky, cb) * (up * lamps[4, 2] + (1.0 - up) * lamps[5, 2])
         edge = finish[5] * grazing2 * grazing2 * open_sky
         shine_r, shine_g, shine_b = edge * lamps[4, 0], edge * lamps[4, 1], edge * lamps[4, 2]
         for n in range(2):
             lx, ly, lz = lamps[n, 0], lamps[n, 1], lamps[n, 2]
             arrives = direct if n == 0 else open_sky
             facing = nx * lx + ny * ly + nz * lz
-            red += _wrapped(facing, finish[0]) * _bounced(arrives, cr) * lamps[n, 3]
-            green += _wrapped(facing, finish[1]) * _bounced(arrives, cg) * lamps[n, 4]
-            blue += _wrapped(facing, finish[2]) * _bounced(arrives, cb) * lamps[n, 5]
+            red += _wrap(facing, finish[0]) * _bounce(arrives, cr) * lamps[n, 3]
+            green += _wrap(facing, finish[1]) * _bounce(arrives, cg) * lamps[n, 4]
+            blue += _wrap(facing, finish[2]) * _bounce(arrives, cb) * lamps[n, 5]
             if finish[3] > 0.0:
                 hx, hy, hz = ex + lx, ey + ly, ez + lz
                 length = np.sqrt(hx * hx + hy * hy + hz * hz)
@@ -94,11 +94,11 @@ def _highlight(finish: Real, normal: float, along: float, facing: float) -> floa
 
 
 @compiled
-def _bounced(arrives: float, colour: float) -> float:
+def _bounce(arrives: float, colour: float) -> float:
     return arrives * (1.0 + colour * (1.0 - arrives))
 
 
 @compiled
-def _wrapped(facing: float, wrap: float) -> float:
+def _wrap(facing: float, wrap: float) -> float:
     soft = max(facing + wrap, 0.0) / (1.0 + wrap)
     return soft * np.sqrt(soft)

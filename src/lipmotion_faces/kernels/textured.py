@@ -161,9 +161,9 @@ def _mark(
         i = row - top
         start, stop = x0, x1
         if x1 - x0 > WIDE_SAMPLES:
-            start, stop = _narrowed(start, stop, px, of_a - bias_a, step_a)
-            start, stop = _narrowed(start, stop, px, of_b - bias_b, step_b)
-            start, stop = _narrowed(start, stop, px, of_c - bias_c, step_c)
+            start, stop = _narrow(start, stop, px, of_a - bias_a, step_a)
+            start, stop = _narrow(start, stop, px, of_b - bias_b, step_b)
+            start, stop = _narrow(start, stop, px, of_c - bias_c, step_c)
             of_a -= step_a * (start - x0)
             of_b -= step_b * (start - x0)
             of_c -= step_c * (start - x0)
@@ -186,7 +186,7 @@ def _mark(
 
 
 @compiled
-def _narrowed(start: int, stop: int, px: float, inside: float, step: float) -> tuple[int, int]:
+def _narrow(start: int, stop: int, px: float, inside: float, step: float) -> tuple[int, int]:
     """Return the columns that may be on the inner side of an edge, and one more at either end."""
     if step > 0:
         stop = min(stop, int(np.floor(px + inside / step - 0.5)) + 2)
@@ -239,7 +239,7 @@ def _between(
 
 
 @compiled
-def _shaded(
+def _shade(
     t: int, px: float, py: float, planes: Real, level: int, texels: NDArray[np.uint16], levels: NDArray[np.int64]
 ) -> tuple[float, float, float, float]:
     """Return the light of a triangle at a place on the screen, and the opacity of its texture."""
@@ -280,7 +280,7 @@ def _resolve(
                 opacity[row, column] = 0
                 continue
             if whole:
-                red, green, blue, _ = _shaded(t, 2 * column + 1.0, 2 * row + 1.0, planes, looks[t, 0], texels, levels)
+                red, green, blue, _ = _shade(t, 2 * column + 1.0, 2 * row + 1.0, planes, looks[t, 0], texels, levels)
                 picture[row, column, 0] = tone[_level(red, most)]
                 picture[row, column, 1] = tone[_level(green, most)]
                 picture[row, column, 2] = tone[_level(blue, most)]
@@ -316,7 +316,7 @@ def _mix(
             if t == NO_TRIANGLE or _earlier(ids, k) != k:
                 continue
             px, py = _middle(ids, k, row, column)
-            red, green, blue, alpha = _shaded(t, px, py, planes, looks[t, 0], texels, levels)
+            red, green, blue, alpha = _shade(t, px, py, planes, looks[t, 0], texels, levels)
             alpha = alpha * alphas[t, 1] if layer else 1.0
             for other in range(k, 4):
                 if ids[other] == t:

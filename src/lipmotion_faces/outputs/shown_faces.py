@@ -1,4 +1,4 @@
-"""Faces as outputs show them: drawn faces, characters and filmed people answer the same questions."""
+"""Faces as outputs show them: one interface for drawn faces, characters, cut-outs and filmed people."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ AnyFace = str | Path | Face | FilmedFace | CutOut | DrivenCharacter
 
 
 class _WithHead(ShownFace):
-    """A face of which files for 3D programs show the 3D head."""
+    """A face that is no 3D character: files for 3D programs show the 3D head instead."""
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
         drawn_video.check_drawable(path, generation.motion)
@@ -65,7 +65,7 @@ class ShownDrawing(_WithHead):
         if others and self.character is None:
             named = ", ".join(sorted(others))
             LOG.warning("%s: %s is of a rig that this face has not, and does not show; pin jawOpen", path, named)
-        seen, prosody = performance.cached(_seen), performance.cached(_played_prosody)
+        seen, prosody = performance.cached(_deliver), performance.cached(_measure_played_prosody)
         monitor, hertz = performance.monitor, _frame_rate(settings)
         drawn_video.write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
 
@@ -90,7 +90,7 @@ class ShownCharacter(ShownDrawing):
 
 
 class ShownCutOut(_WithHead):
-    """A character of pictures, one for each mouth shape: they are shown as cues are chosen."""
+    """Pictures, one for each mouth shape: each is shown as long as its cue."""
 
     def __init__(self, face: CutOut) -> None:
         self.face = face
@@ -161,7 +161,7 @@ class ShownPerson(_WithHead):
 
     def film(self, performance: Performance) -> filmed_video.Film:
         """Return the video, which is made while it is read. Raises InputError: the motion lacks channels."""
-        settings, seen = performance.settings, performance.cached(_seen)
+        settings, seen = performance.settings, performance.cached(_deliver)
         return filmed_video.make_film(
             self.face,
             seen.motion,
@@ -178,7 +178,7 @@ class ShownPerson(_WithHead):
 
 
 def shown_face(face: AnyFace | ShownFace) -> ShownFace:
-    """Return a face as outputs show it, of a name, a path or a value. Raises InputError, ModelFormatError: none."""
+    """Return a face as outputs show it, by name, path or value. Raises InputError, ModelFormatError: no such face."""
     if isinstance(face, ShownFace):
         return face
     if isinstance(face, DrivenCharacter):
@@ -203,17 +203,17 @@ def shown_face(face: AnyFace | ShownFace) -> ShownFace:
     return ShownCharacter(opened) if isinstance(opened, MeshFace) else ShownDrawing(opened)
 
 
-def _seen(performance: Performance) -> Generation:
+def _deliver(performance: Performance) -> Generation:
     settings = performance.settings
     character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
     if performance.generation.curve_edits:
         character = character or settings.face.character
-    prosody = performance.cached(_played_prosody) if performance.generation.curve_edits else None
+    prosody = performance.cached(_measure_played_prosody) if performance.generation.curve_edits else None
     hertz, staging = _frame_rate(settings), settings.staging
     return deliver_to_face(performance.generation, settings.delivery, hertz, character, staging, prosody)
 
 
-def _played_prosody(performance: Performance) -> Prosody:
+def _measure_played_prosody(performance: Performance) -> Prosody:
     """Return loudness and pitch of the sound track, in the time of the motion."""
     return shift_prosody(measure_prosody(performance.cached(drawn_video.sound_track)), performance.settings.delivery)
 

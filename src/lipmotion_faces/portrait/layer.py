@@ -15,7 +15,7 @@ from lipmotion_faces.portrait.design import Colour, Points
 
 SUPERSAMPLING = 4
 Pixels = NDArray[np.floating[Any]]
-"""Colours 0..255, cover 0..1, or lengths; float32 unless a caller chose otherwise."""
+"""Colours 0..255, coverage 0..1, or lengths; float32 unless a caller chose otherwise."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Layer:
     ) -> None:
         """Paint the inside of an outline, and of ``within`` where that is given."""
         softest = max([blur, *(shade.radius for shade in shades if isinstance(shade, Rim))])
-        window = self.window.around(outline, 3 * softest)
+        window = self.window.around(outline, 3 * softest)  # three standard deviations of the blur
         pixels = self.pixels[window.area_in(self.window)]
         mask = _mask(window, outline, blur)
         paint: Pixels = np.broadcast_to(np.array(colour, dtype=np.float32), (*mask.shape, 3))
@@ -163,5 +163,5 @@ def _mask(window: Window, outline: Points, blur: float = 0) -> Pixels:
 
 
 def lay_over(above: Pixels, below: Pixels) -> NDArray[np.float32]:
-    """Return premultiplied pixels [shape=(h, w, 4)] over others."""
+    """Return premultiplied pixels laid over others [each shape=(h, w, 4)]."""
     return np.asarray(above + (1 - above[..., 3:]) * below, np.float32)

@@ -37,7 +37,7 @@ class MouthPainter:
 
     def __init__(self, design: Design, window: Window) -> None:
         self._lips, colours = design.lips, design.palette
-        self._textures = _flat_textures(colours) if design.flat else _shaded_textures(colours)
+        self._textures = _flat_textures(colours) if design.flat else _shade_textures(colours)
         self._x = window.columns(COLUMNS).reshape(-1, COLUMNS).T.astype(np.float64)
         self._scale, self._first_row = window.view.scale, window.y0 - window.view.origin[1]
 
@@ -203,7 +203,7 @@ def _flat_textures(colours: Palette) -> MouthTextures:
     )
 
 
-def _shaded_textures(colours: Palette) -> MouthTextures:
+def _shade_textures(colours: Palette) -> MouthTextures:
     depth, x = _grid(9, 33)
     seam = np.sin(np.pi * depth) ** 0.5 * (1 - 0.6 * np.abs(x) ** 3)
     depth, x = _grid(12, 17)

@@ -146,7 +146,7 @@ class FaceFollower:
 
     def person(self) -> NDArray[np.bool_]:
         """Return in which frames the face found is that of the person [shape=(T,)]."""
-        scenes = self._scenes_of_person()
+        scenes = self._find_scenes()
         return np.array([scene in scenes for scene in self._scene_of_frame])
 
     def share_of_person(self) -> float:
@@ -156,13 +156,13 @@ class FaceFollower:
 
     def thumbnails(self) -> list[Array]:
         """Return thumbnails of the person's face, at most ``MOST_LOOKS`` from all scenes."""
-        scenes = sorted(self._scenes_of_person())
+        scenes = sorted(self._find_scenes())
         looks = [thumbnail for index in scenes for thumbnail in self._scenes[index].thumbnails]
         return looks[:: -(-len(looks) // MOST_LOOKS)] if looks else []
 
     def cuts(self) -> list[int]:
         """Return the frames at which the camera changes, or the picture changes to or from somebody else."""
-        of_person, cuts, last = self._scenes_of_person(), [], None
+        of_person, cuts, last = self._find_scenes(), [], None
         for index, scene in enumerate(self._scenes):
             if scene.thumbnails:
                 if last is not None and (index in of_person, True) != (
@@ -178,7 +178,7 @@ class FaceFollower:
         known = self._wanted or [thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]
         self._scenes.append(_Scene(known, self._finder, self._tracker))
 
-    def _scenes_of_person(self) -> set[int]:
+    def _find_scenes(self) -> set[int]:
         """Return the scenes of the wanted person, else the longest one, and all whose face resembles one of theirs."""
         counts = np.bincount([n for n in self._scene_of_frame if n is not None], minlength=len(self._scenes))
         of_person = set() if self._wanted else {int(np.argmax(counts))}

@@ -194,7 +194,7 @@ def report_html(  # noqa: PLR0913
     warning = [element("p", QUICK_WARNING, class_="warning")] if quick else []
     overview = element("ul", *entries, class_="overview")
     main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_section, finished))
-    footer = element("footer", element("h2", "The corpus and the run"), _listed(about))
+    footer = element("footer", element("h2", "The corpus and the run"), _list(about))
     return whole_page(title, style, header, main, footer, script=SCRIPT)
 
 
@@ -237,7 +237,7 @@ def _section(part: FinishedPart) -> Html:
         element(
             "details",
             element("summary", "How this was made"),
-            _listed(made_with),
+            _list(made_with),
             element(
                 "p", "Beside this page: ", element("a", "all figures as JSON", href=f"{part.name}/figures.json"), "."
             ),
@@ -274,5 +274,5 @@ def _clip(part: FinishedPart) -> list[Html]:
     ]
 
 
-def _listed(entries: Mapping[str, str]) -> Html:
+def _list(entries: Mapping[str, str]) -> Html:
     return element("dl", *(joined(element("dt", key), element("dd", text)) for key, text in entries.items()))

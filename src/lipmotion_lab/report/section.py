@@ -1,4 +1,4 @@
-"""What a report says of one experiment: words, charts, tables, and what held of the order that a paper prints."""
+"""One experiment in a report: words, charts, tables, and whether the order in the paper held."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class Table:
 
 
 def _cell(column: Column, row: Row) -> tuple[str, str]:
-    """Return a figure with its star, and its interval; empty: it has none."""
+    """Return a figure with its star, and its interval; empty texts where there is none."""
     value = row.get(column.key)
     if not column.form:
         return "–" if value is None else str(value), ""
@@ -153,7 +153,7 @@ class Section:
 
     about    : what was trained and compared, in sentences
     verdict  : what was found, in one sentence
-    words    : what held and what did not, in sentences, by what they are of
+    words    : by heading, sentences on what held and what did not
     charts   : drawings
     table    : the most important one
     shown    : systems whose motion is shown, by the names that ``ExperimentSettings.receive`` gets

@@ -251,7 +251,7 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
         names = {name + ending for name in PAPER_FIGURES}
         pairs = [pair for pair in size["pairs"] if {pair["better"], pair["worse"]} <= names]
         if pairs:
-            by_acc, by_error = (_order_of_systems(main.rows, pairs, ending, *measure) for measure in MEASURES)
+            by_acc, by_error = (_compare_order(main.rows, pairs, ending, *measure) for measure in MEASURES)
             words[f"Systems {called}, by ACC"] = [*([by_acc.verdict()] if verdict else []), *by_acc.sentences()]
             by_amse.append(f"Systems {called}: {by_error.verdict()}")
             verdict = verdict or by_acc.verdict()
@@ -299,7 +299,7 @@ def _chosen(name: str, options: Mapping[str, Any]) -> str:
     return f"{name}: {', '.join(texts) or 'as printed'}."
 
 
-def _order_of_systems(
+def _compare_order(
     rows: Mapping[str, Row], pairs: Sequence[Mapping[str, Any]], ending: str, key: str, title: str, form: str
 ) -> PaperOrder:
     """Return the paper's order of systems by one measure; ``ending``: of their names here."""

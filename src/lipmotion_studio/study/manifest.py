@@ -1,4 +1,4 @@
-"""Studies as folders: ``study.json``, which says what is shown and how it was made, its trials, and ``videos/``."""
+"""Studies as folders: ``study.json`` with the trials and how each video was made, and ``videos/``."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import read_text_file, sha256_of
 from lipmotion.types.values import any_members, as_tuple, items, number, text, truth, value_of, whole
-from lipmotion_studio.study.answers import ANCHOR, FIRST, HIGHEST_RANK, KINDS, MOS, PAIRED, SECOND, is_possible
+from lipmotion_studio.study.answers import ANCHOR, FIRST, HIGHEST_RANK, KINDS, MOS, PAIRED, RANKING, SECOND, is_possible
 from lipmotion_studio.study.settings import MATCH, PREFERENCE, SCALES
 
 FORMAT, VERSION = "lipmotion_studio.study", 1
 MANIFEST, VIDEOS = "study.json", "videos"
 VIDEO_NAME = re.compile(r"[0-9a-f]{32}\.mp4")
-"""Names of videos: the beginning of the digest of their content, which says nothing of what made them."""
+"""Names of videos: the beginning of the digest of their content, so that raters cannot tell what made them."""
 MAX_TRIALS = 10_000
 
 
@@ -47,7 +47,7 @@ class StudyTrial:
 
     videos   : numbers of videos in the study, in the order in which they are shown
     expected : the value that an attentive rater gives to every question; empty: there is none
-    note     : what the page asks for besides, where the answer is told; otherwise empty
+    note     : on pages that check attention, which answer to give; otherwise empty
     """
 
     videos: tuple[int, ...]
@@ -198,7 +198,7 @@ def main_trials(
 
 
 def anchor_trials(base: str, sentences: Sequence[str], videos: VideoNumbers) -> list[StudyTrial]:
-    """Return pairs of a condition and the same out of step, for each sentence, second and first in turns."""
+    """Return, for each sentence, a condition beside itself out of step, which is second and first in turn."""
     trials = []
     for n, sentence in enumerate(sentences):
         pair = (videos[sentence, base], videos[sentence, ANCHOR])
@@ -206,18 +206,18 @@ def anchor_trials(base: str, sentences: Sequence[str], videos: VideoNumbers) -> 
     return trials
 
 
-_TOLD = {
+_ANSWERS = {
     PAIRED: ((SECOND, "the second video"), (FIRST, "the first video")),
     MOS: (("2", "2 on every scale"), ("4", "4 on every scale")),
+    RANKING: (("0", "0 for every video"), (str(HIGHEST_RANK), f"{HIGHEST_RANK} for every video")),
 }
 
 
 def attention_trials(kind: str, trials: Sequence[StudyTrial], count: int, seed: int) -> list[StudyTrial]:
-    """Return trials whose page tells what to answer, made of some of the trials that count."""
+    """Return trials whose page states what to answer, made from some of the trials that count."""
     checks = []
     for n, trial in enumerate(shuffled(trials, "check", seed)[:count]):
-        told = _TOLD.get(kind, (("0", "0 for every video"), (str(HIGHEST_RANK), f"{HIGHEST_RANK} for every video")))
-        value, words = told[n % 2]
+        value, words = _ANSWERS[kind][n % 2]
         note = f"This page checks that you read it: after the videos, please answer {words}, whatever you saw."
         checks.append(replace(trial, expected=value, note=note))
     return checks

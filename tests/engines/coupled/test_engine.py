@@ -6,7 +6,6 @@ import pytest
 
 from engines.coupled.tiny import KINDS, chains, observations, structure
 from lipmotion import engines, types
-from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.engine import (
     chain_states,
     explain_frames,
@@ -16,7 +15,7 @@ from lipmotion.engines.coupled.engine import (
     unit_posteriors,
 )
 from lipmotion.motion import generation
-from lipmotion.testing.examples import CHANNELS, examples, speech, timeline
+from lipmotion.testing import CHANNELS, examples, speech, timeline
 from oracles import coupled as oracle
 
 every = pytest.mark.parametrize(("kind", "sets", "limit"), [kind for kind in KINDS if kind[2] is not None])
@@ -75,8 +74,8 @@ def test_posteriors_of_units_are_sums_over_their_states():
 
 
 def coupled_options(name):
-    kept = ("structure", "chains", "asynchrony")
-    return {key: value for key, value in SYSTEMS[name].items() if key in kept} | {"mixtures": 2}
+    config = engines.engine_from_settings(preset=name).config
+    return {key: getattr(config, key) for key in ("structure", "chains", "asynchrony")} | {"mixtures": 2}
 
 
 @cache
@@ -149,14 +148,16 @@ def test_in_silence_away_from_speech_the_mean_is_the_rest_pose():
     assert found.channels["opening"].value == pytest.approx(model.rest_pose[0])
 
 
-def test_recordings_of_several_blocks_are_explained_as_one(monkeypatch):
-    monkeypatch.setattr(generation, "BLOCK_FRAMES", 60)
-    monkeypatch.setattr(generation, "MARGIN_FRAMES", 50)
+def test_recordings_of_several_blocks_are_explained_as_one():
+    border = generation.BLOCK_FRAMES
     engine, (model, _) = engines.engine_named("coupled", coupled_options("ph-vi-CHMM")), fitted("ph-vi-CHMM")
-    spoken = speech(timeline(SENTENCE))
+    silence_s = border / 100 - 1  # the border lies in the sentence
+    spoken = speech(
+        types.Timeline((types.Span(0, silence_s, types.Unit("sil")), *timeline(SENTENCE).shifted(silence_s)))
+    )
     posteriors = engine.posteriors(model, spoken)
     result = engine.generate(model, spoken)
-    frames = [3, 59, 60, 61, 119, 120, 150]
+    frames = [3, *range(border - 2, border + 3), border + 50]
     for row, found in zip(frames, engine.explain(model, spoken, frames), strict=True):
         assert found.state == result.trace.states[result.trace.frames[row]] == found.joint.name
         assert list(found.chains[1].lead.values()) == pytest.approx(posteriors[1].lead[row].tolist())

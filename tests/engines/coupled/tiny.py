@@ -7,18 +7,21 @@ import numpy as np
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product, initial_transitions, reachable
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
+from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
-from lipmotion.units.unit_sets import CLOSED_UNIT
 
+COUPLED, FACTORIAL, MULTISTREAM, HMM = "coupled", "factorial", "multistream", "hmm"
+"""Values of the option ``structure``."""
+SYSTEMS = ("ph-HMM", "ph-MSHMM", "ph-CHMM", "ph-FHMM", "ph-vi-CHMM", "ph-vi-FHMM")
+"""Presets."""
 BILABIAL = ("p", "b", "m", "em")
 SHUT = (*BILABIAL, "sil", "sp")
 THREE = UnitSet(
     "three",
-    {phone: CLOSED_UNIT if phone in SHUT else "round" if phone in ("uw", "ow", "w") else "open" for phone in PHONES},
+    {phone: "closed" if phone in SHUT else "round" if phone in ("uw", "ow", "w") else "open" for phone in PHONES},
 )
-TWO = UnitSet("two", {phone: CLOSED_UNIT if phone in SHUT else "open" for phone in PHONES})
+TWO = UnitSet("two", {phone: "closed" if phone in SHUT else "open" for phone in PHONES})
 """On the second chain, round and open are one unit."""
 KINDS = [
     (COUPLED, (THREE, TWO), 1), (COUPLED, (THREE, TWO), 0), (FACTORIAL, (THREE, TWO), 1),
@@ -27,8 +30,8 @@ KINDS = [
 """Structures, the unit sets of their chains, and their limits of asynchrony."""
 
 
-def structure(kind=COUPLED, chains=(THREE, TWO), states=2, limit=1, cross_units=True) -> Structure:
-    return Structure(kind, chains, states, limit, cross_units)
+def structure(kind=COUPLED, chains=(THREE, TWO), states=2, limit=1, **more) -> Structure:
+    return Structure(kind, chains, states, limit, **more)
 
 
 def grammar(of: Structure, seed=0) -> Grammar:

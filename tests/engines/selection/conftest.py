@@ -1,23 +1,21 @@
 """A small model of recorded units, trained once."""
 
+from typing import Any
+
 import pytest
 
-from lipmotion.engines.selection.costs import SelectionConfig
-from lipmotion.engines.selection.engine import SelectionEngine
-from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.testing.examples import examples
+from lipmotion.engines import engine_named
+from lipmotion.testing import examples
 from lipmotion.types import silent_monitor
 
-SETTINGS = SelectionConfig(joint_recogniser=False, articulation=False, closures=False)
-
 
 @pytest.fixture(scope="session")
-def engine() -> SelectionEngine:
+def engine() -> Any:
     """An engine that shows recordings as they are."""
-    return SelectionEngine(SETTINGS)
+    return engine_named("selection", {"joint_recogniser": False, "articulation": False, "closures": False})
 
 
 @pytest.fixture(scope="session")
-def model(engine: SelectionEngine) -> SelectionModel:
+def model(engine) -> Any:
     """A model of the synthetic examples."""
     return engine.fit(examples(), silent_monitor).model

@@ -1,22 +1,29 @@
 """The costs and overlaps of Minnis & Breen 2000, each on units that differ in one thing only."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from engines.selection.drawn_units import PHONE_S, array, costs_of, inventory, target_of, timeline, with_stress
-from lipmotion.engines.selection import concatenation, windows
-from lipmotion.engines.selection.costs import (
-    ABUTTING_JOIN,
-    FRACTIONS,
-    JOIN_AFTER,
-    JOIN_BEFORE,
-    Costs,
-    SelectionConfig,
-    Target,
-    select,
+from engines.selection.drawn_units import (
+    PHONE_S,
+    array,
+    costs_of,
+    inventory,
+    recorded,
+    sentence,
+    target_of,
+    timeline,
+    with_stress,
 )
+from lipmotion.engines import engine_from_settings, engine_named
+from lipmotion.engines.selection import concatenation, windows
+from lipmotion.engines.selection import costs as search
+from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE, select
+from lipmotion.engines.selection.inventory import RecordedUnits
+from lipmotion.engines.selection.windows import phone_windows
 from lipmotion.types import Span, Timeline, Unit
 
 NAMED = {"protected": "p", "invisible": "t", "normal": "s"}
@@ -96,7 +103,7 @@ def test_units_merge_in_an_identical_phone_only_and_another_stress_has_its_cost(
         assert [costs.join_kind(target, 1, unit, 4) for unit in (0, 6)] == [JOIN_AFTER, ABUTTING_JOIN]
 
 
-def overlapping(before: str, after: str, kind: int) -> tuple[Costs, Target, list[int]]:
+def overlapping(before: str, after: str, kind: int):
     """Return units of two recordings, at 0 and at 1, that overlap in aa between two phones."""
     costs = costs_of(inventory(f"{before} aa f", f"f aa {after}", levels=(0, 1)), hard=1.0)
     return costs, target_of(costs, f"{before} aa {after}"), [0, 1, 5] if kind == JOIN_BEFORE else [0, 4, 5]
@@ -144,20 +151,6 @@ def test_velocities_that_differ_cost_where_units_are_joined() -> None:
     assert costs.join_costs(target_of(costs, "aa iy"), 1, array(1), array(2)) == pytest.approx(wanted)
 
 
-def test_by_default_a_cut_in_a_cluster_and_a_merge_in_another_stress_cost_more() -> None:
-    costs = costs_of(inventory("uw", "uw", "s l"), SelectionConfig())
-    inside, between = (costs.join_costs(target_of(costs, text), 1, array(0), array(1)) for text in ("s l", "s | l"))
-    assert inside > between + 0.01
-    stressed = with_stress(inventory("iy aa s", "f aa uw", "f aa uw"), -1, 1, -1, -1, 0, -1, -1, 1, -1)
-    costs = costs_of(stressed, SelectionConfig())
-    target = target_of(costs, "iy aa uw")
-    for other, equal in (
-        costs.join_costs(target, 2, array(1), array(5, 8))[0],
-        costs.join_costs(target, 1, array(0), array(4, 7))[0],
-    ):
-        assert other > equal + 0.01
-
-
 def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
     """§4: "smoothed for the last 5% of the first unit, and the first 5% of the second unit"."""
     units = inventory("s iy", "uw n", levels=(0, 1), duration_s=1.0)
@@ -172,8 +165,114 @@ def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
 def test_by_default_units_merge_in_a_vowel_rather_than_abut_behind_a_plosive() -> None:
     """§4: "/s p u/ and /u n/" rather than "/s p/ and /u n/"."""
     units = inventory("s p", "uw n", "s p uw", "uw n")
-    costs = costs_of(units, SelectionConfig())
+    costs = costs_of(units, engine_named("selection", {}).config)
     target = target_of(costs, "s p uw n")
-    pieces = concatenation.pieces_of(costs, target, select(costs, target).units)
+    pieces = concatenation.pieces_of(costs, target, search.select(costs, target).units)
     assert ABUTTING_JOIN not in [piece.join for piece in pieces[1:]]
     assert (pieces[0].unit, pieces[0].stop + (pieces[1].join == JOIN_AFTER)) == (4, 3)
+
+
+DEFAULT, PRINTED = engine_named("selection", {}).config, engine_from_settings(preset="minnis2000").config
+BOTH = pytest.mark.parametrize("config", [DEFAULT, PRINTED], ids=["default", "printed"])
+PRESERVED = ("f", "v", "m", "em", "p", "b")
+HOMOPHONES = (
+    ("we buy four cats", "we buy for cats"),
+    ("so two men go", "so to men go"),
+    ("my bee sleeps", "my be sleeps"),
+)
+"""Stressed and unstressed words of the same phones."""
+EDGES = ("we saw ice cream", "we saw i scream"), ("see that's tough", "see that stuff"), ("peace talks", "pea stalks")
+"""The same phones, cut into words elsewhere."""
+
+
+def list_recordings(
+    units: RecordedUnits, config: Any, wanted: Timeline[Unit], wrong: Timeline[Unit], by: str = "stress"
+) -> set[int]:
+    """Return the recordings of the phones that differ between two sentences by their stress or words, if any do."""
+    costs = costs_of(units.without(config.suppressed_phones), config)
+    one, other = (costs.shown(phone_windows([each])) for each in (wanted, wrong))
+    differs = (getattr(one, by) != getattr(other, by)).reshape(len(one), -1).any(axis=1)
+    assert one.phones.tolist() == other.phones.tolist()
+    found = select(costs, costs.target(one, None, None)).units
+    recordings = costs.inventory.windows.recording[found]
+    return set(recordings[differs if differs.any() else slice(None)].tolist())
+
+
+@BOTH
+@pytest.mark.parametrize(("one", "other"), HOMOPHONES)
+def test_stress_alone_decides(config: Any, one: str, other: str) -> None:
+    for wanted, wrong in ((sentence(one), sentence(other)), (sentence(other), sentence(one))):
+        units = recorded(wrong, wanted)
+        assert list_recordings(units, config, wanted, wrong) == {1}
+        assert list_recordings(units, replace(config, stress=0.0), wanted, wrong) == {0}
+
+
+@BOTH
+@pytest.mark.parametrize(("one", "other"), EDGES)
+def test_edges_of_words_alone_decide(config: Any, one: str, other: str) -> None:
+    config = replace(config, stress=0.0)
+    for wanted, wrong in ((sentence(one), sentence(other)), (sentence(other), sentence(one))):
+        units = recorded(wrong, wanted)
+        assert list_recordings(units, config, wanted, wrong, by="words") == {1}
+        assert list_recordings(units, replace(config, word=0.0), wanted, wrong, by="words") == {0}
+
+
+def test_pace_alone_decides_but_not_in_print() -> None:
+    text = "my bee sleeps"
+    for wanted, wrong in ((sentence(text, 0.06), sentence(text, 0.2)), (sentence(text, 0.2), sentence(text, 0.06))):
+        units = recorded(wrong, wanted)
+        assert list_recordings(units, DEFAULT, wanted, wrong) == {1}
+        for deaf in (replace(DEFAULT, duration=0.0), PRINTED):
+            assert list_recordings(units, deaf, wanted, wrong) == {0}
+
+
+@pytest.mark.parametrize("phone", PRESERVED)
+def test_units_merge_beside_a_protected_phone_not_in_it(phone: str) -> None:
+    """The lips are closed on the teeth or on one another in one recording: "see | v aa n" of three pieces, not two."""
+    units = inventory(f"s iy {phone}", f"{phone} aa n", f"iy {phone} aa", levels=(0, 0, 1))
+    config = replace(DEFAULT, context=0.0)
+    costs = costs_of(units, config)
+    target = target_of(costs, f"s iy {phone} aa n")
+    assert costs.inventory.windows.recording[select(costs, target).units[2]] == 2
+    careless = costs_of(units, replace(config, protected=0.0))
+    assert careless.inventory.windows.recording[select(careless, target).units[2]] < 2
+
+
+@pytest.mark.parametrize("phone", PRESERVED)
+def test_closures_survive_hard_joins(phone: str) -> None:
+    """Where units abut beside a protected phone, its neighbour is bent and it keeps the shape that was recorded."""
+    units = inventory("s iy", phone, "uw n", levels=(1, 0, 1))
+    costs = costs_of(units, PRINTED)
+    target = target_of(costs, f"s iy {phone} uw n")
+    pieces = pieces_of(costs, target, np.arange(5))
+    assert [piece.join for piece in pieces[1:]] == [ABUTTING_JOIN] * 2
+    motion = concatenated(units, target, pieces, 101)[:, 0]
+    assert motion[41:60] == pytest.approx(0, abs=1e-9)
+    assert motion[[20, 80]] == pytest.approx(1)
+    assert np.abs(np.diff(motion)).max() < 0.9  # bent, not cut
+
+
+def test_a_cut_in_a_cluster_is_worth_a_worse_merge() -> None:
+    """ "s l iy": s l of one recording merged with another l at some distance, or s against l iy inside the cluster."""
+    units = inventory("s l", "s", "l iy", levels=(1.4, 0, 0))
+    config = replace(DEFAULT, context=0.0, word=0.0)
+
+    def recording_of_s(settings: Any) -> int:
+        costs = costs_of(units, settings)
+        return int(costs.inventory.windows.recording[select(costs, target_of(costs, "s l iy")).units[0]])
+
+    assert recording_of_s(config) == 0
+    assert recording_of_s(replace(config, cluster=0.0)) == 1
+    assert recording_of_s(replace(config, cluster=0.0, hard=0.25)) == 0
+
+
+def test_units_merge_where_stress_agrees() -> None:
+    """The first of two equal recordings is left for the second, whose vowel has the stress of the third."""
+    before = with_stress(inventory("b iy", "b iy", "iy s"), 0, 0, 1, 1, 1, -1)
+    after = with_stress(inventory("iy s", "iy s", "b iy"), 0, 0, 1, 1, -1, 1)
+    for units, phone in ((before, 0), (after, 2)):
+        for stress, chosen in ((DEFAULT.stress, 1), (0.0, 0)):
+            config = replace(DEFAULT, context=0.0, stress=stress)
+            costs = costs_of(units, config)
+            found = select(costs, target_of(costs, "b iy s", (-1, 1, -1))).units
+            assert units.windows.recording[found[phone]] == chosen, (phone, stress)

@@ -1,19 +1,23 @@
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from lipmotion import engines, errors
-from lipmotion.engines.selection.engine import SelectionEngine
-from lipmotion.engines.selection.model import SelectionModel
+from lipmotion import engines, errors, types
+from lipmotion.engines.selection.concatenation import TimeMap, concatenated, pieces_of, shown_units
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, select
 from lipmotion.engines.selection.selection_training import SEGMENT_S, target_of
-from lipmotion.testing.examples import examples, speech, timeline
+from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
+from lipmotion.testing import PHONES, example, examples, speech, timeline
 from lipmotion.types import Generation, Span, Timeline, Unit, silent_monitor
 
 SPOKEN = speech(timeline(("b", "aa", "t", "iy", "m", "uw")))
 
 
-def test_every_unit_says_which_recording_it_comes_from(model: SelectionModel, engine: SelectionEngine) -> None:
+def test_every_unit_says_which_recording_it_comes_from(model, engine) -> None:
     names = {each.name for each in examples()}
     result = engine.generate(model, SPOKEN)
     for span in result.units:
@@ -26,7 +30,7 @@ def test_every_unit_says_which_recording_it_comes_from(model: SelectionModel, en
     assert {span.label.unit for span in result.units} <= set(result.trace.states)
 
 
-def test_given_sources_are_kept_if_they_are_of_the_phone(model: SelectionModel, engine: SelectionEngine) -> None:
+def test_given_sources_are_kept_if_they_are_of_the_phone(model, engine) -> None:
     first = engine.generate(model, SPOKEN)
 
     def edited(label: Unit) -> Generation:
@@ -47,7 +51,7 @@ def test_given_sources_are_kept_if_they_are_of_the_phone(model: SelectionModel, 
     assert edited(Unit("uw", first.units[2].label.unit)).units[2].label.unit.endswith(" uw")
 
 
-def test_an_edited_phone_changes_the_motion_near_it_only(model: SelectionModel, engine: SelectionEngine) -> None:
+def test_an_edited_phone_changes_the_motion_near_it_only(model, engine) -> None:
     long = speech(timeline(("b", "aa", "t", "iy", "m", "uw") * 3))
     first = engine.generate(model, long)
     spans = list(first.units)
@@ -58,7 +62,7 @@ def test_an_edited_phone_changes_the_motion_near_it_only(model: SelectionModel, 
     assert not changed[int(spans[5].start_s * 100) :].any()
 
 
-def test_its_description_counts_units_and_names_stand_ins(model: SelectionModel, engine: SelectionEngine) -> None:
+def test_its_description_counts_units_and_names_stand_ins(model, engine) -> None:
     text = engine.describe(model)
     assert text.startswith(f"{int(model.inventory.usable.sum())} units of {len(model.inventory.names)} recordings")
     assert "ao (aa)" in text
@@ -70,31 +74,36 @@ def test_options_out_of_their_range_are_refused() -> None:
             engines.engine_named("selection", {option: value})
 
 
-def test_silence_longer_than_any_recorded_one_stands_still(model: SelectionModel, engine: SelectionEngine) -> None:
+def test_silence_longer_than_any_recorded_one_stands_still(model, engine) -> None:
     units = Timeline((*timeline(("b", "aa")).spans[:-1], Span(0.8, 9.0, Unit("sil")), Span(9.0, 9.2, Unit("aa"))))
     opening = engine.generate(model, speech(units)).motion["opening"]
     assert np.abs(np.diff(opening[200:800])).max() < 1e-3
 
 
-def test_in_noise_the_sound_alone_chooses(model: SelectionModel, engine: SelectionEngine, monkeypatch) -> None:
+def test_in_noise_the_sound_alone_chooses(model, engine) -> None:
     costs = model.costs(engine.config)
     unsure = replace(SPOKEN, units_known=False, confidence=0.0)
     assert not target_of(model, costs, unsure).by_sound
     guide = model.guide
     distorted = (guide.predict(unsure)[0], np.ones(len(unsure.features.values)))
-    monkeypatch.setattr(type(guide), "predict", lambda *_: distorted)
+
+    class Noisy(type(guide)):
+        def predict(self, _):
+            return distorted
+
+    model = replace(model, guide=Noisy(**vars(guide)))
     target = target_of(model, costs, unsure)
     assert target.by_sound
     assert target.windows.durations_s == pytest.approx(SEGMENT_S, rel=0.1)
     assert not target_of(model, costs, SPOKEN).by_sound  # phones that are known are relied on
-    plain = SelectionEngine(replace(engine.config, guide=0.0))
+    plain = replace(engine, config=replace(engine.config, guide=0.0))
     assert not target_of(model, model.costs(plain.config), unsure).by_sound
     result = engine.generate(model, unsure)
     assert np.corrcoef(result.motion["opening"], distorted[0][:, 0])[0, 1] > 0.8
     assert len(result.units) == len(unsure.units)
 
 
-def test_without_recorded_silence_the_mouth_rests(engine: SelectionEngine) -> None:
+def test_without_recorded_silence_the_mouth_rests(engine) -> None:
     trimmed = []
     for each in examples(5):
         inside = [n for n, span in enumerate(each.speech.units) if span.label.phone != "sil"]
@@ -103,7 +112,7 @@ def test_without_recorded_silence_the_mouth_rests(engine: SelectionEngine) -> No
         valid[: int(first.start_s * 100) + 1] = False
         valid[int(last.end_s * 100) :] = False
         trimmed.append(replace(each, valid=valid))
-    learned = SelectionEngine(replace(engine.config, guide=0.0)).fit(trimmed, silent_monitor).model
+    learned = replace(engine, config=replace(engine.config, guide=0.0)).fit(trimmed, silent_monitor).model
     opening = engine.generate(learned, SPOKEN).motion["opening"]
     assert np.abs(opening[:40] - learned.rest[0]).max() < 0.03
 
@@ -128,9 +137,7 @@ def test_models_that_contradict_themselves_are_refused(model, engine, name, dama
         engine.from_arrays(arrays)
 
 
-def test_sources_that_cannot_be_used_are_reported(
-    model: SelectionModel, engine: SelectionEngine, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_sources_that_cannot_be_used_are_reported(model, engine, caplog: pytest.LogCaptureFixture) -> None:
     first = engine.generate(model, SPOKEN)
     engine.generate(model, replace(SPOKEN, units=first.units))
     assert not caplog.records
@@ -139,3 +146,123 @@ def test_sources_that_cannot_be_used_are_reported(
     engine.generate(model, replace(SPOKEN, units=Timeline(tuple(spans))))
     assert "1 of 8 units name no recorded unit" in caplog.text
     assert "'nosuch 1.000-1.100 s aa'" in caplog.text
+
+
+SENTENCES = st.lists(st.sampled_from(PHONES), min_size=1, max_size=6)
+
+
+def wanted(model, engine, phones: list[str]):
+    costs = model.costs(engine.config)
+    return costs, target_of(model, costs, speech(timeline(phones)))
+
+
+def total(costs, target, units: list[int]) -> float:
+    each = sum(costs.target_costs(target, n, np.array([unit]))[0] for n, unit in enumerate(units))
+    joins = (
+        costs.join_costs(target, n, np.array([units[n - 1]]), np.array([units[n]]))[0, 0] for n in range(1, len(units))
+    )
+    return float(each + sum(joins))
+
+
+@settings(max_examples=12)
+@given(st.lists(st.sampled_from(PHONES), min_size=1, max_size=3), st.integers(0, 99))
+def test_no_sequence_of_candidates_is_cheaper(model, engine, phones: list[str], seed: int) -> None:
+    """Two candidates a bias: at most six a phone, so that every sequence is compared."""
+    few = replace(engine, config=replace(engine.config, candidates=2))
+    costs, target = wanted(model, few, phones)
+    excluded = np.random.default_rng(seed).random(len(model.inventory.windows)) < 0.5
+    found = (costs.candidates(target, number, excluded) for number in range(len(target)))
+    every = [units if len(units) else costs.candidates(target, number) for number, units in enumerate(found)]
+    sums = costs.target_costs(target, 0, every[0])
+    for number in range(1, len(target)):
+        step = costs.join_costs(target, number, *every[number - 1 : number + 1])
+        sums = sums[..., None] + step + costs.target_costs(target, number, every[number])
+    chosen = select(costs, target, excluded)
+    assert sums.shape == tuple(map(len, every))
+    assert chosen.cost == pytest.approx(sums.min())
+    assert total(costs, target, chosen.units.tolist()) == pytest.approx(chosen.cost)
+
+
+@settings(max_examples=12)
+@given(SENTENCES)
+def test_pruning_does_not_change_the_cost(model, engine, phones: list[str]) -> None:
+    wide = replace(engine, config=replace(engine.config, beam=10**6, most=0.4))
+    costs, target = wanted(model, wide, phones)
+    assert select(costs, target).cost == pytest.approx(select(costs, target, prune=False).cost)
+
+
+LONGER = st.lists(st.sampled_from(PHONES), min_size=2, max_size=8)
+
+
+def laid_out(model, engine, units: types.Timeline):
+    costs = model.costs(engine.config)
+    target = target_of(model, costs, speech(units))
+    pieces = pieces_of(costs, target, select(costs, target).units)
+    return target, pieces
+
+
+@settings(max_examples=15)
+@given(LONGER, st.floats(0.04, 0.3))
+def test_edges_of_phones_fall_on_edges_of_phones(model, engine, phones: list[str], duration_s: float) -> None:
+    target, pieces = laid_out(model, engine, timeline(phones, duration_s))
+    assert (pieces[0].first, pieces[-1].stop) == (0, len(target))
+    assert all(one.stop == two.first and one.start_s < two.start_s for one, two in pairwise(pieces))
+    recorded = model.inventory.windows.times_s
+    for piece, following in zip(pieces, [*pieces[1:], None], strict=True):
+        clock = TimeMap.of(model.inventory, target, piece, following)
+        starts = target.windows.times_s[piece.first : piece.stop, 0]
+        wanted = recorded[piece.unit : piece.unit + len(starts), 0]
+        assert clock(starts) == pytest.approx(wanted, abs=2e-3)
+        assert (np.diff(clock(np.arange(0, target.windows.times_s[-1, 1], 0.005))) > -1e-9).all()
+
+
+@settings(max_examples=15)
+@given(LONGER)
+def test_motion_stays_within_what_was_recorded_and_no_join_is_a_jump(model, engine, phones: list[str]) -> None:
+    target, pieces = laid_out(model, engine, timeline(phones))
+    frames = int(target.windows.times_s[-1, 1] * 100)
+    motion, recorded = concatenated(model.inventory, target, pieces, frames), model.inventory.values
+    jump = np.ptp(recorded, axis=0)  # by which a hard join beside a protected phone may bend the other side
+    assert (motion >= recorded.min(axis=0) - jump).all()
+    assert (motion <= recorded.max(axis=0) + jump).all()
+    largest = np.abs(np.diff(recorded, axis=0)).max(axis=0)
+    hard = any(piece.join == ABUTTING_JOIN for piece in pieces[1:])
+    bend = hard * jump * np.pi / 4  # within two frames, where pieces abut
+    assert (np.abs(np.diff(motion, axis=0)).max(axis=0) < 3 * largest + bend).all()
+
+
+def test_classes_of_lip_reading_and_their_overlaps() -> None:
+    """The symmetric table is Table 1 but for one entry; read with the phone after as forward, it is but for two."""
+    assert OVERLAPS["symmetric"]["normal", "invisible"] == pytest.approx(1 - TABLE_1["invisible", "normal"])
+    other = {pair: share for pair, share in OVERLAPS["anticipatory"].items() if share != pytest.approx(TABLE_1[pair])}
+    assert other == pytest.approx({("invisible", "normal"): 0.23, ("normal", "invisible"): 0.73})
+    classes = [lip_reading_class(phone, parsed_invisible("t d g k")) for phone in ("b", "t", "l", "aa")]
+    assert classes == ["protected", "invisible", "normal", "normal"]
+    for text in ("t xx", "sil", "p"):
+        with pytest.raises(errors.InputError, match="cannot be invisible"):
+            parsed_invisible(text)
+
+
+@settings(max_examples=20)
+@given(LONGER, st.integers(0, 999))
+def test_every_unit_is_shown(model, engine, phones: list[str], seed: int) -> None:
+    costs = model.costs(engine.config)
+    target = target_of(model, costs, speech(timeline(phones)))
+    excluded = np.random.default_rng(seed).random(len(model.inventory.windows)) < 0.7
+    units = select(costs, target, excluded).units
+    pieces = pieces_of(costs, target, units)
+    assert all(two.start_s - one.start_s > 0.01 for one, two in pairwise(pieces))
+    shown = shown_units(target, pieces, int(target.windows.times_s[-1, 1] * 100))
+    assert set(units.tolist()) <= set(shown.tolist())
+
+
+def test_a_recorded_sentence_comes_back_as_it_was_recorded(engine) -> None:
+    engine = replace(engine, config=replace(engine.config, guide=0.0))
+    recorded = [example(phones, seed) for seed, phones in enumerate((("b", "aa", "t", "iy"), ("m", "uw", "s", "p")))]
+    model = engine.fit(recorded, types.silent_monitor).model
+    for one in recorded:
+        again = engine.generate(model, one.speech)
+        assert len({source.split(" ")[0] for source in again.trace.states}) == 1
+        near = slice(20, len(one.motion.values) - 20)  # silence far from speech is not stored
+        difference = np.abs(again.motion.values - one.motion.values)[near, :2]
+        assert np.percentile(difference, 99) < 0.02  # recorded motion has noise that few components leave out

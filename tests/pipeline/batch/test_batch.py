@@ -20,13 +20,13 @@ from lipmotion import Delivery, Job, Outputs, Request, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.formats import motion_suffixes
-from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.batch import BatchLine, batch, read_lines
+from lipmotion.pipeline.batch import run as one_line
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
-from lipmotion.pipeline.batch.run import LineWork, check_line_job, finish_line
 from lipmotion.pipeline.workers import WorkerDiedError
 from lipmotion.types import Item
+from testing.toy import SMALL
 
 
 @pytest.fixture
@@ -147,8 +147,8 @@ def test_what_no_line_could_do_ends_it_before_the_first_line(sounds, settings, t
 def test_silence_can_have_every_form_that_speech_can(settings):
     kinds = tuple(suffix.removeprefix(".") for suffix in motion_suffixes())
     late = Delivery(offset_ms=-5000, stepped=True)
-    check_line_job(replace(settings, outputs=Outputs(kinds=kinds, articulation=True), delivery=late), "first")
-    check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)), "second")
+    one_line.check_line_job(replace(settings, outputs=Outputs(kinds=kinds, articulation=True), delivery=late), "first")
+    one_line.check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)), "second")
 
 
 @pytest.mark.long
@@ -176,12 +176,12 @@ class DyingPool:
             yield function(item)
 
 
-def waiting(sounds: Path, settings: Job, out: Path) -> list[LineWork]:
+def waiting(sounds: Path, settings: Job, out: Path) -> list[one_line.LineWork]:
     place = Place(str(out), "run")
     for name in ("receipts", "work"):
         (place.own / name).mkdir(parents=True)
     (place.own / "run").write_text("run")
-    return [LineWork(line, settings, "s", place) for line in read_lines(sounds, ("json",))]
+    return [one_line.LineWork(line, settings, "s", place) for line in read_lines(sounds, ("json",))]
 
 
 @pytest.mark.parametrize(("times", "outcome"), [(1, "done"), (2, "failed")])
@@ -205,15 +205,15 @@ def test_workers_that_never_begin_end_the_batch(sounds, settings, tmp_path):
 
 def test_a_line_that_another_worker_finished_is_not_done_again(sounds, settings, tmp_path):
     work = waiting(sounds, settings, tmp_path / "out")[0]
-    first = finish_line(work)
+    first = one_line.finish_line(work)
     assert 0 < first["motion"] < 1
     assert 0 <= first["least_sure_s"] < first["duration_s"]
     path = tmp_path / "out" / next(iter(first["outputs"]))
     before = path.stat().st_mtime_ns
-    assert finish_line(work) == first
+    assert one_line.finish_line(work) == first
     assert path.stat().st_mtime_ns == before
     path.unlink()  # the worker died after the receipt, before the renaming
-    assert finish_line(work)["outputs"] == first["outputs"]
+    assert one_line.finish_line(work)["outputs"] == first["outputs"]
     assert path.is_file()
 
 
@@ -221,7 +221,7 @@ def test_a_worker_of_an_earlier_run_writes_nothing(sounds, settings, tmp_path):
     work = waiting(sounds, settings, tmp_path / "out")[0]
     (work.place.own / "run").write_text("a later one")
     with pytest.raises(ExportError, match="another run of this batch has begun"):
-        finish_line(work)
+        one_line.finish_line(work)
     assert contents(tmp_path / "out").keys() == {".batch/run"}
 
 
@@ -390,7 +390,7 @@ def test_a_worker_of_a_cluster_is_killed(cluster, toy_speech, settings, tmp_path
 def test_a_training_on_a_cluster_is_that_of_one_process(cluster, toy_corpus, tmp_path):
     """Also where a worker dies on the way."""
     address, processes = cluster
-    how = {"engine": engine_named("joint", {}), "recogniser": HmmConfig(mixtures=1, iterations=1)}
+    how = {"engine": engine_named("joint", {}), "recogniser": replace(SMALL, iterations=1)}
 
     def kill_one(event: object) -> None:
         if getattr(event, "stage", "").endswith("contexts"):
@@ -405,8 +405,7 @@ def test_a_training_on_a_cluster_is_that_of_one_process(cluster, toy_corpus, tmp
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
-def test_no_cluster_answers(sounds, settings, tmp_path, monkeypatch):
+def test_no_cluster_answers(sounds, settings, tmp_path):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("lipmotion.pipeline.workers.CONNECT_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         batch(sounds, tmp_path / "out", settings, cluster="tcp://127.0.0.1:9")

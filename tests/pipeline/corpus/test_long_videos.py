@@ -1,6 +1,7 @@
 import json
 import shutil
 from collections.abc import Iterable
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -11,9 +12,21 @@ import pytest
 
 from lipmotion import Corpus, prepare
 from lipmotion.errors import CorpusError
-from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Channel, Motion, Progress, TimedTranscript, TimedWord, Track, TranscriptLine
+from lipmotion.types import (
+    Audio,
+    Channel,
+    Motion,
+    Span,
+    TimedTranscript,
+    TimedWord,
+    Timeline,
+    Track,
+    TranscriptLine,
+    Unit,
+    Utterance,
+)
 from lipmotion_faces.corpus import long_videos
+from lipmotion_faces.corpus import sync as module
 from lipmotion_faces.corpus.long_videos import (
     LEAST_S,
     LONGEST_S,
@@ -24,9 +37,10 @@ from lipmotion_faces.corpus.long_videos import (
     spoken_lines,
     utterance_spans,
 )
+from lipmotion_faces.corpus.sync import offsets, sync
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.track import VideoScan, track
-from pipeline.made import replace_tracking
+from pipeline.made import features_of, read_sound, replace_tracking
 
 RATE = 16_000
 SENTENCES = [(1.0 + 4.5 * n, 4.0 + 4.5 * n) for n in range(10)]
@@ -108,7 +122,7 @@ def test_a_long_video_is_divided_at_its_pauses(talk, tmp_path):
     assert report.prepared[0] == "talk-00h00m00.68s"
     assert report.kind.endswith(", divided into utterances")
     corpus = Corpus.open(tmp_path / "corpus")
-    samples = read_audio(talk).samples
+    samples = read_sound(talk).samples
     for name, (start_s, end_s) in zip(report.prepared, SENTENCES, strict=True):
         found = corpus.utterance(name)
         first_s, last_s = float(found.source["start_s"]), float(found.source["end_s"])
@@ -121,13 +135,6 @@ def test_a_long_video_is_divided_at_its_pauses(talk, tmp_path):
         assert found.words is None
         assert found.source["file"] == "talk.mkv"
     assert [corpus.utterance(name).split for name in report.prepared] == ["train"] * 8 + ["val", "test"]
-
-
-@pytest.mark.usefixtures("scanned")
-def test_it_is_kept_when_it_is_prepared_again(talk, tmp_path):
-    prepare(talk, tmp_path / "corpus", workers=1)
-    again = prepare(talk, tmp_path / "corpus", workers=1)
-    assert again.counts == {"prepared": 0, "kept": 10, "skipped": 0}
 
 
 @pytest.mark.usefixtures("scanned")
@@ -175,18 +182,6 @@ def test_silence_is_refused(tmp_path):
     assert not (tmp_path / "other").exists()
 
 
-@pytest.mark.usefixtures("scanned")
-def test_progress_is_reported(talk, tmp_path):
-    seen: list[Progress] = []
-    prepare(
-        talk, tmp_path / "corpus", workers=1, monitor=lambda event: isinstance(event, Progress) and seen.append(event)
-    )
-    assert [event.stage for event in seen[:3]] == ["dividing long videos"] * 2 + ["preparing recordings"]
-    shares = [event.share for event in seen]
-    assert shares == sorted(shares)
-    assert (shares[0], shares[-1]) == pytest.approx((0.0, 1.0))
-
-
 @pytest.mark.video
 @pytest.mark.recordings
 def test_clips_one_after_the_other(recordings, tmp_path):
@@ -219,7 +214,7 @@ def joined(clips: list[Path], path: Path) -> None:
 
     images, samples = [], np.zeros(3 * RATE * len(clips))
     for number, clip in enumerate(clips):
-        frames, sound = frames_of(clip)[:75], read_audio(clip).samples[: 3 * RATE]
+        frames, sound = frames_of(clip)[:75], read_sound(clip).samples[: 3 * RATE]
         images += frames + frames[-1:] * (75 - len(frames))
         samples[3 * RATE * number :][: len(sound)] = sound
     write_video(path, images, (360, 288), samples, crf="8")
@@ -348,3 +343,115 @@ def test_times_that_are_missing():
         (1.0, 3.0, ("hello", "you")),
         (3.0, 3.5, ("you",)),
     ]
+
+
+RATE_HZ = 16_000
+COUNT = 4
+
+
+def voice(seed: int, late_s: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return three seconds of noise that swells, late, and a lip opening at 25 Hz that follows it in time."""
+    draw = np.random.default_rng(seed)
+    tones = list(zip(draw.uniform(0.7, 4, 6), draw.uniform(0, 6.3, 6), strict=True))
+
+    def swell(time_s: np.ndarray) -> np.ndarray:
+        return np.exp(0.8 * sum(np.sin(2 * np.pi * hertz * time_s + phase) for hertz, phase in tones))
+
+    time_s = np.arange(3 * RATE_HZ) / RATE_HZ
+    sound = 0.01 * swell(time_s - late_s) * draw.normal(size=len(time_s))
+    return sound.astype(np.float32), 0.05 * np.log1p(swell(np.arange(75) / 25))
+
+
+def utterance(seed: int, late_s: float, collection: str) -> Utterance:
+    samples, opening = voice(seed, late_s)
+    audio = Audio(samples, RATE_HZ)
+    found = Track(Motion(opening[:, None], 25.0, (Channel("opening"),)), np.ones(75, bool))
+    return Utterance(
+        f"{collection}{seed}",
+        audio,
+        features_of(audio),
+        found,
+        ("a",),
+        "train",
+        {"collection": collection, "sha256": "0"},
+    )
+
+
+@pytest.fixture
+def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
+    """Two collections: one in step, one whose sound is 120 ms late; loudness is all that their lips follow."""
+    energy = np.zeros((11, 13))
+    energy[4, 12], energy[6, 12] = -1, 1
+    monkeypatch.setattr("lipmotion_faces.corpus.sound_offset._weights", energy.ravel)
+    made = Corpus.create(tmp_path / "corpus")
+    for seed in range(COUNT):
+        made.add(utterance(seed, 0.0, "here"), {"recipe": "9"})
+        made.add(utterance(10 + seed, 0.12, "there"), {"recipe": "9"})
+    return made
+
+
+def test_each_collection_has_its_own(corpus):
+    found = offsets(corpus)
+    assert set(found.clips) == set(corpus.names())
+    assert found.collections["there"].late_s - found.collections["here"].late_s == pytest.approx(0.12, abs=0.01)
+    assert found.collections["there"].known
+    assert [line.split(":")[0] for line in found.lines()] == ["here", "there"]
+    assert "ms), by 4 clips together, which corpus sync removes; 4 tell alone: median +1" in found.lines()[1]
+
+
+def test_sync_moves_what_is_late_once(corpus):
+    before = {name: corpus.utterance(name).audio.samples.copy() for name in corpus.names()}
+    late_s = offsets(corpus).collections["there"].late_s
+    moved = sync(corpus)
+    assert moved["there"] == late_s
+    again = Corpus.open(corpus.path)
+    shift = round(late_s * RATE_HZ)
+    for seed in range(10, 10 + COUNT):
+        name = f"there{seed}"
+        one = again.utterance(name)
+        np.testing.assert_allclose(one.audio.samples, before[name][shift:], atol=1e-4)
+        assert float(one.source["offset_removed_ms"]) == pytest.approx(1000 * late_s, abs=0.1)
+        assert one.features.values.shape[0] == len(one.audio.samples) // 160 + 1
+        assert json.loads((again.folder(name) / "entry.json").read_text())["settings"] == {"recipe": "9"}
+    assert abs(offsets(again).collections["there"].late_s) < 0.005
+    assert "there" not in sync(again)
+    assert module.move_sound(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
+
+
+def test_early_sound_gets_a_beginning(corpus):
+    late = corpus.utterance("here0")
+    moved = module.move_sound(late, -0.1)
+    assert moved.audio.duration_s == pytest.approx(late.audio.duration_s + 0.1)
+    np.testing.assert_array_equal(moved.audio.samples[1600:], late.audio.samples)
+    assert float(moved.source["offset_removed_ms"]) == -100
+
+
+def test_labels_move_with_the_sound(corpus):
+    bounds = [0.0, 0.4, 1.2, 3.0]
+    spans = tuple(Span(a, b, Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True))
+    for late_s, expected in ((0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])):
+        moved = module.move_sound(replace(corpus.utterance("here0"), phones=Timeline(spans)), late_s)
+        found = list(moved.phones)
+        assert [found[0].start_s, found[-1].start_s, found[-1].end_s] == pytest.approx(expected)
+        assert found[-1].end_s == pytest.approx(moved.audio.duration_s)
+
+
+def test_curves_without_lips_are_passed_over(corpus):
+    one = corpus.utterance("here0")
+    jaw = Track(Motion(np.zeros((75, 1)), 25.0, (Channel("jaw"),)), np.ones(75, bool))
+    corpus.add(replace(one, name="jaw", track=jaw))
+    assert set(offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
+
+
+def test_lips_that_do_not_follow_are_left_alone(corpus):
+    names = [name for name in corpus.names() if name.startswith("there")]
+    still = [corpus.utterance(name) for name in names]
+    for name, other in zip(names, [*still[1:], still[0]], strict=True):
+        corpus.add(replace(corpus.utterance(name), track=other.track), {})
+    assert not offsets(corpus).collections["there"].known
+    line = offsets(corpus).lines()[1]
+    assert line.startswith("there: not measured: 4 clips of this voice cannot tell whether the sound is late. Training")
+    assert line.endswith("give corpus prepare --offset-ms")
+    before = corpus.utterance(names[0]).audio.samples.copy()
+    assert "there" not in sync(corpus)
+    np.testing.assert_array_equal(corpus.utterance(names[0]).audio.samples, before)

@@ -14,14 +14,13 @@ from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.tables import SPEECH_CURVES
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit
 from lipmotion.units import is_silent
 from lipmotion_faces.corpus import supplied
 from meshes.flame import head
 from meshes.live_link_app import write_take
 from meshes.speech import said
-from pipeline.made import replace_tracking, write_noise, write_sound
+from pipeline.made import read_sound, replace_tracking, write_noise, write_sound
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
@@ -230,7 +229,7 @@ def test_a_long_video_gets_the_recorders_sound_in_its_own_time(recorded_twice_fo
     recording = SourceRecording(
         "take", recorded_twice_folder / "take.wav", None, recorder=recorded_twice_folder / "take.recorder.wav"
     )
-    own, sound = read_audio(recorded_twice_folder / "take.wav"), supplied.separate_sound(recording)
+    own, sound = read_sound(recorded_twice_folder / "take.wav"), supplied.separate_sound(recording)
     assert sound is not None
     placed = supplied.align_sound(sound, own.duration_s)
     assert len(placed.samples) == len(own.samples)

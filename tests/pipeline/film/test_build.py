@@ -54,15 +54,6 @@ def test_one_video(make_videos):
     assert (take.span.start_s, take.span.end_s) == (0.0, MOST_FOOTAGE_S)
 
 
-def test_a_folder(make_videos):
-    folder = make_videos("a", "b", "c")
-    found = choose_takes(folder)
-    assert names(found) == ["a", "b", "c"]
-    assert {take.collection for take in found} == {"filmed/anna"}
-    assert all(take.file.parent == folder for take in found)
-    assert found[0].span.end_s == float("inf")
-
-
 def test_of_a_folder_with_lists_the_training_list(make_videos):
     folder = make_videos("a", "b", "c", "d")
     (folder / "train.txt").write_text("b\nd\n")
@@ -112,14 +103,6 @@ def test_a_corpus_with_its_videos(tmp_path, make_videos):
     assert [take.file.name for take in found] == ["a.mkv", "b.mkv"]
     assert {take.collection for take in found} == {"filmed/anna"}
     assert dict(found[0].rights) == {"licence": "CC BY 4.0", "attribution": "anna"}
-
-
-def test_a_corpus_of_several_people(tmp_path, make_videos):
-    folder = make_videos("a", "b", "c", "d")
-    corpus = prepared(tmp_path / "corpus", ["a.mkv", "b.mkv", "c.mkv", "d.mkv"], ("anna", "ben"))
-    assert [take.file.name for take in choose_takes(corpus.path, folder, "ben")] == ["b.mkv", "d.mkv"]
-    with pytest.raises(InputError, match=r"2 speakers, a face is that of one person"):
-        choose_takes(corpus.path, folder)
 
 
 @pytest.mark.parametrize(
@@ -212,18 +195,6 @@ def test_motion_becomes_the_person(built):
     assert np.corrcoef(dark, take.motion["opening"])[0, 1] > 0.8
     lips = Motion(take.motion.values[:, :3], 25.0, take.motion.channels[:3])
     assert codes.chin_px == pytest.approx(toy_chin_px(lips), abs=3)
-
-
-def test_progress_rises_to_the_end(built):
-    _, events = built
-    progress = [event for event in events if isinstance(event, Progress)]
-    assert len(progress) == len(events) == SENTENCES + 3
-    values = [event.share for event in progress]
-    assert values == sorted(values)
-    assert values[-1] == pytest.approx(1.0)
-    stages = list(dict.fromkeys(event.stage for event in progress))
-    assert stages == ["tracking the face", "learning the face", "choosing the background"]
-    assert [event.step for event in progress[:SENTENCES]] == list(range(1, SENTENCES + 1))
 
 
 def test_the_speech_is_kept_with_its_motion(built):

@@ -30,7 +30,7 @@ from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
 from speech.sounds import tone, write_sound
 from testing.toy import ToySentence, toy_motion, toy_sentences
-from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, SCALE, toy_chin_px, toy_frames, toy_places
+from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, SCALE, toy_chin_px, toy_places
 
 MIDDLE = (slice(150, 230), slice(70, 154))
 """Rows and columns of the background in which the mouth is."""
@@ -71,15 +71,6 @@ def test_any_rate(filmed_face, motion):
     for fps in (0.0, -25.0, float("nan"), float("inf")):
         with pytest.raises(InputError, match=r"the frame rate is .*, required more than 0"):
             make_film(filmed_face, motion, fps=fps)
-
-
-def test_speech_longer_and_shorter_than_the_background(filmed_face, motion):
-    frames = list(make_film(filmed_face, motion).frames)
-    assert len(frames) == pytest.approx(len(motion.values) / 4, abs=1)
-    assert len(frames) > len(filmed_face.background.video)
-    for samples, count in ((9, 3), (1, 1)):
-        short = Motion(motion.values[:samples], 100.0, motion.channels)
-        assert len(list(make_film(filmed_face, short).frames)) == count
 
 
 def test_the_jaw_follows_what_it_is_told(filmed_face, brief, toy_sentence):
@@ -367,13 +358,6 @@ def test_a_background_at_any_rate(sequence):
         assert np.abs(np.array(shown) - np.arange(frames) / rate_hz * 25).max() <= 0.5 + 1e-6
 
 
-def test_frames_are_those_that_were_filmed(sequence, filmed_face):
-    (first,) = sequence.frames(1, 25.0)
-    motion = filmed_face.takes[0].motion
-    drawn = next(toy_frames(motion, toy_places(len(motion.values))))
-    assert np.abs(first.frame.astype(int) - drawn).mean() < 2
-
-
 def test_the_face_box_holds_the_head_in_every_frame(sequence):
     left, top, right, bottom = sequence.face_box
     for place in sequence.face_to_frame:
@@ -383,15 +367,6 @@ def test_the_face_box_holds_the_head_in_every_frame(sequence):
                 assert left - 1e-9 <= across <= right + 1e-9
                 assert top - 1e-9 <= down <= bottom + 1e-9
     assert right - left < (HEAD_PX[2] - HEAD_PX[0]) * SCALE + 20
-
-
-def test_a_larger_mouth_in_the_same_place(sequence):
-    middle = np.array([0.0, 76.0, 1.0])
-    larger = sequence.enlarge(1.3)
-    for old, new in zip(sequence.face_to_frame, larger.face_to_frame, strict=True):
-        assert new @ middle == pytest.approx(old @ middle)
-        assert new[:, :2] == pytest.approx(1.3 * old[:, :2])
-    assert np.array_equal(larger.chin_px, sequence.chin_px)
 
 
 def test_the_chin_is_where_the_tracker_sees_it(video):

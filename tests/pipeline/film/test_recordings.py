@@ -5,10 +5,10 @@ import pytest
 
 from cli.conftest import here, run
 from lipmotion import Request, animate, load_face
-from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
 from lipmotion_faces.film.filmed_video import make_film, write_film
 from lipmotion_faces.tracking.track import track
+from pipeline.made import read_sound
 
 __all__ = ["here", "run"]
 pytestmark = [pytest.mark.recordings, pytest.mark.video, pytest.mark.long]
@@ -69,7 +69,7 @@ def test_what_was_built(built):
 def test_tracked_motion_of_unseen_speech_is_tracked_again(built, clips, tmp_path):
     clip = clips[CLIPS]
     original = track(clip, crops=False).motion
-    write_film(tmp_path / "a.mp4", make_film(load_face(built), original), read_audio(clip))
+    write_film(tmp_path / "a.mp4", make_film(load_face(built), original), read_sound(clip))
     assert likeness(opening_in(tmp_path / "a.mp4"), np.asarray(original["opening"])) > 0.85
 
 

@@ -15,16 +15,15 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
-from lipmotion.pipeline.generation import GRID_S, LONGEST_S, MARGIN_S, find_excerpt
+from lipmotion.pipeline.generation import GRID_S, MARGIN_S
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
-from lipmotion.pipeline.outputs.output import OutputSettings, Performance, measure_prosody
-from lipmotion.types import Audio, Constraints, Generation, Outlook, Pin, Span, Speech, Timeline, Unit
+from lipmotion.pipeline.outputs.output import measure_prosody
+from lipmotion.types import Audio, Constraints, Generation, Outlook, Span, Speech, Timeline, Unit
 from lipmotion.units import group_words
 from lipmotion_faces.outputs.drawn_video import sound_track
-from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.registry import stage_face
-from pipeline.made import write_sound
+from pipeline.made import performed, write_sound
 from testing.toy import ToySentence
 
 
@@ -300,11 +299,8 @@ def test_single_pictures_are_those_of_the_video(session, request_):
     """Any frame, before and after an edit; what is not at that time is refused."""
     pictures = SessionPictures(session)
     for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
-        performance = Performance(
-            session.generate(edits),
-            OutputSettings(shown_face("portrait"), None, sounded=True, staging=edits.staging()),
-            sound=request_.recording,  # type: ignore[arg-type]
-        )
+        shown = performed(session.generate(edits), "portrait", sounded=True, staging=edits.staging())
+        performance = replace(shown, sound=request_.recording)
         seen, prosody = (
             deliver_to_face(performance.generation, Delivery(), 25.0),
             measure_prosody(sound_track(performance)),
@@ -386,17 +382,6 @@ def test_around_an_edit_the_motion_is_that_of_the_whole(long_request, toy_model,
     assert np.abs(after.motion["opening"] - before["opening"]).max() > 0.1
     with session.sketching(), pytest.raises(InputError, match="9999"):
         session.generate(edits.then("pin opening 0.1 at 9999"))
-
-
-def test_what_lies_far_apart_is_made_whole():
-    units, frames = Timeline(tuple(Span(n / 10, (n + 1) / 10, Unit("aa")) for n in range(600))), 6001
-    assert find_excerpt(units, units, (), frames) is None
-    near = find_excerpt(units, units, [Pin(30.0, "opening", 0.1), Pin(31.0, "opening", 0.1)], frames)
-    assert near.frames.start % 100 == 0
-    assert near.frames.start / 100 <= 30 - MARGIN_S
-    assert near.frames.stop / 100 >= 31 + MARGIN_S
-    far = [Pin(1.0, "opening", 0.1), Pin(2.0 + LONGEST_S, "opening", 0.1)]
-    assert find_excerpt(units, units, far, frames) is None
 
 
 SENTENCES = (

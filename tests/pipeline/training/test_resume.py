@@ -1,8 +1,11 @@
 import multiprocessing
+import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,19 +13,21 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from lipmotion import Corpus, Model, Run, save_model, train
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.training import chain_training as em_steps
-from lipmotion.hmm.model import HmmConfig
-from lipmotion.hmm.multistream import multistream_training
+from lipmotion.errors import CorpusError, MissingDependencyError
+from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline import workers
-from lipmotion.pipeline.model import BOTH, GEOMETRY
 from lipmotion.pipeline.training import labels
-from lipmotion.pipeline.training.labels import fingerprint_training
-from lipmotion.stats import em
-from lipmotion.types import Item, Monitor, Progress, silent_monitor
-from lipmotion.units import Lexicon
+from lipmotion.pipeline.training.other_speakers import align_recordings, is_held_out_speaker, synthesise_sentences
+from lipmotion.speech.sound.acoustic_conditions import spoken_samples
+from lipmotion.speech.voices.installed import installed_voices
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
+from lipmotion.types import Audio, Item, Monitor, Progress, Timeline, Unit, silent_monitor
+from lipmotion.units import Lexicon, split_words
+from pipeline.made import recogniser_of, write_sound
+from testing.formant_synthesiser import synthesise
+from testing.toy import SMALL, toy_sentences
 
-CONFIG = HmmConfig(mixtures=2, iterations=1, context_frames=20)
-Train = Callable[..., Model]
+CONFIG = replace(SMALL, mixtures=2, iterations=1, context_frames=20)
 
 
 class Stopped(Exception):  # noqa: N818
@@ -99,41 +104,6 @@ def test_stopped_after_any_event(corpus, whole, work, tmp_path):
 
 
 @pytest.mark.long
-def test_stopped_again_and_again(corpus, whole, work, tmp_path):
-    """Every run gets some steps further than the one before."""
-    stops = 0
-    while True:
-        try:
-            model = run(corpus, work, stopping_after(8))
-            break
-        except Stopped:
-            stops += 1
-            assert stops < 50
-    assert stops > 1
-    assert content(model, tmp_path) == whole
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "options"), [("joint", {}), ("coupled", {"chains": "sVis 2vis", "mixtures": 1})])
-def test_finished_shards_are_not_summed_again(corpus, work, tmp_path, monkeypatch, name, options):
-    """The E-steps of a training that is stopped are found again, under what their models and data are."""
-    monkeypatch.setattr(em, "SAVE_S", 0.0)
-    engine, computed = engine_named(name, options), []
-    for module, function in ((multistream_training, "_shard_sums"), (em_steps, "_shard_sums")):
-        usual = getattr(module, function)
-        monkeypatch.setattr(module, function, lambda job, usual=usual: (computed.append(1), usual(job))[1])
-    whole = content(train(corpus, recogniser=CONFIG, engine=engine)[0], tmp_path)
-    count = len(computed)
-    assert count > 3
-    stop = next(i for i, e in enumerate(create_events(corpus)) if getattr(e, "share", 0) > 0.6) + 3
-    with pytest.raises(Stopped):
-        train(corpus, recogniser=CONFIG, engine=engine, run=Run(work=work, monitor=stopping_after(stop)))
-    computed.clear()
-    assert content(train(corpus, recogniser=CONFIG, engine=engine, run=Run(work=work))[0], tmp_path) == whole
-    assert 0 < len(computed) < count
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("what", ["corpus", "lexicon"])
 def test_another_job_starts_over(corpus, work, tmp_path, what):
     run(corpus, work)
@@ -149,15 +119,6 @@ def test_another_job_starts_over(corpus, work, tmp_path, what):
         options["lexicon"] = Lexicon({"papa": (("p", "ae", "p", "ax"),)})
     expected = content(train(corpus, **options)[0], tmp_path)  # type: ignore[arg-type]
     assert content(train(corpus, **options, run=Run(work=work))[0], tmp_path) == expected  # type: ignore[arg-type]
-
-
-@pytest.mark.long
-def test_a_damaged_checkpoint_is_not_used(corpus, whole, work, tmp_path):
-    assert content(run(corpus, work), tmp_path) == whole
-    for name in ("phones", "labels-0"):
-        path = work / f"{name}.checkpoint"
-        path.write_bytes(path.read_bytes()[:-500])
-    assert content(run(corpus, work), tmp_path) == whole
 
 
 @pytest.mark.long
@@ -199,16 +160,23 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path):
     engine, job = engine_named("trajectory", {}), (CONFIG, Lexicon())
 
     def digests() -> list[str]:
-        return [fingerprint_training(corpus, ["toy00"], engine, *job, visual, None) for visual in (GEOMETRY, BOTH)]
+        return [
+            labels.fingerprint_training(corpus, ["toy00"], engine, *job, visual, None)
+            for visual in ("geometry", "both")
+        ]
 
     corpus.add(utterance)
     plain, pictured = digests()
     assert plain != pictured
     others = [
-        fingerprint_training(corpus, [], engine, *job, GEOMETRY, None),
-        fingerprint_training(corpus, ["toy00"], engine_named("trajectory", {"states": 3}), *job, GEOMETRY, None),
-        fingerprint_training(corpus, ["toy00"], engine, replace(CONFIG, relevance=3.0), Lexicon(), GEOMETRY, None),
-        fingerprint_training(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), GEOMETRY, None),
+        labels.fingerprint_training(corpus, [], engine, *job, "geometry", None),
+        labels.fingerprint_training(
+            corpus, ["toy00"], engine_named("trajectory", {"states": 3}), *job, "geometry", None
+        ),
+        labels.fingerprint_training(
+            corpus, ["toy00"], engine, replace(CONFIG, relevance=3.0), Lexicon(), "geometry", None
+        ),
+        labels.fingerprint_training(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), "geometry", None),
     ]
     assert len({plain, *others}) == 5
     crops = np.array(utterance.track.crops)
@@ -218,3 +186,182 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path):
     assert digests()[1] != pictured
     corpus.add(replace(utterance, words=("papa",)))
     assert digests()[0] != plain
+
+
+VOICES = [SyntheticVoice("low", "flite", "anna"), SyntheticVoice("high", "flite", "bert")]
+TEXTS = ["Blue baby.", "Five tea."]
+Sayings = Iterator[tuple[Audio, Timeline[Unit]]]
+
+
+@pytest.fixture
+def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every voice speaks as the formant synthesiser does, without any pause."""
+
+    def say(texts: list[str], voice: SyntheticVoice, _: Lexicon | None) -> Sayings:
+        for text in texts:
+            if text == "Bee":
+                yield synthesise([("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)])
+                continue
+            phones = [phone for word in split_words(text) for phone in Lexicon().pronunciations(word)[0]]
+            yield synthesise([(phone, 0.12) for phone in phones], pitch_hz=100 if voice.name == "low" else 200)
+
+    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.speak_sentences", say)
+
+
+@pytest.mark.usefixtures("spoken")
+def test_every_text_in_every_voice():
+    sentences = list(synthesise_sentences(TEXTS, VOICES))
+    assert [sentence.name for sentence in sentences] == [
+        "flite-low-001", "flite-low-002", "flite-high-001", "flite-high-002",
+    ]  # fmt: skip
+    assert [sentence.speaker for sentence in sentences] == ["anna", "anna", "bert", "bert"]
+    assert [s.name for s in synthesise_sentences(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
+
+
+@pytest.mark.usefixtures("spoken")
+def test_sentences_stand_between_pauses_over_a_faint_noise():
+    for sentence in synthesise_sentences(TEXTS, VOICES):
+        first, last = sentence.phones[0], sentence.phones[-1]
+        assert first.label == last.label == Unit("sil")
+        assert (first.start_s, first.end_s) == (0, 0.25)
+        assert last.end_s == pytest.approx(sentence.audio.duration_s)
+        assert last.duration_s == pytest.approx(0.25)
+        assert all(a.end_s == b.start_s for a, b in pairwise(sentence.phones))
+        loud = sentence.audio.samples[spoken_samples(sentence.audio)].std()
+        for part in (sentence.audio.samples[:4000], sentence.audio.samples[-4000:]):
+            assert 20 * np.log10(loud / part.std()) == pytest.approx(50, abs=0.6)
+
+
+@pytest.mark.usefixtures("spoken")
+def test_pauses_of_the_synthesiser_become_longer():
+    (sentence,) = synthesise_sentences(["Bee"], VOICES[:1])
+    assert [span.label.phone for span in sentence.phones] == ["sil", "b", "iy", "sil"]
+    assert [span.start_s for span in sentence.phones] == pytest.approx([0, 0.35, 0.45, 0.65])
+    assert sentence.phones[-1].end_s == pytest.approx(1.1)
+
+
+@pytest.mark.usefixtures("spoken")
+def test_the_same_again():
+    for one, other in zip(synthesise_sentences(TEXTS, VOICES), synthesise_sentences(TEXTS, VOICES), strict=True):
+        assert np.array_equal(one.audio.samples, other.audio.samples)
+        assert one.phones == other.phones
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("spoken")
+def test_texts_by_default_say_every_phone_of_the_dictionary():
+    sentences = list(synthesise_sentences(voices=VOICES[:1]))
+    said = {span.label.phone for sentence in sentences for span in sentence.phones}
+    assert len(sentences) == 60
+    assert {"er", "hh", "ng", "oy", "sh", "uh", "zh"} <= said
+    assert len(said) == 43  # 42 of the dictionary, and silence
+
+
+def test_without_voices_it_says_what_to_install():
+    with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
+        next(synthesise_sentences(TEXTS, ()))
+
+
+def test_sides_never_change():
+    named = {"slt": True, "espeak-f2": True, "espeak-m7": True, "kal": False, "awb": False, "rms": False}
+    assert {speaker: is_held_out_speaker(speaker) for speaker in named} == named
+
+
+def test_a_quarter_is_kept_aside():
+    assert np.mean([is_held_out_speaker(f"speaker {number}") for number in range(2000)]) == pytest.approx(
+        0.25, abs=0.03
+    )
+
+
+def write(path: Path, audio: Audio, text: str | None = None) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_sound(path, audio)
+    if text is not None:
+        path.with_suffix(".txt").write_text(text, encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def own(toy_model: Model) -> Any:
+    return recogniser_of(toy_model)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two recordings that can be used, and four that cannot."""
+    first, second, third = toy_sentences(3)
+    write(tmp_path / "anna" / "one.wav", first.audio, " ".join(first.words))
+    write(tmp_path / "two.wav", second.audio, " ".join(second.words).upper())
+    write(tmp_path / "unsaid.wav", third.audio)
+    write(tmp_path / "too long.wav", Audio(third.audio.samples[:6000], 16_000), " ".join(third.words * 4))
+    write(tmp_path / "unsayable.wav", third.audio, "猫")
+    (tmp_path / "broken.wav").write_bytes(b"RIFF nothing")
+    (tmp_path / "broken.txt").write_text("blue", encoding="utf-8")
+    return tmp_path
+
+
+def test_recordings_are_aligned(folder, own):
+    items: list[Item] = []
+    sentences = list(align_recordings(folder, own, monitor=items.append))  # type: ignore[arg-type]
+    assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "anna"), ("two", "two")]
+    for sentence, toy in zip(sentences, toy_sentences(3), strict=False):
+        assert [span.label for span in sentence.phones] == [span.label for span in toy.units]
+        late_s = [a.start_s - b.start_s for a, b in zip(sentence.phones, toy.units, strict=True)]
+        assert np.median(np.abs(late_s)) < 0.04  # the toy model is a crude one
+    assert sorted((item.name, item.outcome) for item in items) == [
+        ("broken", "skipped"),
+        ("too long", "skipped"),
+        ("unsayable", "skipped"),
+    ]
+
+
+def test_librispeech_is_read_as_it_is_distributed(tmp_path, own):
+    chapter = tmp_path / "LibriSpeech" / "dev-clean" / "84" / "121123"
+    sentences = toy_sentences(3)
+    for number, sentence in enumerate(sentences):
+        write(chapter / f"84-121123-{number:04d}.flac", sentence.audio)
+    lines = [f"84-121123-{number:04d} {' '.join(s.words).upper()}\n" for number, s in enumerate(sentences[:2])]
+    (chapter / "84-121123.trans.txt").write_text("".join(lines))
+    items: list[Item] = []
+    for folder in (tmp_path, chapter.parent):
+        spoken = list(align_recordings(folder, own, monitor=items.append))  # type: ignore[arg-type]
+        assert [each.speaker for each in spoken] == ["84", "84"]
+        for each, sentence in zip(spoken, sentences, strict=False):
+            assert [span.label for span in each.phones] == [span.label for span in sentence.units]
+    assert {item.reason for item in items} == {
+        f"{chapter / '84-121123.trans.txt'}: has no line of 84-121123-0002; required this name, a blank and its words"
+    }
+
+
+def test_labelled_phones_are_used_as_they_are(tmp_path, own):
+    sentence, *_ = toy_sentences(3)
+    write(tmp_path / "one.wav", sentence.audio)
+    write_labels(tmp_path / "one.TextGrid", sentence.units)
+    (spoken,) = align_recordings(tmp_path, own)
+    assert [span.start_s for span in spoken.phones] == pytest.approx([span.start_s for span in sentence.units])
+
+
+def test_a_transcript_of_other_words_is_detected(folder, own):
+    (folder / "two.txt").write_text("squash six fish chefs")
+    items: list[Item] = []
+    (sentence,) = align_recordings(folder, own, monitor=items.append)  # type: ignore[arg-type]
+    assert sentence.name == "anna-one"
+    (reason,) = (item.reason for item in items if item.name == "two")
+    assert re.search(r"agree with the sound at -\d+\.\d, required -4\.2 or more", reason)
+
+
+@pytest.mark.parametrize("name", ["nothing", ""])
+def test_a_folder_without_transcripts(tmp_path, own, toy_sentence, name):
+    write(tmp_path / "unsaid.wav", toy_sentence.audio)
+    with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
+        next(align_recordings(tmp_path / name, own))
+
+
+@pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
+def test_real_voices():
+    voices = installed_voices()[-1:]
+    if not voices:
+        pytest.skip("the synthesisers have no voices")
+    (sentence,) = synthesise_sentences(["My baby may be home."], voices)
+    closed = [span.label.phone for span in sentence.phones if span.label.phone in ("m", "b")]
+    assert closed == list("mbbmbm")
+    assert sentence.phones[0].duration_s >= 0.25

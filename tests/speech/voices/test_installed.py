@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, errors
-from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.acoustic_conditions import noisy_audio
-from lipmotion.speech.voices import espeak_events, installed, synthesiser
+from lipmotion.speech.voices import installed, synthesiser
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
+from pipeline.made import features_of, recogniser_of
 
 FAKED = [
     synthesiser.SyntheticVoice("kal16", "flite", "kal"),
@@ -150,12 +149,6 @@ def test_flite_begins_again_at_each_utterance() -> None:
     assert found == [("pau", 0, 0.2), ("ay", 0.2, 0.5), ("pau", 0.5, 0.6), ("y", 0.6, 0.8)]
 
 
-def test_without_the_library_the_program_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(espeak_events, "LIBRARIES", ("libnothing.so.0",))
-    with pytest.raises(SystemExit, match=r"libnothing.so.0 is installed; apt install libespeak-ng1"):
-        espeak_events._library("")
-
-
 @pytest.fixture(params=sorted(installed.SYNTHESISERS))
 def real(request: pytest.FixtureRequest) -> synthesiser.SyntheticVoice:
     """The last voice of each synthesiser that is installed."""
@@ -187,10 +180,10 @@ def test_real_voices_say_what_the_dictionary_says(real: synthesiser.SyntheticVoi
 
 @pytest.mark.long
 def test_the_times_of_real_voices_are_those_of_the_aligner(real: synthesiser.SyntheticVoice, toy_model: Model) -> None:
-    recogniser, late_s = Recogniser(toy_model.phones, "general"), []
+    recogniser, late_s = recogniser_of(toy_model, "general"), []
     for audio, units in installed.speak_sentences(TEXTS, real):
         room = noisy_audio(audio, "white", 50)
-        placed = recogniser.align_phones(room, analysed(room).mfcc(), units)
+        placed = recogniser.align_phones(room, features_of(room), units)
         said, aligned = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
         late_s += [a.start_s - b.start_s for a, b in zip(said, aligned, strict=True)]
     assert np.median(np.abs(late_s)) < 0.02  # two frames; flite 0.013, festival with kal 0.015

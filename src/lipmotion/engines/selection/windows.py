@@ -15,7 +15,7 @@ from lipmotion.units.phones import VISEME_OF, VISEMES
 from lipmotion.units.stress import NUCLEI, find_stress
 
 PROTECTED_PHONES = ("f", "v", "m", "em", "p", "b")
-"""Phones whose lip shape every join must preserve. The print names /v/ twice and /b/ never."""
+"""Phones whose lip shape every join must preserve. The paper lists /v/ twice and /b/ never."""
 PROTECTED, INVISIBLE, NORMAL = "protected", "invisible", "normal"
 
 Overlaps = Mapping[tuple[str, str], float]
@@ -36,7 +36,7 @@ TABLE_1: Overlaps = {
 SYMMETRIC: Overlaps = {**TABLE_1, (NORMAL, INVISIBLE): 0.73}
 """Table 1 with the one entry changed that makes it symmetric: 73/27 opposite to 27/73."""
 ANTICIPATORY: Overlaps = {(before, after): 1 - TABLE_1[after, before] for before, after in TABLE_1}
-"""Table 1 with its rows for the phone after: the abstract calls the influence of the following segment forward."""
+"""Table 1 with its rows read as the phone after: the abstract calls the influence of the following segment forward."""
 MIDDLE: Overlaps = dict.fromkeys(TABLE_1, 0.5)
 LEARNED: Overlaps = {**MIDDLE, (NORMAL, PROTECTED): 0.1}
 """The shares with the least errors of joined motion on the training list of GRID s1 (docs/results/selection.md)."""

@@ -1,4 +1,4 @@
-"""A character that motion moves: a mesh with blendshapes, or with control points, from its files to its vertices."""
+"""A user's own character that motion moves: a mesh with blendshapes or control points, from weights to vertices."""
 
 from __future__ import annotations
 
@@ -39,8 +39,7 @@ def _solve_with_table(
     rows   : of a table, one a blendshape; the source is the name of the solved shape (``FaceShapes.names``)
     parted : how far each blendshape parts the lips at weight 1, eye distances [shape=(R,)]
     Where the lips touch in solved weights they touch with these gains, too; elsewhere they are as far apart as the
-    gains make them. What the offsets do to the lips, they do in every frame. Weights that the motion has for
-    blendshapes by the mesh's names are such weights already, and stay.
+    gains make them. Offsets act in every frame. If the motion already has weights by the mesh's names, they stay.
     """
     parting = np.zeros(len(shapes.names))
     for row, parts in zip(rows, parted.tolist(), strict=True):
@@ -69,23 +68,23 @@ def _solve_with_table(
     return replace(moved, channels=tuple(Channel(name, WEIGHT) for name in moved.names))
 
 
-def plain_row(control: str, source: str) -> RigRow:
+def make_plain_row(control: str, source: str) -> RigRow:
     """Return the row of a blendshape that follows a curve as it is."""
     return RigRow(control, source, low=0.0, high=1.0)
 
 
 def list_rows(mesh: Mesh, shapes: FaceShapes | None, others: Mapping[str, str]) -> Iterator[RigRow]:
-    """Yield rows of a table that change nothing: every blendshape of a mesh, with its curve; an empty source: none."""
+    """Yield a row that changes nothing for every blendshape of a mesh: its curve, or an empty source."""
     for shape in mesh.shapes:
         solved = None if shapes is None else _find_solved_name(shape, shapes)
         source = others.get(shape.name, "")
         if solved is not None and shapes is not None:
             source = shapes.known[shapes.names.index(solved)].removeprefix("vowel_") or shape.name
-        yield plain_row(shape.name, source)
+        yield make_plain_row(shape.name, source)
 
 
 def _find_solved_name(shape: Blendshape, shapes: FaceShapes) -> str | None:
-    """Return the name of the solved shape that a blendshape is, or is one of; None: it is none of the mouth."""
+    """Return the name of the solved shape that a blendshape belongs to; None: it is not of the mouth."""
     if shape.name in shapes.names:
         return shape.name
     known = {arkit_name(shape.called), spoken_name(shape.called)} - {None} if shape.source else set()
@@ -157,13 +156,13 @@ class DrivenCharacter:
         return list(map(DrivenPose, rows, other_rows))
 
     def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
-        """Return weights of expressions for moods [each shape=(T,)], none parting p, b, m; None: there is none."""
+        """Return weights of VRM's expressions for moods, by the mesh's names [each shape=(T,)]; none parts p b m."""
         moods = expression_weights(read_moods(motion)) if self._expressions else {}
         upper, lower = (self.placement.vertices[self.placement.row(point)] for point in (UPPER_MIDDLE, LOWER_MIDDLE))
         curves = {}
         for name, shape in self._expressions.items():
             if name in moods:
-                curve = self.table.get(shape, plain_row(shape, name)).alone(moods[name])
+                curve = self.table.get(shape, make_plain_row(shape, name)).alone(moods[name])
                 moved = self.placement.to_motion(self.mesh.displacements(np.array([upper, lower]), (shape,)))[0]
                 curves[shape] = curve * mouth.free if moved[0, 1] - moved[1, 1] > LEAST_GAP / 2 else curve
         return curves
@@ -198,7 +197,7 @@ class DrivenCharacter:
 
     @cached_property
     def moving(self) -> NDArray[np.int64]:
-        """The vertices that ever move, but for the turning of the head, ascending [shape=(N,)]."""
+        """Numbers of the vertices that ever move, other than with the head, ascending [shape=(N,)]."""
         names = {*self._mouth_names, *self._other_names}
         rows = [shape.rows for shape in self.mesh.shapes if shape.name in names]
         if self.binding is not None:
@@ -206,7 +205,7 @@ class DrivenCharacter:
         return np.unique(np.concatenate(rows)) if rows else np.zeros(0, np.int64)
 
     def has_shape(self, known: str) -> bool:
-        """Return whether the mesh has a blendshape that moves something, by its name of ARKit."""
+        """Return whether the mesh has a blendshape of this ARKit name that moves something."""
         others = (row.source for row in self._other_rows)
         return known in others or (self.shapes is not None and known in self.shapes.known)
 
@@ -218,7 +217,7 @@ class DrivenCharacter:
         return {row.control: row.alone(others.get(row.source, nothing)) for row in self._other_rows}
 
     def table_rows(self) -> tuple[RigRow, ...]:
-        """Return the table of the character: the rows that it has, and for other blendshapes what moves them now."""
+        """Return a full table of the character: its own rows, and for other blendshapes what moves them without one."""
         known = {shape.name: shape.called.lower() for shape in self.mesh.shapes}
         others = {name: called for name, called in known.items() if called in VRM_EMOTIONS}
         others |= {row.control: row.source for row in self._other_rows}
@@ -238,7 +237,7 @@ class DrivenCharacter:
         for number, shape in enumerate(self.mesh.shapes):
             solved = _find_solved_name(shape, self.shapes) if self.shapes else None
             if solved is not None:
-                rows.append(replace(self.table.get(shape.name, plain_row(shape.name, shape.name)), source=solved))
+                rows.append(replace(self.table.get(shape.name, make_plain_row(shape.name, shape.name)), source=solved))
                 numbers.append(number)
         return tuple(rows), parted[numbers]
 
@@ -254,7 +253,7 @@ class DrivenCharacter:
         numbers = numbers_by_name(self.mesh, arkit_name)
         pairs = [(known, self.mesh.shapes[number]) for known in ARKIT_OTHERS for number in numbers.get(known, ())]
         return tuple(
-            replace(self.table.get(shape.name, plain_row(shape.name, known)), source=known)
+            replace(self.table.get(shape.name, make_plain_row(shape.name, known)), source=known)
             for known, shape in pairs
             if len(shape.rows)
         )

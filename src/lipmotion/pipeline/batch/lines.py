@@ -24,13 +24,13 @@ FILE_COLUMNS = ("file", "path", "recording", "audio", "wav")
 COLUMNS = ("transcript", "output", "speaker")
 """Names of the other columns that are read."""
 OWN_FILES = ("batch.jsonl", "report.csv", "report.html", "marks.csv")
-"""Files of a batch itself beside the outputs of its lines."""
+"""Files of the batch itself, in the folder of its lines' outputs."""
 OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""
 LARGEST_LIST_BYTES, MAX_LINES = 1 << 27, 200_000
-"""Most bytes of a list, and most lines of a batch: the words of a very long game."""
+"""Maximum bytes of a list, and lines of a batch: the words of a very long game."""
 LONGEST_PART_BYTES = 255
-"""Most bytes of the name of a file or a folder, on the usual file systems."""
+"""Maximum bytes of the name of a file or a folder, on usual file systems."""
 MAX_NAMED_LINES = 3
 CONTROL = re.compile(r"[\x00-\x1f]")
 
@@ -138,7 +138,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
 
 
 def file_key(name: str) -> str:
-    """Return what two names share where neither case nor the form of accents counts."""
+    """Return a name without differences of case and of the form of accents: equal keys are one file on some systems."""
     return unicodedata.normalize("NFD", unicodedata.normalize("NFD", name).casefold())
 
 

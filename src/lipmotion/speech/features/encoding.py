@@ -104,14 +104,14 @@ def encode_window(log_mel: Array, encoder: Encoder) -> Array:
         x = _gelu(np.concatenate(columns, axis=1) @ kernel + bias)
     x += _positions(x.shape[1])
     for layer in encoder.layers:
-        queries, keys, values = np.split(_standardised(x) @ layer.attend + layer.attend_bias, 3, axis=1)
+        queries, keys, values = np.split(_standardise(x) @ layer.attend + layer.attend_bias, 3, axis=1)
         q, k, v = (part.reshape(len(x), HEADS, -1).swapaxes(0, 1) for part in (queries, keys, values))
         scores = q @ k.swapaxes(1, 2)
         scores = np.exp(scores - scores.max(axis=2, keepdims=True))
         attended = (scores / scores.sum(axis=2, keepdims=True)) @ v
         x += attended.swapaxes(0, 1).reshape(x.shape) @ layer.join + layer.join_bias
-        x += _gelu(_standardised(x) @ layer.widen + layer.widen_bias) @ layer.narrow + layer.narrow_bias
-    components: Array = _standardised(x) @ encoder.basis + encoder.shift
+        x += _gelu(_standardise(x) @ layer.widen + layer.widen_bias) @ layer.narrow + layer.narrow_bias
+    components: Array = _standardise(x) @ encoder.basis + encoder.shift
     return components
 
 
@@ -121,7 +121,7 @@ def _gelu(x: Array) -> Array:
     return result
 
 
-def _standardised(x: Array) -> Array:
+def _standardise(x: Array) -> Array:
     """Return rows with mean 0 and variance 1; the gains of layer normalisation are in the weights that follow."""
     centred = x - x.mean(axis=1, keepdims=True)
     result: Array = centred / np.sqrt(np.square(centred).mean(axis=1, keepdims=True) + np.float32(1e-5))

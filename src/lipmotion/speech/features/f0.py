@@ -114,10 +114,10 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
         weighted.argmax(axis=1, out=peak)
         np.greater(weighted[rows, peak], 0, out=exists)
         weighted[rows, peak] = 0
-    return _refined(correlation, peaks + 1, is_peak)
+    return _refine(correlation, peaks + 1, is_peak)
 
 
-def _refined(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _refine(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Return log F0 and cost at the tops of parabolas through three correlations [shapes=(CANDIDATES, n)]."""
     rows = np.arange(len(correlation))
     left, top, right = (correlation[rows, peaks + side] for side in (-1, 0, 1))
@@ -146,7 +146,7 @@ def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
 
 def _frication(samples: Floats, block: slice) -> Floats:
     """Return the power to add for the frequencies above the low-passed signal, around every frame [shape=(n,)]."""
-    slope = np.diff(_reflected(samples, (block.start - 1) * HOP - 1, block.stop * HOP))
+    slope = np.diff(_reflect(samples, (block.start - 1) * HOP - 1, block.stop * HOP))
     np.square(slope, out=slope)
     power = slope.reshape(-1, HOP).mean(axis=1)
     return np.float32(FRICATION_SHARE / 2) * (power[1:] + power[:-1])
@@ -166,7 +166,7 @@ def _low_passed(samples: Floats, first: int, hops: int) -> Floats:
     """Return ``hops`` · 10 ms at 4 kHz, the first sample centred ``_TAPS // 2`` after sample ``first``."""
     low_pass = _tables().low_pass
     parts = low_pass.shape[1] // _HOP
-    padded = _reflected(samples, first, first + (hops + parts - 1) * HOP)
+    padded = _reflect(samples, first, first + (hops + parts - 1) * HOP)
     products = padded.reshape(-1, HOP) @ low_pass  # what every 10 ms add to the same 10 ms and to those before
     low = products[:hops, :_HOP].copy()
     for part in range(1, parts):
@@ -174,7 +174,7 @@ def _low_passed(samples: Floats, first: int, hops: int) -> Floats:
     return low.reshape(-1)
 
 
-def _reflected(samples: Floats, first: int, end: int) -> Floats:
+def _reflect(samples: Floats, first: int, end: int) -> Floats:
     """Return samples ``first``..``end`` - 1 of the signal, reflected at both ends as often as needed."""
     count = len(samples)
     if first >= 0 and end <= count:

@@ -194,7 +194,7 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     for first, sound in analysed(audio).between_silences:
         at_s = first / FRAME_RATE_HZ
         said = units.between(at_s, at_s + sound.duration_s)
-        level_db = _smoothed(analysed(sound).log_energy.astype(np.float64) * DB)
+        level_db = _smooth(analysed(sound).log_energy.astype(np.float64) * DB)
         pitch = log_f0(sound).astype(np.float64) * 12 / np.log(2)  # semitones
         voiced = np.isfinite(pitch)
         laughs = tuple(_laughs(sound, level_db, voiced, said))
@@ -338,7 +338,7 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
         for least, most in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
         for inside in [(centres >= least) & (centres < most)]
     )
-    level = _smoothed(DB * np.log(bright))
+    level = _smooth(DB * np.log(bright))
     reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
     windows = sliding_window_view(np.pad(level, reach, "edge"), 2 * reach + 1)
     rank = int(QUIET_SHARE * windows.shape[1])
@@ -367,7 +367,7 @@ def _frames(start_s: float, end_s: float) -> slice:
     return slice(round(start_s * FRAME_RATE_HZ), round(end_s * FRAME_RATE_HZ))
 
 
-def _smoothed(curve: Curve) -> Curve:
+def _smooth(curve: Curve) -> Curve:
     reach = round(4 * SMOOTHING_FRAMES)
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTHING_FRAMES) ** 2)
     return np.convolve(np.pad(curve, reach, "edge"), window / window.sum(), "valid")

@@ -1,4 +1,4 @@
-"""Times of a transcript as anchors of its alignment: the frames that each word may have."""
+"""Times of a transcript, as of subtitles, bound its alignment: the frames in which each word may lie."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from lipmotion.types import FRAME_RATE_HZ, TimedTranscript
 
 LOG = logging.getLogger("lipmotion")
 LINE_TOLERANCE_S, WORD_TOLERANCE_S = 0.5, 0.25
-"""By how much lines and words may be earlier or later than their times say, at first."""
-WIDENING_FACTORS, LEAST_IMPROVEMENT = (2, 4, 8, 16), 0.2
-"""Where words press against their windows or fit badly, the tolerance becomes so many times as wide, step by step, and
-stays so if the words then fit better, in nats a frame."""
+"""By how much lines and words may be earlier or later than their times, at first."""
+WIDENING_FACTORS, MIN_IMPROVEMENT = (2, 4, 8, 16), 0.2
+"""Where words press against their windows or fit badly, the tolerance is widened by these factors in turn; it stays
+wider where the words then fit better by this many nats a frame."""
 BAD_FIT, WORST_FIT = -3.5, -6.0
 """Words that fit worse than the first, in nats a frame, may be elsewhere; worse than the second, they are not there."""
 FREE_FRAMES = 60_000
-"""A recording of up to so many frames, ten minutes, is aligned without times where these are of something else."""
+"""Recordings of up to ten minutes are aligned without times where these belong to something else."""
 NEIGHBOURS = 3
-"""So many words on each side of one without room, and all that share its time, get a wider window, too."""
-MOST_SHIFT_S, MIN_CORRELATION, LEAST_GAIN, FEWEST_TIMES = 120.0, 0.3, 0.15, 20
-"""A shift of all times, of so many or more, is searched up to the first, and corrected from these correlations on."""
-MOST_WIDENINGS = 40
-"""Windows without room are doubled so many times; then they are opened altogether."""
+"""Words on each side of one without room whose windows are widened too, with all that share its time."""
+MAX_SHIFT_S, MIN_CORRELATION, MIN_GAIN, MIN_TIMES = 120.0, 0.3, 0.15, 20
+"""A common shift of all times: the largest that is searched; the correlation, and its gain over no shift, from which it
+is corrected; and the times that are needed to tell."""
+MAX_WIDENINGS = 40
+"""Doublings of windows without room; then every word may lie anywhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +62,13 @@ def anchors_of(transcript: TimedTranscript) -> Anchors:
             last = place == len(line.words) - 1
             end_s = line.end_s if word.end_s is None and (not own or last) else word.end_s
             tolerance_s = WORD_TOLERANCE_S if timed else LINE_TOLERANCE_S
-            rows.append((_number(start_s), _number(end_s), tolerance_s))
+            rows.append((_none_to_nan(start_s), _none_to_nan(end_s), tolerance_s))
     table = np.array(rows, float).reshape(-1, 3)
     differs = ~np.isclose(table[1:, :2], table[:-1, :2], equal_nan=True).all(axis=1)
     return Anchors(table[:, 0], table[:, 1], table[:, 2], np.append(0, np.cumsum(differs)))
 
 
-def _number(time_s: float | None) -> float:
+def _none_to_nan(time_s: float | None) -> float:
     return np.nan if time_s is None else time_s
 
 
@@ -79,15 +80,15 @@ def fitted(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: flo
     loud       : which frames are loud [shape=(T,)]
     Raises InputError: all lines begin after the end.
     """
-    late_s = lateness_s(transcript, loud)
+    late_s = measure_lateness(transcript, loud)
     if late_s:
         which = "late" if late_s > 0 else "early"
         LOG.warning("the times of the transcript are %.1f s %s; corrected", abs(late_s), which)
         transcript = transcript.shifted(-late_s)
-    return _within(transcript, duration_s)
+    return _drop_late_lines(transcript, duration_s)
 
 
-def _within(transcript: TimedTranscript, duration_s: float) -> TimedTranscript:
+def _drop_late_lines(transcript: TimedTranscript, duration_s: float) -> TimedTranscript:
     """Return the lines of a transcript that begin within a recording. Raises InputError: none does."""
     latest_s = duration_s + LINE_TOLERANCE_S
     lines = [line for line in transcript.lines if line.start_s is None or line.start_s <= latest_s]
@@ -106,21 +107,21 @@ def _within(transcript: TimedTranscript, duration_s: float) -> TimedTranscript:
     return TimedTranscript(tuple(lines))
 
 
-def lateness_s(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
-    """Return by how much all times of a transcript are late, as those of subtitles for another cut; 0: not by much.
+def measure_lateness(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
+    """Return by how many seconds all times of a transcript are late, as of subtitles for another cut; 0: unclear.
 
     loud : which frames are loud [shape=(T,)]
-    It is the shift at which the spans of the times and the loud frames correlate best, up to ``MOST_SHIFT_S``, if it is
-    larger than the tolerance of lines, and the correlation at least ``MIN_CORRELATION``, and by ``LEAST_GAIN`` better
+    It is the shift at which the spans of the times and the loud frames correlate best, up to ``MAX_SHIFT_S``, if it is
+    larger than the tolerance of lines, and the correlation at least ``MIN_CORRELATION``, and by ``MIN_GAIN`` better
     than without a shift.
     """
     anchors = anchors_of(transcript)
     known = ~np.isnan(anchors.start_s) & ~np.isnan(anchors.end_s)
-    most = min(round(MOST_SHIFT_S * FRAME_RATE_HZ), len(loud) // 4)
-    if len(np.unique(anchors.groups[known])) < FEWEST_TIMES or most == 0:
+    max_shift = min(round(MAX_SHIFT_S * FRAME_RATE_HZ), len(loud) // 4)
+    if len(np.unique(anchors.groups[known])) < MIN_TIMES or max_shift == 0:
         return 0.0
-    spoken = np.zeros(len(loud) + 2 * most)
-    edges = np.round(np.stack([anchors.start_s, anchors.end_s])[:, known] * FRAME_RATE_HZ) + most
+    spoken = np.zeros(len(loud) + 2 * max_shift)
+    edges = np.round(np.stack([anchors.start_s, anchors.end_s])[:, known] * FRAME_RATE_HZ) + max_shift
     for first, end in np.unique(np.clip(edges, 0, len(spoken)).astype(np.intp), axis=1).T:
         spoken[first:end] = 1
     loudness = loud.astype(float)
@@ -134,47 +135,47 @@ def lateness_s(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
     product = product[: len(mean)]
     correlation = np.divide(product, scale, out=np.zeros_like(product), where=scale > 1e-6)
     best = int(correlation.argmax())
-    late_s = (best - most) / FRAME_RATE_HZ
-    gain = correlation[best] - max(correlation[most], 0.0)
-    is_sure = correlation[best] >= MIN_CORRELATION and gain >= LEAST_GAIN
+    late_s = (best - max_shift) / FRAME_RATE_HZ
+    gain = correlation[best] - max(correlation[max_shift], 0.0)
+    is_sure = correlation[best] >= MIN_CORRELATION and gain >= MIN_GAIN
     return late_s if is_sure and abs(late_s) > LINE_TOLERANCE_S else 0.0
 
 
-def windows_of(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int) -> Windows:
-    """Return the frames that each word may have.
+def make_windows(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int) -> Windows:
+    """Return the frames in which each word may lie.
 
     A word without a time has those between the words with times around it. No word may begin before those ahead of it
-    may, nor end after those behind it may; where times are out of order that leaves no room (``feasible_windows``).
+    may, nor end after those behind it may; out of order, times leave no room (``feasible_windows``).
     """
     first = np.floor((anchors.start_s - tolerance_s) * FRAME_RATE_HZ)
     end = np.ceil((anchors.end_s + tolerance_s) * FRAME_RATE_HZ) + 1
-    first, end = _filled(first, 0.0), _filled(end[::-1], float(frames))[::-1]
+    first, end = _carry_forward(first, 0.0), _carry_forward(end[::-1], float(frames))[::-1]
     first, end = np.maximum.accumulate(first), np.minimum.accumulate(end[::-1])[::-1]
     return Windows(np.clip(first, 0, frames).astype(np.intp), np.clip(end, 0, frames).astype(np.intp))
 
 
-def _filled(values: NDArray[np.float64], before: float) -> NDArray[np.float64]:
-    """Return values with the last known one in place of those that are not known; ``before`` those, a given one."""
+def _carry_forward(values: NDArray[np.float64], before: float) -> NDArray[np.float64]:
+    """Return values with unknown ones replaced by the last known one before; ``before`` where there is none."""
     known = np.append(True, ~np.isnan(values))
     latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
     return np.append(before, values)[latest][1:]
 
 
 def feasible_windows(
-    anchors: Anchors, tolerance_s: NDArray[np.float64], least: NDArray[np.intp], edge: int, frames: int
+    anchors: Anchors, tolerance_s: NDArray[np.float64], min_frames: NDArray[np.intp], edge: int, frames: int
 ) -> tuple[Windows, NDArray[np.float64]]:
     """Return windows in which all words have room, and the tolerances, doubled around words that had none.
 
-    least : the fewest frames of each word
+    min_frames : the fewest frames of each word
     edge  : the fewest frames of the silence at both ends
-    If there is no room after ``MOST_WIDENINGS``, the windows are the whole recording.
+    If there is no room after ``MAX_WIDENINGS``, the windows are the whole recording.
     """
-    for _ in range(MOST_WIDENINGS):
-        windows = windows_of(anchors, tolerance_s, frames)
-        crowded = np.zeros(len(least), bool)
+    for _ in range(MAX_WIDENINGS):
+        windows = make_windows(anchors, tolerance_s, frames)
+        crowded = np.zeros(len(min_frames), bool)
         earliest = edge
         ends = np.minimum(windows.end, frames - edge).tolist()
-        for word, (first, end, count) in enumerate(zip(windows.first.tolist(), ends, least.tolist(), strict=True)):
+        for word, (first, end, count) in enumerate(zip(windows.first.tolist(), ends, min_frames.tolist(), strict=True)):
             begin = max(first, earliest)
             crowded[word] = begin + count > end
             earliest = min(begin + count, max(end, first))  # the words after it are judged as if it had room
@@ -185,11 +186,11 @@ def feasible_windows(
         )
         near = near | np.isin(anchors.groups, anchors.groups[crowded])
         tolerance_s = np.where(near, 2 * tolerance_s, tolerance_s)
-    tolerance_s = np.full(len(least), np.inf)
-    return windows_of(anchors, tolerance_s, frames), tolerance_s
+    tolerance_s = np.full(len(min_frames), np.inf)
+    return make_windows(anchors, tolerance_s, frames), tolerance_s
 
 
-def pressed_words(placed: Sequence[PlacedWord], windows: Windows, frames: int) -> NDArray[np.bool_]:
+def find_pressed_words(placed: Sequence[PlacedWord], windows: Windows, frames: int) -> NDArray[np.bool_]:
     """Return which words begin with their window, or end with it: they might belong outside [shape=(W,)]."""
     pressed = np.zeros(len(windows.first), bool)
     ends = [item.start for item in placed[1:]] + [frames]
@@ -201,7 +202,7 @@ def pressed_words(placed: Sequence[PlacedWord], windows: Windows, frames: int) -
     return pressed
 
 
-def group_fits(placed: Sequence[PlacedWord], groups: NDArray[np.intp], frames: int) -> NDArray[np.float64]:
+def average_fits(placed: Sequence[PlacedWord], groups: NDArray[np.intp], frames: int) -> NDArray[np.float64]:
     """Return the fit of the words of each time, the mean over their frames [shape=(groups,)]."""
     total, count = np.zeros(int(groups[-1]) + 1), np.zeros(int(groups[-1]) + 1)
     ends = [item.start for item in placed[1:]] + [frames]
@@ -215,43 +216,43 @@ def group_fits(placed: Sequence[PlacedWord], groups: NDArray[np.intp], frames: i
 
 def align_within(
     anchors: Anchors,
-    least: NDArray[np.intp],
+    min_frames: NDArray[np.intp],
     edge: int,
     frames: int,
     search: Callable[[Windows], list[PlacedWord]],
 ) -> tuple[list[PlacedWord], Windows]:
     """Return words aligned within their windows, and these.
 
-    least, edge : as of ``feasible_windows``
+    min_frames, edge : as of ``feasible_windows``
     search      : aligns within windows, with the fit of each word
     Where words press against their windows, or fit badly, these are widened step by step, and stay so if the words then
-    fit better by ``LEAST_IMPROVEMENT``: words also press where speech beside them is not in the transcript. If all fit
+    fit better by ``MIN_IMPROVEMENT``: words also press where speech beside them is not in the transcript. If all fit
     badly even so, the words of a recording of up to ``FREE_FRAMES`` are aligned without times; if they fit better then,
     the times are not used. What fits badly in the end is logged as a warning.
     """
-    placed, windows, tolerance_s = _placed(anchors, anchors.tolerance_s, least, edge, frames, search)
+    placed, windows, tolerance_s = _place_words(anchors, anchors.tolerance_s, min_frames, edge, frames, search)
     for factor in WIDENING_FACTORS:
-        fits = group_fits(placed, anchors.groups, frames)
+        fits = average_fits(placed, anchors.groups, frames)
         wider_s = np.maximum(factor * anchors.tolerance_s, tolerance_s)
         doubted = fits < BAD_FIT
-        doubted[anchors.groups[pressed_words(placed, windows, frames)]] = True
+        doubted[anchors.groups[find_pressed_words(placed, windows, frames)]] = True
         doubted &= np.isin(np.arange(len(fits)), anchors.groups[tolerance_s < wider_s])
         if not doubted.any():
             break
         wide_s = np.where(doubted[anchors.groups], wider_s, tolerance_s)
-        wide = _placed(anchors, wide_s, least, edge, frames, search)
-        gain = group_fits(wide[0], anchors.groups, frames) - fits
-        better = doubted & (np.maximum(gain, _beside(gain)) >= LEAST_IMPROVEMENT)
+        wide = _place_words(anchors, wide_s, min_frames, edge, frames, search)
+        gain = average_fits(wide[0], anchors.groups, frames) - fits
+        better = doubted & (np.maximum(gain, _average_neighbours(gain)) >= MIN_IMPROVEMENT)
         if (better == doubted).all():
             placed, windows, tolerance_s = wide
         elif better.any():
             kept_s = np.where(better[anchors.groups], wider_s, tolerance_s)
-            placed, windows, tolerance_s = _placed(anchors, kept_s, least, edge, frames, search)
-    free = _free(placed, anchors, frames, search)
+            placed, windows, tolerance_s = _place_words(anchors, kept_s, min_frames, edge, frames, search)
+    free = _align_freely(placed, anchors, frames, search)
     if free is not None:
         return free
-    last_fits = group_fits(placed, anchors.groups, frames)
-    wrong = np.flatnonzero(_beside(last_fits) < WORST_FIT)
+    last_fits = average_fits(placed, anchors.groups, frames)
+    wrong = np.flatnonzero(_average_neighbours(last_fits) < WORST_FIT)
     if len(wrong):
         known = anchors.start_s[(anchors.groups <= int(wrong[0])) & ~np.isnan(anchors.start_s)]
         LOG.warning(
@@ -261,36 +262,36 @@ def align_within(
     return placed, windows
 
 
-def _placed(
+def _place_words(
     anchors: Anchors,
     tolerance_s: NDArray[np.float64],
-    least: NDArray[np.intp],
+    min_frames: NDArray[np.intp],
     edge: int,
     frames: int,
     search: Callable[[Windows], list[PlacedWord]],
 ) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
     """Return words aligned within windows that have room, these windows, and their tolerances."""
-    windows, tolerance_s = feasible_windows(anchors, tolerance_s, least, edge, frames)
+    windows, tolerance_s = feasible_windows(anchors, tolerance_s, min_frames, edge, frames)
     return search(windows), windows, tolerance_s
 
 
-def _free(
+def _align_freely(
     placed: list[PlacedWord], anchors: Anchors, frames: int, search: Callable[[Windows], list[PlacedWord]]
 ) -> tuple[list[PlacedWord], Windows] | None:
-    """Return words aligned without times, if those that are aligned within them fit badly, and fit better so."""
+    """Return words aligned without times, where they fit badly within them and better without; None elsewhere."""
     everywhere = np.zeros(len(anchors.groups), np.intp)
-    fit = float(group_fits(placed, everywhere, frames)[0])
+    fit = float(average_fits(placed, everywhere, frames)[0])
     if fit >= BAD_FIT or frames > FREE_FRAMES:
         return None
     windows = Windows(everywhere, np.full(len(everywhere), frames, np.intp))
     free = search(windows)
-    if float(group_fits(free, everywhere, frames)[0]) < fit + LEAST_IMPROVEMENT:
+    if float(average_fits(free, everywhere, frames)[0]) < fit + MIN_IMPROVEMENT:
         return None
     LOG.warning("the times of the transcript do not fit the sound; they are not used")
     return free, windows
 
 
-def _beside(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _average_neighbours(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of each value and those beside it."""
     count = np.convolve(np.ones(len(values)), np.ones(3))[1:-1]
     return np.convolve(values, np.ones(3))[1:-1] / count

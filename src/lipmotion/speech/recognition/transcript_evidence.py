@@ -224,10 +224,10 @@ def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[flo
         entered[t] = before > phone[1:]
         phone[1:] = np.maximum(phone[1:], before) + spoken[t]
         blank = arrived + silent[t]
-    return _traced(arrivals, entered, ways, same, edges, anything - silent)
+    return _trace(arrivals, entered, ways, same, edges, anything - silent)
 
 
-def _traced(
+def _trace(
     arrivals: NDArray[np.int8],
     entered: NDArray[np.bool_],
     ways: NDArray[np.int8],

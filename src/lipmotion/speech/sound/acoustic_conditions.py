@@ -151,7 +151,7 @@ def condition_spectra(
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if rng.random() < WARP_PROBABILITY else 1.0
         tempo = float(np.exp(rng.uniform(-LARGEST_TEMPO, LARGEST_TEMPO))) if rng.random() < TEMPO_PROBABILITY else 1.0
         sped = audio  # played ``tempo`` times as fast: tempo, pitch and formants change together
-        if tempo != 1.0 and len(samples := _resampled(audio.samples, tempo)) >= WINDOW:
+        if tempo != 1.0 and len(samples := _resample(audio.samples, tempo)) >= WINDOW:
             sped = Audio(samples.astype(np.float32), audio.rate_hz)
         varied, distortion = in_condition(sped, voices, rng)
         result.append(ConditionSpectrum(spectrum(varied, warp).astype(np.float16), tempo, distortion))
@@ -184,11 +184,11 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
         noise = (
             _babble(voices, len(samples), rng)
             if voices and rng.random() < BABBLE_PROBABILITY
-            else _coloured(len(samples), rng)
+            else _colour(len(samples), rng)
         )
         samples, added = samples + noise * np.sqrt(level * share), added + share
     if rng.random() < FILTER_PROBABILITY:
-        samples = _filtered(samples, rng)
+        samples = _filter(samples, rng)
     if rng.random() < CLIPPING_PROBABILITY:
         limit = np.abs(samples).max() * rng.uniform(0.2, 0.7)
         samples = np.clip(samples, -limit, limit)
@@ -196,7 +196,7 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
     return Audio(samples.astype(np.float32), audio.rate_hz), float(np.clip(distortion, 0, 1))
 
 
-def _resampled(samples: NDArray[np.floating], factor: float) -> Samples:
+def _resample(samples: NDArray[np.floating], factor: float) -> Samples:
     count = max(int(len(samples) / factor), 1)
     return np.interp(np.arange(count) * factor, np.arange(len(samples)), samples)
 
@@ -205,7 +205,7 @@ def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Sa
     """Return voices at random speeds and levels, of power 1 in all [shape=(count,)]."""
     total = np.zeros(count)
     for _ in range(int(rng.integers(1, TALKERS + 1))):
-        voice = _resampled(voices[int(rng.integers(len(voices)))].samples, rng.uniform(0.75, 1.3))
+        voice = _resample(voices[int(rng.integers(len(voices)))].samples, rng.uniform(0.75, 1.3))
         level = np.sqrt(np.square(voice).mean()) + 1e-9
         total += (
             np.resize(np.roll(voice, -int(rng.integers(len(voice)))), count) / level * 10 ** (rng.normal(0, 3) / 20)
@@ -213,7 +213,7 @@ def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Sa
     return total / (total.std() + 1e-9)
 
 
-def _coloured(count: int, rng: np.random.Generator) -> Samples:
+def _colour(count: int, rng: np.random.Generator) -> Samples:
     """Return noise of a random colour, sometimes with hum, of power 1 [shape=(count,)]."""
     from scipy.fft import irfft, next_fast_len, rfft
 
@@ -229,7 +229,7 @@ def _coloured(count: int, rng: np.random.Generator) -> Samples:
     return noise / (noise.std() + 1e-12)
 
 
-def _filtered(samples: Samples, rng: np.random.Generator) -> Samples:
+def _filter(samples: Samples, rng: np.random.Generator) -> Samples:
     """Return samples behind a smooth filter, or a telephone: a narrow band, coded in eight bits."""
     from scipy.fft import irfft, next_fast_len, rfft
 

@@ -242,10 +242,10 @@ class LanguageLexicon(Lexicon):
         Raises InputError: a word in letters that its language is not written in, or that has no phone.
         """
         missing = [word for word in dict.fromkeys(words) if word not in self.user]
-        return replace(self, user=self.user | _pronounced(missing, self.language)) if missing else self
+        return replace(self, user=self.user | _pronounce(missing, self.language)) if missing else self
 
 
-def _pronounced(words: Sequence[str], language: str) -> dict[str, tuple[Pronunciation, ...]]:
+def _pronounce(words: Sequence[str], language: str) -> dict[str, tuple[Pronunciation, ...]]:
     """Return the pronunciations of words, by word. Raises as ``LanguageLexicon.with_words``."""
     spoken = LANGUAGES[language]
     for word in words:

@@ -102,7 +102,7 @@ def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str,
     return starts
 
 
-def _pronounced(library: Any, word: str) -> str:
+def _pronounce(library: Any, word: str) -> str:
     library.espeak_TextToPhonemes.restype = ctypes.c_char_p
     encoded = ctypes.create_string_buffer(word.encode())
     rest, phones = ctypes.c_void_p(ctypes.addressof(encoded)), []
@@ -136,7 +136,7 @@ def main() -> None:
     ):
         sys.exit(f"no voice {task['voice']!r}")
     if "words" in task:
-        json.dump([_pronounced(library, word) for word in task["words"]], sys.stdout)
+        json.dump([_pronounce(library, word) for word in task["words"]], sys.stdout)
         return
     folder = Path(task["folder"])
     starts = [_speak(library, rate_hz, text, folder / f"{number}.wav") for number, text in enumerate(task["texts"])]

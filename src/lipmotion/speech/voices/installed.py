@@ -99,7 +99,7 @@ def _festival_voices() -> tuple[SyntheticVoice, ...]:
 def _say_with_festival(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     paths = [folder / f"{number}.wav" for number in range(len(texts))]
     script = folder / "say.scm"
-    calls = [f"(say {_quoted(text)} {_quoted(str(path))})" for text, path in zip(texts, paths, strict=True)]
+    calls = [f"(say {_quote(text)} {_quote(str(path))})" for text, path in zip(texts, paths, strict=True)]
     script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
     printed = program_output(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts), folder=folder)
     parts = printed.split(f"{MARK}\n")[1:]
@@ -117,7 +117,7 @@ def _say_with_festival(voice: str, texts: Sequence[str], folder: Path) -> Iterat
         path.unlink()
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 

@@ -51,7 +51,7 @@ def inventory_timeline(
             said[-1] = (*said[-1][:2], span.end_s)
         each_s = span.duration_s / max(len(names), 1)
         said += [(phone, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, phone in enumerate(names)]
-    phones = _joined(_covered([(phone, start, end) for phone, start, end in said if end > start], duration_s))
+    phones = _join(_cover([(phone, start, end) for phone, start, end in said if end > start], duration_s))
     spoken = [phone for phone in phones if not is_silent(phone[0])]
     if not spoken:
         raise InputError("the synthesiser says no phone; give another text")
@@ -145,7 +145,7 @@ def _cost(phone: str, other: str) -> float:
     return OWN_KIND_COST if (phone in VOWELS) == (other in VOWELS) else OTHER_KIND_COST
 
 
-def _covered(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:
+def _cover(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:
     """Return phones with silence where none was, cut at the end of the sound."""
     covered: list[tuple[str, float, float]] = []
     now = 0.0
@@ -156,7 +156,7 @@ def _covered(phones: Phones, duration_s: float) -> list[tuple[str, float, float]
     return [(phone, start, end) for phone, start, end in covered if end > start]
 
 
-def _joined(phones: Phones) -> list[tuple[str, float, float]]:
+def _join(phones: Phones) -> list[tuple[str, float, float]]:
     """Return phones in which neighbouring silences are one."""
     joined: list[tuple[str, float, float]] = []
     for silent, run in groupby(phones, key=lambda phone: is_silent(phone[0])):

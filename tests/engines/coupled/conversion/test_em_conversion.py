@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import KINDS, TWO, chains, observations, structure
+from engines.coupled.tiny import KINDS, chains, observations, structure
+from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.conversion import mean_regression
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
@@ -15,14 +16,12 @@ from lipmotion.engines.coupled.conversion.em_conversion import (
     path_means,
     without_visual_streams,
 )
-from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.engines.coupled.model import CoupledConfig
-from lipmotion.engines.coupled.training.coupled_training import _state_regressions, fit_coupled
 from lipmotion.stats.curves import with_dynamics
-from lipmotion.testing.examples import example, examples, speech, timeline
+from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
 from oracles import coupled as oracle
 
+PLAIN = {"mixtures": 1, "closures": False, "articulation": False}
 every = pytest.mark.parametrize(("kind", "sets", "limit"), KINDS)
 
 
@@ -165,29 +164,21 @@ def test_expected_means_and_precisions_are_sums_over_states():
     np.testing.assert_allclose(regression.precisions(posterior), posterior @ (1 / regression.variances), rtol=1e-6)
 
 
-def test_every_viseme_has_a_regression_for_each_position_of_a_state():
-    regression_of_state, family = _state_regressions(structure(states=2), 1)
-    assert regression_of_state.tolist() in ([2, 3, 0, 1], [0, 1, 2, 3])
-    assert family.tolist() == [0, 0, 1, 1]
-    assert len(TWO.units) == 2
-
-
 @pytest.mark.parametrize("regression", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_the_regression_brings_motion_closer(regression):
-    config = CoupledConfig(acoustic_regression=regression, mixtures=1, closures=False, articulation=False)
-    model = fit_coupled(examples(6), config, silent_monitor).model
+    engine = engine_named("coupled", PLAIN | {"acoustic_regression": regression})
+    model = engine.fit(examples(6), silent_monitor).model
     assert (model.regression is not None) is regression
     held_out = example(("t", "aa", "p", "iy", "m", "uw", "s", "aa"), seed=77)
-    generated = CoupledEngine(config).generate(model, held_out.speech).motion
+    generated = engine.generate(model, held_out.speech).motion
     error = np.sqrt(np.mean((generated["opening"] - held_out.motion["opening"]) ** 2))
     assert error < (0.02 if regression else 0.05)
 
 
 @pytest.mark.long
 def test_the_mouth_rests_in_long_silence():
-    config = CoupledConfig(mixtures=1)
-    engine = CoupledEngine(config)
-    model = fit_coupled(examples(), config, silent_monitor).model
+    engine = engine_named("coupled", {"mixtures": 1})
+    model = engine.fit(examples(), silent_monitor).model
     generated = engine.generate(model, speech(timeline(("aa", "t", "aa")))).motion["opening"]
     opening = model.rest_pose[model.space.direct_names.index("opening")]
     assert np.abs(generated[:30] - opening).max() < 2e-3
@@ -195,12 +186,11 @@ def test_the_mouth_rests_in_long_silence():
 
 
 def test_unknown_voices_follow_their_encoding():
-    draw, config = np.random.default_rng(0), CoupledConfig(mixtures=1, closures=False, articulation=False)
+    draw, engine = np.random.default_rng(0), engine_named("coupled", PLAIN)
     heard = [
         replace(each, speech=replace(each.speech, encoding=draw.normal(size=(len(each.valid), 64)).astype(np.float16)))
         for each in examples(4)
     ]
-    engine = CoupledEngine(config)
     model = engine.from_arrays(engine.to_arrays(engine.fit(heard, silent_monitor).model))
     known, unknown = (replace(heard[0].speech, voice=voice) for voice in (1.0, 0.5))
     assert np.array_equal(

@@ -1,25 +1,55 @@
+"""Streams with a known lag: chains that may be apart must be better than one, and no worse without a lag."""
+
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from functools import cache
+from itertools import groupby, pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
-from engines.coupled.tiny import THREE, TWO, chains, observations, structure
+from engines.coupled.tiny import (
+    COUPLED,
+    FACTORIAL,
+    HMM,
+    MULTISTREAM,
+    SYSTEMS,
+    THREE,
+    TWO,
+    chains,
+    observations,
+    structure,
+)
 from lipmotion import engines, errors
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, reestimated_group
+from lipmotion.engines import engine_named
+from lipmotion.engines.coupled.chains import densities, model
+from lipmotion.engines.coupled.chains.densities import (
+    LEAST_COMPONENT_FRAMES,
+    AudioVisualObservations,
+    reestimated_group,
+)
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS
-from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.engines.coupled.model import CoupledConfig
-from lipmotion.engines.coupled.training import alignment, coupled_training
+from lipmotion.engines.coupled.chains.structures import unit_sets
+from lipmotion.engines.coupled.conversion.em_conversion import EXACT, VITERBI, ConversionSettings, convert
+from lipmotion.engines.coupled.training import alignment, chain_training
 from lipmotion.engines.coupled.training import chain_training as em_steps
-from lipmotion.engines.coupled.training.chain_training import CONVERGENCE_GAIN, MixtureSchedule, growing_chains
+from lipmotion.engines.coupled.training.alignment import AlignedUtterance
+from lipmotion.engines.coupled.training.chain_training import (
+    CONVERGENCE_GAIN,
+    MixtureSchedule,
+    growing_chains,
+    lattice_utterance,
+)
+from lipmotion.engines.coupled.training.coupled_training import train_on_speech
+from lipmotion.measures.curves import pooled_correlation
 from lipmotion.motion.frame_labels import frames_away
-from lipmotion.testing.examples import examples
-from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit, silent_monitor
+from lipmotion.testing import examples
+from lipmotion.types import FRAME_RATE_HZ, GREY, Channel, Example, Motion, Span, Timeline, Unit, silent_monitor
 from oracles import coupled as oracle
+from oracles.joint import mixture
+from oracles.paths import posteriors
 
-FLOORS = (np.full(2, 1e-3, np.float32), np.full(1, 1e-3, np.float32))
 PHONES = ("p", "uw", "aa", "b", "aa", "uw")
 
 
@@ -41,15 +71,19 @@ def sentences(count=6, frames_each=9, seed=0) -> list[alignment.AlignedUtterance
 
 
 @pytest.mark.parametrize(
-    ("kind", "sets"), [(COUPLED, (THREE, TWO)), (FACTORIAL, (THREE, TWO)), (MULTISTREAM, (THREE,)), (HMM, (THREE,))]
-)
-def test_the_likelihood_rises_at_every_step(kind, sets):
+    ("kind", "sets", "limit"),
+    [(COUPLED, (THREE, TWO), 1), (FACTORIAL, (THREE, TWO), 1), (FACTORIAL, (THREE, TWO), None),
+     (MULTISTREAM, (THREE,), 1), (HMM, (THREE,), 1)],
+)  # fmt: skip
+def test_the_likelihood_rises_at_every_step(kind, sets, limit):
     steps = []
     how = MixtureSchedule((4,) if kind == HMM else (4, 2), (1.0, 1.0), most_steps=8)
-    of = structure(kind, sets, states=3)
+    of = structure(kind, sets, states=3, limit=limit)
     *_, grown = growing_chains(of, ("speech", "seen"), sentences(), how, steps.append)
     assert grown.converged is bool(steps[-1].log_likelihood - steps[-2].log_likelihood < CONVERGENCE_GAIN)
     assert {step.mixtures[0] for step in steps} == {1, 2, 4}
+    if limit is None:
+        assert len(grown.model.transitions.own_density_states) > 5
     for one, other in pairwise(steps):
         if one.mixtures == other.mixtures:
             assert other.log_likelihood >= one.log_likelihood - 1e-5
@@ -86,16 +120,6 @@ def test_densities_are_weighted_means_and_variances():
     assert compared > 10
 
 
-def test_a_stream_that_was_not_observed_is_not_reestimated():
-    model = chains()
-    blind = observations(8, seen=False)
-    statistics = em_steps.e_step(model, [em_steps.LatticeUtterance(blind, model.full_lattice)])
-    assert not statistics.emissions[1].products[0].any()
-    better = em_steps.m_step(model, statistics, FLOORS, streams=(0, 1))
-    np.testing.assert_array_equal(better.groups[1].mixtures.means, model.groups[1].mixtures.means)
-    assert not np.array_equal(better.groups[0].mixtures.means, model.groups[0].mixtures.means)
-
-
 def test_no_recording_has_a_path_and_options_that_cannot_be():
     model = chains()
     lattice = replace(model.full_lattice, allowed_units=np.zeros((3, 3), bool))
@@ -103,7 +127,7 @@ def test_no_recording_has_a_path_and_options_that_cannot_be():
         em_steps.e_step(model, [em_steps.LatticeUtterance(observations(3), lattice)])
     for options in ({"mixtures": 3}, {"asynchrony": -2}, {"structure": "ring"}, {"audio_weight": -1.0}):
         with pytest.raises(errors.InputError):
-            CoupledConfig(**options)
+            engines.engine_named("coupled", options)
 
 
 def test_allowed_units_are_those_of_labels_near_a_frame():
@@ -156,13 +180,14 @@ def with_pictures(number: int) -> Example:
 def test_every_stream_has_a_chain_and_a_weight_of_its_own():
     """Speech, points and pictures on three chains."""
     data = [with_pictures(number) for number in range(5)]
-    config = CoupledConfig(chains="phone viseme viseme", states=2, mixtures=1, visual_weight=0.5, eigenlips_weight=0.25)
-    model = coupled_training.fit_coupled(data, config, silent_monitor).model
+    weights = {"visual_weight": 0.5, "eigenlips_weight": 0.25}
+    engine = engines.engine_named("coupled", {"chains": "phone viseme viseme", "states": 2, "mixtures": 1} | weights)
+    model = engine.fit(data, silent_monitor).model
     assert model.chains.streams == ("speech", "geometry", "eigenlips")
     assert [group.weights for group in model.chains.groups] == [(1.0,), (0.5,), (0.25,)]
     assert [stream.name for stream in model.visual] == ["geometry", "eigenlips"]
     assert len(model.chains.structure.chains) == 3
-    generated = CoupledEngine(config).generate(model, data[0].speech).motion
+    generated = engine.generate(model, data[0].speech).motion
     for name in ("opening", "lips_r_01"):
         assert np.corrcoef(generated[name], data[0].motion[name])[0, 1] > 0.8
 
@@ -185,3 +210,291 @@ def test_a_preset_is_the_system_of_the_paper(name):
     if "CHMM" in name:
         assert np.abs(chains.transitions.product.lead).max() == 1
         assert len(chains.transitions.advance[1]) != of.state_counts[1]  # depends on the states of both chains
+
+
+SMALL = {"articulation": False, "states": 1, "asynchrony": 0, "mixtures": 1, "speech_only_mixtures": 2, "components": 1}
+PLAIN = {"acoustic_regression": False, "variance_scaling": False}
+STRUCTURES = {"hmm": "phone", "multistream": "phone", "factorial": "phone viseme", "coupled": "phone viseme"}
+
+
+def aligned(sentences: Sequence[Example]) -> list[AlignedUtterance]:
+    """Speech with motion in two dimensions, and the phones in time; without motion, what nobody has seen is 0."""
+    found = []
+    for each in sentences:
+        seen = each.motion.values[:, :2] if each.motion.channels else np.zeros((len(each.valid), 2))
+        streams = each.speech.features.values, seen.astype(np.float32)
+        found.append(AlignedUtterance(AudioVisualObservations(streams, (None, each.valid)), each.speech.units))
+    return found
+
+
+def second_stage(mixtures: int, steps: int, weight: float) -> Any:
+    options = {"speech_only_mixtures": mixtures, "speech_only_steps": steps, "speech_only_weight": weight}
+    return engine_named("coupled", options).config
+
+
+@cache
+def trained(kind: str = "coupled", mixtures: int = 2) -> Any:
+    of = structure(kind, unit_sets(STRUCTURES[kind]))
+    groups = 1 if kind == "hmm" else 2
+    how = chain_training.MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
+    *_, grown = chain_training.growing_chains(of, ("speech", "lips"), aligned(examples(4)), how)
+    return grown.model
+
+
+def other_speaker(example: Example, seed: int = 5) -> Example:
+    """The same sentence by a speaker with other features, without motion."""
+    turned = np.linalg.qr(np.random.default_rng(seed).normal(size=(39, 39)))[0]
+    values = example.speech.features.values
+    mixed = (0.3 * values + 0.8 * values @ turned).astype(np.float32)
+    features = replace(example.speech.features, values=mixed)
+    frames = len(values)
+    nothing = Motion(np.zeros((frames, 0)), FRAME_RATE_HZ, ())
+    return Example("other speaker", replace(example.speech, features=features), nothing, np.zeros(frames, bool))
+
+
+def speech_alone(sentences: Sequence[Example]) -> list[AlignedUtterance]:
+    return aligned([other_speaker(each) for each in sentences])
+
+
+def three_frames() -> AlignedUtterance:
+    """The end of a silence and the beginning of a t, with motion: so short that all paths can be tried."""
+    (whole,) = aligned(examples(1))
+    start = round(whole.phones.spans[1].start_s * FRAME_RATE_HZ) - 2
+    phones = Timeline((Span(0.0, 0.02, Unit("sil")), Span(0.02, 0.03, Unit("t"))))
+    cut = slice(start, start + 3)
+    seen = tuple(None if mask is None else mask[cut] for mask in whole.observations.observed)
+    return AlignedUtterance(
+        AudioVisualObservations(tuple(values[cut] for values in whole.observations.streams), seen), phones
+    )
+
+
+def speech_posteriors(chains: Any, one: AlignedUtterance) -> np.ndarray:
+    """Return the posterior of each density of speech [shape=(T, G)] in a model of speech alone, by all of its paths.
+
+    Its states are the joint ones, its emissions those of speech, its moves the coupled ones.
+    """
+    lattice, mixtures = em_steps.lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
+    x, product = one.observations.streams[0], chains.transitions.product
+    log = np.full((len(x), len(mixtures.means)), -np.inf)
+    for frame, density in np.ndindex(log.shape):
+        if lattice.allowed_units[frame, density // chains.structure.states]:
+            terms = mixtures.log_weights[density], mixtures.means[density], mixtures.variances[density]
+            log[frame, density] = mixture(x[frame], *terms)
+    place = {state: number for number, state in enumerate(lattice.states.tolist())}
+    arcs = {
+        (place[int(product.arc_from[arc])], place[int(product.arc_to[arc])]): chains.transitions.arc_log[arc]
+        for arc in lattice.transition_index
+    }
+    with np.errstate(divide="ignore"):
+        first = np.log(product.initial[lattice.states])
+    states = product.chain_states[0][lattice.states]
+    found, _, _ = posteriors(log, states, arcs, first, np.zeros(len(states)))
+    return np.stack([found[:, states == density].sum(axis=1) for density in range(log.shape[1])], axis=1)
+
+
+def learned(before: Any, density: int, gamma: np.ndarray, x: np.ndarray, floor: np.ndarray):
+    """Return the weights, means and variances of one density after the textbook M-step, with variance floors.
+
+    gamma : posterior of the density in each frame [shape=(T,)]
+    """
+    parts = [
+        [mixture(frame, [share], [mean], [variance]) for share, mean, variance in zip(*components, strict=True)]
+        for components in [(before.log_weights[density], before.means[density], before.variances[density])]
+        for frame in x
+    ]
+    weight = np.exp(parts - np.logaddexp.reduce(parts, axis=1)[:, None]) * gamma[:, None]
+    total = weight.sum(axis=0)
+    means, variances = before.means[density].astype(float), before.variances[density].astype(float)
+    for part in np.flatnonzero(total > LEAST_COMPONENT_FRAMES):
+        means[part] = weight[:, part] @ x / total[part]
+        variances[part] = np.maximum(weight[:, part] @ (x - means[part]) ** 2 / total[part], floor)
+    return total / total.sum(), means, variances
+
+
+@pytest.mark.long
+def test_a_step_is_that_of_the_split_model() -> None:
+    """Speech of the first stage and of other speakers: the same utterance, with weights 1 and 49."""
+    chains, own = trained(), three_frames()
+    other = replace(own, observations=own.observations.without_stream(1))
+    found = train_on_speech(chains, [own], [other], second_stage(2, 1, 49.0)).groups[0].mixtures
+    gamma, x = 50 * speech_posteriors(chains, own), own.observations.streams[0]
+    before, (floor, _) = chains.groups[0].mixtures, em_steps.variance_floors([own.observations])
+    visited = np.flatnonzero(gamma.sum(axis=0) >= 3)
+    assert len(visited) >= 3
+    for density in visited:
+        shares, means, variances = learned(before, density, gamma[:, density], x, floor)
+        assert np.exp(found.log_weights[density]) == pytest.approx(shares, abs=1e-3)
+        assert found.means[density] == pytest.approx(means, abs=1e-3)
+        assert found.variances[density] == pytest.approx(variances, rel=1e-2, abs=1e-3)
+    others = np.setdiff1d(np.arange(len(before.means)), visited)
+    assert found.select(others).means.tobytes() == before.select(others).means.tobytes()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["hmm", "coupled"])
+def test_every_step_raises_the_likelihood(kind: str) -> None:
+    steps: list[chain_training.TrainingStep] = []
+    own, others = aligned(examples(4)), speech_alone(examples(4, seed=9))
+    train_on_speech(trained(kind), own, others, second_stage(4, 6, 0.5), steps.append)
+    for _, run in groupby(steps, lambda step: step.mixtures):
+        figures = [step.log_likelihood for step in run]
+        assert len(figures) > 2
+        assert np.diff(figures).min() > -1e-3
+        assert figures[1] > figures[0] + 0.1
+    assert {step.mixtures[0] for step in steps} == ({2} if kind == "hmm" else {2, 4})
+
+
+@pytest.mark.parametrize("kind", ["coupled", pytest.param("multistream", marks=pytest.mark.long)])
+def test_visual_densities_and_transitions_stay(kind: str) -> None:
+    chains = trained(kind)
+    found = train_on_speech(chains, aligned(examples(3)), speech_alone(examples(3, seed=9)), second_stage(4, 2, 1.0))
+    assert found.transitions is chains.transitions
+    before, after = chains.groups[-1].stream_mixtures(1), found.groups[-1].stream_mixtures(1)
+    assert after.means.tobytes() == before.means.tobytes()
+    assert after.variances.tobytes() == before.variances.tobytes()
+    assert (
+        np.abs(found.groups[0].stream_mixtures(0).means[:, :2] - chains.groups[0].stream_mixtures(0).means).max() > 0.1
+    )
+
+
+def test_a_weight_is_how_often_an_utterance_counts() -> None:
+    chains, (one,) = trained(), aligned(examples(1))
+    twice = em_steps.e_step(chains, [em_steps.lattice_utterance(chains, one)] * 2)
+    heavy = em_steps.e_step(chains, [em_steps.lattice_utterance(chains, one, 2.0)])
+    assert heavy.frames == twice.frames
+    assert heavy.log_likelihood == pytest.approx(twice.log_likelihood)
+    assert heavy.transition_counts == pytest.approx(twice.transition_counts, abs=1e-5)
+    for a, b in zip(heavy.emissions, twice.emissions, strict=True):
+        assert a.occupancy == pytest.approx(b.occupancy, abs=1e-4)
+        assert a.products[0] == pytest.approx(b.products[0], abs=1e-2)
+
+
+def fitted(sentences: Sequence[Example], **options: object) -> tuple[Any, Any]:
+    engine = engine_named("coupled", SMALL | options)
+    return engine, engine.fit(sentences, silent_monitor).model
+
+
+def arrays(sentences: Sequence[Example], **options: object) -> list[bytes]:
+    engine, model = fitted(sentences, **PLAIN | options)
+    return [array.tobytes() for array in engine.to_arrays(model).values()]
+
+
+def test_motion_that_was_not_observed_is_ignored_wherever_the_example_stands() -> None:
+    moving, speech_only = examples(4), [other_speaker(one) for one in examples(3, seed=9)]
+    channels = [
+        replace(
+            one, motion=replace(moving[0].motion, values=np.full((len(one.valid), len(moving[0].motion.channels)), 9.0))
+        )
+        for one in speech_only
+    ]
+    first = arrays([*moving, *speech_only])
+    assert first == arrays([speech_only[0], moving[0], *channels[1:], *moving[1:]])
+    assert first != arrays(moving)
+
+
+def right(engine: Any, model: Any, sentence: Example) -> tuple[float, float]:
+    """Return the correlation of the opening with the original's, of unknown words, and of speech frames right."""
+    spoken = replace(sentence.speech, units_known=False)
+    generated = engine.generate(model, spoken).motion["opening"]
+    observations = model.speech_observations(spoken)
+    chains = model.chains
+    found = chains.posteriors(chains.emission_log_densities(observations, chains.full_lattice), chains.full_lattice)
+    states = found.chains[0].argmax(axis=1) // chains.structure.states
+    labels = [
+        (chains.structure.units[0].index(span.label.phone), frame)
+        for span in spoken.units
+        if span.label.phone != "sil"
+        for frame in range(round(span.start_s * FRAME_RATE_HZ), round(span.end_s * FRAME_RATE_HZ))
+    ]
+    share = float(np.mean([states[frame] == unit for unit, frame in labels]))
+    return float(np.corrcoef(generated, sentence.motion["opening"])[0, 1]), share
+
+
+@pytest.mark.long
+def test_another_speaker_is_recognised_and_the_first_one_still_is() -> None:
+    moving, speech_only = examples(6), [other_speaker(one) for one in examples(6, seed=9)]
+    (own,), (original,) = examples(1, seed=20), examples(1, seed=21)
+    other = replace(original, speech=other_speaker(original).speech)
+    one, two = fitted(moving), fitted([*moving, *speech_only])
+    before, after = right(*one, other), right(*two, other)
+    assert after[0] > before[0] + 0.1
+    assert after[1] > before[1] + 0.2
+    assert right(*two, own) > (0.9, 0.9)
+
+
+STATES, LAGGED = 3, ("p", "uw", "aa")
+SEEN = np.array([(0.0, 0.0), (0.5, -2.0), (2.0, 1.0)])
+"""Speech of every state of a phone lies elsewhere on a circle; what is seen is wider in the middle one."""
+
+
+def lagged(count: int, lag: int, seed: int) -> list[AlignedUtterance]:
+    """Sentences of ten phones; a state lasts 3 to 7 frames; what is seen is ``lag`` frames ahead of the speech."""
+    made = []
+    for number in range(count):
+        draw = np.random.default_rng([seed, number])
+        phones = draw.integers(1, 3, 10).cumsum() % 3  # none twice in a row
+        frames = draw.integers(3, 8, (10, STATES))
+        edges = (np.cumsum([0, *frames.sum(axis=1)]) / 100).tolist()
+        spans = (Span(a, b, Unit(LAGGED[p])) for (a, b), p in zip(pairwise(edges), phones, strict=True))
+        state = np.repeat(STATES * np.repeat(phones, STATES) + np.tile(np.arange(STATES), 10), frames.ravel())
+        early = state[np.clip(np.arange(len(state)) + lag, 0, len(state) - 1)]
+        lips = SEEN[early // STATES] * np.where(early % STATES == 1, 1.3, 1)[:, None]
+        speech = 3 * np.stack([np.cos(state * 2 * np.pi / 9), np.sin(state * 2 * np.pi / 9)], axis=1)
+        noisy = (values + draw.normal(0, size, values.shape) for values, size in ((speech, 0.6), (lips, 0.3)))
+        streams = tuple(values.astype(np.float32) for values in noisy)
+        made.append(AlignedUtterance(densities.AudioVisualObservations(streams, (None, None)), Timeline(tuple(spans))))
+    return made
+
+
+@cache
+def trained_on(lag: int, kind: str, limit: int | None = 1, **more: object) -> tuple[model.Chains, float]:
+    """Return chains, and the correlation of the lips that they make from speech alone, as the paper converts."""
+    of = structure(kind, (THREE,) if kind == MULTISTREAM else (THREE, THREE), STATES, limit, **more)
+    *_, grown = growing_chains(of, ("speech", "seen"), lagged(20, lag, 0), MixtureSchedule((1, 1), (1.0, 1.0)))
+    how, held_out, full = ConversionSettings(VITERBI, EXACT, 5), lagged(8, lag, 1), grown.model.full_lattice
+    lips = [convert(grown.model, one.observations, full, how).streams[1] for one in held_out]
+    recorded = [one.observations.streams[1].astype(float) for one in held_out]
+    return grown.model, float(pooled_correlation(lips, recorded).mean())
+
+
+def lead_shares(chains: model.Chains, lag: int) -> np.ndarray:
+    """Return the shares of frames in which the lips are a state behind, in step and a state ahead, by both streams."""
+    shares = np.zeros(3)
+    for one in lagged(20, lag, 0):
+        joint = chains.infer(one.observations, lattice_utterance(chains, one).lattice).posteriors.joint
+        shares += np.bincount(chains.transitions.product.lead[1][joint.states] + 1, joint.probability.sum(axis=0), 3)
+    return shares / shares.sum()
+
+
+@pytest.mark.parametrize("lag", [5, -5])
+@pytest.mark.parametrize("more", [{}, {"moves_together": True}])
+def test_with_a_lag_coupled_chains_win(lag, more):
+    """The lips are a state ahead of the voice, or behind it: one chain cannot say so."""
+    chains, acc = trained_on(lag, COUPLED, **more)
+    assert acc > trained_on(lag, MULTISTREAM)[1] + 0.05
+    behind, _, ahead = lead_shares(chains, lag)
+    assert (ahead > behind) == (lag > 0)
+    assert max(ahead, behind) > 0.2
+
+
+def test_without_a_lag_chains_that_move_together_are_one_chain():
+    """By Eq. 2 both move by chance, given the joint state before: a tenth of the frames is out of step for nothing."""
+    alone, together, printed = (
+        trained_on(0, MULTISTREAM),
+        trained_on(0, COUPLED, moves_together=True),
+        trained_on(0, COUPLED),
+    )
+    assert together[1] == pytest.approx(alone[1], abs=0.005)
+    assert lead_shares(together[0], 0)[1] > 0.99
+    assert lead_shares(printed[0], 0)[1] < 0.9
+    assert printed[1] < alone[1] - 0.005
+
+
+def test_factorial_chains_as_printed_may_be_apart_from_the_start():
+    """Without a limit in Viterbi training, more joint states two states apart have densities of their own."""
+    two_apart = []
+    for start_limit in (1, 2):
+        chains, _ = trained_on(8, FACTORIAL, None, start_limit=start_limit, unseen_loss=0.0)
+        first, second = chains.transitions.own_density_states.T
+        two_apart.append(np.count_nonzero((first // STATES == second // STATES) & (np.abs(first - second) == 2)))
+    assert two_apart[1] > two_apart[0]

@@ -335,7 +335,7 @@ class _BeamSearch:
         if max(between, inside) > SILENT_ROW:
             stay.sound = np.full(len(said), NEVER)
             return stay
-        entered = self._entered(paths, sounds)
+        entered = self._enter(paths, sounds)
         least = max(float(stay.best.max()), float(entered.sound.max(initial=NEVER))) - BEAM
         after = stay.chosen(stay.best > least).with_others(entered.chosen(entered.sound > least))
         after = self._with_ended_words(after, least, row)
@@ -345,7 +345,7 @@ class _BeamSearch:
             kept = best >= np.partition(best, -MOST_PATHS)[-MOST_PATHS]
         return after.chosen(kept)
 
-    def _entered(self, paths: _Paths, sounds: Scores) -> _Paths:
+    def _enter(self, paths: _Paths, sounds: Scores) -> _Paths:
         """Return the paths that go on to the next phone; between two that are the same there is a blank."""
         tree, counts = self.english.tree, self.english.tree.arcs[paths.node]
         source = np.repeat(np.arange(len(counts)), counts)
