@@ -2,7 +2,7 @@
 # make test   installs everything, then runs the quick tests (under three minutes)
 # make test-all   the three that follow, and pages in both browsers
 # make test-long      tests that take seconds: mutations, kills, real recordings, copies of the repository, pages
-# make test-portable  the numeric tests as other processors would run them
+# make test-portable  the numeric tests as other processors would run them, those of files as on Windows
 # make test-explore   the property tests with other random cases at every run
 # make test-agents    the plug-ins for voice agents with both frameworks, in an environment of their own
 # make check  lint, types, import contracts

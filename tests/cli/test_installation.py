@@ -92,6 +92,13 @@ def test_no_face_tracking(monkeypatch):
     assert "libGL.so.1" in found.text
 
 
+def test_no_microphone(monkeypatch):
+    monkeypatch.setattr(doctor_module, "find_spec", lambda name: name == "sounddevice")
+    monkeypatch.setattr(doctor_module, "find_library", lambda _: None)
+    found = doctor_module.look_at("microphone")
+    assert (found.state, "libportaudio2" in found.text) == ("absent", True)
+
+
 @pytest.mark.long
 def test_the_main_path():
     found = doctor_module.look_at("main path")

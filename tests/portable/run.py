@@ -1,4 +1,4 @@
-"""``python -m portable.run``: run the numeric tests with the kernels of other processors (``make test-portable``)."""
+"""``python -m portable.run``: run tests as on other processors, or as on Windows (``make test-portable``)."""
 
 import argparse
 import itertools
@@ -22,6 +22,9 @@ NUMERIC = (
 )
 """Tests that notice rounding: they compare what was computed in two ways, choose between values that nearly tie, or
 need the same bytes twice; name others on the command line for more."""
+WRITING = [str(TESTS / folder) for folder in ("storage", "pipeline/batch", "studio/test_folder.py")]
+"""Tests that notice the files, folders and locks of another system."""
+LIKE_WINDOWS = {"PYTHONPATH": os.pathsep.join((str(TESTS.parent / "scripts" / "like_windows"), str(TESTS)))}
 LONGEST_S = 3600.0
 LEFT_OUT = ["-m", "not long and not video", "-k", "not memory"]
 """Tests that take longer and compute nothing that the others do not."""
@@ -74,6 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{core}: {kernels(core) if able else 'left out: this processor lacks its instructions'}", flush=True)
     with ThreadPoolExecutor(options.jobs) as pool:
         jobs = [pool.submit(tested, name, changes, options.tests) for name, changes in settings().items()]
+        if sys.platform == "linux" and options.tests == parser.get_default("tests"):
+            jobs.append(pool.submit(tested, "as on Windows", LIKE_WINDOWS, WRITING))
         outcomes = [job.result() for job in jobs]
     for outcome in outcomes:
         verdict = "passed" if outcome.passed else "FAILED"

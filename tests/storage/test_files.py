@@ -107,7 +107,8 @@ def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_pat
         "    os._exit(1)\n"
     )
     run_child([sys.executable, "-c", program, target])
-    assert len(names(tmp_path)) == 1
+    (left,) = tmp_path.iterdir()
+    os.utime(left, (0, 0))  # Windows, where no process can be looked for, goes by its age
     with atomic_file(tmp_path / "other.json") as other, atomic_file(target) as mine:
         assert len(names(tmp_path)) == 0
         other.touch()

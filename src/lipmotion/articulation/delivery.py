@@ -140,9 +140,10 @@ def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Un
     return Timeline(tuple(spans))
 
 
-def intensify(generation: Generation, intensity: float, opening: Curve | None = None) -> Generation:
+def intensify(generation: Generation, intensity: float | Curve, opening: Curve | None = None) -> Generation:
     """Return a generation with movements away from the rest pose so many times as large.
 
+    intensity : of all frames, or of each [shape=(T,)]; frames of 1 stay as they are
     opening : how far the lips are apart in every frame [shape=(T,)]; None: the channel ``opening``
     In every frame the whole face moves by one factor, so that distances and points agree. It is 1 where the lips touch,
     or are no further apart than at rest (silence, p b m), and the intensity where they are open; openings beyond the
@@ -150,12 +151,13 @@ def intensify(generation: Generation, intensity: float, opening: Curve | None = 
     Without an opening the factor is the intensity everywhere.
     """
     motion = generation.motion
-    if intensity == 1 or not len(motion.values):
+    factor = intensity = np.broadcast_to(np.asarray(intensity, np.float64), len(motion.values))
+    moved = np.flatnonzero(intensity != 1)
+    if not len(moved):
         return generation
     if opening is None and "opening" in motion.names:
         opening = motion["opening"].astype(np.float64)
     rest = find_rest_frames(motion, generation.units, opening)
-    factor = np.full(len(motion.values), float(intensity))
     if opening is not None:
         closed = float(np.median(opening[rest]))
         further, touching = opening - closed, max(CLOSED_OPENING - closed, 0.0)
@@ -164,18 +166,18 @@ def intensify(generation: Generation, intensity: float, opening: Curve | None = 
         limited = np.where(wanted > widest, widest + widest * np.tanh((wanted - widest) / widest), wanted)
         change = np.divide(limited, further, out=np.ones_like(further), where=further > 0) - 1
         factor = 1 + smooth_step((further - touching) / UNSCALED_GAP) * change
-    values = motion.values.astype(np.float64)
-    still = np.median(values[rest], axis=0)
-    larger = still + factor[:, None] * (values - still)
-    for column, channel in enumerate(motion.channels):
-        if channel.unit == WEIGHT:
-            larger[:, column] = np.clip(larger[:, column], 0, 1)
-        if channel.name in ARTICULATORY or is_mood(channel.name):
-            larger[:, column] = values[:, column]
+    values = motion.values.copy()
+    for column, channel in enumerate(motion.channels):  # by columns: hours of all channels would not fit twice
+        curve = values[:, column].astype(np.float64)
         if channel.name in GROWING:
-            larger[:, column] = 1 - np.clip(1 - values[:, column], 0, 1) ** np.sqrt(intensity)
-    spread = generation.change_frames(lambda rows: rows * factor[:, None] ** 2)
-    return replace(generation, motion=replace(motion, values=larger), spread=spread)
+            curve = 1 - np.clip(1 - curve, 0, 1) ** np.sqrt(intensity)
+        elif channel.name not in ARTICULATORY and not is_mood(channel.name):
+            still = np.median(curve[rest])
+            curve = still + factor * (curve - still)
+            curve = np.clip(curve, 0, 1) if channel.unit == WEIGHT else curve
+        values[moved, column] = curve[moved]
+    spread = generation.change_frames(lambda rows: (rows * factor[:, None] ** 2).astype(rows.dtype))
+    return replace(generation, motion=replace(motion, values=values), spread=spread)
 
 
 ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", "oval", *GROWING, *EDITED.values())

@@ -75,7 +75,7 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
     keys = [key for key in keys if not key.is_manner]
     if not keys:
         return motion
-    time_s, others = motion.time_s, [number for number, name in enumerate(motion.names) if not is_mood(name)]
+    time_s, others = motion.time_s, motion.selected([name for name in motion.names if not is_mood(name)])
     curves = {key.mood: np.zeros(len(time_s)) for key in keys if key.mood in MOODS}
     for key in keys:
         begin_s = key.time_s - CHANGE_S[0]
@@ -83,8 +83,8 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
         wanted = dict.fromkeys(curves, 0.0) | {key.mood: key.strength}
         curves = {mood: curve + share * (wanted[mood] - curve) for mood, curve in curves.items()}
     added = [curve[:, None].astype(motion.values.dtype) for curve in curves.values()]
-    values = np.concatenate([motion.values[:, others], *added], axis=1)
-    channels = (*(motion.channels[number] for number in others), *(Channel(PREFIX + mood, WEIGHT) for mood in curves))
+    values = np.concatenate([others.values, *added], axis=1)
+    channels = (*others.channels, *(Channel(PREFIX + mood, WEIGHT) for mood in curves))
     return Motion(values, motion.rate_hz, channels)
 
 

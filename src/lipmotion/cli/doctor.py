@@ -8,8 +8,10 @@ import platform
 import re
 import tempfile
 from collections.abc import Callable, Iterator
+from ctypes.util import find_library
 from dataclasses import dataclass
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -203,6 +205,13 @@ def _phone_recogniser() -> str:
     return phone_recogniser(name).source
 
 
+def _microphone() -> str:
+    """Return the version of sounddevice; it is not imported: that starts PortAudio, which may end the process."""
+    if not find_spec("sounddevice") or not (find_spec("_sounddevice_data") or find_library("portaudio")):
+        raise _AbsentError(f"for 'live': {install_command('live')}, on Linux also libportaudio2")
+    return f"sounddevice {metadata.version('sounddevice')}, PortAudio"
+
+
 def _face_tracking() -> str:
     """Return which OpenCV and MediaPipe are imported, and whether another OpenCV lies over that of the extra."""
     try:
@@ -303,6 +312,7 @@ _PARTS: dict[str, Callable[[], str]] = {
     "FFmpeg": _ffmpeg,
     "voices": _voices,
     "phone recogniser": _phone_recogniser,
+    "microphone": _microphone,
     "face tracking": _face_tracking,
     "model that ships": _model,
     "compiled kernels": _compiled_kernels,

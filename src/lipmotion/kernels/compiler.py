@@ -80,9 +80,12 @@ every larger array back to the system and asks for it again: that takes as long 
 _LOCK = RLock()
 
 
-def compiled(function: FunctionT) -> FunctionT:
-    """Compile a function at its first call; the result is cached on disk if possible."""
-    return cast(FunctionT, _Kernel(function, False))
+def compiled(function: FunctionT, form: FunctionT | None = None) -> FunctionT:
+    """Compile a function at its first call; the result is cached on disk if possible.
+
+    form : computes the same bits with NumPy, where there is no numba; None: then the function runs as Python, slowly
+    """
+    return cast(FunctionT, _Kernel(function, False, form))
 
 
 def compiled_to_rounding(function: FunctionT) -> FunctionT:
@@ -109,8 +112,8 @@ def pays(frames: int = 0) -> bool:
 class _Kernel:
     """A function that is compiled when it is first called, with all kernels that it calls."""
 
-    def __init__(self, function: Callable[..., Any], fastmath: set[str] | bool) -> None:
-        self.function, self.fastmath = function, fastmath
+    def __init__(self, function: Callable[..., Any], fastmath: set[str] | bool, form: Any = None) -> None:
+        self.function, self.fastmath, self.form = function, fastmath, form
         self.kernel: Any = None
         self._is_ready = False
         update_wrapper(self, function)
@@ -124,7 +127,7 @@ class _Kernel:
     def prepare(self) -> Any:
         """Make the kernel and return it. Kernels call one another by global names, under which numba must find it."""
         if self.kernel is None:
-            self.kernel = _machine_code(self.function, self.fastmath) if numba_works() else _interpreted(self.function)
+            self.kernel = self._in_machine_code() if numba_works() else self.form or self._in_python()
             names = self.function.__globals__
             for name, value in list(names.items()):
                 if isinstance(value, _Kernel):
@@ -132,19 +135,17 @@ class _Kernel:
             self._is_ready = True
         return self.kernel
 
+    def _in_machine_code(self) -> Any:
+        import numba
 
-def _machine_code(function: Callable[..., Any], fastmath: set[str] | bool) -> Any:
-    import numba
+        kernel = numba.njit(nogil=True, error_model="numpy", fastmath=self.fastmath)(self.function)
+        with suppress(RuntimeError):  # neither beside the file nor in the user's cache folder can anything be written
+            kernel._cache = _disk_cache()(self.function)  # as its ``enable_caching``
+        return kernel
 
-    kernel = numba.njit(nogil=True, error_model="numpy", fastmath=fastmath)(function)
-    with suppress(RuntimeError):  # neither beside the file nor in the user's cache folder can anything be written
-        kernel._cache = _disk_cache()(function)  # as its ``enable_caching``
-    return kernel
-
-
-def _interpreted(function: Callable[..., Any]) -> Callable[..., Any]:
-    _warn_once()
-    return np.errstate(all="ignore")(function)
+    def _in_python(self) -> Callable[..., Any]:
+        _warn_once()
+        return np.errstate(all="ignore")(self.function)
 
 
 @cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
@@ -291,23 +291,29 @@ def generate_passages(
         posteriors=heard and replace(heard, values=np.repeat(heard.values[:1], REST_FRAMES // 2, axis=0)),
         encoding=None if speech.encoding is None else np.zeros((REST_FRAMES, speech.encoding.shape[1]), np.float16),
     )
-    rest, made = finish(generate(silent_speech, Constraints()), -NOWHERE_S), []
-    for part in parts:
-        start_s = part.first / FRAME_RATE_HZ
-        inside = [pin for pin in pins if part.inside.start <= round(pin.time_s * FRAME_RATE_HZ) < part.inside.stop]
-        shifted = Constraints(tuple(replace(pin, time_s=pin.time_s - start_s) for pin in inside))
-        try:
-            generation = generate(replace(part.speech, times_given=speech.times_given), shifted)
-        except InputError as error:
-            raise InputError(f"{error} (in the passage that begins at {start_s:.2f} s)") from error
-        spans = list(generation.units)
-        spans[0] = replace(spans[0], start_s=-LONG_SILENCE_S)
-        spans[-1] = replace(spans[-1], end_s=spans[-1].end_s + LONG_SILENCE_S)
-        finished = finish(replace(generation, units=Timeline(tuple(spans))), start_s)
-        made.append(replace(finished, units=generation.units))
+    rest, made = finish(generate(silent_speech, Constraints()), -NOWHERE_S), list[Generation]()
+
+    def generate_each() -> Iterator[NDArray[np.floating[Any]]]:
+        """Yield the values of each passage: beside all of them together, they would take an hour's memory twice."""
+        for part in parts:
+            start_s = part.first / FRAME_RATE_HZ
+            inside = [pin for pin in pins if part.inside.start <= round(pin.time_s * FRAME_RATE_HZ) < part.inside.stop]
+            shifted = Constraints(tuple(replace(pin, time_s=pin.time_s - start_s) for pin in inside))
+            try:
+                generation = generate(replace(part.speech, times_given=speech.times_given), shifted)
+            except InputError as error:
+                raise InputError(f"{error} (in the passage that begins at {start_s:.2f} s)") from error
+            spans = list(generation.units)
+            spans[0] = replace(spans[0], start_s=-LONG_SILENCE_S)
+            spans[-1] = replace(spans[-1], end_s=spans[-1].end_s + LONG_SILENCE_S)
+            finished = finish(replace(generation, units=Timeline(tuple(spans))), start_s)
+            none = replace(finished.motion, values=finished.motion.values[:0].copy())
+            made.append(replace(finished, motion=none, units=generation.units))
+            yield finished.motion.values
+
     dtype = np.dtype(np.float32) if frames > DOUBLE_FRAMES else rest.motion.values.dtype
     like = np.empty((frames, 0), dtype)
-    values = np.require(_join_rows(parts, [each.motion.values for each in made], rest.motion.values, like), None, "W")
+    values = np.require(_join_rows(parts, generate_each(), rest.motion.values, like), None, "W")
     spread: Any
     if isinstance(rest.spread, ReducedVariance):
         rows = [each.spread.reduced for each in made if isinstance(each.spread, ReducedVariance)]
@@ -328,7 +334,7 @@ def generate_passages(
 
 def _join_rows(
     parts: Sequence[SpeechPart],
-    rows: Sequence[NDArray[np.floating[Any]]],
+    rows: Iterable[NDArray[np.floating[Any]]],
     rest: NDArray[np.floating[Any]],
     like: NDArray[np.floating[Any]],
 ) -> NDArray[Any]:

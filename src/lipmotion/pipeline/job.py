@@ -138,6 +138,7 @@ def run(  # noqa: PLR0913
     if picture:
         write_posteriors(picture, *chain_posteriors(session, edits.edits))
     generation = session.generate(edits.edits)
+    del session  # sound and features of an hour, which outputs do not need
 
     of_writing = sub_monitor(monitor, RECOGNITION, 1.0)
     write_outputs(job, face, generation, recording, model=model, temporary=temporary, monitor=of_writing)

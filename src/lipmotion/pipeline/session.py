@@ -157,9 +157,15 @@ class Session:
     ) -> None:
         self.request: Request = resolve_language(read_request(as_request(speech), is_typed=False))
         self.model = model if isinstance(model, Model) else load_model(model or self.request.model)
-        self._work = map_in_processes(workers, self._prepare)
+        request = self.request
+
+        def prepare() -> None:  # not of this object, which would keep itself until the garbage is collected
+            prepare_search(request)
+            if background is not None:
+                background()
+
+        self._work = map_in_processes(workers, prepare)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
-        self._background = background
         self._lasts_s, self._motions, self._known_audio = lasts_s, 0, audio
         self._one_at_a_time = RLock()
         self._cache = Cache()
@@ -211,11 +217,6 @@ class Session:
         """Return the speech as input of the engine, with the phones of ``units``."""
         with self._one_at_a_time, one_thread():
             return self._edited_speech(edits.steps)
-
-    def _prepare(self) -> None:
-        prepare_search(self.request)
-        if self._background is not None:
-            self._background()
 
     @cached_property
     def _recording(self) -> SpeechAnalysis:

@@ -13,6 +13,7 @@ import re
 import shutil
 import stat
 import sys
+import time
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -138,6 +139,8 @@ def _reached(folder: Path, *, create: bool = False) -> Iterator[int | None]:
             if handle is not None:
                 outer, handle = handle, os.open(name, _FOLDER | _NO_LINK, dir_fd=handle)
                 os.close(outer)
+            elif create and not place.is_dir():
+                raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(place))
         yield handle
     finally:
         if handle is not None:
@@ -236,18 +239,15 @@ def remove_left_files(target: Path) -> None:
     with suppress(OSError):  # a folder that may be written to, but not listed
         for left in target.parent.glob(f"{prefix}*"):
             process = left.name[len(prefix) :].split("-")[0]
-            if sys.platform == "win32" or not process.isdigit():
-                is_left = sys.platform == "win32"  # which deletes no file that is open
-            else:
-                is_left = False
-                try:
+            try:
+                if sys.platform != "win32":
                     os.kill(int(process), 0)
-                except ProcessLookupError:
-                    is_left = True
-                except OSError:  # a process of another user
-                    continue
-            if is_left:
+                elif time.time() - left.stat().st_mtime > 3600:  # there signal 0 would end the process
+                    remove(left)
+            except ProcessLookupError:
                 remove(left)
+            except (OSError, OverflowError, ValueError):  # a process of another user, or no number of one
+                continue
 
 
 def output_place(target: Path) -> Path:

@@ -98,6 +98,8 @@ class Motion:
     def selected(self, names: Sequence[str]) -> Motion:
         """Return the motion of some channels, in the given order. Raises InputError: no such channel."""
         columns = [self.column(name) for name in names]
+        if columns == [*range(len(self.names))]:
+            return self
         return Motion(self.values[:, columns], self.rate_hz, tuple(self.channels[column] for column in columns))
 
     def at(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:

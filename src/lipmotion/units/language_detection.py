@@ -57,12 +57,12 @@ def is_english(words: Iterable[Pronunciation]) -> bool | None:
     return share >= IS_ENGLISH if len(long) >= MIN_WORDS and not NOT_ENGLISH < share < IS_ENGLISH else None
 
 
-def _alike(phones: Iterable[str]) -> Pronunciation:
-    """Return phones without the differences that recognisers of phones do not make."""
-    return tuple(_ALIKE.get(phone, phone) for phone in phones)
+def _alike(phones: Iterable[str]) -> str:
+    """Return phones, with spaces between, without the differences that recognisers of phones do not make."""
+    return " ".join(_ALIKE.get(phone, phone) for phone in phones)
 
 
 @cache
-def _pronunciations() -> frozenset[Pronunciation]:
+def _pronunciations() -> frozenset[str]:
     text = (find_english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8").lower()
     return frozenset(_alike(line.split()[1:]) for line in text.splitlines())

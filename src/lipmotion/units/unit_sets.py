@@ -13,7 +13,7 @@ set and a line of text on them; the groups are ours. Counts, and silence:
 from __future__ import annotations
 
 import os
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -118,10 +118,6 @@ class UnitSet:
     def phones(self, unit: str) -> tuple[str, ...]:
         """Return the phones of a unit."""
         return tuple(phone for phone, other in self.unit_of_phone.items() if other == unit)
-
-    def units_within(self, phones: Container[str]) -> tuple[str, ...]:
-        """Return the units all of whose phones are among some phones."""
-        return tuple(unit for unit in self.units if all(phone in phones for phone in self.phones(unit)))
 
     def classes(self) -> dict[str, frozenset[str]]:
         """Return the sets of units that decision trees may ask about, by name, each set once.

@@ -298,10 +298,6 @@ class Refiner:
                 f"candidates of {counts}, required {wanted[0]} and {wanted[1]} px; make them with the same eigenlips"
             )
 
-    def refine(self, coefficients: Levels) -> Pictures:
-        """Return the pictures [shape=(T, H, W, 3)] at eigenlips [shape=(T, 3·K)]. Raises InputError: as ``choose``."""
-        return self.pictures(coefficients, self.choose(coefficients))
-
     def choose(self, coefficients: Levels) -> Index:
         """Return for each frame and colour the candidate whose detail it gets [shape=(T, 3)].
 

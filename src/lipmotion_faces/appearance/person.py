@@ -150,14 +150,6 @@ class Appearance:
         details, _ = candidates.measure_details(enlarge(self.jaw, self.scale), self.jaws, self.jaw_codes)
         return candidates.Candidates(self.jaw_codes, details)
 
-    def mouth_refiner(self, options: candidates.RefinementOptions) -> candidates.Refiner:
-        """Return what makes pictures of the mouth from eigenlips."""
-        return candidates.Refiner(enlarge(self.mouth, self.scale), self.mouth_candidates, options)
-
-    def jaw_refiner(self, options: candidates.RefinementOptions = JAW_OPTIONS) -> candidates.Refiner:
-        """Return what makes pictures of the lower face from components of the jaw."""
-        return candidates.Refiner(enlarge(self.jaw, self.scale), self.jaw_candidates, options)
-
     def predict_codes(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
         """Return the lower face for motion of tracked points.
 

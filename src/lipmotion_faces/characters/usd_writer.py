@@ -134,7 +134,8 @@ def write_usda(path: Path, scene: Scene) -> None:
     Raises ExportError: the file cannot be written.
     """
     normals = compute_shading_normals(scene.mesh, split=scene.split)
-    rate, last, bound = f"{_codes_hz(scene):.9g}", f"{_last_code(scene):.9g}", ("SkelBindingAPI",)
+    last_code = max(len(scene.weights.values) - 1, 0) * _codes_per_key(scene) if scene.weights else 0.0
+    rate, last, bound = f"{_codes_hz(scene):.9g}", f"{last_code:.9g}", ("SkelBindingAPI",)
     places = [np.eye(4), np.eye(4)][: len(_joints(scene))]
     if scene.turn is not None:
         places[1][3, :3] = scene.turn.pivot
@@ -267,10 +268,6 @@ def _codes_hz(scene: Scene) -> float:
 def _codes_per_key(scene: Scene) -> float:
     """Return how many time codes a key is after the one before."""
     return _codes_hz(scene) / scene.weights.rate_hz if scene.weights else 1.0
-
-
-def _last_code(scene: Scene) -> float:
-    return max(len(scene.weights.values) - 1, 0) * _codes_per_key(scene) if scene.weights else 0.0
 
 
 def _joints(scene: Scene) -> Sequence[str]:

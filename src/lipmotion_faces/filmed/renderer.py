@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion_faces.appearance import candidates, lower_face
 from lipmotion_faces.appearance.camera_noise import NoiseSource
-from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
+from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes, enlarge
 from lipmotion_faces.appearance.placing import cut, feather, place
 from lipmotion_faces.appearance.poisson import CloningSystem, cloning_system
 
@@ -146,11 +146,13 @@ class Stitcher:
 
     @cached_property
     def _mouths(self) -> candidates.Refiner:
-        return self.appearance.mouth_refiner(self.options.mouth or candidates.STEADY)
+        mouth = enlarge(self.appearance.mouth, self.appearance.scale)
+        return candidates.Refiner(mouth, self.appearance.mouth_candidates, self.options.mouth or candidates.STEADY)
 
     @cached_property
     def _jaws(self) -> candidates.Refiner:
-        return self.appearance.jaw_refiner(self.options.jaw_detail)
+        jaw = enlarge(self.appearance.jaw, self.appearance.scale)
+        return candidates.Refiner(jaw, self.appearance.jaw_candidates, self.options.jaw_detail)
 
     @cached_property
     def _noise(self) -> NoiseSource:

@@ -360,12 +360,6 @@ class Figure:
         share[self.head] = 1 - self._held[self.head, 0]
         return share
 
-    def mouth_rows(self) -> dict[str, NDArray[np.intp]]:
-        """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
-        lips, every = self.skin.lip_rows(), np.arange(len(self._places))
-        inner = {name: every[self.rows[name]] for name in ("tongue", "teeth", "upper teeth")}
-        return {"lips": lips[1 : VISIBLE_RINGS + 1].ravel(), "wall": self._wall, **inner}
-
     def _shade(self, pose: CharacterPose, places: Real) -> tuple[Real, Real]:
         """Return colours and arriving light: eyes are darker under their lids, the mouth is darker inside."""
         colours, arrives = self.colours.copy(), self._reaches.copy()

@@ -6,6 +6,8 @@ Positions are in pixels; the centre of the first pixel is at 0.5.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,39 @@ Floats = NDArray[np.float64]
 Packed = NDArray[np.uint64]
 ONE = 1 << 16
 """A pixel, in whole numbers."""
+
+
+def source_places(shift: Floats, step: int, shape: tuple[int, ...], axis: int, length: int) -> Floats:
+    """Return where each pixel of a target of a shape lies along an axis of its source, which is so long."""
+    row, column = np.arange(shape[0]) / step, np.arange(shape[1]) / step
+    r, c = np.minimum(row.astype(int), len(shift) - 2), column.astype(int)
+    rows = shift[r] + (row - r)[:, None] * (shift[r + 1] - shift[r])
+    shifts = rows[:, c] + (column - c) * (rows[:, c + 1] - rows[:, c])
+    return np.clip(np.indices(shape[:2])[axis] + shifts, 0, length - 1)
+
+
+def warp_arrays(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
+    """Fill a picture as ``warp``, all pixels at once."""
+    y, x = (source_places(s, step, target.shape, k, source.shape[k]) for k, s in enumerate((shift_y, shift_x)))
+    y0, x0 = np.minimum(y.astype(int), source.shape[0] - 2), np.minimum(x.astype(int), source.shape[1] - 2)
+    fx, fy = (x - x0).astype(np.float32)[..., None], (y - y0).astype(np.float32)[..., None]
+    above = source[y0, x0] + fx * (source[y0, x0 + 1] - source[y0, x0])
+    below = source[y0 + 1, x0] + fx * (source[y0 + 1, x0 + 1] - source[y0 + 1, x0])
+    target[...] = above + fy * (below - above)
+
+
+def warp_packed_arrays(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
+    """Fill a picture as ``_warp_packed``, all pixels at once; levels differ by what that rounds."""
+    levels = np.empty((*target.shape[:2], 4), np.float32)
+    warp_arrays(source[..., None].view(np.uint16).astype(np.float32), shift_x, shift_y, step, levels)
+    target[...] = levels[..., : target.shape[2]] + 0.5
+
+
+def stack_arrays(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas) -> None:
+    """Fill a picture as ``stack``, all pixels at once."""
+    mixed = below + skin[..., 4:].astype(np.float64) * shade
+    mixed = skin[..., :4] + (1 - skin[..., 3:4].astype(np.float64)) * mixed
+    target[...] = (above + (1 - above[..., 3:].astype(np.float64)) * mixed) * [1, 1, 1, 255] + 0.5
 
 
 @compiled
@@ -69,7 +104,7 @@ def paint_band(layer: Layer, top: Floats, bottom: Floats, across: Floats, textur
                 layer[row, column, 3] += np.float32(opacity * (1.0 - layer[row, column, 3]))
 
 
-@compiled
+@partial(compiled, form=warp_arrays)
 def warp(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
     """Fill a picture with another one that is shifted, by a different distance everywhere.
 
@@ -108,7 +143,7 @@ def warp_bytes(source: Canvas, shift_x: Floats, shift_y: Floats, step: int, targ
     _warp_packed(source.view(np.uint64)[..., 0], shift_x, shift_y, step, target)
 
 
-@compiled
+@partial(compiled, form=stack_arrays)
 def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas) -> None:
     """Fill in the values 0..255 of four layers over one another [shape=(H, W, 4)], premultiplied.
 
@@ -128,7 +163,7 @@ def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: Canvas)
                 target[row, column, channel] = np.uint16(mixed * (255.0 if channel == 3 else 1.0) + 0.5)
 
 
-@compiled
+@partial(compiled, form=warp_packed_arrays)
 def _warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
     """Mix all four channels of ``warp_bytes`` at once, in the parts of a number; no sum needs more than 16 bits."""
     height, width, channels = target.shape

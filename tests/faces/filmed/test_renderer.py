@@ -79,7 +79,7 @@ def part_in_frame(part: np.ndarray, place: np.ndarray) -> np.ndarray:
 def stitched(appearance: Appearance, codes: FaceCodes, backgrounds: list[Background], **options: object) -> np.ndarray:
     """Return the frames [shape=(T, H, W, 3)], whole numbers."""
     stitcher = Stitcher(appearance, StitchingOptions(**options))  # type: ignore[arg-type]
-    return np.stack(list(stitcher.stitch(codes, backgrounds))).astype(int)
+    return np.stack(list(stitcher.stitch(codes, backgrounds))).astype("i4")
 
 
 @pytest.mark.parametrize("jaw", [True, False])
@@ -87,7 +87,7 @@ def test_a_face_in_its_own_footage_is_that_footage(
     appearance: Appearance, backgrounds: list[Background], jaw: bool
 ) -> None:
     made = stitched(appearance, codes_in(appearance, backgrounds), backgrounds, jaw=jaw)
-    footage = np.stack([each.frame for each in backgrounds]).astype(int)
+    footage = np.stack([each.frame for each in backgrounds]).astype("i4")
     part = lower_face.moved_part(1) if jaw else lower_face.mouth_ellipse(1)
     inside = np.stack([part_in_frame(part, each.face_to_frame) for each in backgrounds])
     difference = np.abs(made - footage)[inside]
@@ -119,8 +119,8 @@ def test_a_silent_mouth_onto_a_talking_one(
     """The footage's own mouth does not shine through, and its chin goes up."""
     silent = closed(spoken)
     made = stitched(appearance, appearance.predict_codes(silent), backgrounds)
-    wanted = np.stack([each.frame for each in footage_of(silent, noise=0.0)]).astype(int)
-    footage = np.stack([each.frame for each in backgrounds]).astype(int)
+    wanted = np.stack([each.frame for each in footage_of(silent, noise=0.0)]).astype("i4")
+    footage = np.stack([each.frame for each in backgrounds]).astype("i4")
     inside = np.stack([part_in_frame(lower_face.moved_part(1), each.face_to_frame) for each in backgrounds])
     talks = spoken["opening"] > 0.12
     assert talks.sum() >= 4
@@ -200,7 +200,7 @@ def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
     zeros = np.zeros((len(chosen), appearance.jaw_codes.shape[1]), np.float32)
     codes = FaceCodes(appearance.mouth_codes[chosen], zeros, zeros[:, 0])
     assert len(chosen) > BATCH
-    made = np.stack(list(Stitcher(appearance, options).mouths(codes))).astype(int)
+    made = np.stack(list(Stitcher(appearance, options).mouths(codes))).astype("i4")
     assert np.abs(made - appearance.mouths[chosen]).max() <= 1
     blurred = np.stack(list(Stitcher(appearance, StitchingOptions(mouth=None, noise=False)).mouths(codes)))
     assert np.array_equal(blurred, appearance.mouth.restore(codes.mouth))

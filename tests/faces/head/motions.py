@@ -3,7 +3,9 @@
 import numpy as np
 
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion_faces.head.figure import Figure
 from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.skin import RINGS, VISIBLE_RINGS
 from lipmotion_faces.head.stage import Stage
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())
@@ -23,11 +25,18 @@ def steady(phones: tuple[str, ...], values: float = 0.08, duration_s: float = 0.
     return opening(*[values] * (int(100 * duration_s) * len(phones) + 1), rate_hz=100.0)
 
 
+def mouth_rows(figure: Figure) -> dict[str, np.ndarray]:
+    """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
+    lips, every = figure.skin.lip_rows(), np.arange(len(figure.turning()))
+    inner = {name: every[figure.rows[name]] for name in ("tongue", "teeth", "upper teeth")}
+    return {"lips": lips[1 : VISIBLE_RINGS + 1].ravel(), "wall": lips[VISIBLE_RINGS + 1 : RINGS].ravel(), **inner}
+
+
 def parts_seen(stage: Stage, pose: CharacterPose) -> dict[str, np.ndarray]:
     """Return which pixels show lips, wall, tongue, teeth (lower) and upper teeth [each shape=(H, W)]."""
     drawn = stage.figure.frame(pose, stage.canvas.camera.place)
     seen = {}
-    for name, rows in stage.figure.mouth_rows().items():
+    for name, rows in mouth_rows(stage.figure).items():
         marked = np.zeros(len(drawn.places), bool)
         marked[rows] = True
         seen[name] = stage.canvas.shown(drawn.places, marked, stage.figure.triangles)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from faces.head.motions import mouth_rows
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.base import rotate_head
 from lipmotion_faces.head.part import MOUTH_Y, head
@@ -74,7 +75,7 @@ def test_turning_moves_the_head_and_not_the_body_and_keeps_lengths():
 
 def test_the_mouth_is_darker_in_its_depth_and_when_it_closes_and_light_is_at_most_white():
     def brightness(pose: CharacterPose, name: str) -> float:
-        return float(figure().frame(pose, VIEWER).light[figure().mouth_rows()[name]].mean())
+        return float(figure().frame(pose, VIEWER).light[mouth_rows(figure())[name]].mean())
 
     assert brightness(OPEN, "wall") < 0.3 * brightness(OPEN, "lips")
     assert brightness(OPEN._replace(roundness=1), "upper teeth") < brightness(OPEN, "upper teeth")

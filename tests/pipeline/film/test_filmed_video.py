@@ -77,13 +77,13 @@ def test_the_jaw_follows_what_it_is_told(filmed_face, brief, toy_sentence):
     closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(brief.values), 1)), 100.0, brief.channels)
     sound = Audio(toy_sentence.audio.samples[16_000 * 4 // 10 :], 16_000)
     films = {
-        jaw: np.stack(list(make_film(filmed_face, closed, sound=sound, options=Outputs(jaw=jaw)).frames)).astype(int)
+        jaw: np.stack(list(make_film(filmed_face, closed, sound=sound, options=Outputs(jaw=jaw)).frames)).astype("i2")
         for jaw in ("motion", "energy", "none")
     }
     below = (slice(None), slice(212, 240), slice(90, 134))  # the chin
     assert np.abs(films["motion"][below] - films["energy"][below]).mean() > 0.3
     assert np.abs(films["motion"][below] - films["none"][below]).mean() > 0.3
-    shown = np.stack([each.copy() for each in filmed_face.background.video.frames(range(20))]).astype(int)
+    shown = np.stack([each.copy() for each in filmed_face.background.video.frames(range(20))])
     assert np.array_equal(films["none"][:20][:, 225:], shown[:, 225:])  # the background's own jaw
     with pytest.raises(InputError, match="a jaw that follows the energy needs the sound; give the recording"):
         make_film(filmed_face, brief, options=Outputs(jaw="energy"))
@@ -132,7 +132,7 @@ def test_sound_and_pictures_are_as_long(filmed_face, motion, toy_sentence, tmp_p
 
 def test_the_mark(filmed_face, brief, tmp_path):
     path, sound = tmp_path / "a.mp4", Audio(np.zeros(16_000 * 8 // 10, np.float32), 16_000)
-    plain = np.stack(list(make_film(filmed_face, brief).frames))[::10].astype(int)
+    plain = np.stack(list(make_film(filmed_face, brief).frames))[::10].astype("i4")
     for mark in ("metadata", "visible", "none"):
         options: dict[str, Any] = {} if mark == "metadata" else {"mark": mark}  # it is the default
         write_film(path, make_film(filmed_face, brief), sound, **options)

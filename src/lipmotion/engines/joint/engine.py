@@ -312,14 +312,14 @@ class JointEngine(Engine[JointModel]):
             units,
             constraints,
             close=self.config.closures,
-            closing_units=model.units.units_within(LIP_CLOSING),
+            closing_units=tuple(u for u in model.units.units if set(model.units.phones(u)).issubset(LIP_CLOSING)),
         )
-        return Generation(
-            motion,
-            variance,
-            with_unit_names(units, model.units),
-            StateTrace(_density_names(model.hmm, path), path.frames),
+        forest = model.hmm.models[MOTION].forest
+        names = tuple(
+            f"{left}-{unit}+{right}.{state}: {forest.name(forest.leaf(((left, unit, right), state)))}"
+            for (left, unit, right), state in path.states.triphones
         )
+        return Generation(motion, variance, with_unit_names(units, model.units), StateTrace(names, path.frames))
 
     def describe(self, model: JointModel) -> str:  # noqa: D102
         return model.hmm.text()
@@ -384,11 +384,3 @@ def _own_times(
 def _aligned(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:
     sequence, bounds = units_to_frames(units, observations.frames, model.units.silence[0], model.units.unit_of)
     return align(model.hmm, observations, sequence, bounds)
-
-
-def _density_names(hmm: JointHmm, path: StatePath) -> tuple[str, ...]:
-    forest = hmm.models[MOTION].forest
-    return tuple(
-        f"{left}-{unit}+{right}.{state}: {forest.name(forest.leaf(((left, unit, right), state)))}"
-        for (left, unit, right), state in path.states.triphones
-    )

@@ -57,7 +57,9 @@ def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
     """Return the densities of motion along a path of states. Raises InputError: no motion, or its weight is 0."""
     model, means, precisions = _motion_gaussians(hmm)
     chosen = model.forest.leaves(path.states.triphones)[path.frames]
-    return _make_densities(model.tied.mixtures.log_weights[chosen].astype(float), means[chosen], precisions[chosen])
+    precisions = precisions[chosen]
+    precisions[[0, -1], :, 1:] = 0  # Δ and Δ² of the first and last frame count for nothing
+    return FrameDensities(model.tied.mixtures.log_weights[chosen].astype(float), means[chosen], precisions)
 
 
 def solve_trajectory(
@@ -130,9 +132,3 @@ def _motion_gaussians(hmm: JointHmm) -> tuple[StreamModel, Array, Array]:
     means = mixtures.means * deviation + model.scale.mean
     precisions = weight / (mixtures.variances * deviation**2)
     return model, means.reshape(G, M, 3, D // 3), precisions.reshape(G, M, 3, D // 3)
-
-
-def _make_densities(log_weights: Array, means: Array, precisions: Array) -> FrameDensities:
-    """Return the densities, in which Δ and Δ² of the first and last frame count for nothing; changes the precisions."""
-    precisions[[0, -1], :, 1:] = 0
-    return FrameDensities(log_weights, means, precisions)

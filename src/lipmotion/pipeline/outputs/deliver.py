@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from lipmotion.articulation.curve_edits import apply_gain
+from lipmotion.articulation.curve_edits import GAIN_EDGE_S, span_weight
 from lipmotion.articulation.delivery import (
     Delivery,
     close_on_frame_grid,
@@ -24,7 +24,7 @@ from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_m
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import show_edited_curves, with_curves
-from lipmotion.types import Gain, Generation, Prosody, VoiceEvent
+from lipmotion.types import Generation, Prosody, VoiceEvent
 from lipmotion.types.audio import LAUGHTER, SHOUT, WHISPER
 from lipmotion.types.delivery import NEUTRAL, PLAIN, MoodKey, Staging, sort_moods
 from lipmotion.types.motion import RADIAN
@@ -59,13 +59,14 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
 
     keys : in the order of their times; moods do not count. Each holds until the next manner
     """
-    manners = [key for key in keys if key.is_manner]
-    last = MoodKey(len(generation.motion.values) / generation.motion.rate_hz, PLAIN)
-    for key, stop_s in ((key, later.time_s) for key, later in pairwise((*manners, last))):
-        factor = 1 + key.strength * (FACTORS[key.mood] - 1)
-        if factor != 1 and key.time_s < stop_s:
-            generation = apply_gain(generation, Gain(key.time_s, stop_s, factor))
-    return generation
+    manners, time_s = [key for key in keys if key.is_manner], generation.motion.time_s
+    last, intensity = MoodKey(len(time_s) / generation.motion.rate_hz, PLAIN), np.ones(len(time_s))
+    for key, later in pairwise((*manners, last)):
+        if key.time_s < later.time_s:
+            near = slice(*np.searchsorted(time_s, (key.time_s - GAIN_EDGE_S, later.time_s + GAIN_EDGE_S)))
+            share = span_weight(time_s[near], key.time_s, later.time_s, GAIN_EDGE_S)
+            intensity[near] *= 1 + share * key.strength * (FACTORS[key.mood] - 1)
+    return intensify(generation, intensity)
 
 
 def deliver(generation: Generation, delivery: Delivery) -> Generation:
@@ -83,9 +84,8 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
         opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
         generation = intensify(generation, delivery.intensity, opening)
     if not all(key.is_manner for key in keys):
-        moods = with_moods(generation.motion, keys)
-        names = tuple(name for name in generation.motion.names if not is_mood(name))
-        generation = generation.selected(names).with_motion(moods)
+        generation = generation.selected([name for name in generation.motion.names if not is_mood(name)])
+        generation = generation.with_motion(with_moods(generation.motion, keys))
     return shift_in_time(generation, delivery)
 
 

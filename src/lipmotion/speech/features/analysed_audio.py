@@ -36,7 +36,6 @@ from lipmotion.speech.sound.voice_activity import (
 from lipmotion.types import Audio, Features, JoinedRows
 
 MadeT = TypeVar("MadeT")
-FloatT = TypeVar("FloatT", bound=np.floating[Any])
 SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
 QUIETEST = 0.1
@@ -76,21 +75,22 @@ class AnalysedAudio(Audio):
         bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(stretches)), self.frames]
         passages = []
         sounds = {id(piece): _LevelledPiece(piece.samples) for piece, _ in found}
+        encodings = {id(piece): WindowedEncoding(sounds[id(piece)].read, len(piece.samples)) for piece, _ in found}
         for number, (piece, (first, end)) in enumerate(found):
             level, samples = piece.energy[first:end], piece.samples[first * HOP : end * HOP]
             gain = passage_gain(level)
             samples = apply_gain(fill_gaps(samples, level), np.arange(len(gain)), gain)
-            sounds[id(piece)].add(first, samples, gain)
             sound = find_spoken_frames(level)
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
             padded = _PassageAudio(
                 np.pad(samples, (lead * HOP, tail * HOP)),
                 self.rate_hz,
-                piece=sounds[id(piece)],
+                encodings=encodings[id(piece)],
                 first=first,
                 lead=lead,
                 tail=tail,
             )
+            sounds[id(piece)].add(first, padded.sound.samples, gain)
             own = slice(bounds[number], bounds[number + 1])
             passages.append(Passage(stretches[number].first - lead, own, padded))
         return tuple(passages)
@@ -120,11 +120,7 @@ class AnalysedAudio(Audio):
             energy = log_energy(samples)
             tones = find_tones(samples, energy)
             passages = [] if tones else find_passages(energy)
-            silent = np.asarray(~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1))
-            for first, end in passages:
-                silent[first:end] = False
-            runs = find_sound_runs(silent, 1) if passages else []
-            cuts = [(first + end) // 2 * HOP for first, end in runs if end - first >= SEPARATE_FRAMES]
+            cuts = _silences_beside(passages, samples)
             if tones:
                 waiting.append((start, samples.copy()))
             for tone in tones:
@@ -180,8 +176,7 @@ class AnalysedAudio(Audio):
 
     def mfcc(self, warp: float = 1.0) -> Features:
         """Return the features of ``speech.features.mfcc.mfcc`` at one warp of the frequencies."""
-        (features,) = self.mfcc_of_warps((warp,))
-        return features
+        return self.mfcc_of_warps((warp,))[0]
 
     def joined_mfcc(self) -> Features:
         """Return ``mfcc`` with values that are ``JoinedRows``."""
@@ -195,33 +190,33 @@ class AnalysedAudio(Audio):
             self._mfcc.update(zip(missing, self._new_mfcc(missing), strict=True))
         return [self._mfcc[warp] for warp in warps]
 
-    def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        for passage in self.passages:
-            passage.audio.mfcc_of_warps(warps)  # the spectra are computed once for all
-        return [Features(self.joined(partial(_mfcc_values, warp=warp)), self.duration_s) for warp in warps]
+    def keep_warps(self, *warps: float) -> None:
+        """Forget the features at all other warps."""
+        for warp in self._mfcc.keys() - {*warps}:
+            del self._mfcc[warp]
 
-    def _kind(self, of_audio: Callable[[AnalysedAudio], NDArray[Any]], *silence: float) -> NDArray[Any]:
-        return self.joined(of_audio, *silence)
+    def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
+        return [Features(self.joined(partial(_mfcc_values, warp=warp)), self.duration_s) for warp in warps]
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
         """The natural logarithm of the energy of every frame [shape=(T,)], each passage at the same level."""
-        return self._kind(lambda audio: audio.log_energy, SILENT_ENERGY)
+        return self.joined(lambda audio: audio.log_energy, SILENT_ENERGY)
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
         """The features of the general models [shape=(T, 39)], as of ``speech.recognition.general``."""
-        return self._kind(lambda audio: audio.general_features)
+        return self.joined(lambda audio: audio.general_features)
 
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
         """The normalised log mel spectrum [shape=(T, 40)], as of ``speech.features.mfcc``."""
-        return self._kind(lambda audio: audio.spectrum)
+        return self.joined(lambda audio: audio.spectrum)
 
     @cached_property
     def encoding(self) -> NDArray[np.float16]:
         """What the speech encoder makes of every frame [shape=(T, 64)], as of ``speech.features.encoding``."""
-        return self._kind(lambda audio: audio.encoding)
+        return self.joined(lambda audio: audio.encoding)
 
     def stretch(self, first: int, stop: int) -> AnalysedAudio:
         """Return some frames of the recording, with the features that they have in the whole."""
@@ -261,14 +256,13 @@ class _Piece(NamedTuple):
 
 
 class _LevelledPiece:
-    """The sound of a piece at the level of all passages, whose encoding knows what is around a passage."""
+    """The sound of a piece at the level of all passages, of which encodings know what is around a passage."""
 
     def __init__(self, samples: NDArray[np.float32]) -> None:
         self._samples = samples
         self._passages: list[tuple[int, NDArray[np.float32]]] = []
         self._frames: list[int] = []
         self._gains: list[float] = []
-        self.encoding = WindowedEncoding(self._read, len(samples))
 
     def add(self, first: int, samples: NDArray[np.float32], gain: NDArray[np.float64]) -> None:
         """Add the levelled samples of a passage that begins in a frame, and the gain in its frames [shape=(T,)]."""
@@ -276,7 +270,8 @@ class _LevelledPiece:
         self._frames += [first, first + len(gain) - 1]
         self._gains += [float(gain[0]), float(gain[-1])]
 
-    def _read(self, first: int, stop: int) -> NDArray[np.float32]:
+    def read(self, first: int, stop: int) -> NDArray[np.float32]:
+        """Return the samples from one to before another."""
         result = apply_gain(self._samples[first:stop], self._frames, self._gains, first)
         for start, samples in self._passages:
             begin, end = max(first, start), min(stop, start + len(samples))
@@ -291,20 +286,29 @@ def _heard(samples: NDArray[np.float32]) -> slice:
     return slice(int(sound.argmax()), len(sound) - int(sound[::-1].argmax())) if sound.any() else slice(0, 0)
 
 
+def _silences_beside(passages: Sequence[Stretch], samples: NDArray[np.float32]) -> list[int]:
+    """Return a sample of each digital silence before, after and between passages that is long enough to part them."""
+    silent = np.asarray(~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1))
+    for first, end in passages:
+        silent[first:end] = False
+    runs = find_sound_runs(silent, 1) if passages else []
+    return [(first + end) // 2 * HOP for first, end in runs if end - first >= SEPARATE_FRAMES]
+
+
 @dataclass(frozen=True, eq=False)
 class _PassageAudio(AnalysedAudio):
     """The sound of one passage, of which features are computed.
 
-    piece, first : the sound between digital silences that it is part of, and the frame there in which it begins
+    encodings, first : of the sound between digital silences that it is part of, and the frame there in which it begins
     lead, tail : frames of silence before and after what is recorded, with the features of the quietest moment
     """
 
-    piece: _LevelledPiece | None = None
+    encodings: WindowedEncoding | None = None
     first: int = 0
     lead: int = 0
     tail: int = 0
 
-    @cached_property
+    @property  # cached, it would keep itself, and an hour's sound, until the garbage is collected
     def passages(self) -> tuple[Passage, ...]:
         return (Passage(0, slice(0, self.frames), self),)
 
@@ -312,13 +316,14 @@ class _PassageAudio(AnalysedAudio):
     def recorded(self) -> slice:
         return slice(self.lead, self.frames - self.tail)
 
-    @cached_property
-    def _sound(self) -> Audio:
+    @property
+    def sound(self) -> Audio:
+        """What is recorded of it."""
         return Audio(self.samples[self.lead * HOP : len(self.samples) - self.tail * HOP], self.rate_hz)
 
     @cached_property
     def _energy(self) -> NDArray[np.float32]:
-        return log_energy(checked_samples(self._sound))
+        return log_energy(checked_samples(self.sound))
 
     def _with_silence(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Return the rows of the sound, and before and after them their mean where it is the most silent."""
@@ -329,7 +334,7 @@ class _PassageAudio(AnalysedAudio):
         return np.concatenate([np.repeat(silence, self.lead, axis=0), rows, np.repeat(silence, self.tail, axis=0)])
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        found = mfcc_of_warps(self._sound, warps, self._energy)
+        found = mfcc_of_warps(self.sound, warps, self._energy)
         return [Features(self._with_silence(each.values), self.duration_s) for each in found]
 
     @cached_property
@@ -338,21 +343,19 @@ class _PassageAudio(AnalysedAudio):
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
-        rows = self._with_silence(general_features(self._sound))
+        rows = self._with_silence(general_features(self.sound))
         rows[:, :CEPSTRA] -= rows[:, :CEPSTRA].mean(axis=0, dtype=np.float64).astype(np.float32)
         return rows  # its models were trained on sentences with silence
 
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
-        return self._with_silence(spectrum(self._sound))
+        return self._with_silence(spectrum(self.sound))
 
     @cached_property
     def encoding(self) -> NDArray[np.float16]:
-        encoding = self.piece.encoding if self.piece else WindowedEncoding(self._read, len(self._sound.samples))
-        return self._with_silence(encoding.rows(self.first, self.first + len(self._energy)))
-
-    def _read(self, first: int, stop: int) -> NDArray[np.float32]:
-        return self._sound.samples[first:stop]
+        samples = self.sound.samples
+        encodings = self.encodings or WindowedEncoding(lambda first, stop: samples[first:stop], len(samples))
+        return self._with_silence(encodings.rows(self.first, self.first + len(self._energy)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,13 +370,11 @@ class _Stretch(AnalysedAudio):
         return (Passage(0, slice(0, self.frames), self),)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
-        return [Features(self._rows(each.values), self.duration_s) for each in self.whole.mfcc_of_warps(warps)]
+        self.whole.mfcc_of_warps(warps)  # the spectra are computed once for all
+        return super().mfcc_of_warps(warps)
 
-    def _kind(self, of_audio: Callable[[AnalysedAudio], NDArray[Any]], *_: float) -> NDArray[Any]:
-        return self._rows(of_audio(self.whole))
-
-    def _rows(self, rows: NDArray[FloatT]) -> NDArray[FloatT]:
-        return rows[self.first : self.first + len(self.samples) // HOP + 1]
+    def joined(self, of_passage: Callable[[AnalysedAudio], NDArray[Any]], _: float | None = None) -> NDArray[Any]:
+        return of_passage(self.whole)[self.first : self.first + len(self.samples) // HOP + 1]
 
 
 def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
@@ -389,7 +390,10 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
 
 
 def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return samples without the offset of their quietest sound, where that is most of it; digital silence stays."""
+    """Return samples without a constant offset, which would make pauses as loud as speech; digital silence stays.
+
+    It is that of the quietest sound between digital silences, and taken off where it is most of what is heard there.
+    """
     count = len(samples) // HOP if samples.ndim == 1 else 0
     sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
     for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():

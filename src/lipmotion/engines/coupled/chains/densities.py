@@ -93,7 +93,10 @@ class EmissionEvaluator:
             observed = observations.observed[stream]
             if observed is not None and not observed.any():
                 continue
-            log = _restricted(form, densities).log_components(observations.streams[stream])
+            if not np.array_equal(densities, np.arange(form.constant.shape[1])):
+                columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, densities]
+                form = QuadraticForm(columns.reshape(len(columns), -1), form.constant[:, densities])  # noqa: PLW2901
+            log = form.log_components(observations.streams[stream])
             if exponent != 1:
                 log *= np.float32(exponent)
             if observed is not None:
@@ -101,13 +104,6 @@ class EmissionEvaluator:
             total += log
         total += log_weights
         return normalised_components(total)
-
-
-def _restricted(form: QuadraticForm, densities: Index) -> QuadraticForm:
-    if np.array_equal(densities, np.arange(form.constant.shape[1])):
-        return form
-    columns = form.form.reshape(len(form.form), *form.constant.shape)[:, :, densities]
-    return QuadraticForm(columns.reshape(len(columns), -1), form.constant[:, densities])
 
 
 @dataclass(frozen=True, eq=False)

@@ -258,17 +258,19 @@ def factorial_lattice(
         for units, allowed in zip(structure.units, (allowed_units, visible_units), strict=True)
     )
     states = _kernel_states(first, structure.states), _kernel_states(second, structure.states)
-    columns = []
+    columns, index, start = [], [], 0
     for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
         position = np.full(count, -1)
         position[own] = np.arange(len(own))
         columns.append(position[transitions.own_density_states[:, chain]])
+        index += [start + own, start + count + own]
+        start += 2 * count
     own_density_positions = np.stack(columns, axis=1)
     inside = np.flatnonzero((own_density_positions >= 0).all(axis=1))
     chains = [min(number, 1) for number in range(len(ties))]
     densities = tuple(np.concatenate([states[chain], structure.state_counts[chain] + inside]) for chain in chains)
     return FactorialLattice(
-        transition_index=_transition_index(states, structure),
+        transition_index=np.concatenate(index),
         densities=densities,
         ties=tuple(_within(chosen, tie) for chosen, tie in zip(densities, ties, strict=True)),
         density_units=np.concatenate([states[0], transitions.own_density_states[inside, 0]]) // structure.states,
@@ -294,14 +296,6 @@ def _visible_units(structure: Structure, allowed_units: NDArray[np.bool_]) -> ND
 def _kernel_states(units: Index, states: int) -> Index:
     """Return the states of some units in the order of the kernel: the first state of every unit, then the second."""
     return np.concatenate([units * states + state for state in range(states)])
-
-
-def _transition_index(states: tuple[Index, Index], structure: Structure) -> Index:
-    index, start = [], 0
-    for own, count in zip(states, structure.state_counts, strict=True):
-        index += [start + own, start + count + own]
-        start += 2 * count
-    return np.concatenate(index)
 
 
 def _within(densities: Index, tie: Index) -> Index:
