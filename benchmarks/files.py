@@ -29,8 +29,8 @@ from lipmotion.types import Generation
 from lipmotion_blender.curves import at_frames
 from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.scene import Scene
-from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.pose import head_poses
+from lipmotion_faces.head.skin import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh, mouth_weights
 from lipmotion_faces.outputs.scenes import character_scene, head_scene, write_scene
 from programs import gltf_report, gltf_validator, python_with, run_with

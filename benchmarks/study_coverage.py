@@ -24,10 +24,10 @@ from scipy.special import ndtr, ndtri, stdtrit
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from lipmotion_studio.study.analysis import crossed
 from lipmotion_studio.study.analysis.analyse import power_of, raters_needed
-from lipmotion_studio.study.analysis.crossed import Components, Interval, crossed_mean
+from lipmotion_studio.study.analysis.crossed import RANKS, Components, Interval, RatingTable, rating_figures
 from lipmotion_studio.study.analysis.paired import fit_strengths, paired_figures
-from lipmotion_studio.study.analysis.ratings import RANKS, RatingTable, rating_figures
 from study.simulated import Effects, comparisons, expected_preference, expected_rating, ratings
 
 Array = NDArray[np.float64]
@@ -184,7 +184,7 @@ def power(studies: int) -> list[dict[str, Any]]:
             for _ in range(studies):
                 values = difference + draw.normal(size=(raters, sentences))
                 values += rater * draw.normal(size=(raters, 1)) + sentence * draw.normal(size=(1, sentences))
-                told += crossed_mean(values, 4.0).p_value < 0.05
+                told += crossed.crossed_mean(values, 4.0).p_value < 0.05
             row = {"rater": rater, "sentence": sentence, "difference": difference, "sentences": sentences}
             said = power_of(components, difference, raters, sentences)
             rows.append(row | {"raters": raters, "said": said, "told": told / studies})

@@ -28,8 +28,8 @@ from lipmotion_faces.film.filmed_video import FILM, make_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion_faces.registry import make_face
-from lipmotion_faces.tracking.footage import footage_frames, track_footage
 from lipmotion_faces.tracking.head_pose import region_to_image
+from lipmotion_faces.tracking.track import footage_frames, track_footage
 from lipmotion_faces.tracking.trackers import LIP_POINTS
 
 Array = NDArray[np.float64]

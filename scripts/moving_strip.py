@@ -18,7 +18,7 @@ from PIL import Image
 import lipmotion
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
 from lipmotion_faces import Staging
-from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
+from lipmotion_faces.tracking.track import Footage, footage_frames, track_footage
 
 STRIP = Path(__file__).parent.parent / "docs" / "images" / "strip.webp"
 WIDTH_PX, HEIGHT_PX = 300, 340

@@ -73,11 +73,14 @@ class Registry(Generic[ExtensionT]):
     group    : the group of the entry points: ``lipmotion.engines``, for instance
     built_in : ``module:attribute`` of each built-in extension, by name; a package cannot replace it, nor what this
                distribution itself declares as entry points (faces, studio, lab)
+    base     : extensions are classes of it, if it is given; ``named``: their attribute ``name`` is the name
     """
 
     kind: str
     group: str
     built_in: Mapping[str, str]
+    base: type[Any] | None = None
+    named: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -88,8 +91,17 @@ class Registry(Generic[ExtensionT]):
     def load(self, name: str) -> ExtensionT:
         """Import an extension and return it; what it prints meanwhile goes to standard error.
 
-        Raises InputError: no extension has this name, or the package that adds it cannot be imported.
+        Raises InputError: none has this name, the package that adds it cannot be imported, or it is of another kind.
         """
+        found = self._find(name)
+        if self.base is not None:
+            fits = isinstance(found, type) and issubclass(found, self.base)
+            if not fits or (self.named and getattr(found, "name", "") != name):
+                required = f"a class of {self.base.__name__}{' of this name' * self.named}"
+                raise InputError(f"the {self.kind} {name!r} of an installed package is {found!r}, required {required}")
+        return found
+
+    def _find(self, name: str) -> ExtensionT:
         if name in self.built_in:
             module, _, attribute = self.built_in[name].partition(":")
             return getattr(import_module(module), attribute)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.storage.media import MAX_PIXELS, bound_allocations, x264_instructions
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.sources import MAX_PIXELS, bound_allocations, x264_instructions
 
 Frame = NDArray[np.uint8]
 ReadFrames = Callable[[int, int], Iterable[Frame]]
@@ -68,7 +68,6 @@ class FrameGroups:
         self._groups[group] = list(self._read(self._starts[group], self._starts[group + 1]))
 
     def _largest(self) -> int:
-        """Return the bytes of the largest group that is kept."""
         return max(sum(frame.nbytes for frame in group) for group in self._groups.values())
 
 

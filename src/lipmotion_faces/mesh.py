@@ -22,8 +22,7 @@ from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces import base
-from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
-from lipmotion_faces.rendering.rasteriser import Camera, flat
+from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, drawn_surface, flat
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

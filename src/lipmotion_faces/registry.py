@@ -20,6 +20,7 @@ FACES: Registry[type[Face]] = Registry(
         "cartoon": f"{_DRAWN}:Cartoon",
         "head": "lipmotion_faces.head:Head",
     },
+    Face,
 )
 
 
@@ -32,10 +33,7 @@ def make_face(name: str = "portrait") -> Face:
         from lipmotion_faces.portrait.layered import LayeredFace
 
         return LayeredFace(Path(name))
-    chosen = FACES.load(name)
-    if not (isinstance(chosen, type) and issubclass(chosen, Face)):
-        raise InputError(f"{chosen!r} is called a face, {name!r}, by an installed package; required a class of Face")
-    return chosen()
+    return FACES.load(name)()
 
 
 def is_drawings(face: str | Path, folder: Path = Path()) -> bool:

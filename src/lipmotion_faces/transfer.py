@@ -14,8 +14,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.motion.space import resample_track
-from lipmotion.motion.speaker_maps import SpeakerMap
-from lipmotion.motion.transfer_map import count_speech_s, fit_transfer_map, select_channels
+from lipmotion.motion.speaker_maps import SpeakerMap, count_speech_s, fit_transfer_map, select_channels
 from lipmotion.pipeline.analysis.read_request import read_recording
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.generation import generate_for, speaker_map

@@ -26,7 +26,7 @@ from lipmotion.errors import CorpusError, InputError, MissingDependencyError, sh
 from lipmotion.formats.sound import write_sound
 from lipmotion.measures import curves
 from lipmotion.measures.closures import REACH, closed_threshold, find_closings, match_closings
-from lipmotion.motion.rest import is_away_from_speech
+from lipmotion.motion.frame_labels import is_away_from_speech
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.train import label_phones
 from lipmotion.speech.recognition.recogniser import cached_recogniser

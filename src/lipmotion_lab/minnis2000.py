@@ -19,10 +19,17 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.engines.selection.concatenation import Piece, pieces_of
-from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_BEFORE, MINNIS_2000, Costs, SelectionConfig, Target
+from lipmotion.engines.selection.costs import (
+    ABUTTING_JOIN,
+    JOIN_BEFORE,
+    MINNIS_2000,
+    Costs,
+    SelectionConfig,
+    Target,
+    select,
+)
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.kernels.compiler import one_thread
 from lipmotion.pipeline.model import Model

@@ -23,8 +23,7 @@ from cli.conftest import Done, is_one_error
 from lipmotion import Corpus
 from lipmotion.cli import main
 from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
-from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
-from lipmotion.cli.terminal.progress import outcome, report_progress
+from lipmotion.cli.terminal.progress import outcome, print_json, print_line, print_lines, report_progress
 from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.generate.explain import explanation_text

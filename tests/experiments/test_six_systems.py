@@ -17,7 +17,7 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.archive import read_archive
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.report.sections import xie_liu_section
-from lipmotion_lab.xie_liu2007 import plots, systems
+from lipmotion_lab.xie_liu2007 import six_systems, systems
 from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
 from testing.toy import SMALL, toy_sentences
 
@@ -140,7 +140,7 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures):
 @LONG
 def test_pictures_are_written(figures, folder):
     assert figures
-    assert sorted(path.name for path in folder.iterdir()) == sorted(plots.PLOT_FILES.values())
+    assert sorted(path.name for path in folder.iterdir()) == sorted(six_systems.PLOT_FILES.values())
     assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
 
 

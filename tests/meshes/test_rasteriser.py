@@ -9,9 +9,8 @@ from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, Mes
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.characters import character_files, gltf_scene, textures
 from lipmotion_faces.characters.textures import decode_srgb
-from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
+from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, TexturedCanvas, drawn_surface, flat, gradient
 from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches
-from lipmotion_faces.rendering.rasteriser import Camera, Canvas, flat, gradient
 from meshes.gltf import UV, document, glb, textured_document, with_colours
 
 CAMERA = Camera(120, 100, (0.5, -0.25), across=2.0, distance=8.0)

@@ -3,8 +3,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.motion.frame_labels import StateLayout, label_full_context, with_neighbours
-from lipmotion.motion.rest import find_digital_silence, is_away_from_speech, list_speech_intervals
+from lipmotion.motion.frame_labels import (
+    StateLayout,
+    find_digital_silence,
+    is_away_from_speech,
+    label_full_context,
+    list_speech_intervals,
+    with_neighbours,
+)
 from lipmotion.testing import timeline
 from lipmotion.types import ENERGY_FEATURE, Timeline, Unit
 from meshes.speech import said

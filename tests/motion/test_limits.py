@@ -17,11 +17,19 @@ from lipmotion.motion.closure import (
     estimate_closure,
     find_closable_ranges,
 )
-from lipmotion.motion.limits import MotionLimits, check_poses, check_rest, check_spread, measure_limits
+from lipmotion.motion.generation import LARGEST_FACTOR, VarianceScaling
 from lipmotion.motion.modulation_filter import REACH as TAPS
 from lipmotion.motion.modulation_filter import ModulationFilter
-from lipmotion.motion.space import MotionSpace, fit_space, resample_to_model
-from lipmotion.motion.variance_scaling import LARGEST_FACTOR, VarianceScaling
+from lipmotion.motion.space import (
+    MotionLimits,
+    MotionSpace,
+    check_poses,
+    check_rest,
+    check_spread,
+    fit_space,
+    measure_limits,
+    resample_to_model,
+)
 from lipmotion.stats.pca import Pca
 from lipmotion.testing import PHONES, examples, speech, timeline
 from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit, silent_monitor

@@ -42,7 +42,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[type[
     monkeypatch.syspath_prepend(tmp_path)
     point = metadata.EntryPoint("frames", "predictor_of_the_page:FrameRegression", predictors.PREDICTORS.group)
     monkeypatch.setitem(predictors.PREDICTORS.__dict__, "_installed", {"frames": point})
-    yield predictors.load_predictor("frames")
+    yield predictors.PREDICTORS.load("frames")
     del sys.modules["predictor_of_the_page"]
 
 
@@ -95,7 +95,7 @@ def test_a_name_that_is_none_is_refused_before_the_training(monkeypatch: pytest.
             engine_from_settings(name, settings=["predictor=frames"])
     point = metadata.EntryPoint("frames", "json:dumps", predictors.PREDICTORS.group)
     monkeypatch.setitem(predictors.PREDICTORS.__dict__, "_installed", {"frames": point})
-    with pytest.raises(InputError, match="required a Predictor of this name"):
+    with pytest.raises(InputError, match="required a class of Predictor of this name"):
         engine_from_settings("trajectory", settings=["predictor=frames"])
     assert predictors.PREDICTORS.group in GROUPS
 

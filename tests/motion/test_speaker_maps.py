@@ -7,8 +7,8 @@ import pytest
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion import speaker_maps
 from lipmotion.motion.closure import find_closable_ranges
-from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
-from lipmotion.motion.transfer_map import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map
+from lipmotion.motion.frame_labels import is_away_from_speech, list_speech_intervals
+from lipmotion.motion.speaker_maps import REST_PRIOR_S, compose_maps, count_speech_s, fit_transfer_map
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
 from testing.toy import toy_motion, toy_sentences
 

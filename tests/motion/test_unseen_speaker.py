@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lipmotion import Request, load_model
-from lipmotion.motion import articulation, unseen_speaker
+from lipmotion.motion import articulation
+from lipmotion.motion import articulation as unseen_speaker
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.closure import REACH_S, find_closable_ranges
 from lipmotion.motion.general_motion import hear_articulators
@@ -33,7 +34,7 @@ def welcome() -> Speech:
 @pytest.fixture
 def no_distortion_is_low(monkeypatch: pytest.MonkeyPatch) -> None:
     """Phones can be relied on as far as words confirm them, however clear the sound is."""
-    monkeypatch.setattr("lipmotion.motion.rest.DISTORTIONS", (-2.0, -1.0))
+    monkeypatch.setattr("lipmotion.motion.frame_labels.DISTORTIONS", (-2.0, -1.0))
 
 
 def generated(speech: Speech, *pins: Pin) -> Generation:

@@ -142,7 +142,7 @@ def test_a_pin_that_cannot_be_met(move):
         ),
         (Pin(9.0, "opening", 0.1), r"pin at 9.0 s lies outside the recording \(0 to 2.76 s\)"),
         (Pin(-0.1, "opening", 0.1), "pin at -0.1 s lies outside"),
-        (Pin(0.5, "opening", float("nan")), "has the value nan, required a finite number"),
+        (Pin(0.5, "opening", float("nan")), "sets opening to nan, required a finite number"),
     ):
         with pytest.raises(InputError, match=message):
             move(constraints=Constraints((pin,)))

@@ -16,7 +16,7 @@ from lipmotion_faces import Staging
 from lipmotion_faces.characters import fbx
 from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
 from lipmotion_faces.characters.scene import Scene
-from lipmotion_faces.head.lips import VISIBLE_RINGS
+from lipmotion_faces.head.skin import VISIBLE_RINGS
 from lipmotion_faces.head.stage import figure, head_mesh
 from lipmotion_faces.outputs.scenes import character_scene, delivered_scene, head_scene, write_scene
 from meshes.heads import head, write_glb

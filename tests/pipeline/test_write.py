@@ -197,7 +197,7 @@ def test_a_kind_of_a_package_is_written_beside_others(result, tmp_path, monkeypa
     kinds = output.OUTPUTS.built_in
     monkeypatch.setitem(kinds, "words", f"{__name__}:WordOutput")
     monkeypatch.setitem(kinds, "wrong", f"{__name__}:settings")
-    with pytest.raises(InputError, match="is called an output, 'wrong', by an installed package"):
+    with pytest.raises(InputError, match="the output 'wrong' of an installed package"):
         write(result, tmp_path / "a.words.csv")
     monkeypatch.delitem(kinds, "wrong")
     write(result, [tmp_path / "a.words.csv", tmp_path / "a.json"])

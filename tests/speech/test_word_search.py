@@ -334,7 +334,7 @@ def test_a_long_recording_is_cut(loud: str) -> None:
 def test_a_recogniser_that_is_not_installed_or_is_none_is_refused() -> None:
     with pytest.raises(errors.MissingDependencyError, match="pip install absent"):
         posteriors.phone_recogniser("absent")
-    with pytest.raises(errors.InputError, match="required a PhoneRecogniser"):
+    with pytest.raises(errors.InputError, match="required a class of PhoneRecogniser"):
         posteriors.phone_recogniser("odd")
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion_studio.study.analysis.crossed import RANKS, SCALES, RatingTable
 from lipmotion_studio.study.analysis.paired import PairTable
-from lipmotion_studio.study.analysis.ratings import RANKS, SCALES, RatingTable
 from lipmotion_studio.study.answers import FIRST, MOS, PAIRED, RANKING, SECOND, Answer
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from functools import partial
 
 import cv2
 
-from lipmotion.motion.rest import find_runs
+from lipmotion.motion.frame_labels import find_runs
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged, find_repeated
 
 FRAMES, RATE_HZ = 75, 25.0

@@ -9,11 +9,19 @@ import pytest
 from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.types import Motion, Track
-from lipmotion_faces.tracking import video_scan
-from lipmotion_faces.tracking.footage import Footage, footage_frames, footage_groups, read_video_frames, track_footage
+from lipmotion_faces.tracking import track as video_scan
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
-from lipmotion_faces.tracking.track import CHANNELS, measure_motion, track
+from lipmotion_faces.tracking.track import (
+    CHANNELS,
+    Footage,
+    footage_frames,
+    footage_groups,
+    measure_motion,
+    read_video_frames,
+    track,
+    track_footage,
+)
 from lipmotion_faces.tracking.trackers import JAW_POINTS, LIP_POINTS
 from vision.scripted import COLUMN, face
 from vision.variants import write_frames

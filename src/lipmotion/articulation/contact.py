@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.rest import find_runs
+from lipmotion.motion.frame_labels import find_runs
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import mark_closing_phones

@@ -59,7 +59,8 @@ def apply_curve_edits(
         column = motion.column(edit.channel)
         is_weight = motion.channels[column].unit == WEIGHT
         if isinstance(edit, Pin):
-            pins.append((find_pinned_frame(edit, motion, is_weight=is_weight), column, edit.value))
+            frame = find_pinned_frame(edit, len(motion.values), motion.rate_hz, is_weight=is_weight)
+            pins.append((frame, column, edit.value))
             continue
         if isinstance(edit, DrawnCurve):
             check_drawn(edit, is_weight=is_weight)

@@ -14,10 +14,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
+from lipmotion.cli.arguments.declared import check_paths
 from lipmotion.cli.arguments.options import Version
-from lipmotion.cli.arguments.paths import check_paths
 from lipmotion.cli.terminal.events import Events, Stopper
-from lipmotion.cli.terminal.printing import flush_output, print_usage, with_program_name
+from lipmotion.cli.terminal.progress import flush_output, print_usage, with_program_name
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.extensions import Registry
 from lipmotion.types.values import parse_number, parse_whole
@@ -194,8 +194,7 @@ class WrongCommandLineError(LipMotionError):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Raises an error for a wrong command line, as one line that says where help is; reports help that cannot be
-    printed."""
+    """Raises an error for a wrong command line, as one line that says where help is; reports help it cannot print."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)

@@ -112,9 +112,7 @@ class Engine(Animator[ModelT]):
 
     @abstractmethod
     def from_arrays(self, arrays: Arrays) -> ModelT:
-        """Deserialise a model. Raises ModelFormatError: an array is missing or unknown, or has a wrong shape, type or
-        range.
-        """
+        """Deserialise a model. Raises ModelFormatError: an array is missing, unknown, misshapen or out of range."""
 
     def hidden(self, model: ModelT, speech: Speech) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:  # noqa: ARG002
         """Return features on which models of other people stand, and the distortion of the sound; None: there are none.
@@ -124,9 +122,7 @@ class Engine(Animator[ModelT]):
         return None
 
     def explain(self, model: ModelT, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...] | None:  # noqa: ARG002
-        """Return explanations of frames, 0 to T - 1, of generated motion; None: the trace says all
-        (``explain_by_trace``).
-        """
+        """Return explanations of frames of generated motion; None: the trace says all (``explain_by_trace``)."""
         return None
 
     def posteriors(self, model: ModelT, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: ARG002

@@ -18,6 +18,7 @@ ENGINES: Registry[type[Engine[Any]]] = Registry(
         "joint": "lipmotion.engines.joint.engine:JointEngine",
         "selection": "lipmotion.engines.selection.engine:SelectionEngine",
     },
+    Engine,
 )
 
 DEFAULT = "trajectory"
@@ -35,7 +36,7 @@ def engine_named(name: str, configuration: Mapping[str, Any] | None = None, *, s
     >>> engine.name, engine.config.components, engine.config.states
     ('trajectory', 8, 5)
     """
-    chosen = _class_of(name)
+    chosen = ENGINES.load(name)
     parsed = chosen.Config.stored if stored else chosen.Config.parsed
     try:
         return _create(chosen, parsed(configuration or {}))
@@ -59,7 +60,7 @@ def engine_from_settings(
     if preset is not None:
         name, options = _preset(name, preset)
     name = name or DEFAULT
-    chosen = _class_of(name)
+    chosen = ENGINES.load(name)
     try:
         if units is not None:
             options |= chosen.Config.values_of([f"units={units}"])
@@ -73,18 +74,8 @@ def engine_from_settings(
 
 def preset_visual(preset: str | None) -> str | None:
     """Return the kind of motion that a preset is trained on where none is asked for; None: the default of ``train``."""
-    kinds = [_class_of(engine).Config.preset_visual for engine in ENGINES.names]
+    kinds = [ENGINES.load(engine).Config.preset_visual for engine in ENGINES.names]
     return next((kind[each] for kind in kinds for each in (preset or "").split() if each in kind), None)
-
-
-def _class_of(name: str) -> type[Engine[Any]]:
-    """Return the class of an engine. Raises InputError: no such engine, or an extension that is not an ``Engine``."""
-    chosen = ENGINES.load(name)
-    if not (isinstance(chosen, type) and issubclass(chosen, Engine)):
-        raise InputError(
-            f"{chosen!r} is called an engine, {name!r}, by an installed package; required a class of Engine"
-        )
-    return chosen
 
 
 def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
@@ -94,7 +85,7 @@ def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
 
 def _preset(name: str | None, preset: str) -> tuple[str, dict[str, Any]]:
     """Return the engine and the options of presets. Raises InputError: no engine has one, or two differ."""
-    engines = {known: engine for engine in ENGINES.names for known in _class_of(engine).Config.presets}
+    engines = {known: engine for engine in ENGINES.names for known in ENGINES.load(engine).Config.presets}
     options: dict[str, Any] = {}
     for each in preset.split() or [preset]:
         if each not in engines:
@@ -102,7 +93,7 @@ def _preset(name: str | None, preset: str) -> tuple[str, dict[str, Any]]:
         name = name or engines[each]
         if name != engines[each]:
             raise InputError(f"{each} is a preset of {engines[each]!r}, not of {name!r}; leave out one of them")
-        more = _class_of(name).Config.presets[each]
+        more = ENGINES.load(name).Config.presets[each]
         for key, value in options.items():
             if more.get(key, value) != value:
                 raise InputError(f"presets {preset}: {key} is {value!r} and {more[key]!r}; give one of them")

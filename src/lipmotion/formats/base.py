@@ -94,13 +94,13 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "tres": "lipmotion.formats.game_engines:GODOT",
         "vmd": "lipmotion.formats.vmd:MOTION_FORMAT",
         "bvh": "lipmotion.formats.bvh:MOTION_FORMAT",
-        "a2f.json": "lipmotion.formats.weights_json:AUDIO2FACE",
+        "a2f.json": "lipmotion.formats.motion_document:AUDIO2FACE",
         "motion3.json": "lipmotion.formats.live2d:MOTION_FORMAT",
     },
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
 _CUES = "lipmotion.formats.cues:read_cue_motion"
-_FRAMES = "lipmotion.formats.weights_json:read_frames"
+_FRAMES = "lipmotion.formats.motion_document:read_frames"
 MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
     "motion reader",
     "lipmotion.motion_readers",

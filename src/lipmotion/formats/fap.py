@@ -128,7 +128,6 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 def _number(name: str) -> int | None:
-    """Return the number of a parameter by the name of its channel, or None."""
     digits = name.removeprefix("fap").partition("_")[0]
     is_number = name.startswith("fap") and digits.isascii() and digits.isdecimal()
     return int(digits) if is_number and len(MANY_VALUES) < int(digits) <= COUNT else None

@@ -88,7 +88,7 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
         raise InputError("the two eye corners are in one place, required the outer corners of both eyes")
     if len(rigid) >= MIN_RIGID_MARKERS:
         across = np.broadcast_to(across.mean(axis=0), across.shape)
-    turned = _rotate(places - centre, _smallest_rotations(across)) / distance
+    turned = np.einsum("tij,tnj->tni", _smallest_rotations(across), (places - centre)) / distance
     _, y, z = turned[:, len(rigid) :].mean(axis=(0, 1))  # about x by quarters, so that the mouth is below the eyes
     cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[round(float(np.arctan2(z, -y) / (np.pi / 2))) % 4]
     turned = turned @ np.array([[1.0, 0, 0], [0, cosine, -sine], [0, sine, cosine]]).T
@@ -111,12 +111,7 @@ def _steady(places: Array, rigid: int) -> Array:
     signs = np.ones((len(places), 3))
     signs[:, 2] = np.sign(np.linalg.det(left @ right))
     rotations = np.einsum("tji,tj,tkj->tik", right, signs, left)
-    return _rotate(places - centres, rotations) + centres[0]
-
-
-def _rotate(places: Array, rotations: Array) -> Array:
-    """Return places [shape=(T, N, 3)] under one rotation a frame [shape=(T, 3, 3)]."""
-    return np.einsum("tij,tnj->tni", rotations, places)
+    return np.einsum("tij,tnj->tni", rotations, (places - centres)) + centres[0]
 
 
 def _smallest_rotations(across: Array) -> Array:

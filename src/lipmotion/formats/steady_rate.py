@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.shape_names import arkit_name, is_known
-from lipmotion.motion.rest import find_runs
+from lipmotion.motion.frame_labels import find_runs
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion.types.motion import RADIAN
 
@@ -52,9 +52,7 @@ LONGEST_STEP_S = 2.0
 
 
 def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
-    """Return the rate of television, N · 1000 / 1001 (29.97), that a rate rounded by ``off_hz`` stands for, or the
-    rate.
-    """
+    """Return the rate of television, N · 1000 / 1001, that a rate rounded by ``off_hz`` stands for, or the rate."""
     television = float(np.rint(hertz * 1.001)) * 1000 / 1001
     return television if television and abs(television - hertz) <= off_hz else hertz
 
@@ -117,9 +115,7 @@ def tabulate_frames(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], A
 
 
 def times_to_seconds(times: Array, key: str) -> Array:
-    """Return times in seconds, told by the name of their column (``column_key``) or their size. Raises InputError: no
-    number.
-    """
+    """Return times in seconds, told by their column (``column_key``) or their size. Raises InputError: no number."""
     if not np.isfinite(times).all():
         raise InputError(f"the time of row {int(np.argmin(np.isfinite(times))) + 1} is no number, required one in each")
     per_second = next((scale for unit, scale in PER_SECOND.items() if key.endswith(unit)), 1.0)

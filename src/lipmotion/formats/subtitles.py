@@ -1,6 +1,5 @@
 """Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``,
-Whisper's table of lines (``.tsv``), and lyrics (``.lrc``).
-"""
+Whisper's table of lines (``.tsv``), and lyrics (``.lrc``)."""
 
 from __future__ import annotations
 

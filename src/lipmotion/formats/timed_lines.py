@@ -212,10 +212,7 @@ def _find_columns(line: str) -> dict[str, int]:
 
 
 def _read_table(text: str, columns: dict[str, int], where: str, given: str = "") -> list[LabelTier]:
-    """Return the tiers of a table: of the Montreal Forced Aligner, Praat, or anybody.
-
-    given : its header; empty: it is the first line
-    """
+    """Return the tiers of a table, of the Montreal Forced Aligner or any; ``given``: its header."""
     header = given or next(line for _, line in _lines(text))
     delimiter = max(",;\t", key=header.count)
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)

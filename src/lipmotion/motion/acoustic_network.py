@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.articulation import unseen_share
+from lipmotion.motion.frame_labels import rate_clearness
 from lipmotion.motion.network_steps import (
     STEP,
     ConvolutionalShape,
@@ -25,7 +26,6 @@ from lipmotion.motion.network_steps import (
 from lipmotion.motion.posterior_network import PosteriorNetwork, list_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.motion.prior_regression import EncodingRegression
-from lipmotion.motion.rest import rate_clearness
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays

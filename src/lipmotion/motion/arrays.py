@@ -14,11 +14,9 @@ from lipmotion.motion.articulation import (
     articulation_to_arrays,
 )
 from lipmotion.motion.closure import OPENING, Closure
-from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.limits import MotionLimits, check_poses
+from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
-from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.variance_scaling import VarianceScaling
+from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses
 from lipmotion.stats.pca import Pca, check_orthonormal
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel

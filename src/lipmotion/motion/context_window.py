@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.pca import find_principal_axes
+from lipmotion.stats.pca import find_principal_axes, measure_covariance
 from lipmotion.storage.schema import LARGEST_MEAN, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
-"""Frames whose features are used, relative to the frame whose motion is predicted: up to 240 ms before and after it,
-denser near it."""
+"""Frames whose features are used, relative to the predicted one: up to 240 ms before and after, denser near it."""
 SCALE = 12.0
 """Root mean square length of a reduced feature vector: ridge parameters are relative to it."""
 MIN_DEVIATION = 1e-3
@@ -41,10 +40,7 @@ class AcousticContext:
     basis: NDArray[np.float32]
 
     def __call__(self, features: NDArray[np.float32], frames: NDArray[np.intp] | slice) -> NDArray[np.float32]:
-        """Return the reduced features around some frames of a recording [shape=(N, F)].
-
-        features : of the whole recording [shape=(T, D)]; beyond its ends, the first and last frame are repeated
-        """
+        """Return the reduced features around some frames of a recording [shape=(N, F)]; beyond its ends they repeat."""
         inputs = (_stack(features, frames) - self.mean) / self.scale
         return np.asarray(inputs @ self.basis, np.float32)
 
@@ -55,16 +51,7 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     recordings : acoustic features of each [each shape=(T, D)]
     size       : number of components, or fewer where there are fewer inputs
     """
-    count, total, products = 0, np.zeros(0), np.zeros(0)
-    for features in recordings:
-        rows = _stack(features, slice(None)).astype(float)
-        if not count:
-            total, products = np.zeros(rows.shape[1]), np.zeros((rows.shape[1],) * 2)
-        count += len(rows)
-        total += rows.sum(axis=0)
-        products += rows.T @ rows
-    mean = total / count
-    covariance = products / count - np.outer(mean, mean)
+    mean, covariance = measure_covariance(_stack(features, slice(None)) for features in recordings)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + MIN_DEVIATION
     basis = np.ascontiguousarray(
         find_principal_axes(covariance / np.outer(scale, scale), size).T

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior, unseen_share
+from lipmotion.motion.articulation import (
+    ArticulationPrior,
+    Predict,
+    Statistics,
+    UnseenSpeaker,
+    choose_closing_reach,
+    fit_articulation_prior,
+    unseen_share,
+    widen_range,
+)
 from lipmotion.motion.closure import (
     Closure,
     choose_closed_frames,
@@ -18,11 +28,8 @@ from lipmotion.motion.closure import (
     fit_closure,
     is_never_negative,
 )
-from lipmotion.motion.limits import MotionLimits, measure_limits
 from lipmotion.motion.modulation_filter import ModulationFilter
-from lipmotion.motion.space import MotionSpace, fit_reduced_motion
-from lipmotion.motion.unseen_speaker import UnseenSpeaker, choose_closing_reach, widen_range
-from lipmotion.motion.variance_scaling import VarianceScaling
+from lipmotion.motion.space import MotionLimits, MotionSpace, fit_reduced_motion, measure_limits
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,
@@ -37,6 +44,46 @@ from lipmotion.types import (
     frame_of,
 )
 
+Array = NDArray[np.float64]
+LARGEST_FACTOR = 2.0
+"""No factor is larger: a dimension that hardly depends on speech would be scaled too far."""
+MIN_DEVIATION = 1e-6
+
+
+def fit_scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Array]) -> Array:
+    """Return the factors by which generated movements are scaled to vary as much as recorded ones [shape=(Q,)].
+
+    recorded, generated : motion of each clip [each shape=(T_i, Q)]; at least one clip
+    A factor is the mean over clips of the recorded standard deviations divided by that of the generated ones, from 1 to
+    ``LARGEST_FACTOR``.
+    """
+    wanted, made = (np.mean([clip.std(axis=0) for clip in clips], axis=0) for clips in (recorded, generated))
+    ratio = wanted / np.maximum(made, MIN_DEVIATION)
+    return np.clip(ratio, 1.0, LARGEST_FACTOR)
+
+
+class VarianceScaling(NamedTuple):
+    """Factors by which movements away from the rest pose are scaled, dimension by dimension.
+
+    Source: Silén, Helander, Nurminen & Gabbouj 2012. Deviation: scaling is about the rest pose, not about the mean, so
+    that a closed mouth stays closed.
+    factors : from ``fit_scaling_factors`` [shape=(Q,)]
+    rest    : the rest pose [shape=(Q,)]
+    """
+
+    factors: Array
+    rest: Array
+
+    def apply(self, means: Array, precisions: Array) -> tuple[Array, Array]:
+        """Return means and precisions of the scaled movements [each shape=(T, 3, Q)].
+
+        means, precisions : of static value, Δ and Δ² [each shape=(T, 3, Q)]
+        """
+        scaled = means * self.factors
+        scaled[:, 0] += self.rest * (1 - self.factors)
+        return scaled, precisions / (self.factors * self.factors)
+
+
 BLOCK_FRAMES, MARGIN_FRAMES = 6000, 500
 """Frames of a block, and frames before and after it that are generated with it and then dropped: frames that are
 seconds away do not change the result, and the memory does not grow with the recording."""
@@ -45,8 +92,6 @@ DOUBLE_FRAMES = 60_000
 
 Pins = dict[tuple[int, int], float]
 """Pinned values by frame and dimension of the motion space."""
-Statistics = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Means and precisions of successive frames [each shape=(T, 3, Q)], or values and variances [each shape=(T, Q)]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +128,7 @@ class LearnedMotion:
 
     def generate(  # noqa: PLR0913
         self,
-        statistics: Callable[[slice], Statistics],
+        statistics: Predict,
         frames: int,
         units: Timeline[Unit],
         constraints: Constraints | None = None,
@@ -99,7 +144,7 @@ class LearnedMotion:
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
         Voices that training does not know part their lips to speak and have typical talkers' range; they, and known
-        ones in noise, follow what the general network hears (``motion.unseen_speaker``).
+        ones in noise, follow what the general network hears (``motion.articulation``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
@@ -193,14 +238,14 @@ def bend_through_pins(values: NDArray[np.float64], pins: Sequence[tuple[int, int
         values[frame, column] = value
 
 
-def find_pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
-    """Return the frame of a pin in motion. Raises InputError: a time outside of it, or a value that is not possible."""
+def find_pinned_frame(pin: Pin, frames: int, rate_hz: float = FRAME_RATE_HZ, *, is_weight: bool = False) -> int:
+    """Return the frame of a pin. Raises InputError: a time outside of the frames, or a value that is not possible."""
     if not np.isfinite(pin.value) or (is_weight and not 0 <= pin.value <= 1):
         required = "0 to 1" if is_weight else "a finite number"
         raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required {required}")
-    frame = frame_of(pin.time_s, len(motion.values), motion.rate_hz)
+    frame = frame_of(pin.time_s, frames, rate_hz)
     if frame is None:
-        last_s = (len(motion.values) - 1) / motion.rate_hz
+        last_s = (frames - 1) / rate_hz
         raise InputError(f"pin at {pin.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
     return frame
 
@@ -218,12 +263,7 @@ def resolve_pins(constraints: Constraints | None, space: MotionSpace, frames: in
             raise InputError(
                 f"cannot pin {shorten(repr(pin.channel))}; channels that can be pinned: {', '.join(names)}"
             )
-        frame = frame_of(pin.time_s, frames, FRAME_RATE_HZ)
-        if frame is None:
-            last_s = (frames - 1) / FRAME_RATE_HZ
-            raise InputError(f"pin at {pin.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
-        if not np.isfinite(pin.value):
-            raise InputError(f"pin at {pin.time_s} s has the value {pin.value}, required a finite number")
+        frame = find_pinned_frame(pin, frames)
         column = names.index(pin.channel)
         check_magnitude(space.channels[space.direct[column]], pin.value, pin.value)
         if is_never_negative(space.channels[space.direct[column]]) and pin.value < 0:

@@ -58,8 +58,7 @@ SHIFTS = 2
 """Time steps begin at so many rows of posteriors: training draws one of them, the motion is the mean over all."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.4, 0
 STEPS, RECURRENT_STEPS = 50.0, 50.0
-"""Optimiser steps of either network by the square root of the seconds of motion: 390 for a minute, 1,800 for 22
-minutes."""
+"""Optimiser steps of either network by the square root of the seconds of motion: 390 for 1 minute, 1,800 for 22."""
 RECURRENT = RecurrentShape("recurrent", "recurrent-network", SHAPE.inputs, 96, 2)
 RECURRENT_BATCH, RECURRENT_DROPOUT = 8, 0.5
 RECURRENT_RATE, LARGEST_RECURRENT_RATE = 0.36, 3e-2
@@ -287,12 +286,7 @@ def limit_logarithms(posteriors: TokenPosteriors) -> NDArray[np.float32]:
 
 
 def _stack_inputs(components: NDArray[np.floating], spectrum: NDArray[np.floating] | None) -> list[NDArray[np.float32]]:
-    """Return the inputs in every time step, by shift [each shape=(ceil((N - shift) / 2), 400)].
-
-    components : of posteriors [shape=(N, 120)]
-    spectrum   : normalised log mel spectrum [shape=(T, 40)]; None: switched off
-    The spectrum of each time step stands before the components of its two rows. A single row is not shifted.
-    """
+    """Return the inputs in every time step, by shift: the spectrum (None: off), then the components of two rows."""
     return [_stack_shift(components, spectrum, shift) for shift in range(min(SHIFTS, len(components)))]
 
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.errors import ModelFormatError
 from lipmotion.extensions import Registry
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, refuse_undeclared
@@ -139,23 +139,15 @@ PREDICTORS: Registry[type[Predictor]] = Registry(
         "prior": "lipmotion.motion.prior_regression:PriorRegression",
         "encoding": "lipmotion.motion.prior_regression:EncodingRegression",
     },
+    Predictor,
+    named=True,
 )
-
-
-def load_predictor(name: str) -> type[Predictor]:
-    """Return a predictor by name. Raises InputError: there is none, or a package adds something else by this name."""
-    chosen = PREDICTORS.load(name)
-    if not (isinstance(chosen, type) and issubclass(chosen, Predictor) and chosen.name == name):
-        raise InputError(
-            f"{chosen!r} is called a predictor, {name!r}, by an installed package; required a Predictor of this name"
-        )
-    return chosen
 
 
 def check_predictor(name: str) -> None:
     """Raise InputError if no predictor can be chosen by a name, which may be ``AUTOMATIC``."""
     if name != AUTOMATIC:
-        load_predictor(name)
+        PREDICTORS.load(name)
 
 
 def choose_predictor(name: str, examples: Sequence[Example]) -> type[Predictor] | None:
@@ -165,15 +157,15 @@ def choose_predictor(name: str, examples: Sequence[Example]) -> type[Predictor] 
     conditions; else a network from posteriors, given those.
     """
     if name != AUTOMATIC:
-        return load_predictor(name)
+        return PREDICTORS.load(name)
     measured_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
     if measured_s < MIN_OWN_S and all(example.speech.prior is not None for example in examples):
-        return load_predictor("prior")
-    network = load_predictor("network")
+        return PREDICTORS.load("prior")
+    network = PREDICTORS.load("network")
     if network.conditions(measured_s, 1) and all(example.condition_spectra for example in examples):
         return network
     if all(example.speech.posteriors is not None for example in examples):
-        return load_predictor("posteriors")
+        return PREDICTORS.load("posteriors")
     return None
 
 
@@ -184,7 +176,7 @@ def count_conditions(name: str, motion_s: float, most: int) -> int:
     most     : as many as the configuration allows
     """
     names = ("network", "posteriors") if name == AUTOMATIC else (name,)
-    return max(load_predictor(each).conditions(motion_s, most) for each in names)
+    return max(PREDICTORS.load(each).conditions(motion_s, most) for each in names)
 
 
 def split_folds(count: int) -> Iterator[tuple[list[int], list[int]]]:
@@ -211,7 +203,7 @@ def predictor_to_arrays(predictor: Predictor | None) -> dict[str, NDArray[Any]]:
 
 def list_predictor_arrays(arrays: Arrays) -> set[str]:
     """Return the names of those arrays that are a predictor's."""
-    built_in = {name for known in PREDICTORS.built_in for name in load_predictor(known).ARRAYS}
+    built_in = {name for known in PREDICTORS.built_in for name in PREDICTORS.load(known).ARRAYS}
     return {name for name in arrays if name in built_in or name.startswith(ADDED)}
 
 
@@ -224,8 +216,8 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
     """
     names = {name.rpartition(".")[0] for name in arrays_under(arrays, ADDED)}
     added = {name: arrays_under(arrays, f"{ADDED}{name}.") for name in sorted(names)}
-    found = [name for name in PREDICTORS.built_in if arrays.keys() & load_predictor(name).ARRAYS]
-    inside = {part for name in found for part in load_predictor(name).CONTAINS}
+    found = [name for name in PREDICTORS.built_in if arrays.keys() & PREDICTORS.load(name).ARRAYS]
+    inside = {part for name in found for part in PREDICTORS.load(name).CONTAINS}
     stored = {name: arrays for name in found if name not in inside} | added
     if len(stored) > 1:
         raise ValueError(f"the predictors {' and '.join(stored)}, required one of them")
@@ -235,7 +227,7 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
     if name not in PREDICTORS.names:
         known = ", ".join(PREDICTORS.names)
         raise ModelFormatError(f"no predictor {name!r}; there are: {known}; install the package that adds it")
-    chosen = load_predictor(name)
+    chosen = PREDICTORS.load(name)
     if name in added:
         refuse_undeclared(chosen_arrays, chosen.ARRAYS)
     return chosen.from_arrays(chosen_arrays, dimensions)

@@ -218,10 +218,7 @@ class PriorRegression(Predictor):
         return outputs[:, :-1], np.clip(outputs[:, -1], 0, 1)
 
     def _fill(self, kinds: Sequence[Array]) -> Array:
-        """Return the regressors [shape=(N, R)]; those that the training had and this speech has not have their mean.
-
-        kinds : as of ``_regressors``; of speech without posteriors, or from another version, some columns are missing
-        """
+        """Return the regressors [shape=(N, R)]; those that the training had and this speech has not have their mean."""
         row, starts = self.mean.astype(float), np.cumsum([0, *self.sizes])
         result = np.tile(row, (len(kinds[0]), 1))
         for kind, start, size in zip(kinds, starts, self.sizes, strict=False):
@@ -294,10 +291,7 @@ def _solve(data: Sequence[_Fold], penalty: Array) -> tuple[Array, Array]:
 
 
 def _choose_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) -> Array:
-    """Return the ridge parameter of each kind of regressors with the least error of the first dimensions.
-
-    weights : of the squared errors of these dimensions [shape=(D,)]
-    """
+    """Return the ridge parameter of each kind of regressors with the least error, by ``weights`` of dimensions."""
     data = [_Fold(each.regressors, each.motion[:, : len(weights)]) for each in data]
     ridges = np.full(len(sizes), INITIAL_RIDGE)
 

@@ -21,7 +21,7 @@ from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, speakers_from_arrays, speakers_to_arrays
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
-from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
+from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive
 from lipmotion.storage.schema import arrays_under, refuse_undeclared
 from lipmotion.types import PriorOutput, Speech
 
@@ -131,20 +131,7 @@ def read_header(path: Path) -> dict[str, Any]:
     """Return the header of a model file. Raises as ``load_model``."""
     if not path.is_file():
         raise InputError(f"{path}: no such model")
-    try:
-        header = read_archive_header(path)
-    except UNREADABLE as error:
-        raise ModelFormatError(
-            f"{path}: not a lipmotion model ({error}); give a file that `lipmotion train` wrote"
-        ) from error
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise ModelFormatError(f"{path}: not a lipmotion model; give a file that `lipmotion train` wrote")
-    if header.get("version") != VERSION:
-        raise ModelFormatError(
-            f"{path}: model version {header.get('version')}, this lipmotion reads version {VERSION}; "
-            "upgrade lipmotion, or train the model again"
-        )
-    return header
+    return read_header_of(path, FORMAT, VERSION, "lipmotion model", "give a file that `lipmotion train` wrote")
 
 
 def shipped_path() -> Path:

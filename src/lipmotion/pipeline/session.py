@@ -44,8 +44,7 @@ from lipmotion.pipeline.edits import (
     remove_pins,
     with_span,
 )
-from lipmotion.pipeline.excerpts import apply_excerpt, cut_analysis, find_excerpt
-from lipmotion.pipeline.generation import find_person, generate_motion
+from lipmotion.pipeline.generation import apply_excerpt, cut_analysis, find_excerpt, find_person, generate_motion
 from lipmotion.pipeline.model import Model, load_model, with_prior
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.pipeline.workers import map_in_processes

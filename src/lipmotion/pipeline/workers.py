@@ -43,7 +43,6 @@ def process_count(count: int | None) -> int:
 
 
 def _in_order(numbered: Iterator[tuple[int, ResultT]]) -> Iterator[ResultT]:
-    """Yield results in the order of their numbers, from 0 on."""
     waiting: dict[int, ResultT] = {}
     following = 0
     for number, result in numbered:

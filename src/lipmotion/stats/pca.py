@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +61,15 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
     squares, vectors = np.linalg.eigh(centred @ centred.T)  # XXᵀu = λu gives XᵀX(Xᵀu) = λ(Xᵀu)
     chosen = _find_largest(squares, components, least)
     return Pca(mean, _fix_signs((vectors[:, chosen] / np.sqrt(squares[chosen])).T @ centred))
+
+
+def measure_covariance(tables: Iterable[NDArray[Any]]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean [shape=(D,)] and covariance [shape=(D, D)] of the rows of tables, taken one at a time."""
+    count, total, products = 0, np.float64(0), np.float64(0)
+    for rows in (table.astype(float) for table in tables):
+        count, total, products = count + len(rows), total + rows.sum(axis=0), products + rows.T @ rows
+    mean = np.asarray(total / count)
+    return mean, products / count - np.outer(mean, mean)
 
 
 def find_principal_axes(products: NDArray[np.float64], components: int, least: float = 0.0) -> NDArray[np.float64]:

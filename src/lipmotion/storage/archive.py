@@ -17,6 +17,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from lipmotion.errors import ModelFormatError, shorten
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import ParallelMap
@@ -55,6 +56,23 @@ def read_archive_header(path: Path) -> Any:
     with zipfile.ZipFile(path) as file:
         check_archive(file)
         return from_json(file.read(HEADER))
+
+
+def read_header_of(path: Path, form: str, version: int, what: str, remedy: str) -> dict[str, Any]:
+    """Return the header of an archive of a format. Raises ModelFormatError: of another one or version, or damaged.
+
+    what, remedy : the name of such an archive, as ``face``, and what its user can do
+    """
+    try:
+        header = read_archive_header(path)
+    except UNREADABLE as error:
+        raise ModelFormatError(f"{path}: not a {what} ({shorten(str(error))}); {remedy}") from error
+    if not isinstance(header, dict) or header.get("format") != form:
+        raise ModelFormatError(f"{path}: not a {what}; {remedy}")
+    if header.get("version") != version:
+        found = f"{path}: {what.rsplit(maxsplit=1)[-1]} version {shorten(str(header.get('version')))}"
+        raise ModelFormatError(f"{found}, this lipmotion reads version {version}; upgrade lipmotion, or {remedy}")
+    return header
 
 
 def read_archive(path: Path) -> dict[str, NDArray[Any]]:

@@ -12,13 +12,11 @@ if TYPE_CHECKING:
     from lipmotion.types.configuration import *
     from lipmotion.types.delivery import *
     from lipmotion.types.edits import *
-    from lipmotion.types.explanation import *
     from lipmotion.types.generation import *
     from lipmotion.types.motion import *
     from lipmotion.types.progress import *
     from lipmotion.types.speech import *
     from lipmotion.types.timeline import *
-    from lipmotion.types.utterance import *
 
 __all__ = [
     "ENERGY_FEATURE", "EYE_DISTANCE", "FRAME_RATE_HZ", "GREY", "SPECTRUM_BANDS", "WEIGHT", "Audio", "ChainPosteriors",
@@ -34,7 +32,7 @@ __all__ = [
 
 _MODULES = (
     *("configuration", "delivery", "audio", "timeline", "motion"),
-    *("edits", "speech", "generation", "progress", "explanation", "utterance"),
+    *("edits", "speech", "generation", "progress"),
 )
 """Where the names are looked for, in this order."""
 

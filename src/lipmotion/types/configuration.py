@@ -73,7 +73,7 @@ def option(default: Any, rule: Rule = ANY, *, omit_default: bool = False, **show
             they need not be imported), and what messages say of them. What the command line shows, of options that
             are there (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are not
             the field's), still (the option that lists what of several is switched off). Of files: reads (what
-            it is), replaceable, default_path, writes, all as of cli.arguments.paths
+            it is), replaceable, default_path, writes, all as of cli.arguments.declared
     """
     return field(default=default, metadata={"rule": rule, "omit_default": omit_default, **shown})
 

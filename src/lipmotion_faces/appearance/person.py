@@ -22,9 +22,9 @@ from lipmotion.motion.eigenlips import (
     eigenlips_to_arrays,
     fit_eigenlips,
 )
+from lipmotion.motion.frame_labels import find_runs
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
-from lipmotion.motion.rest import find_runs
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion

@@ -12,7 +12,7 @@ from lipmotion.errors import InputError, ModelFormatError, shorten
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.binding import MAX_WEIGHTS, ControlBinding
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
+from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors
 from lipmotion.storage.sources import check_source
@@ -25,6 +25,7 @@ BINDING_SUFFIX = ".binding"
 WEIGHT_COLUMNS = ("vertex", "point", "weight")
 POINT_COLUMNS = ("point", "vertex")
 LARGEST_TABLE_BYTES = 1 << 26
+AGAIN = "bind the character again"
 BINDING_ARRAYS = {
     "points": ArraySpec(np.int64, "C", 0, 1000),
     "vertices": ArraySpec(np.int64, "C", 0, MOST_VERTICES),
@@ -57,22 +58,17 @@ def save_binding(path: Path, binding: ControlBinding, mesh: Mesh) -> None:
 def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
     """Return the binding of a file. Raises InputError: no file, or another mesh. Raises ModelFormatError: damaged."""
     check_source(path, "binding")
+    read_header_of(path, BINDING_FORMAT, BINDING_VERSION, "binding", AGAIN)
     try:
-        header = read_archive_header(path)
-        if not isinstance(header, dict) or header.get("format") != BINDING_FORMAT:
-            raise ModelFormatError(f"{path}: is no binding; bind the character again")
-        if header.get("version") != BINDING_VERSION:
-            version = shorten(str(header.get("version")))
-            raise ModelFormatError(f"{path}: version {version}, required {BINDING_VERSION}; bind the character again")
-        with format_errors(f"{path}: the binding", "bind the character again"):
+        with format_errors(f"{path}: the binding", AGAIN):
             arrays = check_arrays(read_archive(path), BINDING_ARRAYS)
     except UNREADABLE as error:
-        raise ModelFormatError(f"{path}: is no binding ({shorten(str(error))}); bind the character again") from error
+        raise ModelFormatError(f"{path}: not a binding ({shorten(str(error))}); {AGAIN}") from error
     count = int(arrays["vertex_count"])
     if count != len(mesh.vertices):
         raise InputError(f"{path}: made for {count} vertices, the character has {len(mesh.vertices)}; bind it again")
     template = mouth_template()
-    with format_errors(f"{path}: the binding", "bind the character again"):
+    with format_errors(f"{path}: the binding", AGAIN):
         if tuple(arrays["points"].tolist()) != template.points:
             raise ValueError("its points are not those of motion")
         if max(arrays["vertices"].max(), arrays["rows"].max(initial=0)) >= count:

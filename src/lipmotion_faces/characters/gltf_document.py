@@ -205,9 +205,7 @@ class GltfDocument:
         return self.parts.get(name, [])
 
     def linked(self, uri: str, kind: str) -> bytes:
-        """Return the bytes of an address, or of a file in the same folder. Raises InputError: no such file, elsewhere,
-        damaged.
-        """
+        """Return the bytes of an address, or of a file beside it. Raises InputError: none, elsewhere, damaged."""
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
             if not head.endswith(";base64"):
@@ -423,9 +421,7 @@ class PlacedNode:
 
 
 def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
-    """Return the nodes of the scene, or all roots', by number. Raises InputError: one is there twice, too deep, too far
-    away.
-    """
+    """Return the nodes of the scene, or all roots', by number. Raises InputError: one is twice, too deep, too far."""
     nodes, scenes = document.items("nodes"), document.items("scenes")
     if scenes:
         roots = scenes[document.parts.get("scene", 0)].get("nodes", [])

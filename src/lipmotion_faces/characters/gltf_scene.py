@@ -218,8 +218,6 @@ class _SharedVertices:
 
 
 class _SceneSurface:
-    """The surface of a scene, primitive by primitive."""
-
     def __init__(self, document: GltfDocument) -> None:
         self._document, self._budget = document, document.budget
         self._arrays = GltfArrays(document)

@@ -70,9 +70,7 @@ class _Track:
     kind: str
 
     def at(self, time_s: Array) -> Array:
-        """Return values at frames' times [shape=(len(time_s), S)]; a frame that is a key but for rounding has its
-        value.
-        """
+        """Return values at frames' times [shape=(len(time_s), S)]; a frame that is nearly a key has its value."""
         rounding = ROUNDING_FRAMES * time_s[1] if len(time_s) > 1 else 0.0
         before = np.clip(np.searchsorted(self.time_s, time_s + rounding, "right") - 1, 0, len(self.time_s) - 1)
         inside = np.where(np.abs(self.time_s[before] - time_s) <= rounding, self.time_s[before], time_s)

@@ -96,9 +96,7 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class ShadingNormals:
-    """Normals of a mesh at rest [shape=(V, 3)], and of each blendshape vertices [shape=(N,)] and changes [shape=(N,
-    3)].
-    """
+    """Normals of a mesh at rest [shape=(V, 3)], and vertices and changes of each blendshape [shape=(N,), (N, 3)]."""
 
     rest: Array
     turned: tuple[tuple[NDArray[np.int64], Array], ...]

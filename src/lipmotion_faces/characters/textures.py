@@ -71,9 +71,7 @@ class TextureTable:
     first: tuple[int, ...]
 
     def level(self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Return the row of ``levels`` that suits triangles, by areas in the texture and on the screen [each
-        shape=(F,)].
-        """
+        """Return the row of ``levels`` that suits triangles, by areas in texture and on screen [each shape=(F,)]."""
         first = self.first[texture]
         last = (*self.first, len(self.levels))[texture + 1] - 1
         pixels = in_texture * float(self.levels[first, 1] * self.levels[first, 2])

@@ -138,7 +138,6 @@ def coverage_document(result: Coverage) -> dict[str, Any]:
 
 
 def _count_sequences(runs: Iterable[Sequence[str]], length: int) -> Counter[Phones]:
-    """Return how often each sequence of some length occurs in phones between silences."""
     counts: Counter[Phones] = Counter()
     for run in runs:
         sequence = tuple(run) if length == 1 else (SILENCE, *run, SILENCE)

@@ -19,11 +19,11 @@ from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
-from lipmotion.storage.media import open_media, stated_duration_s, video_streams
+from lipmotion.storage.sources import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript
 from lipmotion.units.written_forms import list_readings
 from lipmotion_faces.corpus.supplied import align_sound, separate_sound
-from lipmotion_faces.tracking.video_scan import VideoScan, scan_video
+from lipmotion_faces.tracking.track import VideoScan, scan_video
 
 SHORTEST_S, LONGEST_S = 3.0, 12.0
 """Wanted length of an utterance. Longer ones are divided at their longest pause, shorter ones joined where they can."""

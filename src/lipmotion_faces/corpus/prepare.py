@@ -342,10 +342,7 @@ def _collect(
 
 
 def _leave_out_damaged(corpus: Corpus, outcomes: list[_Outcome], monitor: Monitor) -> list[_Outcome]:
-    """Find damaged pictures beside all others of the same speaker, and return the outcomes with them.
-
-    Their motion is interpolated, as where no face is seen; utterances with too many are removed.
-    """
+    """Return the outcomes without damaged pictures, found beside all others of a speaker: these are interpolated."""
     if all(outcome.kept or outcome.problem for outcome in outcomes):
         return outcomes
     changed = {outcome.name: outcome for outcome in outcomes}

@@ -20,9 +20,9 @@ from lipmotion_faces.appearance.placing import cut, feather, inverse_map
 from lipmotion_faces.coded_video import FrameGroups, encode_video
 from lipmotion_faces.filmed.face import StoredBackground
 from lipmotion_faces.filmed.renderer import Background
-from lipmotion_faces.tracking.footage import Footage, footage_frames, footage_groups, track_footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
+from lipmotion_faces.tracking.track import Footage, footage_frames, footage_groups, track_footage
 
 LOG = logging.getLogger("lipmotion")
 

@@ -21,8 +21,7 @@ from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.media import open_media, stated_duration_s, video_streams
-from lipmotion.storage.sources import check_source, sha256_of
+from lipmotion.storage.sources import check_source, open_media, sha256_of, stated_duration_s, video_streams
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
@@ -30,9 +29,8 @@ from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import best_background, chin_px
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
-from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
 from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.tracking.track import UNSEEN_LIMIT
+from lipmotion_faces.tracking.track import UNSEEN_LIMIT, Footage, footage_frames, track_footage
 
 MOST_FOOTAGE_S = 240.0
 """Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""

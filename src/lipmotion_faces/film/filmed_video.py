@@ -18,8 +18,7 @@ from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Mark, Outputs
 from lipmotion.speech.sound.pauses import levels_db_at
-from lipmotion.storage.media import has_video
-from lipmotion.storage.sources import check_source
+from lipmotion.storage.sources import check_source, has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
 from lipmotion.types.progress import with_reports
 from lipmotion_faces.appearance.person import FaceCodes
@@ -27,7 +26,7 @@ from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import open_background, open_stored_background
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, BATCH, STITCHING, Stitcher
-from lipmotion_faces.tracking.footage import read_video_frames
+from lipmotion_faces.tracking.track import read_video_frames
 from lipmotion_faces.video.mp4 import write_mp4
 from lipmotion_faces.video.synthetic_mark import mark_frames, mark_metadata
 
@@ -49,13 +48,8 @@ def inset_box(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, in
     factor = min(WIDTH_SHARE * width / picture[1], HEIGHT_SHARE * height / picture[0])
     rows, columns = (max(1, round(length * factor)) for length in picture)
     bottom, right = (length - round(MARGIN_SHARE * shorter) for length in frame)
-    border = border_px(frame)
+    border = max(1, round(BORDER_SHARE * min(frame)))
     return right - columns - 2 * border, bottom - rows - 2 * border, right, bottom
-
-
-def border_px(frame: tuple[int, int]) -> int:
-    """Return the width of the border in a frame of some height and width, px."""
-    return max(1, round(BORDER_SHARE * min(frame)))
 
 
 def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Frame]:
@@ -66,7 +60,7 @@ def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Fr
     for frame, picture in zip(frames, pictures, strict=False):
         size = (frame.shape[0], frame.shape[1])
         left, top, right, bottom = inset_box(size, (picture.shape[0], picture.shape[1]))
-        border = border_px(size)
+        border = max(1, round(BORDER_SHARE * min(size)))
         rows, columns = bottom - top - 2 * border, right - left - 2 * border
         steps = picture.shape[1] / columns, picture.shape[0] / rows
         to_picture = np.array([[steps[0], 0, steps[0] / 2 - 0.5], [0, steps[1], steps[1] / 2 - 0.5]])

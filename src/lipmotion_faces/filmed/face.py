@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage import schema
-from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
+from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive
 from lipmotion.storage.sources import check_source
 from lipmotion.types import Audio, Channel, Motion
 from lipmotion_faces.appearance.person import Appearance, appearance_arrays, appearance_from_arrays
@@ -155,20 +155,7 @@ def load_face(path: str | Path) -> FilmedFace:
 
 def read_face_header(path: Path) -> dict[str, Any]:
     """Return the header of a face's file. Raises ModelFormatError: not a face, damaged, or of another version."""
-    try:
-        header = read_archive_header(path)
-    except UNREADABLE as error:
-        raise ModelFormatError(
-            f"{path}: not a face ({error}); give a file that `lipmotion face build` wrote"
-        ) from error
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise ModelFormatError(f"{path}: not a face; give a file that `lipmotion face build` wrote")
-    if header.get("version") != VERSION:
-        raise ModelFormatError(
-            f"{path}: face version {header.get('version')}, this lipmotion reads version {VERSION}; upgrade lipmotion, "
-            "or build the face again"
-        )
-    return header
+    return read_header_of(path, FORMAT, VERSION, "face", "give a file that `lipmotion face build` wrote")
 
 
 MOST_TAKES = 1000

@@ -179,8 +179,7 @@ def brow() -> part.Part:
 
 
 INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.12, 0.1, (0.1, 0.03), 0.055
-"""How far a mood raises the inner and the outer ends of the brows, lowers the inner ends, and outer ones, and draws
-them together."""
+"""How far a mood raises inner and outer ends of brows, lowers inner and outer ones, and draws them together."""
 
 
 def shift_brow(places: Real, pose: CharacterPose) -> Real:

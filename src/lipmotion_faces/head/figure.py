@@ -16,10 +16,9 @@ from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.head import palette
 from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
 from lipmotion_faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
-from lipmotion_faces.head.lips import ACROSS, RINGS, VISIBLE_RINGS, closed_share
 from lipmotion_faces.head.part import EYE, MIDDLE, Part, grid_triangles, head, join_parts, part, seen_from_middle, tube
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import AT_CORNER, REST, Skin, move_jaw
+from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, closed_share, move_jaw
 from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches, unit
 
 BUN = np.array([0.0, 1.40, -0.98])

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.lips import ARCH, TEETH_EDGE, TEETH_Z
 from lipmotion_faces.head.part import MOUTH_Y, Part, grid_triangles, join_parts, part
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import move_jaw
+from lipmotion_faces.head.skin import ARCH, TEETH_EDGE, TEETH_Z, move_jaw
 
 Real = NDArray[np.float64]
 

@@ -15,10 +15,9 @@ from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
 from lipmotion_faces.characters.textures import encode_srgb
 from lipmotion_faces.head.figure import Figure
-from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion_faces.head.pose import CharacterPose, stack_poses
-from lipmotion_faces.head.skin import REST
-from lipmotion_faces.rendering.rasteriser import Camera, Canvas, flat
+from lipmotion_faces.head.skin import COLUMNS, REST, VISIBLE_RINGS
+from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, flat
 
 Real = NDArray[np.float64]
 

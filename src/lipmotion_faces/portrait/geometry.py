@@ -226,8 +226,7 @@ BROW_STEPS = 8
 MOOD_STEPS = 24
 """Positions of the brows on the way to a mood."""
 INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.13, 0.1, (0.115, 0.05), 0.06
-"""How far a mood raises the inner and the outer ends of the brows, lowers the inner ends, and outer ones, and draws
-them together."""
+"""How far a mood raises inner and outer ends of brows, lowers inner and outer ones, and draws them together."""
 NOSE_LIFT, CHEEK_LIFT = 0.05, 0.06
 """How far wrinkling lifts the wings of the nose, and a smile the cheeks."""
 NECK_TOP, NECK_END = 1.15, 1.85

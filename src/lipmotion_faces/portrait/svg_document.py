@@ -371,7 +371,7 @@ class _DrawingReader:
             raise InputError(f"groups in groups, more than {DEEPEST_NESTING} deep")
         if self.passed:
             return
-        tag = _local(name)
+        tag = name.rpartition(":")[2]
         if self.box is None:
             if tag != "svg":
                 raise InputError(f"not an SVG: its root is {shorten(tag)!r}")
@@ -436,10 +436,6 @@ def _refuse_style_sheet(target: str, _: str) -> None:
         raise InputError("a style sheet is not read; convert it to plain colours")
 
 
-def _local(name: str) -> str:
-    return name.rpartition(":")[2]
-
-
 def _box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
     text = root.get("viewBox", "")
     numbers = read_numbers(text, 4, "viewBox")
@@ -466,7 +462,7 @@ def _number(text: str, name: str) -> float:
 def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
     """Return what an element hands down, or for a shape what it has itself."""
     for key, value in attributes.items():
-        name = _local(key)
+        name = key.rpartition(":")[2]
         if name == "href" or "url(" in value:
             raise InputError(f"{shorten(name)}={shorten(value)!r} is a reference; required plain colours and shapes")
         if name.lower().startswith("on"):

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.rest import find_runs
+from lipmotion.motion.frame_labels import find_runs
 from lipmotion.stats.pca import choose_evenly
 from lipmotion_faces.tracking.packages import import_opencv
 
@@ -134,11 +134,7 @@ def _find_smeared(unlike: Floats) -> Mask:
 
 
 def _unlikeness(mouths: Floats, bank: Floats, frames: NDArray[np.intp], apart: float) -> Floats:
-    """Return one less the best correlation of each mouth with those of a bank that are not near it in its own clip.
-
-    frames : where in its own clip they are; of others, far away
-    Returns zeros [shape=(T,)] where some mouth has too few to be compared with.
-    """
+    """Return one less the best correlation of each mouth with those of a bank not near it in its own clip; 0: few."""
     is_near = np.abs(np.arange(len(mouths))[:, None] - frames) < apart
     if not len(mouths) or (~is_near).sum(axis=1).min() < LEAST_COMPARED:
         return np.zeros(len(mouths), np.float32)

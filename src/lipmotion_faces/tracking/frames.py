@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.media import MAX_PIXELS, open_media, stated_duration_s, video_streams
-from lipmotion.storage.sources import check_source
+from lipmotion.storage.sources import MAX_PIXELS, check_source, open_media, stated_duration_s, video_streams
 from lipmotion_faces.tracking.packages import import_opencv
 
 
@@ -151,7 +150,6 @@ def _pictures_from(container: Any, stream: Any, first_s: float, damage: list[str
 
 
 def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
-    """Yield the pictures that are not damaged."""
     import av
 
     packets = container.demux(stream)

@@ -43,12 +43,6 @@ class HeadPose:
         rotated = self.scale[:, None, None] * (points @ self.rotation.transpose(0, 2, 1))
         return (rotated + self.translation[:, None, :]) / self.unit
 
-    def plane_to_image(self, depth: float) -> Array:
-        """Return the affine maps [shape=(T, 2, 3)] from (x, y) of the head's plane z = depth to the image."""
-        back = self.rotation.transpose(0, 2, 1) / self.scale[:, None, None]
-        origin = back @ (np.array([0, 0, depth]) * self.unit - self.translation)[:, :, None]
-        return np.concatenate([back[:, :2, :2] * self.unit, origin[:, :2]], axis=2)
-
 
 def estimate_head_pose(points: Array, layout: Sequence[int]) -> HeadPose:
     """Return the pose of a head in every frame.
@@ -151,7 +145,10 @@ def face_to_image(points: Array) -> Array:
     """
     upright = points * (1, -1, -1)
     pose = estimate_head_pose(upright, trackers.TRACKED_POINTS)
-    maps = pose.plane_to_image(float(pose.to_head_coordinates(upright)[:, _LIPS, 2].mean()))
+    depth = float(pose.to_head_coordinates(upright)[:, _LIPS, 2].mean())
+    back = pose.rotation.transpose(0, 2, 1) / pose.scale[:, None, None]
+    origin = back @ (np.array([0, 0, depth]) * pose.unit - pose.translation)[:, :, None]
+    maps = np.concatenate([back[:, :2, :2] * pose.unit, origin[:, :2]], axis=2)
     maps[:, 1] *= -1  # y is down in the image,
     maps[:, :, 1] *= -1  # and in the region
     maps[:, :, :2] /= EYE_DISTANCE_PX

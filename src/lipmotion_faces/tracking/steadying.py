@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX
-from lipmotion_faces.tracking.footage import Footage, footage_frames
 from lipmotion_faces.tracking.packages import import_opencv
+from lipmotion_faces.tracking.track import Footage, footage_frames
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

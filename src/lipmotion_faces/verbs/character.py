@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from lipmotion.cli.arguments.declared import add_options, part_of
-from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.terminal.printing import print_line, print_lines
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output, part_of
+from lipmotion.cli.terminal.progress import print_line, print_lines
 from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.request import Outputs
 from lipmotion.types.values import parse_number

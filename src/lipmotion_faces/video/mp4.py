@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.storage.files import as_text, atomic_file
-from lipmotion.storage.media import x264_instructions
+from lipmotion.storage.sources import x264_instructions
 from lipmotion.types import Audio
 
 XMP_UUID = bytes.fromhex("be7acfcb97a942e89c71999491e3afac")

@@ -14,7 +14,7 @@ from lipmotion.kernels.compiler import one_thread
 from lipmotion.measures import curves
 from lipmotion.measures.closures import clip_closure_counts, closure_figures, phone_closures
 from lipmotion.measures.curves import Clips, bootstrap_interval
-from lipmotion.motion.rest import is_away_from_speech
+from lipmotion.motion.frame_labels import is_away_from_speech
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.stats.curves import varies

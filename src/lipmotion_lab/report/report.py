@@ -40,7 +40,7 @@ from lipmotion_lab.report.sections import (
 )
 from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, share_out, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
-from lipmotion_lab.xie_liu2007.plots import PLOT_CAPTIONS
+from lipmotion_lab.xie_liu2007.six_systems import PLOT_CAPTIONS
 from lipmotion_lab.xie_liu2007.systems import COMPARED_SYSTEMS, select_systems
 
 TEST = "test"

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import (
     add_execution,
     add_figures_arguments,
@@ -19,7 +19,6 @@ from lipmotion.cli.arguments.options import (
     report_figures,
     worker_count,
 )
-from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 

@@ -7,9 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, list_or_all, report_figures
-from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Request
 
 ADAPTERS = "LIPMOTION_LEAGUE"

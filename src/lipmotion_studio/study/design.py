@@ -22,11 +22,10 @@ from lipmotion.pipeline.outputs.output import write
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import atomic_folder
-from lipmotion.storage.media import has_video, open_media
-from lipmotion.storage.sources import read_text_file, sha256_of
+from lipmotion.storage.sources import has_video, open_media, read_text_file, sha256_of
 from lipmotion.types import Audio, Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
-from lipmotion_faces.tracking.footage import read_video_frames
+from lipmotion_faces.tracking.track import read_video_frames
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_faces.video.synthetic_mark import LABEL, SOURCE_TYPE, mark_metadata
 from lipmotion_studio.study import manifest

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.terminal.printing import flush_output, print_line
+from lipmotion.cli.arguments.declared import add_input, add_output
+from lipmotion.cli.terminal.progress import flush_output, print_line
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

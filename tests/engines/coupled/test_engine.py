@@ -6,7 +6,7 @@ import pytest
 
 from engines.coupled.tiny import KINDS, chains, observations, structure
 from lipmotion import engines, types
-from lipmotion.engines.coupled.explanation import (
+from lipmotion.engines.coupled.engine import (
     chain_states,
     explain_frames,
     joint_state,

@@ -1,12 +1,12 @@
 """Chains small enough to list all of their paths."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Grammar, initial_transitions, reachable
+from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product, initial_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
@@ -43,6 +43,25 @@ def grammar(of: Structure, seed=0) -> Grammar:
     )
 
 
+def joint_product(of: Structure, seed=0) -> Product:
+    """The product of chains; without a limit of asynchrony all of their joint states, each chain on its own."""
+    own = grammar(of, seed)
+    if of.limit is not None:
+        return reachable(of, own)
+    steps = [(np.eye(count), np.eye(count, k=1)) for count in of.state_counts]
+    for bigram, (_, moving) in zip(own.bigrams, steps, strict=True):
+        moving[of.states - 1 :: of.states] = 0
+        moving[of.states - 1 :: of.states, :: of.states] = bigram
+    tables = {moves: np.kron(steps[0][moves[0]], steps[1][moves[1]]) for moves in product((0, 1), repeat=2)}
+    places = [(to, source, moves) for moves, table in tables.items() for source, to in np.argwhere(table)]
+    targets, sources, moved = (np.array(part) for part in zip(*sorted(places), strict=True))
+    share = np.array([tables[moves][source, to] for to, source, moves in sorted(places)])
+    initial = np.kron(*(np.kron(first, np.arange(of.states) == 0) for first in own.initial))
+    units = [np.divmod(joint, of.states) for joint in product(*map(range, of.state_counts))]
+    joints = tuple(JointState(tuple(first.tolist()), tuple(state.tolist()), (False, False)) for first, state in units)
+    return Product(of, own, joints, sources, targets, moved.T.astype(bool), share, initial)
+
+
 def mixtures(count, components, size, seed) -> Mixtures:
     draw = np.random.default_rng(seed)
     weights = draw.dirichlet(np.ones(components), count)
@@ -56,11 +75,11 @@ def mixtures(count, components, size, seed) -> Mixtures:
 def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0, weights=(1.0, 1.0)) -> Chains:
     """Chains of random densities and tables, one stream of speech and one visual stream."""
     of = of or structure()
-    product = reachable(of, grammar(of, seed))
-    transitions = initial_transitions(product)
+    joint = joint_product(of, seed)
+    transitions = initial_transitions(joint)
     draw = np.random.default_rng([seed, 1])
     advance = tuple(draw.uniform(0.2, 0.8, len(table)) for table in transitions.advance)
-    transitions = type(transitions)(product, transitions.rows, advance)
+    transitions = type(transitions)(joint, transitions.rows, advance)
     together = [(0, 1)] if of.kind == HMM else [(0,), (1,)]
     groups = []
     for number, members in enumerate(together):
@@ -69,7 +88,7 @@ def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0,
         columns = tuple(slice(a, b) for a, b in pairwise(edges))
         found = mixtures(of.state_counts[chain], components[number], edges[-1], [seed, 2, number])
         groups.append(
-            StreamGroup(members, columns, found, tuple(weights[s] for s in members), product.chain_states[chain])
+            StreamGroup(members, columns, found, tuple(weights[s] for s in members), joint.chain_states[chain])
         )
     return Chains(("speech", "seen"), transitions, tuple(groups))
 

@@ -18,11 +18,11 @@ from engines.selection.drawn_units import (
     with_stress,
 )
 from lipmotion.engines import engine_from_settings, engine_named
-from lipmotion.engines.selection import concatenation, search, windows
+from lipmotion.engines.selection import concatenation, windows
+from lipmotion.engines.selection import costs as search
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
-from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE, select
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import phone_windows
 from lipmotion.types import Span, Timeline, Unit
 

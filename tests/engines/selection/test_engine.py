@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from lipmotion import engines, errors, types
 from lipmotion.engines.selection.concatenation import TimeMap, concatenated, pieces_of, shown_units
-from lipmotion.engines.selection.costs import ABUTTING_JOIN
-from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, select
 from lipmotion.engines.selection.selection_training import SEGMENT_S, target_of
 from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
 from lipmotion.testing import PHONES, example, examples, speech, timeline

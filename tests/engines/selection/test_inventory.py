@@ -9,8 +9,8 @@ import pytest
 from engines.selection.drawn_units import costs_of, inventory, recorded, timeline
 from lipmotion import engines, types
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.costs import select
 from lipmotion.engines.selection.inventory import RecordedUnits, standing_in, unit_index
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, PHONE_NUMBER, SILENT, TABLE_1, covering, phone_windows
 from lipmotion.errors import InputError

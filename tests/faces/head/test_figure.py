@@ -7,10 +7,19 @@ from faces.head.motions import mouth_rows
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.base import rotate_head
 from lipmotion_faces.head.inside import LOWER_EDGE, lower_drop, lower_teeth, upper_teeth
-from lipmotion_faces.head.lips import ARCH, COLUMNS, TEETH_EDGE, TEETH_Z, VISIBLE_RINGS, lip_surface, section_points
 from lipmotion_faces.head.part import MOUTH_Y, head
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import REST, move_jaw
+from lipmotion_faces.head.skin import (
+    ARCH,
+    COLUMNS,
+    REST,
+    TEETH_EDGE,
+    TEETH_Z,
+    VISIBLE_RINGS,
+    lip_surface,
+    move_jaw,
+    section_points,
+)
 from lipmotion_faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh, mouth_weights
 from meshes.heads import shaped
 

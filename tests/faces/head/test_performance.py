@@ -10,7 +10,7 @@ from lipmotion.units import LIP_CLOSING
 from lipmotion_faces import head, make_face, testing
 from lipmotion_faces.head.pose import CharacterPose, head_poses
 from lipmotion_faces.head.stage import Stage, camera_for
-from lipmotion_faces.rendering.rasteriser import Camera
+from lipmotion_faces.rendering.drawn_surface import Camera
 
 
 def middle(phone: str, value: float = 0.08, before: str = "ah", after: str = "ah"):

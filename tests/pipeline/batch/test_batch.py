@@ -20,7 +20,8 @@ from lipmotion import Delivery, Job, Outputs, Request, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.formats import motion_suffixes
-from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
+from lipmotion.pipeline.batch import BatchLine, batch, read_lines
+from lipmotion.pipeline.batch import run as one_line
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.workers import WorkerDiedError
@@ -241,7 +242,7 @@ def test_a_bug_that_one_line_meets_does_not_end_the_batch(sounds, settings, tmp_
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division")
 
-    monkeypatch.setattr("lipmotion.pipeline.batch.one_line._write_line", broken)
+    monkeypatch.setattr("lipmotion.pipeline.batch.run._write_line", broken)
     found = batch(sounds, tmp_path / "out", settings, jobs=1)
     assert found.failed == 3
     assert "unexpected ZeroDivisionError: float division" in ledger_rows(tmp_path / "out")[0]["error"]

@@ -39,8 +39,7 @@ from lipmotion_faces.corpus.long_videos import (
 )
 from lipmotion_faces.corpus.sync import offsets, sync
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
-from lipmotion_faces.tracking.track import track
-from lipmotion_faces.tracking.video_scan import VideoScan
+from lipmotion_faces.tracking.track import VideoScan, track
 from pipeline.made import features_of, read_sound, replace_tracking
 
 RATE = 16_000

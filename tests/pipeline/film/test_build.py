@@ -14,8 +14,8 @@ from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
 from lipmotion_faces.film import build
 from lipmotion_faces.film import build as takes
 from lipmotion_faces.film.build import MOST_FOOTAGE_S, Take, choose_takes
-from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
+from lipmotion_faces.tracking.track import Footage
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video, write_videos
 from speech.sounds import tone, write_sound
 from testing.toy import toy_sentences, toy_utterances

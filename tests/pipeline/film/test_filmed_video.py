@@ -24,8 +24,8 @@ from lipmotion_faces.film.background import (
 from lipmotion_faces.film.filmed_video import face_codes, is_person_of, make_film, person_shown, write_film
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Background, Stitcher
 from lipmotion_faces.outputs.shown_faces import shown_face
-from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE
+from lipmotion_faces.tracking.track import Footage
 from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
 from speech.sounds import tone, write_sound

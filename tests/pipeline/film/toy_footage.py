@@ -10,8 +10,8 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.types import Audio, Channel, Motion, Track
 from lipmotion_faces.film import background, build
-from lipmotion_faces.tracking.footage import Footage
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
+from lipmotion_faces.tracking.track import Footage
 from lipmotion_faces.video.mp4 import write_mp4
 from testing.toy import ToySentence, toy_motion, toy_sentences
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, SHAPE, toy_chin_px, toy_frames, toy_places

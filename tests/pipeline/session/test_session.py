@@ -16,7 +16,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, MoodStep, parse_step
-from lipmotion.pipeline.excerpts import GRID_S, MARGIN_S
+from lipmotion.pipeline.generation import GRID_S, MARGIN_S
 from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import measure_prosody

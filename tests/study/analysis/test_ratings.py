@@ -3,11 +3,16 @@ import pytest
 from scipy import stats
 
 from lipmotion_studio.study.analysis.analyse import power_of, raters_needed, rating_power, share_power
-from lipmotion_studio.study.analysis.crossed import BOTH, RATERS, SENTENCES, Components, crossed_mean, holm
-from lipmotion_studio.study.analysis.ratings import (
+from lipmotion_studio.study.analysis.crossed import (
+    BOTH,
     RANKS,
+    RATERS,
     SCALES,
+    SENTENCES,
+    Components,
     RatingTable,
+    crossed_mean,
+    holm,
     rating_figures,
     rating_table,
     relative_improvement,

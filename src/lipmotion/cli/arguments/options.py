@@ -9,10 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.declared import add_options
-from lipmotion.cli.arguments.paths import add_output, is_pipe
-from lipmotion.cli.terminal.printing import print_lines
-from lipmotion.cli.terminal.progress import outcome
+from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe
+from lipmotion.cli.terminal.progress import outcome, print_lines
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 
@@ -27,7 +25,7 @@ class Version(argparse.Action):
     """Prints the version, and a text behind it; it is looked up only when the option is given."""
 
     def __call__(self, *_: object) -> None:  # noqa: D102
-        from lipmotion.cli.terminal.printing import print_line
+        from lipmotion.cli.terminal.progress import print_line
         from lipmotion.extensions import installed_version
 
         print_line(f"lipmotion {installed_version()}{self.const or ''}")

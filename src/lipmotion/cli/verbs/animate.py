@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import sys
 
-from lipmotion.cli.arguments.declared import OF_ANIMATE, add_job_file, add_options, add_outputs, part_of
+from lipmotion.cli.arguments.declared import (
+    OF_ANIMATE,
+    add_job_file,
+    add_options,
+    add_outputs,
+    add_pipe_format,
+    is_pipe,
+    part_of,
+    read_pipe,
+    write_pipe,
+)
 from lipmotion.cli.arguments.options import add_execution, animate_one_by_one, worker_count
-from lipmotion.cli.arguments.paths import add_pipe_format, is_pipe, read_pipe, write_pipe
-from lipmotion.cli.terminal.printing import print_note
+from lipmotion.cli.terminal.progress import print_error
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
@@ -43,4 +53,5 @@ def run(options: argparse.Namespace) -> None:
             note = done.outlook.text if done.outlook is not None else ""
         written = [str(path) for path in (*files, job.outputs.posteriors) if path and not pipe]
         report.finish("\n".join(map(printable, written)), files=written)
-    print_note(note)
+    if note and sys.stderr is not None and sys.stderr.isatty():
+        print_error(note)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_detail, add_job_file, add_options, part_of
+from lipmotion.cli.arguments.declared import add_detail, add_input, add_job_file, add_options, add_output, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
-from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
 from lipmotion.types.delivery import Delivery, Staging

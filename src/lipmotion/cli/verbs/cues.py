@@ -8,11 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_options, part_of
+from lipmotion.cli.arguments.declared import add_options, add_output, check_paths, is_pipe, part_of, read_pipe
 from lipmotion.cli.arguments.options import Version, place_outputs
-from lipmotion.cli.arguments.paths import add_output, check_paths, is_pipe, read_pipe
-from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
-from lipmotion.cli.terminal.progress import LEVELS, status_lines
+from lipmotion.cli.terminal.progress import LEVELS, flush_output, print_line, print_lines, status_lines
 from lipmotion.errors import shorten
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.sources import is_file

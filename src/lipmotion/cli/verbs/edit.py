@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.declared import add_options, part_of
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
-from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import asdict
 
 from lipmotion.cli.arguments.declared import add_options, part_of
-from lipmotion.cli.terminal.printing import print_json, print_lines
+from lipmotion.cli.terminal.progress import print_json, print_lines
 from lipmotion.pipeline.request import Request
 
 RUNS = 2000

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.terminal.printing import flush_output, print_line
+from lipmotion.cli.arguments.declared import add_input
+from lipmotion.cli.terminal.progress import flush_output, print_line
 from lipmotion.errors import InputError, MissingDependencyError
 
 CHUNK_S = 0.02
@@ -78,7 +78,6 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _open_sound(options: argparse.Namespace) -> tuple[int, Iterator[Any]]:
-    """Return the rate of the sound, and its pieces, as they come."""
     from lipmotion.speech.sound.audio_files import read_audio
 
     if options.input == "-":

@@ -7,9 +7,8 @@ import logging
 from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
+from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, add_pipe_format, part_of, write_pipe
 from lipmotion.cli.arguments.options import add_machine_readable
-from lipmotion.cli.arguments.paths import add_input, add_pipe_format, write_pipe
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Request

@@ -6,9 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
+from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
-from lipmotion.cli.arguments.paths import add_input
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable

@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_machine_readable, list_or_all, worker_count
-from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Request
 
 if TYPE_CHECKING:
     from lipmotion.engines import Engine
     from lipmotion.pipeline.model import Model
-from lipmotion.cli.terminal.printing import print_line
+from lipmotion.cli.terminal.progress import print_line
 
 FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 NONE = "none"

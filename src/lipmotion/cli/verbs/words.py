@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_execution, worker_count
-from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.request import Request
 
 

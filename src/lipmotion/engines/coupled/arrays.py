@@ -10,18 +10,17 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import StreamGroup
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
-from lipmotion.engines.coupled.chains.model import Chains
+from lipmotion.engines.coupled.chains.model import Chains, VisualStream
 from lipmotion.engines.coupled.chains.product import Grammar, Transitions, reachable
-from lipmotion.engines.coupled.chains.structures import FACTORIAL, Structure
-from lipmotion.engines.coupled.chains.visual_streams import VisualStream
+from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays, motion_to_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from_arrays
-from lipmotion.motion.limits import check_poses, check_rest
 from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import list_predictor_arrays, predictor_from_arrays, predictor_to_arrays
+from lipmotion.motion.space import check_poses, check_rest
 from lipmotion.stats.bigram import check_sums_to_one
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.storage.schema import (
@@ -199,7 +198,7 @@ def _transitions(arrays: Arrays, structure: Structure) -> Transitions | Factoria
         check_sums_to_one("bigram", chain["bigram"].sum(axis=1))
     grammar = Grammar(tuple(chain["bigram"] for chain in chains), tuple(chain["first"] for chain in chains))
     advance = tuple(chain["advance"] for chain in chains)
-    if structure.kind == FACTORIAL and structure.limit is None and len(chains) == 2:
+    if structure.limit is None:
         first, second = advance
         own_density_states = check_arrays(arrays, PAIRS)["pairs"]
         for number, count in enumerate(structure.state_counts):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import wrap
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -12,30 +13,274 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
-from lipmotion.engines.coupled.chains.lattice import Lattice
-from lipmotion.engines.coupled.chains.model import Inference
-from lipmotion.engines.coupled.conversion.em_conversion import convert, path_means
-from lipmotion.engines.coupled.explanation import concatenated, describe, explain_frames, unit_posteriors
+from lipmotion.engines.coupled.chains.densities import Single, component_posteriors
+from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
+from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream
+from lipmotion.engines.coupled.chains.product import Product
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
+from lipmotion.engines.coupled.conversion.em_conversion import convert, group_index, path_means
+from lipmotion.engines.coupled.conversion.mean_regression import regression_weights
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.articulation import slice_dynamics, unseen_share
-from lipmotion.motion.generation import Statistics, split_into_blocks
+from lipmotion.motion.articulation import Statistics, slice_dynamics, unseen_share
+from lipmotion.motion.generation import split_into_blocks
+from lipmotion.printable import printable
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.types import (
     ChainPosteriors,
+    ChainStates,
+    ChannelValue,
     Configuration,
     Constraints,
+    DominantGaussian,
     Example,
     Explanation,
     Generation,
     Monitor,
+    NamedProbability,
+    RegressedMean,
     Speech,
     StateTrace,
     Timeline,
     Unit,
 )
+from lipmotion.units import VISEME_OF
+
+KINDS = {
+    HMM: "one chain, one mixture over all streams",
+    MULTISTREAM: "one chain, a mixture for each stream",
+    FACTORIAL: "chains with independent transitions, densities of their joint states",
+    COUPLED: "chains whose transitions depend on all chains, densities of their own states",
+}
+LINE = 110
+
+
+def describe(model: CoupledModel) -> str:
+    """Return a text with the chains, the streams and the regressions of a model, one a line."""
+    return "\n".join(map(printable, [*_chains(model), *_streams(model), *_regressions(model)]))
+
+
+def _chains(model: CoupledModel) -> Iterator[str]:
+    structure, product = model.chains.structure, model.chains.transitions.product
+    yield f"{structure.kind}: {KINDS[structure.kind]}"
+    if len(structure.chains) > 1:
+        apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
+        together = "" if structure.cross_units or structure.limit is None else ", units left together"
+        yield f"  asynchrony: {apart} apart{together}"
+    count = len(product.joint_states) if isinstance(product, Product) else product.chain_states.shape[1]
+    yield f"  joint states: {count}"
+    for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
+        yield f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states"
+        yield from (f"  {line}" for line in wrap(" ".join(units), LINE))
+
+
+def _streams(model: CoupledModel) -> Iterator[str]:
+    chains = model.chains
+    for number, name in enumerate(chains.streams):
+        mixtures = chains.groups[group_index(chains, number)].stream_mixtures(number)
+        densities, components, size = mixtures.means.shape
+        chain = chains.structure.chain_of(number) + 1
+        yield f"stream {name}: {size} dimensions on chain {chain}, {densities} densities of {components} Gaussian(s)"
+
+
+def _regressions(model: CoupledModel) -> Iterator[str]:
+    regressions = model.regression[1] if model.regression is not None else ()
+    for stream, regression in zip(model.visual, regressions, strict=False):
+        count, inputs, _ = regression.coefficients.shape
+        yield f"means of {stream.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
+
+
+Array = NDArray[np.float64]
+MOST_STATES = 3
+"""Greatest number of states of a chain that an explanation names."""
+REST = "rest"
+MIN_PROBABILITY = 0.005
+"""States and regressions with less probability are not named."""
+
+
+def explain_frames(
+    frames: Sequence[Explanation], model: CoupledModel, inference: Inference, rows: Sequence[int]
+) -> list[Explanation]:
+    """Return explanations with chains, Gaussians and regressions; unchanged where no path leads through the chains."""
+    if not np.isfinite(inference.posteriors.log_likelihood):
+        return list(frames)
+    streams = range(len(model.chains.streams))
+    return [
+        replace(
+            frame,
+            chains=chain_states(model.chains, inference.posteriors, row),
+            joint=joint_state(model.chains, inference.posteriors, row),
+            gaussians=tuple(_dominant_gaussian(model, inference, row, stream) for stream in streams),
+            regressions=regressions,
+        )
+        for frame, row, regressions in zip(frames, rows, _regressed_means(model, inference, rows), strict=True)
+    ]
+
+
+def chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tuple[ChainStates, ...]:
+    """Return the most probable states of each chain in a frame, and the probabilities of its asynchrony."""
+    structure = chains.structure
+    return tuple(
+        ChainStates(
+            unit_set.name,
+            _most_probable(
+                [structure.state_name(number, state) for state in range(count)], posteriors.chains[number][row]
+            ),
+            dict(zip(leads(chains, number), lead[row].tolist(), strict=True)),
+        )
+        for number, (unit_set, count, lead) in enumerate(
+            zip(structure.chains, structure.state_counts, lead_posteriors(chains, posteriors), strict=True)
+        )
+    )
+
+
+def joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) -> NamedProbability | None:
+    """Return the most probable joint state in a frame; None where joint states are not listed."""
+    if posteriors.joint is None:
+        return None
+    best = int(posteriors.joint.probability[row].argmax())
+    name = chains.transitions.product.name(int(posteriors.joint.states[best]))
+    return NamedProbability(name, float(posteriors.joint.probability[row, best]))
+
+
+def leads(chains: Chains, chain: int) -> tuple[int, ...]:
+    """Return by how many states a chain may be ahead of the first; empty: it is the first, or there is no limit."""
+    limit = chains.structure.limit
+    return () if limit is None or chain == 0 else tuple(range(-limit, limit + 1))
+
+
+def lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[Single]:
+    """Return, for each chain, the posteriors of its ``leads`` [each shape=(T, len(leads))]."""
+    product, result = chains.transitions.product, []
+    for chain in range(len(chains.structure.chains)):
+        ahead = np.array(leads(chains, chain), np.intp)
+        lead = np.zeros((len(posteriors.most_probable), len(ahead)), np.float32)
+        if isinstance(product, Product) and posteriors.joint is not None:
+            own = product.lead[chain][posteriors.joint.states]
+            lead = posteriors.joint.probability @ (own[:, None] == ahead).astype(np.float32)
+        result.append(lead)
+    return result
+
+
+def unit_posteriors(chains: Chains, posteriors: LatticePosteriors, kept: slice) -> list[ChainPosteriors]:
+    """Return the posteriors of the units of each chain in some frames."""
+    structure = chains.structure
+    return [
+        ChainPosteriors(
+            unit_set.name,
+            units,
+            posteriors.chains[number][kept].reshape(-1, len(units), structure.states).sum(axis=2),
+            leads(chains, number),
+            lead[kept],
+        )
+        for number, (unit_set, units, lead) in enumerate(
+            zip(structure.chains, structure.units, lead_posteriors(chains, posteriors), strict=True)
+        )
+    ]
+
+
+def concatenated(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
+    """Return the posteriors of one chain in successive parts of an utterance as one."""
+    probability, lead = (np.concatenate([getattr(part, name) for part in parts]) for name in ("probability", "lead"))
+    return replace(parts[0], probability=probability, lead=lead)
+
+
+def _most_probable(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
+    best = np.argsort(-probability, kind="stable")[:MOST_STATES]
+    named = [NamedProbability(names[i], float(probability[i])) for i in best]
+    return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
+
+
+def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:
+    chains = model.chains
+    number = group_index(chains, stream)
+    group, responsibilities = chains.groups[number], inference.emissions.responsibilities[number]
+    posterior = inference.posteriors.densities[number][row : row + 1]
+    weight = component_posteriors(posterior, None if responsibilities is None else responsibilities[row : row + 1])[0]
+    component, position = np.unravel_index(weight.argmax(), weight.shape)
+    density = int(inference.lattice.densities[number][position])
+    mixtures = group.stream_mixtures(stream)
+    mean, variance = (x[density, component].astype(float) for x in (mixtures.means, mixtures.variances))
+    channels: Mapping[str, ChannelValue] = {}
+    if stream:
+        visual = model.visual[stream - 1]
+        means, precisions = visual.unstandardised(mean[None], 1 / variance[None])
+        channels = _channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
+    states = chains.transitions.product.chain_states[:, group.tie == density]
+    return DominantGaussian(
+        chains.streams[stream],
+        " | ".join(
+            chains.structure.state_name(chain, int(own[0])) for chain, own in enumerate(states) if (own == own[0]).all()
+        ),
+        int(component) + 1,
+        len(weight),
+        float(weight[component, position]),
+        _distance(inference, stream, row, mean, variance),
+        channels,
+    )
+
+
+def _distance(inference: Inference, stream: int, row: int, mean: Array, variance: Array) -> float | None:
+    """Return how far an observation is from a Gaussian, in standard deviations (RMS); None: it was not observed."""
+    observed = inference.observations.observed[stream]
+    if observed is not None and not observed[row]:
+        return None
+    error = inference.observations.streams[stream][row] - mean
+    return float(np.sqrt(np.mean(error * error / variance)))
+
+
+def _regressed_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
+    """Return, for each frame, expected means of visual streams and their regressions; empty without dynamics."""
+    if not all(stream.dynamic for stream in model.visual):
+        return [() for _ in rows]
+    means, precisions = model.motion_statistics(inference)
+    away, result = model.is_away_from_speech(inference.posteriors.chains[0]), []
+    rest: list[tuple[NamedProbability, ...]] = [(NamedProbability(REST, 1.0),)] * len(model.visual)
+    for row in rows:
+        shares = rest if away[row] else _regression_shares(model, inference, row)
+        regressed = []
+        for stream, own in zip(model.visual, shares, strict=False):
+            mean, variance = means[row, 0, stream.columns], 1 / precisions[row, 0, stream.columns]
+            regressed.append(RegressedMean(stream.name, own, _channel_values(model, stream, mean, variance)))
+        result.append(tuple(regressed))
+    return result
+
+
+def _regression_shares(model: CoupledModel, inference: Inference, row: int) -> list[tuple[NamedProbability, ...]]:
+    """Return the weights of the most important regressions of every visual stream in a frame; empty without any."""
+    structure, result = model.chains.structure, []
+    for number, regression in enumerate(model.regression[1] if model.regression is not None else ()):
+        chain, regression_of_state = structure.chain_of(number + 1), regression.regression_of_state
+        posterior = inference.posteriors.chains[chain][row : row + 1]
+        weights = regression_weights(posterior, regression_of_state, len(regression.coefficients))[0]
+        names = [_regression_name(structure, chain, regression_of_state, k) for k in range(len(weights))]
+        result.append(_most_probable(names, weights))
+    return result
+
+
+def _regression_name(structure: Structure, chain: int, regression_of_state: NDArray[np.intp], regression: int) -> str:
+    """Return the viseme of the states that share a regression, with their position if it is the same: ``bi.2``."""
+    units, positions = np.divmod(np.flatnonzero(regression_of_state == regression), structure.states)
+    phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
+    viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
+    return f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme
+
+
+def _channel_values(
+    model: CoupledModel, stream: VisualStream, means: Array, variances: Array
+) -> Mapping[str, ChannelValue]:
+    """Return values and standard deviations of the channels of a stream, by name, from means and variances."""
+    space = model.space
+    values, variance = np.zeros((1, space.dimensions)), np.full((1, space.dimensions), np.nan)
+    values[:, stream.columns], variance[:, stream.columns] = means, variances
+    motion, variance_of_motion = space.restore(values, variance)
+    channels = zip(space.channels, motion[0].tolist(), np.sqrt(variance_of_motion[0]).tolist(), strict=True)
+    return {
+        channel.name: ChannelValue(value, deviation) for channel, value, deviation in channels if np.isfinite(deviation)
+    }
+
 
 ENCODING_SHARE = 0.8
 """Share of the regression on the encoding for a voice that training knows half or less; one that it knows has none."""

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single
-from lipmotion.engines.coupled.chains.model import Chains, Inference
+from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream, speech_observations
 from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, unit_sets
-from lipmotion.engines.coupled.chains.visual_streams import EIGENLIPS, VisualStream, speech_observations
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     SOFT,
@@ -25,12 +24,10 @@ from lipmotion.engines.coupled.conversion.em_conversion import (
 from lipmotion.engines.coupled.conversion.mean_regression import RegressionInputs, VisualRegression
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
-from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.limits import MotionLimits, measure_limits
+from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import STRENGTH, ModulationFilter
 from lipmotion.motion.predictors import Predictor
-from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.variance_scaling import VarianceScaling
+from lipmotion.motion.space import MotionLimits, MotionSpace, measure_limits
 from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, Speech, option
 from lipmotion.units import UnitSet
 
@@ -46,7 +43,7 @@ class CoupledConfig(Configuration):
     structure  : ``hmm``, ``multistream``, ``factorial`` or ``coupled`` (``presets`` has the paper's six systems)
     chains     : the unit set of each chain, separated by blanks: names or table files; the first chain emits speech
     states     : states per unit, left to right, no skips
-    asynchrony : number of states that chains may be apart; -1: no limit
+    asynchrony : number of states that chains may be apart; -1: no limit, of two factorial chains
     cross_units : let chains leave a unit at different times
     start_asynchrony, unseen_loss : of factorial chains without a limit: how far apart the chains may be while the first
                  densities are learned, and the nats that rare joint states lose (``chains.structures.Structure``)
@@ -119,7 +116,7 @@ class CoupledConfig(Configuration):
 
     def structure_with(self, chains: tuple[UnitSet, ...]) -> Structure:
         """Return the structure of chains of these unit sets. Raises InputError: as ``Structure``."""
-        limit = None if self.asynchrony < 0 else self.asynchrony
+        limit = self.asynchrony if self.asynchrony >= 0 else None if len(chains) > 1 else 0
         others = self.start_asynchrony, self.unseen_loss, self.moves_together
         return Structure(self.structure, chains, self.states, limit, self.cross_units, *others)
 
@@ -265,9 +262,7 @@ class CoupledModel:
         return self.regression[0](inference.observations.streams[0], inference.posteriors.chains[0])
 
     def is_away_from_speech(self, posterior: Single) -> NDArray[np.bool_]:
-        """Return whether each frame is silence away from speech, by posteriors of the first chain [shapes=(T,), (T,
-        N)].
-        """
+        """Return whether each frame is silence away from speech [shape=(T,)], by posteriors of the first chain."""
         structure = self.chains.structure
         silent = np.repeat([structure.chains[0].silent(unit) for unit in structure.units[0]], structure.states)
         speech = posterior @ (~silent).astype(np.float32) > LARGEST_SPEECH_POSTERIOR

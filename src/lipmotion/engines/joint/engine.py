@@ -28,11 +28,10 @@ from lipmotion.motion.arrays import (
     scaling_from_arrays,
     scaling_to_arrays,
 )
-from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
+from lipmotion.motion.articulation import ArticulationPrior, Statistics, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
-from lipmotion.motion.generation import LearnedMotion, Statistics
-from lipmotion.motion.limits import MotionLimits, check_poses, measure_limits
+from lipmotion.motion.generation import LearnedMotion, VarianceScaling, fit_scaling_factors
 from lipmotion.motion.modulation_filter import (
     MODULATION,
     STRENGTH,
@@ -42,8 +41,7 @@ from lipmotion.motion.modulation_filter import (
     learn_filter,
     select_resting_motion,
 )
-from lipmotion.motion.space import MotionSpace, fit_reduced_motion
-from lipmotion.motion.variance_scaling import VarianceScaling, fit_scaling_factors
+from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, fit_reduced_motion, measure_limits
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import arrays_under, format_errors, refuse_undeclared
 from lipmotion.types import (
@@ -246,9 +244,7 @@ class JointEngine(Engine[JointModel]):
         return Fit(self._with_filter(model, examples), {"frames": frames, **figures})
 
     def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
-        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``. Raises
-        as that.
-        """
+        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``."""
         learning = self._learning(self._with_channels(examples))
         classes = learning.units.classes()
         for hmm in grow_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor):
@@ -363,7 +359,6 @@ class JointEngine(Engine[JointModel]):
     def _recognised(
         self, model: JointModel, observations: StreamObservations, duration_s: float
     ) -> tuple[Timeline[Unit], StatePath]:
-        """Return the recognised units in time, and the state sequence from which motion is generated."""
         segments = joint_recogniser(model.hmm).recognise(observations)
         units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
         bounds = np.array([*(segment.first for segment in segments), observations.frames])

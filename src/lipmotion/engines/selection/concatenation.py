@@ -17,8 +17,8 @@ from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_AFTER, JOIN_BE
 from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.windows import PROTECTED_PHONES
-from lipmotion.motion.generation import Statistics
-from lipmotion.motion.rest import find_digital_silence, find_runs, is_away_from_speech, list_speech_intervals
+from lipmotion.motion.articulation import Statistics
+from lipmotion.motion.frame_labels import find_digital_silence, find_runs, frames_away
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.types import FRAME_RATE_HZ, Constraints, Motion, ReducedVariance, Speech, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent
@@ -53,9 +53,7 @@ class Piece:
 
 
 def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
-    """Return the pieces of a selection, in order; of two overlaps in one phone, the second gives way to the next best
-    join.
-    """
+    """Return the pieces of a selection, in order; of two overlaps in one phone, the second gives way."""
     kinds = [ABUTTING_JOIN]
     for number in range(1, len(units)):
         pair = int(units[number - 1]), int(units[number])
@@ -173,12 +171,7 @@ def _rise(time_s: Array, piece: Piece) -> Array:
 def _smooth(
     inventory: RecordedUnits, target: Target, sides: Sequence[tuple[Piece, TimeMap]], time_s: Array, motion: Array
 ) -> None:
-    """Bend two abutting pieces towards one another, in place.
-
-    sides : both pieces, with their time maps
-    The jump is divided between both sides; a side that is a protected phone keeps its shape and the other one takes
-    all, unless both are protected. Bent are 5 % of each piece, but 20 ms at least and 150 ms at most.
-    """
+    """Bend two abutting pieces towards one another, in place; a protected phone beside another one keeps its shape."""
     (before, _), (after, _) = sides
     join_s, times_s = after.start_s, target.windows.times_s
     recording = inventory.windows.recording
@@ -237,16 +230,11 @@ def motion_of_units(
 
 
 def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: bool) -> Array:
-    """Return the weight of the rest pose in every frame, 0 to 1 [shape=(T,)].
-
-    It is 1 in silence of which some is digital, and falls to 0 before the next phone and after the last one: in digital
-    silence there is no breath, as there may be in the silence that was recorded with the unit.
-    always   : whether it is 1 in every silence, for no silence was recorded
-    """
+    """Return the weight of the rest pose in every frame: 1 in silence that is partly digital (``always``: in all)."""
     silent = np.ones(len(features), bool) if always else find_digital_silence(features, units)
     if not silent.any():
         return np.zeros(len(features))
-    away = is_away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, list_speech_intervals(units), SETTLED_S)
+    away = frames_away(units, len(features), SETTLED_S)
     resting = np.zeros(len(features))
     for first, stop in find_runs(away):
         resting[first:stop] = float(silent[first:stop].any())
@@ -257,10 +245,7 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
 
 
 def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
-    """Return 1 in the frames whose unit was recorded between other phones than are wanted, else 0 [shape=(T,)].
-
-    There the table of articulation says more than the unit; elsewhere the unit is a recording of what is wanted.
-    """
+    """Return 1 in the frames whose unit was recorded between other phones than are wanted, else 0 [shape=(T,)]."""
     middle = costs.config.window // 2
     around = slice(middle - 1, middle + 2)
     differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1) & (not target.by_sound)

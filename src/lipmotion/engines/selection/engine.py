@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, motion_of_units, pieces_of, shown_units
-from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target
-from lipmotion.engines.selection.inventory import RecordedUnits, inventory_text, is_source, source_of, units_by_source
+from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
+from lipmotion.engines.selection.inventory import SOURCE, RecordedUnits, inventory_text, source_of, units_by_source
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import fit_selection, target_of
 from lipmotion.engines.selection.windows import PHONE_NUMBER, phone_windows
 from lipmotion.errors import InputError
@@ -216,7 +215,7 @@ def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int
     starts_s, symbols = target.windows.times_s[:, 0], costs.index.contexts[:, costs.config.window // 2]
     given, useless = {}, []
     for span in units:
-        if span.duration_s <= 0 or not is_source(span.label.unit):
+        if span.duration_s <= 0 or not SOURCE.search(span.label.unit):
             continue
         unit, number = named.get(span.label.unit), int(np.argmin(np.abs(starts_s - span.start_s)))
         if unit is not None and symbols[unit] == target.symbol(number):

@@ -17,6 +17,8 @@ from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, find_similar_lips
 
 LINE = 110
+SOURCE = re.compile(r" \d+\.\d+-\d+\.\d+ s \S+$")
+"""The end of what ``source_of`` returns."""
 
 
 def source_of(inventory: RecordedUnits, unit: int) -> str:
@@ -24,11 +26,6 @@ def source_of(inventory: RecordedUnits, unit: int) -> str:
     windows = inventory.windows
     start_s, end_s = windows.times_s[unit].tolist()
     return f"{inventory.names[windows.recording[unit]]} {start_s:.3f}-{end_s:.3f} s {PHONES[windows.phones[unit]]}"
-
-
-def is_source(text: str) -> bool:
-    """Return whether a text has the form of ``source_of``: a recording, two times, and a phone."""
-    return re.search(r" \d+\.\d+-\d+\.\d+ s \S+$", text) is not None
 
 
 def units_by_source(inventory: RecordedUnits, sources: Iterable[str]) -> dict[str, int]:

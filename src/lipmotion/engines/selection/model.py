@@ -133,9 +133,7 @@ def model_arrays(model: SelectionModel) -> dict[str, NDArray[Any]]:
 
 
 def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
-    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: an array is missing or
-    wrong.
-    """
+    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: a missing or wrong array."""
     with format_errors("the model of recorded units"):
         named = (name for name in arrays if name.startswith(JOINT_PREFIX))
         refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, list_predictor_arrays(arrays), UNITS, GUIDE, named)

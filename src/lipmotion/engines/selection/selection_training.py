@@ -10,18 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.concatenation import Chosen, concatenated, motion_of_units, pieces_of
-from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target
+from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import Guide, SelectionModel, at_points, fit_guide
-from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
+from lipmotion.motion.frame_labels import find_runs, frames_away, rate_phones
 from lipmotion.motion.generation import fit_motion
 from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import PredictorTraining, choose_predictor, load_predictor
-from lipmotion.motion.rest import find_runs, is_away_from_speech, list_speech_intervals, rate_phones
+from lipmotion.motion.predictors import PREDICTORS, PredictorTraining, choose_predictor
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.storage.archive import Checkpoint
@@ -87,7 +86,7 @@ def fit_selection(
         recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     guide = None
     if config.guide:
-        kind = choose_predictor(config.predictor, examples) or load_predictor("prior")
+        kind = choose_predictor(config.predictor, examples) or PREDICTORS.load("prior")
         direct, of_guide = len(motion.space.direct), sub_monitor(monitor, 0.3, 0.9)
         training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
         guide = fit_guide(kind.fit(training).predictor, examples, values)
@@ -124,9 +123,7 @@ def fit_selection(
 
 
 def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
-    """Return the inventory of some examples, from motion in the motion space. Raises CorpusError: no phone was measured
-    whole.
-    """
+    """Return the inventory of some examples, from reduced motion. Raises CorpusError: no phone was measured whole."""
     timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
     windows = phone_windows(timelines)
     first = np.concatenate([[0], np.cumsum([len(x) for x in values])]).astype(np.intp)
@@ -160,21 +157,19 @@ def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int
     """Return the ranges of rows that are stored: not the middle of long silences, nor what was not measured."""
     ranges = list[list[int]]()
     for example, begin in zip(examples, first[:-1].tolist(), strict=True):
-        time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
-        near = example.valid & ~is_away_from_speech(time_s, list_speech_intervals(example.speech.units), KEPT_SILENCE_S)
+        near = example.valid & ~frames_away(example.speech.units, len(example.valid), KEPT_SILENCE_S)
         ranges += (find_runs(near) + begin).tolist()
     return ranges
 
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:
     """Return the mean pose in silence away from speech, or that of the least open frames [shape=(Q,)]."""
-    resting = []
-    for example, x in zip(examples, values, strict=True):
-        time_s = np.arange(len(x)) / FRAME_RATE_HZ
-        resting.append(
-            x[example.valid & is_away_from_speech(time_s, list_speech_intervals(example.speech.units), REST_AWAY_S)]
-        )
-    poses = np.concatenate(resting)
+    poses = np.concatenate(
+        [
+            x[example.valid & frames_away(example.speech.units, len(x), REST_AWAY_S)]
+            for example, x in zip(examples, values, strict=True)
+        ]
+    )
     if len(poses) < LEAST_REST_FRAMES:
         poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
         if OPENING in space.direct_names:

@@ -21,6 +21,7 @@ from lipmotion.motion.articulation import (
     KNOWN_VOICE_SHARE,
     TABLE_WEIGHT_WITH_PREDICTOR,
     ArticulationPrior,
+    Statistics,
     slice_dynamics,
     unseen_share,
 )
@@ -31,9 +32,8 @@ from lipmotion.motion.context_window import (
     acoustic_context_from_arrays,
     acoustic_context_to_arrays,
 )
-from lipmotion.motion.frame_labels import FullContextState, StateLayout
-from lipmotion.motion.generation import LearnedMotion, Statistics
-from lipmotion.motion.limits import MotionLimits, check_poses, check_spread, measure_limits
+from lipmotion.motion.frame_labels import FullContextState, StateLayout, rate_phones
+from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import MODULATION, ModulationFilter, filter_from_arrays, filter_to_arrays
 from lipmotion.motion.predictors import (
     ADDED,
@@ -42,9 +42,7 @@ from lipmotion.motion.predictors import (
     predictor_from_arrays,
     predictor_to_arrays,
 )
-from lipmotion.motion.rest import rate_phones
-from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.variance_scaling import VarianceScaling
+from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, check_spread, measure_limits
 from lipmotion.stats.trees import TREES, Context, Tree, trees_from_arrays, trees_to_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Speech
@@ -331,9 +329,7 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
 def model_from_arrays(
     arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str, *, filtered: bool
 ) -> TrajectoryModel:
-    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: an array is missing or
-    wrong.
-    """
+    """Deserialise a model, ``filtered`` with a modulation filter. Raises ModelFormatError: a missing or wrong array."""
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
         others = list_predictor_arrays(arrays)

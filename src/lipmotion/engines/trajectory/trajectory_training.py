@@ -24,10 +24,10 @@ from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_pr
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, label_full_context
+from lipmotion.motion.generation import fit_scaling_factors
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import Predictor, PredictorTraining, choose_predictor, split_folds
 from lipmotion.motion.space import fit_reduced_motion
-from lipmotion.motion.variance_scaling import fit_scaling_factors
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.stats.trees import (
     Question,
@@ -236,11 +236,7 @@ def _share_of_predictor(
     layout: StateLayout,
     direct: int,
 ) -> float:
-    """Return the weight of a predictor beside the states, by cross-validation: 0 to 1.
-
-    direct      : number of channels that are modelled as they are; the weight is chosen for them
-    The states are trained on the same folds. With a single clip, the predictor has all the weight.
-    """
+    """Return the weight of a predictor beside the states, by cross-validation over the same folds: 0 to 1."""
     if len(clips) < 2:
         return 1.0
     products = squares = 0.0

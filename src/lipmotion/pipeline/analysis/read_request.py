@@ -17,8 +17,7 @@ from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon
 
 LABEL_SUFFIXES = (".textgrid", ".eaf", ".lab", ".phn", ".txt", ".json", ".jsonl", ".marks", ".csv", ".tsv")
-"""Suffixes of label files, in lower case; their content decides which form they have. ``.json`` and ``.csv`` may also
-be motion."""
+"""Suffixes of label files; content decides which form they have. ``.json`` and ``.csv`` may also be motion."""
 LONGEST_NAME, LONGEST_PATH = 255, 1000
 """Most bytes of the name of a file on any usual system; most letters of an argument that may be a path."""
 _SUFFIX = re.compile(r"\.[A-Za-z]{1,10}")

@@ -123,12 +123,12 @@ def transcribe(
     costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
     evidence = transcript_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
     if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
-        fit = fit.with_evidence(evidence)
+        fit = replace(fit, missing=evidence.gaps, evidence=evidence)
         warn_of_misfit(fit)
         return Transcription(units, fit)
     phones_recognised = recognised()
     evidence = _compare(evidence, phones_recognised)
-    fit = fit.with_evidence(evidence)
+    fit = replace(fit, missing=evidence.gaps, evidence=evidence)
     warn_of_misfit(fit, corrected=True)
     if fit.is_doubtful:
         return Transcription(None, fit)

@@ -101,7 +101,6 @@ def speak_from_corpus(
 
 
 def _plan_phones(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model) -> Timeline[Unit]:
-    """Return the phones of a text, each as long as it typically is."""
     spans: list[Span[Unit]] = []
     now_s = 0.0
 

@@ -181,7 +181,7 @@ def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) ->
         )
     last_s = (len(motion.values) - 1) / motion.rate_hz
     if isinstance(edit, Pin):
-        find_pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
+        find_pinned_frame(edit, len(motion.values), motion.rate_hz, is_weight=edit.channel in WEIGHTS)
     elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
         verb = {DrawnCurve: "draw", Hold: "hold"}.get(type(edit), "gain")
         raise InputError(f"{verb} from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
@@ -202,7 +202,6 @@ def known_names(mesh: Mesh) -> dict[str, str]:
 def _make_set(
     motion: Motion, units: Timeline[Unit], name: str, staging: Staging | None, prosody: Prosody | None
 ) -> Motion:
-    """Return the curves of one of ``SHAPE_SETS``."""
     if name == ARKIT:
         return solve_shape_weights(motion, units, arkit_mouth())
     motion = with_mouth(motion)

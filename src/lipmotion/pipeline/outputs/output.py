@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lipmotion.articulation.delivery import Delivery, delay_units
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import ExportError
 from lipmotion.extensions import Registry, load_provided
 from lipmotion.formats.label_files import LABEL_SUFFIXES, write_labels
 from lipmotion.formats.sound import SOUND_CODECS, write_sound
@@ -176,18 +176,19 @@ OUTPUTS: Registry[type[Output]] = Registry(
         "sound": f"{_HERE}.output:SoundOutput",
         "cues": f"{_HERE}.cues:CueOutput",
     },
+    Output,
 )
 """Kinds of outputs; those that show a face are entry points of the package of faces."""
 
 
 def plan(path: str | Path, settings: OutputSettings) -> Output:
     """Return the output of a path; the longest suffix counts. Raises ExportError: no kind of output has such a name."""
-    kinds, name = _kinds(), Path(path).name.lower()
+    name = Path(path).name.lower()
 
     def length(kind: type[Output]) -> int:
         return max((len(suffix) for suffix in kind.suffixes(settings) if name.endswith(suffix.lower())), default=0)
 
-    taking = [kind for kind in kinds if kind.takes(Path(path), settings)]
+    taking = [kind for kind in map(OUTPUTS.load, OUTPUTS.names) if kind.takes(Path(path), settings)]
     if taking:
         return max(taking, key=length)(Path(path), settings)
     suffixes = " ".join(output_suffixes(settings))
@@ -196,7 +197,7 @@ def plan(path: str | Path, settings: OutputSettings) -> Output:
 
 def output_suffixes(settings: OutputSettings) -> tuple[str, ...]:
     """Return the ends of names of all outputs, as messages list them."""
-    return tuple(suffix for kind in _kinds() for suffix in kind.suffixes(settings))
+    return tuple(suffix for kind in map(OUTPUTS.load, OUTPUTS.names) for suffix in kind.suffixes(settings))
 
 
 def create_outputs(paths: Iterable[str | Path], settings: OutputSettings) -> list[Output]:
@@ -208,17 +209,6 @@ def create_outputs(paths: Iterable[str | Path], settings: OutputSettings) -> lis
         check_target(output.path, settings.recording)
         output.check()
     return planned
-
-
-def _kinds() -> list[type[Output]]:
-    """Return all kinds. Raises InputError: what an installed package adds is no class of ``Output``."""
-    kinds = []
-    for name in OUTPUTS.names:
-        kind = OUTPUTS.load(name)
-        if not (isinstance(kind, type) and issubclass(kind, Output)):
-            raise InputError(f"{kind!r} is called an output, {name!r}, by an installed package; required an Output")
-        kinds.append(kind)
-    return kinds
 
 
 def measure_prosody(speech: str | Path | Audio) -> Prosody:

@@ -190,9 +190,7 @@ def _edges(count: int, lowest_hz: float, highest_hz: float) -> NDArray[np.float6
 
 
 def triangles(bins: NDArray[np.floating[Any]], edges: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Return triangular filters [shape=(bins, F)]: each rises from one edge [shape=(F + 2,)] to the next and falls
-    to the one after.
-    """
+    """Return triangular filters [shape=(bins, F)]: each rises from one edge to the next and falls to the one after."""
     rising = (bins[:, None] - edges[:-2]) / (edges[1:-1] - edges[:-2])
     falling = (edges[2:] - bins[:, None]) / (edges[2:] - edges[1:-1])
     return np.maximum(0, np.minimum(rising, falling))

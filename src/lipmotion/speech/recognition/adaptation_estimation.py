@@ -34,8 +34,7 @@ PASSES, ITERATIONS = 2, 4
 OWN_RELEVANCE, GENERAL_RELEVANCE = 300.0, 30.0
 """Frames that the prior of a transform, the identity, counts for (docs/adaptation.md says how they were chosen)."""
 SHORT_S, SHORT_RELEVANCE = 10.0, 1000.0
-"""From less speech than this, the own models' features, Δ and ΔΔ are transformed each by themselves, with a stronger
-prior."""
+"""From less speech than this, the own models' features, Δ and ΔΔ are transformed alone, with a stronger prior."""
 MIN_SPEECH_S = 1.0
 
 
@@ -109,13 +108,7 @@ def _improved(
     transform: Array,
     free: NDArray[np.bool_],
 ) -> Array:
-    """Return a transform [shape=(D, D + 1)] that makes frames more probable under the densities of their states.
-
-    features  : not transformed [shape=(T, D)]
-    densities : of each frame [shape=(T,)]
-    transform : to begin with [shape=(D, D + 1)]
-    free      : its entries that may change [shape=(D, D + 1)]
-    """
+    """Return a transform whose ``free`` entries make frames more probable under the densities of their states."""
     return run_em(
         transform,
         lambda transform: collect_transform_statistics(mixtures, features, densities, transform),

@@ -17,8 +17,7 @@ from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
 from lipmotion.units import is_silent
 
 DOUBTFUL_SCORE = -4.2
-"""Under this score the transcript is probably wrong: right ones score 0 to -4.1, wrong ones -2 to -8
-(docs/robustness.md)."""
+"""Under this score the transcript is probably wrong: right ones score 0 to -4.1, wrong ones -2 to -8."""
 WORST_SCORE = -9.0
 """No frame counts for less: a sound that a voice makes in its own way, as synthetic ones do, does not decide alone."""
 FRAME_STEP = 4
@@ -63,10 +62,6 @@ class TranscriptFit:
     def unsaid(self) -> tuple[WordEvidence, ...]:
         """The words that seem not to be said."""
         return self.evidence.unsaid if self.evidence is not None else ()
-
-    def with_evidence(self, evidence: TranscriptEvidence) -> TranscriptFit:
-        """Return the fit as a phone recogniser judges it."""
-        return replace(self, missing=evidence.gaps, evidence=evidence)
 
     @property
     def missing_s(self) -> float:
@@ -215,7 +210,6 @@ def _scored_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames
 
 
 def _first_frame(time_s: float) -> int:
-    """Return the first frame at or after a time."""
     return int(np.ceil(time_s * FRAME_RATE_HZ - 1e-6))
 
 

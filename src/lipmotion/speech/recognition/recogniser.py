@@ -70,8 +70,7 @@ SMALL_PERPLEXITY = 9.0
 less than this, their corpus has few words, which no language model of English expects. Then the phones alone decide.
 The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
 FULL_WEIGHT_SCORE = -5.0
-"""Own models have the weight of the general ones from this speaker similarity score on, and none down from
-``STRANGER_SCORE``."""
+"""Own models have the weight of the general ones from this similarity on, and none down from ``STRANGER_SCORE``."""
 FEW_GAUSSIANS = 2
 """Own models of so few Gaussians a state were trained on less than two minutes: forced alignment uses the general ones
 alone then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),

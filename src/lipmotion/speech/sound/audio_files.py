@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.media import open_media, stated_duration_s, video_streams
-from lipmotion.storage.sources import check_source, is_text
+from lipmotion.storage.sources import check_source, is_text, open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio
 
 HOLE_S = 0.04
@@ -59,19 +58,6 @@ class DecodedAudio:
     stated_s: float
 
 
-def decode_audio(container: Any, rate_hz: int, channel: int | None = None) -> DecodedAudio:
-    """Return the decoded first sound track of an open container.
-
-    channel : number of the channel to take; None: the mean of all channels
-    Time 0 is the container's start; in a file without moving pictures, the first sample.
-    Digital silence, and that which fills holes, is left out until the end: memory that nobody writes to costs nothing.
-    Raises InputError: time stamps that jump by more than ``LONGEST_HOLE_S``, or leave more silence than
-    ``MOST_SILENCE_RATIO`` allows; more sound than the bytes of the track can hold; a rate or a number of channels that
-    no recorder has.
-    """
-    return _TrackDecoder(container, rate_hz, channel).decoded()
-
-
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
     """Raise InputError for a sampling rate or a number of channels that no recorder has.
 
@@ -86,7 +72,11 @@ def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
 
 
 class _TrackDecoder:
-    """Decodes one track; the sound so far is in ``_pieces``, each with the number of samples before it."""
+    """Decodes one track; the sound so far is in ``_pieces``, each with the number of samples before it.
+
+    channel : number of the channel to take; None: the mean of all channels
+    Digital silence, and that which fills holes, is left out until the end: memory that nobody writes to costs nothing.
+    """
 
     def __init__(self, container: Any, rate_hz: int, channel: int | None) -> None:
         self._container = container
@@ -296,7 +286,7 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
             check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
             if len(container.streams.audio) > 1:
                 LOG.info("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
-            return decode_audio(container, rate_hz, channel)
+            return _TrackDecoder(container, rate_hz, channel).decoded()
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise

@@ -143,12 +143,7 @@ def find_tones(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) ->
 
 
 def _margin(log_energy: NDArray[np.float32], floor: float, reaching: int) -> int:
-    """Return how many of the frames beside a sound are of the same recording: up to where it was cut, or mixed.
-
-    log_energy : of the frames beside the sound, the nearest first [shape=(M,)]
-    floor      : that of digital silence
-    reaching   : so many frames beside it have windows that reach into it
-    """
+    """Return how many frames beside a sound, from the nearest on, are of its recording, not cut or mixed."""
     zeros = np.flatnonzero(log_energy <= floor)
     count = max(int(zeros[0]) - reaching, 0) if len(zeros) else len(log_energy)
     for cut in range(CUT_FROM, count - CUT_FRAMES):

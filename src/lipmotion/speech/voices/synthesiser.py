@@ -197,7 +197,6 @@ def _started(
 
 
 def _wait(process: subprocess.Popen[bytes], name: str, sentences: int, sizes: Callable[[], tuple[int, int]]) -> None:
-    """Wait until a program has ended."""
     limit_s, largest = START_S + EACH_S * sentences, LARGEST_SOUND_BYTES * sentences
     start = moved = time.monotonic()
     before = 0, 0

@@ -11,9 +11,16 @@ import numpy as np
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.printable import printable
-from lipmotion_studio.study.analysis.crossed import BOTH, CONFIDENCE, Components, variance_of_mean
+from lipmotion_studio.study.analysis.crossed import (
+    BOTH,
+    CONFIDENCE,
+    Components,
+    difference_components,
+    rating_figures,
+    rating_table,
+    variance_of_mean,
+)
 from lipmotion_studio.study.analysis.paired import order_agreement, pair_table, paired_figures, share_components
-from lipmotion_studio.study.analysis.ratings import difference_components, rating_figures, rating_table
 from lipmotion_studio.study.answers import ANCHOR, FIRST, MOS, PAIRED, RECORDING, Answer, read_answers
 
 MIN_ATTENTION = 2 / 3

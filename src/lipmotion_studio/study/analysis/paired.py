@@ -146,12 +146,6 @@ class PairTable:
         count = self._sums(np.ones(len(values)), chosen)
         return np.where(count > 0, self._sums(values, chosen) / np.maximum(count, 1), np.nan)
 
-    def influence(self, values: crossed.Array) -> crossed.Array:
-        """Return sums of all answers' values, times the number of cells, so that their mean is the sum of all."""
-        count = self._sums(np.ones(len(values)), np.full(len(values), True))
-        sums = self._sums(values, np.full(len(values), True))
-        return np.where(count > 0, sums * int((count > 0).sum()), np.nan)
-
     def _sums(self, values: crossed.Array, chosen: NDArray[np.bool_]) -> crossed.Array:
         sums = np.zeros((len(self.raters), len(self.sentences)))
         np.add.at(sums, (self.rater[chosen], self.sentence[chosen]), values[chosen])
@@ -290,7 +284,9 @@ def strength_figures(table: PairTable) -> Figures:
     names = table.conditions
 
     def row(value: float, change: crossed.Array) -> Figures:
-        error = crossed.crossed_mean(table.influence(change), 1.0)
+        count = table._sums(np.ones(len(change)), np.full(len(change), True))
+        sums = table._sums(change, np.full(len(change), True))
+        error = crossed.crossed_mean(np.where(count > 0, sums * int((count > 0).sum()), np.nan), 1.0)
         interval = crossed.CrossedMean(value, error.error, error.degrees, error.over, None).interval
         low, high = (np.nan, np.nan) if model.is_shrunk else interval
         return {"strength": value, "low": low, "high": high}

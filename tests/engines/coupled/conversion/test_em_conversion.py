@@ -194,8 +194,7 @@ def test_unknown_voices_follow_their_encoding():
     model = engine.from_arrays(engine.to_arrays(engine.fit(heard, silent_monitor).model))
     known, unknown = (replace(heard[0].speech, voice=voice) for voice in (1.0, 0.5))
     assert np.array_equal(
-        engine.generate(model, known).motion.values,
-        engine.generate(model, replace(known, encoding=None)).motion.values,
+        engine.generate(model, known).motion.values, engine.generate(model, replace(known, encoding=None)).motion.values
     )
     whole = slice(0, len(heard[0].valid))
     means, precisions = model.motion_statistics(engine.infer(model, unknown, whole))

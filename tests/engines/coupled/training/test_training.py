@@ -32,12 +32,18 @@ from lipmotion.engines.coupled.chains.densities import (
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.structures import unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import EXACT, VITERBI, ConversionSettings, convert
-from lipmotion.engines.coupled.training import alignment, chain_training, coupled_training, em_steps
+from lipmotion.engines.coupled.training import alignment, chain_training
+from lipmotion.engines.coupled.training import chain_training as em_steps
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
-from lipmotion.engines.coupled.training.chain_training import CONVERGENCE_GAIN, MixtureSchedule, growing_chains
+from lipmotion.engines.coupled.training.chain_training import (
+    CONVERGENCE_GAIN,
+    MixtureSchedule,
+    growing_chains,
+    lattice_utterance,
+)
 from lipmotion.engines.coupled.training.coupled_training import train_on_speech
-from lipmotion.engines.coupled.training.em_steps import lattice_utterance
 from lipmotion.measures.curves import pooled_correlation
+from lipmotion.motion.frame_labels import frames_away
 from lipmotion.testing import examples
 from lipmotion.types import FRAME_RATE_HZ, GREY, Channel, Example, Motion, Span, Timeline, Unit, silent_monitor
 from oracles import coupled as oracle
@@ -154,7 +160,7 @@ def test_floors_are_of_observed_frames():
 
 def test_frames_away_from_speech_are_silence():
     units = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 0.7, Unit("aa")), Span(0.7, 1.5, Unit("sil"))))
-    away = coupled_training.frames_away_from_speech(units, 151)
+    away = frames_away(units, 151, 0.45)
     assert away[:4].all()
     assert not away[6:114].any()
     assert away[116:].all()

@@ -18,9 +18,7 @@ LEAST_COMPONENT_FRAMES = 0.1
 
 @dataclass(frozen=True, eq=False)
 class AudioVisualObservations:
-    """Streams of T frames [each shape=(T, D_s)], speech first, and where each was observed [each shape=(T,)] (None:
-    all).
-    """
+    """Streams of T frames [each shape=(T, D_s)], speech first, and where each was observed [shape=(T,)] (None: all)."""
 
     streams: tuple[Single, ...]
     observed: tuple[NDArray[np.bool_] | None, ...]
@@ -37,9 +35,7 @@ class AudioVisualObservations:
     def with_stream(
         self, stream: int, values: Single, observed: NDArray[np.bool_] | None = None
     ) -> AudioVisualObservations:
-        """Return the observations with other values of a stream [shape=(T, D_s)], observed in these frames
-        [shape=(T,)].
-        """
+        """Return the observations with other values of a stream [shape=(T, D_s)], observed there [shape=(T,)]."""
         streams, masks = list(self.streams), list(self.observed)
         streams[stream], masks[stream] = values, observed
         return AudioVisualObservations(tuple(streams), tuple(masks))
@@ -157,9 +153,7 @@ def zero_emission_statistics(group: StreamGroup) -> EmissionStatistics:
 
 
 def component_posteriors(posterior: Single, responsibilities: Single | None) -> Single:
-    """Return γ(q, k) [shape=(T, M, G')], from γ(q) [shape=(T, G')] and responsibilities [shape=(T, M, G')] (None: M is
-    1).
-    """
+    """Return γ(q, k) [shape=(T, M, G')], from γ(q) [shape=(T, G')] and responsibilities (None: M is 1)."""
     return posterior[:, None] if responsibilities is None else responsibilities * posterior[:, None]
 
 

@@ -47,9 +47,7 @@ class Lattice(ABC):
 
     @abstractmethod
     def posteriors(self, transitions: Any, logs: Sequence[Single]) -> LatticePosteriors:
-        """Return the posteriors of states, by forward–backward, from log densities of stream groups [each shape=(T,
-        G')].
-        """
+        """Return the posteriors of states, by forward–backward, from log densities of stream groups [shape=(T, G')]."""
 
     @abstractmethod
     def best_path(self, transitions: Any, logs: Sequence[Single]) -> tuple[Index, float]:
@@ -142,9 +140,7 @@ class FactorialTransitions:
         return 2 * sum(self.product.structure.state_counts)
 
     def reestimated(self, counts: Array) -> FactorialTransitions:
-        """Return the transitions of an M-step, from counts of leaving and keeping [shape=(statistic_count,)]; unseen
-        states stay.
-        """
+        """Return the transitions of an M-step, from counts of leaving and keeping; unseen states stay."""
         edges = np.cumsum([0, *np.repeat(self.product.structure.state_counts, 2)])
         parts = [counts[a:b] for a, b in pairwise(edges.tolist())]
         first, second = (
@@ -224,12 +220,7 @@ class FactorialLattice(Lattice):
         return self.states[0][first] * count + self.states[1][second], score
 
     def _density_posteriors(self, states: Sequence[Array], own: Single) -> list[Single]:
-        """Return the posteriors of each chain's ``densities`` [each shape=(T, G')].
-
-        states : posteriors of the states of each chain [each shape=(T, N'_c)]
-        own    : posteriors of the joint states with densities of their own [shape=(T, P')]
-        A state's own density has what is left of its posterior after these joint states.
-        """
+        """Return the posteriors of each chain's ``densities``; a state's own has what joint states (``own``) leave."""
         densities = []
         for chain, posterior in enumerate(states):
             remaining = posterior.astype(np.float32)

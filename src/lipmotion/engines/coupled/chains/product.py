@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -13,17 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.structures import COUPLED, Structure
-from lipmotion.errors import InputError
 
 Index = NDArray[np.intp]
-MOST_ARCS = 200_000
-"""A product without a limit of asynchrony may have at most so many arcs, as it is listed arc by arc."""
 
 
 class JointState(NamedTuple):
-    """The unit of each chain, its state within the unit, and whether it has left the unit that others are in
-    (``ahead``).
-    """
+    """The unit of each chain, its state within the unit, and whether it has left the unit of the others (``ahead``)."""
 
     units: tuple[int, ...]
     states: tuple[int, ...]
@@ -93,11 +88,8 @@ class Product:
 def reachable(structure: Structure, grammar: Grammar) -> Product:
     """Return the product of chains: the joint states that can be reached from the beginning of an utterance.
 
-    With a limit of asynchrony all chains go through corresponding units; without one each chain moves on its own.
-    Raises InputError: chains without a limit that have too many joint states to list.
+    All chains go through corresponding units; those without a limit of asynchrony are not listed, but ``lattice``'s.
     """
-    if structure.limit is None:
-        return _all_combinations(structure, grammar)
     chains = range(len(structure.chains))
     none_ahead, first_states = (False,) * len(chains), (0,) * len(chains)
     initial_states = {
@@ -125,84 +117,21 @@ def reachable(structure: Structure, grammar: Grammar) -> Product:
     initial = np.zeros(len(joint_states))
     for joint, probability in initial_states.items():
         initial[number[joint]] = probability
-    return _product_of(structure, grammar, joint_states, arcs, initial)
-
-
-_Successor = tuple[JointState, tuple[bool, ...], float]
-"""A joint state that may follow, which chains move on, and the probability of the units entered."""
-_Arc = tuple[int, int, tuple[bool, ...], float]
-"""Target, source, which chains move on, and the probability of the units entered."""
-
-
-def _product_of(
-    structure: Structure,
-    grammar: Grammar,
-    joint_states: tuple[JointState, ...],
-    arcs: Iterable[_Arc],
-    initial: NDArray[np.float64],
-) -> Product:
-    """Return a product of these joint states and arcs; ``initial`` [shape=(S,)] need not sum to 1."""
-    targets, sources, moves, unit_probability = zip(*sorted(arcs, key=lambda arc: arc[:2]), strict=True)
+    targets, sources, moved, unit_probability = zip(*sorted(arcs, key=lambda arc: arc[:2]), strict=True)
     return Product(
         structure,
         grammar,
         joint_states,
         arc_from=np.array(sources, np.intp),
         arc_to=np.array(targets, np.intp),
-        moves=np.array(moves, bool).T,
+        moves=np.array(moved, bool).T,
         unit_probability=np.array(unit_probability, float),
         initial=initial / initial.sum(),
     )
 
 
-def _all_combinations(structure: Structure, grammar: Grammar) -> Product:
-    """Return the product of all combinations of the chains' states, in which each chain follows arcs of its own."""
-    chains = range(len(structure.chains))
-    arcs = [_chain_arcs(structure, grammar.bigrams[chain]) for chain in chains]
-    total = int(np.prod([len(own) for own in arcs]))
-    if total > MOST_ARCS:
-        raise InputError(
-            f"{' and '.join(chain.name for chain in structure.chains)}: {total} arcs between joint states, at most "
-            f"{MOST_ARCS}; limit the asynchrony, or take smaller unit sets"
-        )
-    states = list(product(*(range(count) for count in structure.state_counts)))
-    joint_states = tuple(
-        JointState(
-            tuple(state // structure.states for state in joint),
-            tuple(state % structure.states for state in joint),
-            (False,) * len(joint),
-        )
-        for joint in states
-    )
-    number = {joint: index for index, joint in enumerate(states)}
-    joint_arcs = (
-        (
-            number[tuple(arc[1] for arc in combination)],
-            number[tuple(arc[0] for arc in combination)],
-            tuple(arc[2] for arc in combination),
-            float(np.prod([arc[3] for arc in combination])),
-        )
-        for combination in product(*arcs)
-    )
-    chain_initial = [np.zeros(count) for count in structure.state_counts]
-    for chain, own in enumerate(chain_initial):
-        own[:: structure.states] = grammar.initial[chain]
-    initial = np.array([np.prod([chain_initial[c][state] for c, state in enumerate(joint)]) for joint in states])
-    return _product_of(structure, grammar, joint_states, joint_arcs, initial)
-
-
-def _chain_arcs(structure: Structure, bigram: NDArray[np.float64]) -> list[tuple[int, int, bool, float]]:
-    """Return the arcs of one chain: source, target, whether it moves on, and the probability of the unit entered."""
-    arcs: list[tuple[int, int, bool, float]] = []
-    for unit, row in enumerate(bigram):
-        for position in range(structure.states):
-            state = structure.state(unit, position)
-            arcs.append((state, state, False, 1.0))
-            if position < structure.states - 1:
-                arcs.append((state, state + 1, True, 1.0))
-        last = structure.state(unit, structure.states - 1)
-        arcs += [(last, structure.state(entered, 0), True, float(share)) for entered, share in enumerate(row)]
-    return arcs
+_Successor = tuple[JointState, tuple[bool, ...], float]
+"""A joint state that may follow, which chains move on, and the probability of the units entered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,9 +270,7 @@ class Transitions:
         return current
 
     def tied(self, frames: NDArray[Any]) -> Transitions:
-        """Return the transitions with one shared row for joint states, of an own state and asynchrony, with few frames
-        [shape=(S,)].
-        """
+        """Return the transitions with one shared row for joint states, of one state and asynchrony, of few frames."""
         rows, advance = [], []
         for chain, own in enumerate(self.rows):
             blocks = self.advance[chain].reshape(self._blocks(chain), -1)
@@ -376,9 +303,7 @@ class Transitions:
         return np.clip(share, LEAST_ADVANCE, 1 - LEAST_ADVANCE)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
-        """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs
-        [shape=(E,)].
-        """
+        """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs."""
         row, moves = self._arc_rows(chain), self.product.moves[chain]
         size = len(self.advance[chain])
         entries = []
@@ -395,9 +320,7 @@ class Transitions:
 
 
 def initial_transitions(product: Product) -> Transitions:
-    """Return the transitions before training: in tables of coupled chains each joint state has a row of its own; in
-    those of other chains each state of the chain has one.
-    """
+    """Return untrained transitions, in coupled chains with a row for each joint state, in others for each state."""
     coupled = product.structure.kind == COUPLED
     own = np.arange(len(product.joint_states))
     rows = [own if coupled else states for states in product.chain_states]

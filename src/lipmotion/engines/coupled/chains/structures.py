@@ -82,6 +82,8 @@ class Structure:
             raise InputError(f"structure {self.kind} with {len(self.chains)} chains; hmm and multistream have one")
         if self.moves_together and self.kind != COUPLED:
             raise InputError(f"moves_together with the structure {self.kind}; required {COUPLED}")
+        if self.limit is None and (self.kind != FACTORIAL or len(self.chains) != 2):
+            raise InputError("asynchrony is -1, no limit, which only two factorial chains have")
         if self.limit is not None and not 0 <= self.limit < self.states:
             raise InputError(
                 f"asynchrony is {self.limit} states, required 0 to {self.states - 1} (fewer than a unit has), or -1"
@@ -132,9 +134,7 @@ class Structure:
 
 
 def unit_sets(names: str) -> tuple[UnitSet, ...]:
-    """Return the unit sets named, or read from files, in a text with blanks between. Raises InputError: none, or no
-    such set.
-    """
+    """Return the unit sets named, or read from files, in a text. Raises InputError: none, or no such set."""
     sets = tuple(load_unit_set(name) for name in names.split())
     if not sets:
         raise InputError("no chains were given; required the unit set of each, as in 'phone viseme'")

@@ -80,11 +80,6 @@ def convert(
     return ConversionResult((observations.streams[0].astype(float), *streams), log_likelihoods)
 
 
-def visual_stream_numbers(chains: Chains) -> range:
-    """Return the numbers of all streams but speech."""
-    return range(1, len(chains.streams))
-
-
 def without_visual_streams(observations: AudioVisualObservations) -> AudioVisualObservations:
     """Return the observations with all streams but speech marked as not observed."""
     for stream in range(1, len(observations.streams)):
@@ -125,7 +120,7 @@ def _start(
     """Return the visual streams before the first step of EM [each shape=(T, D_s)]."""
     if settings.start == VITERBI:
         path, _ = chains.best_path(chains.emission_log_densities(speech, lattice), lattice)
-        return tuple(path_means(chains, path, stream) for stream in visual_stream_numbers(chains))
+        return tuple(path_means(chains, path, stream) for stream in range(1, len(chains.streams)))
     return _updated_streams(chains, given_speech or chains.infer(speech, lattice), EXACT)
 
 
@@ -133,7 +128,7 @@ def _updated_streams(chains: Chains, inference: Inference, update: str) -> tuple
     """Return the visual streams that the posteriors make most likely (M-step) [each shape=(T, D_s)]."""
     statistics = precision_statistics if update == EXACT else _printed_statistics
     streams = []
-    for stream in visual_stream_numbers(chains):
+    for stream in range(1, len(chains.streams)):
         precision, weighted = statistics(chains, inference, stream)
         streams.append(weighted / np.maximum(precision, 1e-300))
     return tuple(streams)
@@ -154,9 +149,7 @@ def _printed_statistics(chains: Chains, inference: Inference, stream: int) -> tu
 def _weighted_precisions(
     group: StreamGroup, stream: int, densities: NDArray[np.intp], weight: Single
 ) -> tuple[Array, Array]:
-    """Return the sums of weighted [shape=(T, M, G')] precisions, and of these times means, of a stream [each shape=(T,
-    D)].
-    """
+    """Return the sums of weighted precisions, and of these times means, of a stream [each shape=(T, D)]."""
     mixtures = group.stream_mixtures(stream).select(densities)
     precision = (1 / mixtures.variances).transpose(1, 0, 2)
     weighted = precision * mixtures.means.transpose(1, 0, 2)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
+from lipmotion.stats.pca import find_principal_axes, measure_covariance
 from lipmotion.stats.trees import ridge, zero_statistics
 
 Array = NDArray[np.float64]
@@ -55,9 +56,7 @@ class RegressionInputs:
     basis: Single
 
     def __call__(self, features: Single, posterior: Single) -> Single:
-        """Return the regression inputs [shape=(T, F + 1)], constant last, of features [shape=(T, 39)] and posteriors
-        [shape=(T, N)].
-        """
+        """Return the regression inputs [shape=(T, F + 1)], constant last, of features and posteriors [shape=(T, N)]."""
         return self._projected(_context(self.acoustic, features, posterior @ self.posterior_basis))
 
     def observed_frames(self, utterance: RegressionUtterance) -> Single:
@@ -84,9 +83,7 @@ class VisualRegression:
     variances: Single
 
     def means(self, inputs: Single, posterior: Single) -> Array:
-        """Return the expected means [shape=(T, D)] for regression inputs [shape=(T, F + 1)] and posteriors [shape=(T,
-        N_v)].
-        """
+        """Return the expected means [shape=(T, D)] for regression inputs and posteriors [shape=(T, N_v)]."""
         weights = regression_weights(posterior, self.regression_of_state, len(self.coefficients))
         means = np.zeros((len(inputs), self.coefficients.shape[2]))
         for weight, matrix in zip(weights.T, self.coefficients, strict=True):
@@ -100,9 +97,7 @@ class VisualRegression:
 
 
 def regression_weights(posterior: Single, regression_of_state: NDArray[np.intp], count: int) -> Single:
-    """Return the weight of each regression [shape=(T, count)], rows summing to 1, by posteriors of states [shape=(T,
-    N)].
-    """
+    """Return the weight of each regression [shape=(T, count)], rows summing to 1, by posteriors of states."""
     weight = posterior @ np.eye(count, dtype=np.float32)[regression_of_state]
     weight[weight < LEAST_WEIGHT] = 0
     return weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
@@ -127,9 +122,7 @@ class RegressionUtterance:
 
 
 def posterior_axes(posteriors: Iterable[Single]) -> Single:
-    """Return the principal axes of posteriors [each shape=(T, N)] as columns [shape=(N, R)]. Raises CorpusError: no
-    posteriors.
-    """
+    """Return the principal axes of posteriors as columns [shape=(N, R)]. Raises CorpusError: no posteriors."""
     total: Array | None = None
     for posterior in posteriors:
         products = (posterior.T @ posterior).astype(float)
@@ -142,16 +135,9 @@ def posterior_axes(posteriors: Iterable[Single]) -> Single:
 def fit_regression_inputs(posterior_basis: Single, utterances: Sequence[RegressionUtterance]) -> RegressionInputs:
     """Return regression inputs along the principal axes of some utterances, with the basis of ``posterior_axes``."""
     acoustic = fit_acoustic_context((utterance.features for utterance in utterances), ACOUSTIC_AXES)
-    count, total, products = 0, np.zeros(0), np.zeros(0)
-    for utterance in utterances:
-        context = _context(acoustic, utterance.features, utterance.reduced_posteriors).astype(float)
-        if not count:
-            total, products = np.zeros(context.shape[1]), np.zeros((context.shape[1],) * 2)
-        count += len(context)
-        total += context.sum(axis=0)
-        products += context.T @ context
-    mean = total / count
-    basis = _principal_axes(products / count - np.outer(mean, mean), INPUT_AXES)
+    contexts = (_context(acoustic, each.features, each.reduced_posteriors) for each in utterances)
+    mean, covariance = measure_covariance(contexts)
+    basis = _principal_axes(covariance, INPUT_AXES)
     return RegressionInputs(acoustic, posterior_basis, mean.astype(np.float32), basis)
 
 
@@ -208,11 +194,7 @@ def _variances(
 
 
 def _principal_axes(covariance: Array, size: int) -> Single:
-    """Return at most ``size`` eigenvectors of the largest eigenvalues as columns; the largest number of each is > 0."""
-    _, vectors = np.linalg.eigh(covariance)
-    basis = vectors[:, ::-1][:, :size]
-    signs = np.where(basis[np.abs(basis).argmax(axis=0), np.arange(basis.shape[1])] < 0, -1.0, 1.0)
-    return (basis * signs).astype(np.float32)
+    return np.ascontiguousarray(find_principal_axes(covariance, size).T.astype(np.float32))
 
 
 def _context(acoustic: AcousticContext, features: Single, reduced_posteriors: Single) -> Single:

@@ -20,8 +20,7 @@ Index = NDArray[np.intp]
 SLACK_S = 0.05
 """A unit is allowed this long before and after its label."""
 FIRST_SHARE = 0.1
-"""Share of the probability of the first unit that is spread over all units, whether an utterance begins with them or
-not."""
+"""Share of the probability of the first unit that is spread over all units, whatever utterances begin with."""
 
 
 @dataclass(frozen=True, eq=False)

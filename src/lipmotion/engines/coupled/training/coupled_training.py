@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Fit
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
-from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.structures import HMM, Structure, unit_sets
-from lipmotion.engines.coupled.chains.visual_streams import (
+from lipmotion.engines.coupled.chains.model import (
     EIGENLIPS,
     GEOMETRY,
+    Chains,
     VisualStream,
     fit_visual_streams,
     speech_observations,
 )
+from lipmotion.engines.coupled.chains.structures import HMM, Structure, unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import without_visual_streams
 from lipmotion.engines.coupled.conversion.mean_regression import (
     RegressionInputs,
@@ -37,29 +37,31 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
 from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.chain_training import (
+    ChainStatistics,
     MixtureSchedule,
     Report,
     TrainingStep,
     component_counts,
     growing_chains,
+    lattice_utterance,
     no_report,
     train_to_convergence,
+    variance_floors,
     with_split_components,
 )
-from lipmotion.engines.coupled.training.em_steps import ChainStatistics, lattice_utterance, variance_floors
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
+from lipmotion.motion.frame_labels import frames_away
+from lipmotion.motion.generation import fit_scaling_factors
 from lipmotion.motion.modulation_filter import learn_filter
-from lipmotion.motion.predictors import Predictor, PredictorTraining, load_predictor
-from lipmotion.motion.rest import is_away_from_speech, list_speech_intervals
+from lipmotion.motion.predictors import PREDICTORS, Predictor, PredictorTraining
 from lipmotion.motion.space import fit_reduced_motion
-from lipmotion.motion.variance_scaling import fit_scaling_factors
 from lipmotion.stats.curves import mark_known_dynamics
 from lipmotion.stats.em import EmResult
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
+from lipmotion.types import Example, Monitor, Progress, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
 
 
@@ -134,9 +136,7 @@ def fit_coupled(
 def growing_models(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor, work: Checkpoint = THREADS
 ) -> Iterator[Callable[[], Fit[CoupledModel]]]:
-    """Yield functions that return the models of 1, 2, 4, … Gaussians on the way to that of ``fit_coupled``. Raises as
-    that.
-    """
+    """Yield functions that return the models of 1, 2, 4, … Gaussians on the way to that of ``fit_coupled``."""
     structure = config.structure_with(unit_sets(config.chains))
     moving = [example for example in examples if mark_known_dynamics(example.valid).any()]
     space, values = fit_reduced_motion(moving or examples, config.components)
@@ -157,7 +157,7 @@ def growing_models(
     prior = fit_articulation_prior(space, values, moving) if config.articulation else None
     encoding: Predictor | None = None
     if config.uses_encoding and all(example.speech.encoding is not None for example in moving):
-        encoding = load_predictor("encoding").fit(PredictorTraining(moving, values, len(space.direct))).predictor
+        encoding = PREDICTORS.load("encoding").fit(PredictorTraining(moving, values, len(space.direct))).predictor
     first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
     def finished(grown: EmResult[Chains, ChainStatistics]) -> Fit[CoupledModel]:
@@ -193,11 +193,6 @@ def growing_models(
         yield partial(finished, grown)
 
 
-def frames_away_from_speech(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
-    """Return whether each frame is silence, further than 0.45 s from every phone [shape=(T,)]."""
-    return is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), AWAY_FROM_SPEECH_S)
-
-
 def _observations(
     example: Example, values: Array, valid: NDArray[np.bool_], visual: Sequence[VisualStream]
 ) -> AudioVisualObservations:
@@ -231,7 +226,7 @@ def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[Traini
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
     """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)]."""
     silent_poses = [
-        x[mask & frames_away_from_speech(example.speech.units, len(x))]
+        x[mask & frames_away(example.speech.units, len(x), AWAY_FROM_SPEECH_S)]
         for example, x, mask in zip(examples, values, valid, strict=True)
     ]
     poses = np.concatenate(silent_poses)

@@ -21,7 +21,7 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.errors import MissingDependencyError
 from lipmotion.extensions import Registry
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, Passage, analysed
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stretches_of_sound
@@ -69,6 +69,8 @@ PHONE_RECOGNISERS: Registry[type[PhoneRecogniser]] = Registry(
     "phone recogniser",
     "lipmotion.phone_recognisers",
     {"hama": "lipmotion.speech.recognition.network.posteriors:Hama"},
+    PhoneRecogniser,
+    named=True,
 )
 
 
@@ -79,8 +81,6 @@ def phone_recogniser(name: str) -> PhoneRecogniser:
     Raises InputError: there is none of this name. Raises MissingDependencyError: it is not installed.
     """
     chosen = PHONE_RECOGNISERS.load(name)
-    if not (isinstance(chosen, type) and issubclass(chosen, PhoneRecogniser) and chosen.name == name):
-        raise InputError(f"{chosen!r} is called a phone recogniser, {name!r}; required a PhoneRecogniser of this name")
     if not chosen.is_installed():
         raise MissingDependencyError(
             f"the phone recogniser {name!r} is not installed: pip install {name}; or leave the recogniser to 'auto', "
@@ -193,7 +193,6 @@ def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map
 
 
 def _placed(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
-    """Yield what is found in a passage, in its own frames of the recording."""
     for (first, end), posteriors in found:
         start, stop = max(passage.first + first, passage.own.start), min(passage.first + end, passage.own.stop)
         skipped = -(-(start - passage.first - first) // POSTERIOR_STEP)
