@@ -59,8 +59,8 @@ from video_ways import (
 
 from lipmotion import Corpus, animate, load_model
 from lipmotion.errors import InputError
-from lipmotion.measures.closures import closed_threshold, phone_closures
-from lipmotion.measures.curves import bootstrap_interval, pooled_correlation
+from lipmotion.measures.closures import find_threshold, measure_phones
+from lipmotion.measures.curves import compute_interval, correlate_pooled
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.train import label_phones
@@ -140,7 +140,7 @@ def report(options: argparse.Namespace, corpus: Corpus, names: Sequence[str], se
     ways = list(judged[names[0]])
     spoken = phones(corpus, names, load_model(options.engine[0] if options.engine else None))
     openings = [np.asarray(corpus.utterance(name).track.motion["opening"], float) for name in corpus.names("train")]
-    threshold = closed_threshold(openings)
+    threshold = find_threshold(openings)
     results = {way: figures([judged[name][way] for name in names], spoken, threshold) for way in ways}
     table = as_table(results)
     print(f"split {options.split}, {len(names)} clips, {'after encoding' if options.mp4 else 'lossless'}\n\n{table}")
@@ -331,7 +331,7 @@ def figures(
     def add(name: str, figure: Callable[..., float], made: list[Array], true: list[Array]) -> None:
         rows[name] = figure(made, true)
         if name in INTERVALS:
-            low[name], high[name] = bootstrap_interval(figure, made, true, 0)
+            low[name], high[name] = compute_interval(figure, made, true, 0)
 
     for name in judged[0].figures:
         values = [np.array([each.figures[name]]) for each in judged]
@@ -362,7 +362,7 @@ def mean(values: Sequence[Array], _: Sequence[Array]) -> float:
 
 def acc(made: Sequence[Array], true: Sequence[Array]) -> float:
     """Return the correlation over all frames of all clips."""
-    return float(pooled_correlation(made, true)[0])
+    return float(correlate_pooled(made, true)[0])
 
 
 def closures(
@@ -372,7 +372,7 @@ def closures(
     made, true = ([each.curves[side][:, 0] for each in judged] for side in ("made", "true"))
     inside: list[list[Span]] = [[(s, e) for s, e, phone in clip if phone in BILABIAL] for clip in spoken]
     other_s = sum(e - s for clip in spoken for s, e, phone in clip if phone not in BILABIAL)
-    found = phone_closures(made, true, inside, other_s, threshold, 25.0)
+    found = measure_phones(made, true, inside, other_s, threshold, 25.0)
     return {
         "p_b_m": found.recall,
         "p_b_m_intervals": found.intervals,

@@ -52,13 +52,13 @@ def measure_workers(options: argparse.Namespace) -> dict[str, Any]:
 
 def _train(options: argparse.Namespace, monitor: Any, workers: int) -> float:
     from lipmotion import Corpus, Run, Selection, train
-    from lipmotion.engines import engine_from_settings
+    from lipmotion.engines import create_engine
     from lipmotion.pipeline import workers as pools
 
     pools.UTTERANCES_PER_WORKER = 1
     corpus = Corpus.open(options.corpus)
     names = corpus.names("train")[: options.clips]
-    engine = engine_from_settings(options.engine, preset=None, units=None, settings=options.setting)
+    engine = create_engine(options.engine, preset=None, units=None, settings=options.setting)
     model, _ = train(corpus, selection=Selection(names=names), engine=engine, run=Run(monitor, workers=workers))
     return float(model.about["minutes"])
 

@@ -3,7 +3,7 @@
 import os
 
 # Before NumPy is loaded: two threads of a matrix product wait for one another in a loop, and for long where the machine
-# has other work. It computes under ``kernels.compiler.one_thread``; two threads: ``make test-portable``.
+# has other work. It computes under ``kernels.compiler.limit_threads``; two threads: ``make test-portable``.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import ctypes
@@ -125,7 +125,7 @@ def hasty_training(request: pytest.FixtureRequest) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         if HASTY & set(request.path.parts):
             patched.setattr(posterior_network, "STEPS", 4.0)
-            few = partial(curves.bootstrap_interval, draws=50)
+            few = partial(curves.compute_interval, draws=50)
             patched.setattr("lipmotion_lab.evaluation.evaluate.bootstrap_interval", few)
         yield
 

@@ -27,12 +27,12 @@ def bibliography() -> Mapping[str, str]:
     return {entry[entry.index("{") + 1 : entry.index(",")]: entry for entry in entries}
 
 
-def engine_citations(name: str) -> str:
+def list_engine_citations(name: str) -> str:
     """Return the BibTeX entries of lipmotion and of an engine's papers; of another package's engine, a remark."""
-    return _entries((LIPMOTION, *ENGINE_KEYS.get(name, ())), _engine_remarks(name))
+    return _entries((LIPMOTION, *ENGINE_KEYS.get(name, ())), _list_engine_remarks(name))
 
 
-def model_citations(header: Mapping[str, Any]) -> str:
+def list_model_citations(header: Mapping[str, Any]) -> str:
     """Return the BibTeX entries of lipmotion, of a model's engine and methods, and of the corpus that it learned from.
 
     header : of a model file. Recordings other than those of GRID are named in a BibTeX comment
@@ -50,10 +50,10 @@ def model_citations(header: Mapping[str, Any]) -> str:
         keys.append(ADAPTATION)
     if len(others) < len(owners):
         keys.append(GRID)
-    return _entries(keys, [*_engine_remarks(engine), *(f"% recordings: {owner}" for owner in others)])
+    return _entries(keys, [*_list_engine_remarks(engine), *(f"% recordings: {owner}" for owner in others)])
 
 
-def _engine_remarks(name: str) -> list[str]:
+def _list_engine_remarks(name: str) -> list[str]:
     """Return a BibTeX comment for an engine of another package; nothing for a built-in one."""
     if name in ENGINE_KEYS:
         return []

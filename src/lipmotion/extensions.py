@@ -32,7 +32,7 @@ SOURCE = "source"
 """What stands for the version where lipmotion is not installed."""
 
 
-def installed_version() -> str:
+def find_version() -> str:
     """Return the version of lipmotion; ``source`` where it is not installed."""
     try:
         return metadata.version(PACKAGE)
@@ -46,10 +46,10 @@ def install_command(extra: str) -> str:
     It names the folder or wheel that lipmotion was installed from, or runs in, where that is there: an index need not
     have lipmotion.
     """
-    return f'pip install "{_installed_from()}[{extra}]"'
+    return f'pip install "{_find_origin()}[{extra}]"'
 
 
-def _installed_from() -> str:
+def _find_origin() -> str:
     """Return the path that lipmotion was installed from, as pip has recorded it (PEP 610); without one its name."""
     import json
     from urllib.parse import urlsplit

@@ -12,7 +12,7 @@ import numpy as np
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track
 from lipmotion.motion.speaker_maps import SpeakerMap, count_speech_s, fit_transfer_map, select_channels
 from lipmotion.pipeline.analysis.read_request import read_recording
@@ -34,7 +34,7 @@ MIN_SPEECH_S = 0.5
 """Fewest seconds of speech, with the face measured, of which a map is made."""
 
 
-@one_thread()
+@limit_threads()
 def map_onto(
     model: Model,
     onto: Onto,

@@ -14,8 +14,8 @@ from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
 from lipmotion.formats.markers import MILLIMETRES
 from lipmotion.measures import curves
-from lipmotion.measures.closures import closed_threshold, closure_figures
-from lipmotion.measures.curves import modulation_distance_db
+from lipmotion.measures.closures import find_threshold, measure_closures
+from lipmotion.measures.curves import measure_modulation_distance
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.storage.json_text import nan_as_null
@@ -121,14 +121,14 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
     }
     if OPENING in channel_figures:
         generated, recorded = ([_values(side, [OPENING])[:, 0]] for side in (made, original))
-        threshold = closed_threshold(recorded)
-        closures = asdict(closure_figures(generated, recorded, threshold, rate_hz))
+        threshold = find_threshold(recorded)
+        closures = asdict(measure_closures(generated, recorded, threshold, rate_hz))
         figures["closures"] = closures | {"closed_under": threshold}
     if points:
         figures["points"] = _point_figures(made, original, points)
     if upper := [name for name in UPPER_FACE if name in names]:  # weights, which are 0 at rest
         generated, recorded = ([_values(side, upper)[:, :, None]] for side in (made, original))
-        deviation = curves.upper_face_deviation(generated, recorded, rest=np.zeros((len(upper), 1)))
+        deviation = curves.measure_upper_face(generated, recorded, rest=np.zeros((len(upper), 1)))
         figures["upper_face"] = {"curves": len(upper), "deviation": deviation}
     return figures
 
@@ -180,19 +180,19 @@ def _channel_figures(
         return {}, []
     generated, reference = [_values(made, names)], [_values(original, names)]
     figures = {
-        "acc": curves.pooled_correlation(generated, reference),
+        "acc": curves.correlate_pooled(generated, reference),
         "rmse": curves.rmse(generated, reference),
-        "nrmse": curves.normalised_rmse(generated, reference),
-        "variance": curves.global_variance_ratio(generated, reference),
-        "jerk": curves.jerk_ratio(generated, reference),
-        "modulation_db": modulation_distance_db(generated, reference, rate_hz),
+        "nrmse": curves.normalise_rmse(generated, reference),
+        "variance": curves.compare_variance(generated, reference),
+        "jerk": curves.compare_jerk(generated, reference),
+        "modulation_db": measure_modulation_distance(generated, reference, rate_hz),
     }
     moves = curves.select_moving(reference, [channel.unit for channel in channels])
     rows = {
         channel.name: {
             "unit": channel.unit,
             **{name: float(values[column]) for name, values in figures.items()},
-            "lag_ms": curves.lag_ms([generated[0][:, column:]], [reference[0][:, column:]], rate_hz),
+            "lag_ms": curves.measure_lag([generated[0][:, column:]], [reference[0][:, column:]], rate_hz),
         }
         for column, channel in enumerate(channels)
         if moves[column]
@@ -217,7 +217,7 @@ def _point_figures(made: Motion, original: Motion, points: Mapping[str, tuple[st
         "points": len(points),
         "lip_points": len(lips),
         "upper_points": len(upper),
-        "landmark_distance_mm": curves.landmark_distance(*both(list(points))),
-        "lip_vertex_error_mm": curves.lip_vertex_error(*both(lips)) if lips else None,
-        "upper_face_deviation_mm": curves.upper_face_deviation(*both(upper), rest) if upper else None,
+        "landmark_distance_mm": curves.measure_landmarks(*both(list(points))),
+        "lip_vertex_error_mm": curves.measure_lip_error(*both(lips)) if lips else None,
+        "upper_face_deviation_mm": curves.measure_upper_face(*both(upper), rest) if upper else None,
     }

@@ -11,7 +11,7 @@ from typing import Any
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, describe_training, train
 from lipmotion.storage.files import make_folder
@@ -105,7 +105,7 @@ REFERENCE_ENGINE = "trajectory"
 WIDTH, WIDTH_FIGURES = "width", ("acc", "nrmse", "global_variance")
 
 
-@one_thread()
+@limit_threads()
 def engines(
     corpus: Corpus,
     *,

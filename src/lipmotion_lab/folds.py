@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
-from lipmotion.kernels.compiler import one_thread
-from lipmotion.measures.closures import closed_threshold
-from lipmotion.measures.curves import pooled_correlation
+from lipmotion.kernels.compiler import limit_threads
+from lipmotion.measures.closures import find_threshold
+from lipmotion.measures.curves import correlate_pooled
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import clip_statistics, figures_of
@@ -60,7 +60,7 @@ def _fold_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> _GeneratedFold:
     return _GeneratedFold(clips, speakers, used, closed_under, tuple(channels))
 
 
-@one_thread()
+@limit_threads()
 def folds(
     corpus: Corpus,
     *,
@@ -124,13 +124,13 @@ def _make_row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, b
         for speaker, clip in zip(result.speakers, result.clips[condition], strict=True):
             clips.setdefault(speaker or "unknown", []).append(clip)
     acc = {
-        speaker: float(pooled_correlation([clip.generated for clip in own], [clip.original for clip in own])[0])
+        speaker: float(correlate_pooled([clip.generated for clip in own], [clip.original for clip in own])[0])
         for speaker, own in sorted(clips.items())
     }
     return row | {"speakers": acc}
 
 
-@one_thread()
+@limit_threads()
 def in_blocks(
     experiment: Callable[..., dict[str, Any]],
     corpus: Corpus,
@@ -157,7 +157,7 @@ def in_blocks(
     tracks = [corpus.utterance(name).track for name in names]
     channels, threshold = choose_channels([corpus.utterance(name) for name in names])[0], None
     if OPENING in channels:
-        threshold = closed_threshold([np.asarray(each.motion[OPENING])[np.asarray(each.seen)] for each in tracks])
+        threshold = find_threshold([np.asarray(each.motion[OPENING])[np.asarray(each.seen)] for each in tracks])
     parts = runner.PartKey(engine_named("trajectory"), names, others=f"{count} {key}")
     kept, results = runner.open_parts(work, corpus, settings, parts), []
     shares = runner.share_out(settings, [f"block {number + 1}" for number in range(count)])

@@ -15,7 +15,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import MOTION, SPEECH
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
@@ -61,7 +61,7 @@ class _System:
     acc: dict[tuple[int, int], float]
 
 
-@one_thread()
+@limit_threads()
 def hofer2008(
     corpus: Corpus,
     options: PhoneticTableOptions = FULL,

@@ -25,7 +25,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError, shorten
 from lipmotion.formats.sound import write_sound
 from lipmotion.measures import curves
-from lipmotion.measures.closures import REACH, closed_threshold, find_closings, match_closings
+from lipmotion.measures.closures import REACH, find_closings, find_threshold, match_closings
 from lipmotion.motion.frame_labels import is_away_from_speech
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.train import label_phones
@@ -337,7 +337,7 @@ def choose(
                 placed = (interpolate_rows(w, GRID_HZ, r.time_s + lag_s) for w, r in zip(weights, chosen, strict=True))
                 coefficients = fit_map(np.concatenate(list(placed)), original)
             moved = [at_best_sync(r, w @ coefficients, lag_s, limit_s) for w, r in zip(weights, chosen, strict=True)]
-            score = float(curves.per_clip_correlation([each[:, :1] for each in moved], opened)[0])
+            score = float(curves.correlate_clips([each[:, :1] for each in moved], opened)[0])
             if score > choice.score + 1e-4:
                 choice, made = Choice(setting, lag_s, smoothing_s, coefficients, score=score), moved
     level = float(np.percentile(np.concatenate([each[:, 0] for each in made]), 95))
@@ -354,7 +354,7 @@ def closing_counts(recording: Recording, made: Array, shut: float) -> tuple[Arra
     Of p, b and m: missed are the speaker's closings there, false are generated ones in other phones, where the speaker
     does not close.
     """
-    opening, own = recording.original[:, 0], closed_threshold([recording.original[:, 0]])
+    opening, own = recording.original[:, 0], find_threshold([recording.original[:, 0]])
     original, generated = find_closings(opening, own), find_closings(made[:, 0], shut)
     pairs = match_closings(generated, original)
     matched = [o for _, o in pairs]
@@ -379,7 +379,7 @@ def _f1(counts: Array) -> float:
 
 def onset_errors(recording: Recording, made: Array, shut: float) -> Array:
     """Return the sum of errors, in ms, with which movements of the mouth begin, and their number [shape=(2,)]."""
-    own, frame_s = closed_threshold([recording.original[:, 0]]), float(np.median(np.diff(recording.time_s)))
+    own, frame_s = find_threshold([recording.original[:, 0]]), float(np.median(np.diff(recording.time_s)))
     original = find_closings(-recording.original[:, 0], -own)  # the first open frame after a closed one
     generated = find_closings(-made[:, 0], -shut)
     pairs = match_closings(generated, original, round(ONSET_REACH_S / frame_s))

@@ -12,7 +12,7 @@ import numpy as np
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Speech, Timeline
@@ -28,7 +28,7 @@ OTHERS = ("width", "outer")
 _ROW = "row"
 
 
-@one_thread()
+@limit_threads()
 def learning_curve(
     corpus: Corpus,
     *,

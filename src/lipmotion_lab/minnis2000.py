@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.engines.selection.concatenation import Piece, pieces_of
+from lipmotion.engines.selection.concatenation import Piece, to_pieces
 from lipmotion.engines.selection.costs import (
     ABUTTING_JOIN,
     JOIN_BEFORE,
@@ -30,8 +30,8 @@ from lipmotion.engines.selection.costs import (
 )
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.selection_training import target_of
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.engines.selection.selection_training import build_target
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.model import Model
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
@@ -84,8 +84,8 @@ def join_figures(
 def select_pieces(engine: SelectionEngine, model: SelectionModel, speech: Speech) -> tuple[Costs, Target, list[Piece]]:
     """Return the costs of a system, the phones of some speech, and the pieces that it chooses for them."""
     costs = model.costs(engine.config)
-    target = target_of(model, costs, speech)
-    return costs, target, pieces_of(costs, target, select(costs, target).units)
+    target = build_target(model, costs, speech)
+    return costs, target, to_pieces(costs, target, select(costs, target).units)
 
 
 def overlap_times_s(costs: Costs, target: Target, pieces: Sequence[Piece]) -> Array:
@@ -147,7 +147,7 @@ def rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
     return {name: each for name, each in found.items() if guided or not (each.guide or each.joint_recogniser)}
 
 
-@one_thread()
+@limit_threads()
 def minnis2000(
     corpus: Corpus,
     *,

@@ -26,7 +26,7 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.kernels.compiler import blas_kernels
+from lipmotion.kernels.compiler import list_blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.pipeline.training.labels import digest_corpus, fingerprint_training
 from lipmotion.pipeline.training.train import Run, phones_and_examples, train
@@ -289,7 +289,7 @@ def _machine() -> dict[str, Any]:
         "cores": os.cpu_count(),
         "processor": named[0] if named else platform.processor() or platform.machine(),
         "system": platform.platform(),
-        "linear algebra": ", ".join(map(str, blas_kernels())),
+        "linear algebra": ", ".join(map(str, list_blas_kernels())),
     }
     return {"machine": machine, "versions": versions}
 

@@ -10,7 +10,7 @@ from hashlib import sha256
 from typing import Any
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.extensions import installed_version
+from lipmotion.extensions import find_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
 from lipmotion.pipeline.outputs.output import OutputSettings, output_suffixes
 from lipmotion.types import values
@@ -163,7 +163,7 @@ def project_document(project: Project) -> dict[str, Any]:
             row | {name: [asdict(each) for each in row[name]] for name in ("exports", "versions") if name in row}
         )
     settings = {each.name: getattr(project, each.name) for each in fields(project) if each.name != "lines"}
-    made_by = {"lipmotion": installed_version()}
+    made_by = {"lipmotion": find_version()}
     return {"format": FORMAT, "version": VERSION, "made_by": made_by, **settings, "lines": rows}
 
 

@@ -17,7 +17,7 @@ from starlette.exceptions import HTTPException
 
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError, LipMotionError, shorten
-from lipmotion.extensions import installed_version
+from lipmotion.extensions import find_version
 from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import write_edits
 from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, parse_step
@@ -209,7 +209,7 @@ class Studio:
             "from": first,
             "lines": [self.row(each) for each in recordings[first : first + count]],
             "forms": self._forms(),
-            "version": installed_version(),
+            "version": find_version(),
             "model": {"name": self.used.name, "engine": self.used.model.engine.name},
         }
 
@@ -457,7 +457,7 @@ class Studio:
             copy.relative_to(self.folder.path).as_posix(),
             digest_of(file.edits.sentences),
             self.used.digest,
-            installed_version(),
+            find_version(),
         )
 
         def add_record(now: ProjectRecording) -> ProjectRecording:

@@ -13,11 +13,11 @@ from lipmotion.articulation.cue_sheets import (
     ANY_SHAPE,
     PHONE_SHAPES,
     choose_cues,
-    cue_frame_count,
-    default_hold_frames,
+    choose_hold_frames,
+    count_cue_frames,
     frame_to_seconds,
     lay_out_cues,
-    shapes_of_phone,
+    list_phone_shapes,
 )
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
@@ -167,7 +167,7 @@ def test_no_time_at_all_and_less_than_the_hold() -> None:
 
 
 def test_the_usual_hold_is_two_frames_at_24() -> None:
-    assert [default_hold_frames(fps) for fps in (1, 12, 24, 25, 30, 48, 60)] == [1, 1, 2, 2, 3, 4, 5]
+    assert [choose_hold_frames(fps) for fps in (1, 12, 24, 25, 30, 48, 60)] == [1, 1, 2, 2, 3, 4, 5]
 
 
 def test_phones_outside_the_motion() -> None:
@@ -181,11 +181,11 @@ def test_phones_outside_the_motion() -> None:
 def test_every_phone_but_h_has_shapes_whose_parts_are_the_whole() -> None:
     assert set(PHONES) - set(PHONE_SHAPES) == {"hh"}
     assert set(PHONE_SHAPES) <= set(PHONES)
-    assert shapes_of_phone("hh") == shapes_of_phone("a phone of another language") == ANY_OPEN
-    assert shapes_of_phone("") == ANY_SHAPE
+    assert list_phone_shapes("hh") == list_phone_shapes("a phone of another language") == ANY_OPEN
+    assert list_phone_shapes("") == ANY_SHAPE
     for phone in PHONES:
-        assert sum(look.share for look in shapes_of_phone(phone)) == pytest.approx(1)
-        for look in shapes_of_phone(phone):
+        assert sum(look.share for look in list_phone_shapes(phone)) == pytest.approx(1)
+        for look in list_phone_shapes(phone):
             assert look.best
             assert set(look.best + look.allowed) <= set(SHAPES)
             assert not set(look.best) & set(look.allowed)
@@ -194,7 +194,7 @@ def test_every_phone_but_h_has_shapes_whose_parts_are_the_whole() -> None:
 def test_the_special_shapes_belong_to_their_sounds() -> None:
     silent = {phone for phone in PHONES if is_silent(phone)}
     for shape, phones in (("A", set(LIP_CLOSING)), ("G", set(VISEMES["ld"])), ("H", {"l", "el"}), ("X", silent)):
-        assert {phone for phone in PHONES if any(shape in look.best for look in shapes_of_phone(phone))} == phones
+        assert {phone for phone in PHONES if any(shape in look.best for look in list_phone_shapes(phone))} == phones
 
 
 def test_optional_shapes_fall_back_as_rhubarb_does() -> None:
@@ -219,7 +219,7 @@ def test_times_in_hundredths_lead_back_to_their_frames() -> None:
 def test_the_last_frame_begins_before_the_end() -> None:
     for fps in RATES:
         for duration_s in [0.0, 0.004, 0.01, 0.04, 0.0417, 0.05, 0.5, 1.0, 2.975, 3.0, 10.009, 60.0]:
-            frames = cue_frame_count(duration_s, fps)
+            frames = count_cue_frames(duration_s, fps)
             sheet = lay_out_cues([(frame, "BC"[frame % 2]) for frame in range(frames)], duration_s, fps, "ABCDEF")
             assert duration_s - 0.01 < sheet.duration_s <= duration_s
             assert frames == pytest.approx(duration_s * fps, abs=1.7)

@@ -10,7 +10,7 @@ from lipmotion.articulation.liveliness import (
     find_phrases,
     lid_closure,
 )
-from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, spoken_mouth
+from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, find_mouth
 from lipmotion.pipeline.outputs.deliver import FACTORS, with_detected, with_manners
 from lipmotion.types import Channel, Generation, Motion, Prosody, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
@@ -143,7 +143,7 @@ PROTOTYPES = {
 
 
 def test_every_mood_has_known_action_units_with_intensities_and_sources():
-    rows = expression.mood_rows()
+    rows = expression.list_mood_rows()
     assert {row.mood for row in rows} == {*MOODS}
     assert len({(row.mood, row.unit) for row in rows}) == len(rows)
     assert {row.source for row in rows} == SOURCES
@@ -151,7 +151,7 @@ def test_every_mood_has_known_action_units_with_intensities_and_sources():
         assert row.unit in ACTION_UNITS
         assert 0 < row.intensity <= 1
     for mood, asked in PROTOTYPES.items():
-        assert asked <= {*expression.mood_table()[mood]}
+        assert asked <= {*expression.read_mood_table()[mood]}
         assert asked <= {row.unit for row in rows if row.mood == mood and row.source == "EMFACS"}
 
 
@@ -177,15 +177,15 @@ def test_neutral_adds_nothing():
     moved = expression.with_moods(motion(), (MoodKey(0.0, NEUTRAL),))
     assert moved.names == motion().names
     assert np.array_equal(moved.values, motion().values)
-    assert not expression.action_units(moved)
-    mouth = spoken_mouth(moved, units())
+    assert not expression.list_action_units(moved)
+    mouth = find_mouth(moved, units())
     assert not any(getattr(mouth, name).any() for name in EXPRESSED)
     assert not compute_liveliness(moved.time_s, moved, units(), None).units
 
 
 @pytest.mark.parametrize("mood", MOODS)
 def test_round_lips_stay_round_in_every_mood(mood):
-    plain, mouth = (spoken_mouth(expression.with_moods(motion(), parse_moods(each)), units()) for each in ("", mood))
+    plain, mouth = (find_mouth(expression.with_moods(motion(), parse_moods(each)), units()) for each in ("", mood))
     round_ = slice(108, 122)  # in uw
     assert mouth.width[round_].max() <= plain.width[round_].max() + 0.03
     assert mouth.width[round_].max() < ROUND_WIDTH + 0.001
@@ -195,7 +195,7 @@ def test_round_lips_stay_round_in_every_mood(mood):
 
 def test_a_smile_widens_the_mouth_at_rest_and_surprise_opens_it():
     plain, happy, surprised = (
-        spoken_mouth(expression.with_moods(motion(), parse_moods(mood)), units()) for mood in ("", "happy", "surprised")
+        find_mouth(expression.with_moods(motion(), parse_moods(mood)), units()) for mood in ("", "happy", "surprised")
     )
     assert happy.width[20] > plain.width[20] + 0.1
     assert happy.smile[20] > 0.8
@@ -222,7 +222,7 @@ def test_a_mood_comes_and_goes_in_the_upper_face_and_grows_with_accents():
     accent = np.arange(6001) % 300 > 200
     voice = Prosody(-40 + 25.0 * accent, 5.0 + 0.3 * accent)
     still, lively = (compute_liveliness(time_s, sad, units(), voice, brows=brows).unit(1) for brows in (False, True))
-    usual = expression.mood_table()["sad"][1]
+    usual = expression.read_mood_table()["sad"][1]
     assert still == pytest.approx(np.full(len(time_s), usual))
     assert 0.03 < lively.std() < 0.2
     assert lively.min() > 0.6 * usual
@@ -238,7 +238,7 @@ def test_shouted_vowels_are_more_open_and_mumbled_ones_less(generation: Generati
     gaps = {}
     for manner in FACTORS:
         found = with_manners(generation, parse_moods(manner))
-        mouth = spoken_mouth(found.motion, found.units)
+        mouth = find_mouth(found.motion, found.units)
         assert mouth.contact[55]  # m
         assert mouth.contact[95]  # p
         gaps[manner] = float(mouth.gap[75])

@@ -8,9 +8,9 @@ from lipmotion.articulation.mouth import (
     TUCKED_GAP,
     WIDTH_REACH,
     SpokenMouth,
-    jaw_drop,
-    spoken_mouth,
-    upper_share,
+    drop_jaw,
+    find_mouth,
+    weigh_upper,
 )
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Motion, Timeline, Unit
@@ -28,18 +28,18 @@ def in_phone(phone: str, opening: float = 0.06, width: float = 0.57) -> dict[str
     """Return the mouth in the middle of a phone after silence, whatever is measured there."""
     wide = np.where(np.arange(101) < 25, 0.57, width)
     moved = motion(100.0, opening=np.full(101, opening), width=wide)
-    return list(spoken_mouth(moved, said((0, 0.2, "sil"), (0.3, 0.7, phone))).rows())[50]
+    return list(find_mouth(moved, said((0, 0.2, "sil"), (0.3, 0.7, phone))).rows())[50]
 
 
 def test_there_is_a_frame_for_every_picture_to_the_end_of_the_motion():
     moved = motion(100.0, opening=np.linspace(0, 0.2, 201))
     for fps in (25.0, 29.97):
-        mouth = spoken_mouth(moved, NOTHING_SAID, fps)
+        mouth = find_mouth(moved, NOTHING_SAID, fps)
         assert mouth.rate_hz == fps
         assert len(mouth.gap) == len(mouth.teeth) == int(2.0 * fps + 1e-6) + 1
         middle = round(fps)
         assert mouth.gap[middle] == pytest.approx(float(opening_to_gap(np.array(0.1 * middle / fps))), abs=1e-3)
-    mouth = spoken_mouth(moved, NOTHING_SAID)
+    mouth = find_mouth(moved, NOTHING_SAID)
     assert isinstance(mouth, SpokenMouth)
     assert mouth.at(100.0) is mouth
 
@@ -48,7 +48,7 @@ def test_speakers_with_different_rest_poses_move_alike():
     opening = 0.06 * (1 - np.cos(2 * np.pi * np.arange(100) / 25))
     stretch = 1 + 0.06 * np.sin(2 * np.pi * np.arange(100) / 25) * (opening > 0.01)
     wide, narrow = (
-        spoken_mouth(motion(opening=opening, width=width * stretch, outer=outer + opening), NOTHING_SAID)
+        find_mouth(motion(opening=opening, width=width * stretch, outer=outer + opening), NOTHING_SAID)
         for width, outer in ((0.64, 0.25), (0.50, 0.20))
     )
     for one, other in zip(wide.rows(), narrow.rows(), strict=True):
@@ -58,31 +58,31 @@ def test_speakers_with_different_rest_poses_move_alike():
 def test_the_rest_is_taken_from_silence():
     width = np.r_[np.full(50, 0.5), np.full(50, 0.6)]
     still = motion(opening=np.r_[np.full(50, 0.02), np.zeros(50)], width=width)
-    assert spoken_mouth(still, NOTHING_SAID).width[75] == pytest.approx(1)
+    assert find_mouth(still, NOTHING_SAID).width[75] == pytest.approx(1)
     units = said((0, 2, "sil"), (2, 4, "p"))
-    assert spoken_mouth(still, units).width[25] == pytest.approx(1)
-    assert spoken_mouth(still, units).width[75] > 1.1
+    assert find_mouth(still, units).width[25] == pytest.approx(1)
+    assert find_mouth(still, units).width[75] > 1.1
 
 
 def test_width_is_as_measured_but_not_without_end():
     moved = motion(opening=np.zeros(100), width=np.r_[np.full(60, 0.5), np.full(20, 0.52), np.full(20, 0.05)])
-    width = spoken_mouth(moved, said((0, 2.4, "sil"))).width
+    width = find_mouth(moved, said((0, 2.4, "sil"))).width
     assert width[70] == pytest.approx(1.04, abs=0.002)
     assert 1 - WIDTH_REACH <= width[90] < 0.72
 
 
 def test_the_opening_alone_is_enough():
-    mouth = spoken_mouth(motion(opening=[0, 0.1, 0.3]), NOTHING_SAID)
+    mouth = find_mouth(motion(opening=[0, 0.1, 0.3]), NOTHING_SAID)
     assert mouth.width[0] == mouth.fullness[0] == 1
     assert mouth.width[2] < mouth.width[1] < 1
-    assert mouth.jaw == pytest.approx(jaw_drop(mouth.gap))
+    assert mouth.jaw == pytest.approx(drop_jaw(mouth.gap))
 
 
 def test_the_tracked_chin_moves_the_jaw_within_reason():
     opening = np.r_[np.zeros(20), np.full(60, 0.1)]
     chin = np.r_[np.full(20, -1.4), np.full(20, -1.475), np.full(20, -1.4), np.full(20, -2.0)]
-    jaw = spoken_mouth(motion(opening=opening, y_152=chin), NOTHING_SAID).jaw
-    usual = float(jaw_drop(opening_to_gap(np.array(0.1))))
+    jaw = find_mouth(motion(opening=opening, y_152=chin), NOTHING_SAID).jaw
+    usual = float(drop_jaw(opening_to_gap(np.array(0.1))))
     assert 0.75 * usual < jaw[30] < 1.15 * usual + 0.01
     assert jaw[50] == pytest.approx(0.75 * usual)
     assert jaw[70] == pytest.approx(1.15 * usual + 0.01)
@@ -90,14 +90,14 @@ def test_the_tracked_chin_moves_the_jaw_within_reason():
 
 def test_the_upper_lip_rises_less_than_the_lower_one_falls():
     gap = np.linspace(0.01, 0.45, 50)
-    assert (upper_share(gap) < 0.32 * gap).all()
-    assert (upper_share(gap) < 0.06).all()
+    assert (weigh_upper(gap) < 0.32 * gap).all()
+    assert (weigh_upper(gap) < 0.06).all()
 
 
 def test_f_and_v_tuck_the_lip_and_show_the_teeth():
     for phone in ("f", "v"):
         for opening, gap in ((0.0, TUCKED_GAP[0]), (0.2, TUCKED_GAP[1])):
-            mouth = spoken_mouth(motion(opening=np.full(50, opening)), said((0.8, 1.2, phone)))
+            mouth = find_mouth(motion(opening=np.full(50, opening)), said((0.8, 1.2, phone)))
             assert mouth.tuck[25] == pytest.approx(1, abs=1e-3)
             assert mouth.gap[25] == pytest.approx(gap, abs=2e-3)
             assert mouth.tuck[5] < 1e-3
@@ -106,7 +106,7 @@ def test_f_and_v_tuck_the_lip_and_show_the_teeth():
 
 def test_the_tip_of_the_tongue_rises():
     for phone in ("th", "dh", "l", "d", "n", "t"):
-        mouth = spoken_mouth(motion(opening=np.full(50, 0.1)), said((0.8, 1.2, phone)))
+        mouth = find_mouth(motion(opening=np.full(50, 0.1)), said((0.8, 1.2, phone)))
         assert 0.4 < mouth.tongue[25] <= 1
         assert (mouth.between_teeth[25] > 0.9) == (phone in ("th", "dh"))
         assert mouth.tongue[5] < 1e-3
@@ -136,7 +136,7 @@ def test_w_is_a_smaller_hole_than_oo_and_opens_sooner():
     gaps = {}
     for phone in ("w", "uw"):
         units = said((0, 0.2, "sil"), (0.3, 0.5, phone), (0.5, 0.8, "ah"))
-        gaps[phone] = spoken_mouth(motion(100.0, opening=np.full(101, 0.06)), units).gap
+        gaps[phone] = find_mouth(motion(100.0, opening=np.full(101, 0.06)), units).gap
     assert gaps["w"][54] > 1.3 * gaps["w"][40]
     assert np.ptp(gaps["uw"][34:48]) < 0.01
 
@@ -144,7 +144,7 @@ def test_w_is_a_smaller_hole_than_oo_and_opens_sooner():
 def test_lips_that_were_tracked_as_closed_part_for_th_and_w_but_not_beside_b():
     closed = motion(100.0, opening=np.zeros(101))
     for phone in ("th", "dh", "w"):
-        mouth = spoken_mouth(closed, said((0.3, 0.4, phone), (0.4, 0.5, "b"), (0.5, 0.6, phone)))
+        mouth = find_mouth(closed, said((0.3, 0.4, phone), (0.4, 0.5, "b"), (0.5, 0.6, phone)))
         assert mouth.gap[33] > 0.02
         assert mouth.contact[43:48].all()
 
@@ -152,7 +152,7 @@ def test_lips_that_were_tracked_as_closed_part_for_th_and_w_but_not_beside_b():
 @pytest.mark.parametrize("fps", [25.0, 100.0])
 def test_beside_f_the_lip_moves_no_faster_than_lips_do(fps):
     units = said((0, 0.3, "aa"), (0.3, 0.4, "f"), (0.4, 0.8, "aa"))
-    mouth = spoken_mouth(motion(100.0, opening=np.full(81, 0.2)), units, fps)
+    mouth = find_mouth(motion(100.0, opening=np.full(81, 0.2)), units, fps)
     leaving = np.abs(np.diff(mouth.gap))[(mouth.tuck[:-1] > 0.5) != (mouth.tuck[1:] > 0.5)]
     assert len(leaving) == 2
     assert leaving.max() <= LIP_SPEED / fps + 1e-9
@@ -162,7 +162,7 @@ def test_beside_f_the_lip_moves_no_faster_than_lips_do(fps):
 def test_articulatory_channels_of_the_motion_count_instead_of_those_of_the_phones():
     channels = (Channel("opening"), Channel("tongue", "weight"), Channel("teeth", "weight"))
     given = Motion(np.tile([0.1, 0.7, 0.2], (101, 1)), 100.0, channels)
-    mouth = spoken_mouth(given, said((0, 0.5, "th"), (0.5, 1.0, "uw")))
+    mouth = find_mouth(given, said((0, 0.5, "th"), (0.5, 1.0, "uw")))
     assert mouth.tongue == pytest.approx(0.7)
     assert mouth.teeth == pytest.approx(0.2)
     assert mouth.protrusion[75] > 0.9
@@ -171,7 +171,7 @@ def test_articulatory_channels_of_the_motion_count_instead_of_those_of_the_phone
 def test_of_motion_that_has_the_gap_itself_phones_say_only_that_p_b_and_m_close():
     gap = np.full(101, 0.1)
     both = motion(100.0, opening=gap, lip_gap=gap)
-    mouth = spoken_mouth(both, said((0, 0.3, "f"), (0.3, 0.5, "aa"), (0.5, 0.6, "m"), (0.6, 1.0, "th")))
+    mouth = find_mouth(both, said((0, 0.3, "f"), (0.3, 0.5, "aa"), (0.5, 0.6, "m"), (0.6, 1.0, "th")))
     assert mouth.contact[55]
     assert mouth.gap[[10, 40, 80]] == pytest.approx(0.1)
 
@@ -187,10 +187,10 @@ def test_unusable_motion_is_refused():
         wrong.append(({"opening": [0.0, 0.1], channel: [0.5, np.nan]}, f"'{channel}' has values that are not finite"))
     for curves, words in wrong:
         with pytest.raises(InputError, match=words):
-            spoken_mouth(motion(**curves), NOTHING_SAID)  # type: ignore[arg-type]
+            find_mouth(motion(**curves), NOTHING_SAID)  # type: ignore[arg-type]
     for fps in (0, -1, float("nan"), float("inf")):
         with pytest.raises(InputError, match="frame rate"):
-            spoken_mouth(motion(opening=[0.0]), NOTHING_SAID, fps)
+            find_mouth(motion(opening=[0.0]), NOTHING_SAID, fps)
 
 
 def test_future_is_not_spread():
@@ -198,6 +198,6 @@ def test_future_is_not_spread():
     ends_s = 0.3 + np.cumsum(lengths_s)
     spans = [(float(end - length), float(end), p) for p, length, end in zip(phones, lengths_s, ends_s, strict=True)]
     moved = motion(100.0, opening=np.full(101, 0.06), width=np.full(101, 0.57))
-    mouth = spoken_mouth(moved, said((0, 0.3, "sil"), *spans))
+    mouth = find_mouth(moved, said((0, 0.3, "sil"), *spans))
     assert mouth.width.max() < 1.02
     assert mouth.width[round(100 * (ends_s[1] - 0.03))] < 0.95  # y rounds for the vowel behind it

@@ -3,7 +3,7 @@ import pytest
 
 from formats.examples import of_motion
 from lipmotion.articulation.contact import CLOSED_OPENING
-from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.articulation.rest import (
     BREATH_GAP,
     INHALING_GAP,
@@ -15,9 +15,9 @@ from lipmotion.articulation.rest import (
     REST,
     find_rest_frames,
     measure_at_rest,
-    pause_weight,
     rest_in_pauses,
     share_short_pauses,
+    weigh_pauses,
 )
 from lipmotion.errors import InputError
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit, VoiceEvent
@@ -68,7 +68,7 @@ LINE = said((0, 0.4, "sil"), (0.4, 1.0, "aa"), (1.0, 1.5, "sp"), (1.5, 2.0, "aa"
 
 
 def test_the_mouth_rests_in_pauses_and_at_both_ends_and_goes_on_in_short_ones():
-    weight = pause_weight(LINE, TIME_S)
+    weight = weigh_pauses(LINE, TIME_S)
     assert weight[:25] == pytest.approx(1)
     assert weight[122:136] == pytest.approx(1)
     assert weight[300] == pytest.approx(1)
@@ -86,7 +86,7 @@ def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
         assert before.max() <= CLOSED_OPENING
         assert opening[round(start_s * 100) - 4] >= BREATH_GAP - 1e-9
     assert opening[60] == pytest.approx(0.1)
-    mouth = spoken_mouth(moved.motion, LINE)
+    mouth = find_mouth(moved.motion, LINE)
     assert mouth.contact[[0, 20, 125, 135, 300]].all()
     assert not mouth.contact[200:289].any()
 

@@ -22,7 +22,7 @@ def declared(monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, Install
     """Returns what is found, by name, where some requirements are declared and no part is looked at."""
 
     def found(*requirements: Requirement) -> dict[str, InstalledPart]:
-        monkeypatch.setattr(doctor_module, "declared_requirements", lambda: requirements)
+        monkeypatch.setattr(doctor_module, "list_requirements", lambda: requirements)
         monkeypatch.setattr(doctor_module, "_PARTS", {})
         return {each.name: each for each in doctor()}
 

@@ -16,7 +16,7 @@ from children import LIPMOTION, child
 from cli.conftest import check_refused, is_one_error
 from lipmotion import Job, Outputs, Request, read_motion
 from lipmotion.cli import command_line
-from lipmotion.cli.arguments.declared import part_of
+from lipmotion.cli.arguments.declared import pick_part
 from lipmotion.pipeline.job import DETAILS
 from lipmotion.types import Delivery, Staging
 from meshes.heads import head, write_glb
@@ -75,8 +75,8 @@ needs_toml = pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 
 def parsed(*words: str) -> Job:
     options = command_line.parse_words(words, argparse.Namespace())
     speech = options.speech[0] if isinstance(options.speech, list) else options.speech
-    request = part_of(options, options.start.request, recording=speech)
-    return part_of(options, options.start, request=request)
+    request = pick_part(options, options.start.request, recording=speech)
+    return pick_part(options, options.start, request=request)
 
 
 def test_the_command_line_makes_the_same_job():

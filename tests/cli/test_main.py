@@ -11,7 +11,7 @@ import pytest
 from children import PIPE, child, run_child
 from cli.conftest import check_refused, is_one_error
 from lipmotion import load_model, save_model
-from lipmotion.citations import ENGINE_KEYS, bibliography, engine_citations, model_citations
+from lipmotion.citations import ENGINE_KEYS, bibliography, list_engine_citations, list_model_citations
 from lipmotion.cli import main
 from lipmotion.cli.verbs.about import SHELLS
 from lipmotion.engines import ENGINES
@@ -264,11 +264,11 @@ def test_every_built_in_engine_names_its_papers():
 
 def test_what_a_header_adds():
     header = {"engine": "joint", "visual": "both", "adapted": {}, "attribution": ["GRID corpus, CC BY 4.0", "a; b"]}
-    text = model_citations(header)
+    text = list_model_citations(header)
     assert keys(text.splitlines()) == ["lipmotion", *ENGINE_KEYS["joint"], "xieliu2007", "gales1998", "cooke2006"]
     assert text.endswith("\n% recordings: a; b")
-    assert "another package" in engine_citations("ridge")
-    assert keys(model_citations({"engine": "ridge"}).splitlines()) == ["lipmotion"]
+    assert "another package" in list_engine_citations("ridge")
+    assert keys(list_model_citations({"engine": "ridge"}).splitlines()) == ["lipmotion"]
 
 
 def test_the_version_is_this_one():

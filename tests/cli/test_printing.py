@@ -25,7 +25,7 @@ from lipmotion.cli import main
 from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
 from lipmotion.cli.terminal.progress import outcome, print_json, print_line, print_lines, report_progress
 from lipmotion.errors import InputError
-from lipmotion.measures.evaluation_table import figures_table
+from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.pipeline.generate.explain import explanation_text
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
 from robustness.case import changed_model
@@ -185,8 +185,8 @@ def test_tables_have_a_line_a_row():
     figures = {
         "closed_under": None, "still_channels": [EVIL], "split": EVIL, "clips": 1, "conditions": {EVIL: condition},
     }  # fmt: skip
-    assert figures_table(figures).count(SHOWN) == 5
-    assert OBEYED.search(figures_table(figures)) is None
+    assert format_figures(figures).count(SHOWN) == 5
+    assert OBEYED.search(format_figures(figures)) is None
     span = Span(0.0, 1.0, Unit(EVIL, EVIL, EVIL))
     explained = Explanation(0.0, 0, span, EVIL, {EVIL: ChannelValue(0.0, 1.0)})
     assert OBEYED.search(explanation_text(explained)) is None

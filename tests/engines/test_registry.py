@@ -1,24 +1,24 @@
 import pytest
 
 from engines.coupled.tiny import SYSTEMS
-from lipmotion.engines import ENGINES, engine_from_settings, engine_named, preset_visual
+from lipmotion.engines import ENGINES, create_engine, engine_named, find_visual
 from lipmotion.errors import InputError
 
 
 def test_settings_and_presets_are_options() -> None:
     for name in sorted(ENGINES.names):
-        assert engine_from_settings(name) == engine_named(name, {})
+        assert create_engine(name) == engine_named(name, {})
     for system in SYSTEMS:
-        assert engine_from_settings(preset=f"xieliu2007 {system}") == engine_from_settings(preset=system)
-        assert preset_visual(f"xieliu2007 {system}") == preset_visual(system) == "eigenlips"
-    assert engine_from_settings(preset="xieliu2007") == engine_from_settings(preset="ph-vi-CHMM")
-    assert (preset_visual("xieliu2007"), preset_visual("hofer2008"), preset_visual(None)) == ("eigenlips", None, None)
+        assert create_engine(preset=f"xieliu2007 {system}") == create_engine(preset=system)
+        assert find_visual(f"xieliu2007 {system}") == find_visual(system) == "eigenlips"
+    assert create_engine(preset="xieliu2007") == create_engine(preset="ph-vi-CHMM")
+    assert (find_visual("xieliu2007"), find_visual("hofer2008"), find_visual(None)) == ("eigenlips", None, None)
 
 
 def test_the_systems_of_xie_and_liu_are_as_printed() -> None:
     """Five states a unit, EM from the best path, nothing after it (§4.1, §7.1, Table 2, Eqs. 17-19)."""
     for system in SYSTEMS:
-        config = engine_from_settings(preset=system).config
+        config = create_engine(preset=system).config
         assert (config.states, config.conversion, config.start, config.update) == (5, "em", "viterbi", "exact")
         assert not any((config.variance_scaling, config.closures, config.articulation, config.dynamic))
         assert config.chains.split()[-1] == ("viseme" if "-vi-" in system else "phone")
@@ -31,12 +31,12 @@ def test_the_systems_of_xie_and_liu_are_as_printed() -> None:
 
 def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
     settings = ["states=4", "audio_weight=2", "acoustic_regression=no", "variance_scaling=TRUE", "chains=sVis 2vis"]
-    config = engine_from_settings("coupled", preset="ph-CHMM", settings=[*settings, "asynchrony=0"]).config
+    config = create_engine("coupled", preset="ph-CHMM", settings=[*settings, "asynchrony=0"]).config
     assert (config.states, config.audio_weight) == (4, 2.0)
     assert (config.acoustic_regression, config.variance_scaling) == (False, True)
     assert (config.structure, config.chains, config.asynchrony) == ("coupled", "sVis 2vis", 0)
-    assert engine_from_settings("trajectory", units="eVis", settings=["units=2vis"]).config.units == "2vis"
-    assert engine_from_settings("joint", units="eVis", settings=["mixtures=2"]).config.mixtures == 2
+    assert create_engine("trajectory", units="eVis", settings=["units=2vis"]).config.units == "2vis"
+    assert create_engine("joint", units="eVis", settings=["mixtures=2"]).config.mixtures == 2
 
 
 def test_arguments_that_are_not_allowed() -> None:
@@ -53,7 +53,7 @@ def test_arguments_that_are_not_allowed() -> None:
         ("trajectory", {"units": "evis"}, "no unit set 'evis'"),
     ):
         with pytest.raises(InputError) as error:
-            engine_from_settings(name, **arguments)  # type: ignore[arg-type]
+            create_engine(name, **arguments)  # type: ignore[arg-type]
         assert words in str(error.value)
 
 
@@ -71,4 +71,4 @@ def test_former_names_of_options_are_understood() -> None:
         assert [getattr(config, config.aliases[option]) for option in values] == list(values.values())
         assert set(values) == set(config.aliases)
         settings = [f"{option}={value}" for option, value in values.items()]
-        assert engine_from_settings(name, settings=settings).config == config
+        assert create_engine(name, settings=settings).config == config

@@ -186,13 +186,13 @@ def clips() -> tuple[Clips, Clips, Clips]:
 
 def test_figures_are_those_of_the_measures(clips):
     original, near, _ = clips
-    wanted = curves.pooled_correlation(near, original).mean()
+    wanted = curves.correlate_pooled(near, original).mean()
     assert evaluate.correlation_statistic(near, original).value == pytest.approx(wanted, abs=1e-12)
     assert evaluate.distance_statistic(near, original).value == pytest.approx(
-        curves.mean_distance(near, original), abs=1e-12
+        curves.find_distance(near, original), abs=1e-12
     )
     some, others = [g[:, :1] for g in near], [o[:, :1] for o in original]
-    score = closures.closure_figures([g[:, 0] for g in near], [o[:, 0] for o in original], 50, 25).score
+    score = closures.measure_closures([g[:, 0] for g in near], [o[:, 0] for o in original], 50, 25).score
     assert evaluate.closing_score_statistic(some, others, 50).value == pytest.approx(100 * score)
 
 
@@ -200,7 +200,7 @@ def test_a_channel_that_stands_still_explains_nothing(clips):
     original, near, _ = clips
     still = [np.concatenate([g[:, :2], np.full((len(g), 1), 0.1)], axis=1) for g in near]
     assert evaluate.correlation_statistic(still, original).value == pytest.approx(
-        curves.pooled_correlation(still, original).mean(), abs=1e-12
+        curves.correlate_pooled(still, original).mean(), abs=1e-12
     )
 
 
@@ -215,7 +215,7 @@ def test_the_interval_is_that_of_drawn_clips(clips):
     drawn = [draw.integers(6, size=6) for _ in range(50)]
 
     def acc(made: Clips, chosen: np.ndarray) -> float:
-        return float(curves.pooled_correlation([made[i] for i in chosen], [original[i] for i in chosen]).mean())
+        return float(curves.correlate_pooled([made[i] for i in chosen], [original[i] for i in chosen]).mean())
 
     one, other = evaluate.correlation_statistic(near, original), evaluate.correlation_statistic(far, original)
     wanted = np.percentile([acc(near, chosen) for chosen in drawn], [2.5, 97.5])

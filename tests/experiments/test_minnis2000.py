@@ -12,8 +12,8 @@ from engines.selection.drawn_units import PHONE_S, costs_of, inventory, target_o
 from experiments.conftest import few_sets, states
 from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus, evaluate, train
-from lipmotion.engines import engine_from_settings
-from lipmotion.engines.selection.concatenation import pieces_of
+from lipmotion.engines import create_engine
+from lipmotion.engines.selection.concatenation import to_pieces
 from lipmotion.engines.selection.costs import SelectionConfig
 from lipmotion.errors import CorpusError
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
@@ -54,7 +54,7 @@ def test_overlaps_count_where_table_1_leaves_the_middle():
     costs = costs_of(inventory("s aa f", "f aa m", levels=(0, 1)), hard=1.0)
     for text, inside in (("s aa m", [(PHONE_S, 2 * PHONE_S)]), ("m aa m", [])):
         target = target_of(costs, text)
-        found = overlap_times_s(costs, target, pieces_of(costs, target, np.array([0, 1, 5])))
+        found = overlap_times_s(costs, target, to_pieces(costs, target, np.array([0, 1, 5])))
         assert found == pytest.approx(np.reshape(inside, (-1, 2))), text
 
 
@@ -77,7 +77,7 @@ def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
 
 @LONG
 def test_the_row_as_printed_is_the_preset(figures, toy_corpus):
-    model, _ = train(toy_corpus, recogniser=SMALL, engine=engine_from_settings(preset="minnis2000"))
+    model, _ = train(toy_corpus, recogniser=SMALL, engine=create_engine(preset="minnis2000"))
     wanted = evaluate(model, toy_corpus)["conditions"]
     for condition, systems in figures["lists"]["test"]["conditions"].items():
         assert systems[PRINTED]["acc"] == pytest.approx(wanted[condition]["channels"]["opening"]["acc"], abs=1e-6)
@@ -140,7 +140,7 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(hofer_figures, toy_co
         numbers = f"mixtures={row['gaussians']}", f"motion_mixtures={row['motion_gaussians']}"
         settings = ["states=3", *numbers, f"closures={pins}", "channels=opening width outer"]
         if (pins, settings[1]) not in evaluated:
-            engine = engine_from_settings(preset="hofer2008", settings=settings)
+            engine = create_engine(preset="hofer2008", settings=settings)
             model = train(toy_corpus, recogniser=SMALL, engine=engine)[0]
             evaluated[pins, settings[1]] = evaluate(model, toy_corpus)
         of_condition = evaluated[pins, settings[1]]["conditions"][block["condition"]]

@@ -73,7 +73,7 @@ def test_a_row_is_what_train_and_evaluate_say(figures, toy_corpus):
 @pytest.mark.parametrize("name", [MULTISTREAM, systems.REFERENCE_SYSTEM])
 def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     """The arrays of the model file and the motion are the same; conversions of one model differ by that alone."""
-    model = train(toy_corpus, recogniser=SMALL, engine=engines.engine_from_settings(preset=name))[0]
+    model = train(toy_corpus, recogniser=SMALL, engine=engines.create_engine(preset=name))[0]
     arrays = model.engine.to_arrays(model.learned)
     kept = read_archive(work / "8" / f"system-{name}.checkpoint")
     assert kept.keys() == {*arrays, "about"}
@@ -87,13 +87,13 @@ def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     rows, training = (figures["rows"][-1][part] for part in ("conditions", "training"))
     row, generated = rows["audio only"][name], [clip.generated for clip in made]
     original = [clip.original for clip in made]
-    assert row["acc"] == pytest.approx(curves.pooled_correlation(generated, original).mean())
-    assert row["amse"] == pytest.approx(curves.mean_distance(generated, original))
+    assert row["acc"] == pytest.approx(curves.correlate_pooled(generated, original).mean())
+    assert row["amse"] == pytest.approx(curves.find_distance(generated, original))
     assert training[name]["parameters"] == model.learned.chains.parameters
     if name == systems.REFERENCE_SYSTEM:
         by_path = engines.engine_named("coupled", model.engine.config.as_mapping() | {"conversion": "viterbi"})
         made = generate_clips(recordings, "audio only", by_path, learned)
-        acc = curves.pooled_correlation([clip.generated for clip in made], original).mean()
+        acc = curves.correlate_pooled([clip.generated for clip in made], original).mean()
         assert rows["audio only"][systems.BEST_PATH]["acc"] == pytest.approx(acc)
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from lipmotion import errors, types
-from lipmotion.formats.web_page import SHARED_COLOURS, Html, colour_code, element, joined, whole_page
+from lipmotion.formats.web_page import SHARED_COLOURS, Html, build_page, element, find_colour, joined
 from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, add_inset, inset_box
 from lipmotion_faces.video import mp4, synthetic_mark
 
@@ -516,16 +516,16 @@ def test_what_is_no_name_is_refused(name):
 
 
 def test_a_page_loads_nothing_from_elsewhere():
-    page = whole_page("</title><script>", f"{SHARED_COLOURS} p {{ color: red; }}", element("p", "text"))
+    page = build_page("</title><script>", f"{SHARED_COLOURS} p {{ color: red; }}", element("p", "text"))
     assert "<title>&lt;/title&gt;&lt;script&gt;</title>" in page
     assert "default-src &#x27;none&#x27;" in page
     assert "script-src" not in page
-    assert "script-src" in whole_page("a", "", script="1;")
+    assert "script-src" in build_page("a", "", script="1;")
     assert not re.search("https?:|//", page)
     body = page[page.index("<body>") : page.index("</body>") + len("</body>")]
     assert ElementTree.fromstring(body).find("p").text == "text"  # noqa: S314 (our own)
 
 
 def test_all_pages_have_the_same_colours():
-    light, dark = colour_code(SHARED_COLOURS).split("prefers-color-scheme: dark")
+    light, dark = find_colour(SHARED_COLOURS).split("prefers-color-scheme: dark")
     assert set(re.findall(r"--[\w-]+(?=:)", light)) == set(re.findall(r"--[\w-]+(?=:)", dark))

@@ -200,7 +200,7 @@ def _xmp(_: Path, name: str) -> None:
 
 
 def _bibtex(_: Path, name: str) -> None:
-    entries = citations.model_citations({"engine": "own" + name, "attribution": [f"x{name}x"]})
+    entries = citations.list_model_citations({"engine": "own" + name, "attribution": [f"x{name}x"]})
     assert sum(line.startswith("@") for line in re.split(r"[\n\r]", entries)) == 1
 
 

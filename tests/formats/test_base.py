@@ -13,10 +13,10 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import (
     MotionFormat,
     base,
-    motion_suffix,
-    motion_suffixes,
+    find_suffix,
+    list_read_suffixes,
+    list_suffixes,
     read_motion,
-    readable_suffixes,
     write_motion,
 )
 from lipmotion.formats.base import MOTION_FORMATS, format_rows, read_members
@@ -64,11 +64,11 @@ def test_the_longest_suffix_chooses_the_format_and_one_without_reader_is_not_off
     monkeypatch.setitem(MOTION_FORMATS.built_in, "take.csv", f"{__name__}:TAKE")
     names = {"a.take.csv": ".take.csv", "a.b.TAKE.Csv": ".take.csv", "a.mistake.csv": ".csv", "take.csv": ".csv"}
     for name, suffix in names.items():
-        assert motion_suffix(Path(name)) == suffix
+        assert find_suffix(Path(name)) == suffix
         text = write(tmp_path / name, generation).read_text()
         assert text.startswith("take of" if suffix == ".take.csv" else "time_s,")
-    assert ".take.csv" in motion_suffixes()
-    assert ".take.csv" not in readable_suffixes()
+    assert ".take.csv" in list_suffixes()
+    assert ".take.csv" not in list_read_suffixes()
     with pytest.raises(InputError, match=r"cannot read motion from '\.take\.csv'; use one of \.json, \.csv, \.npz"):
         read_motion(tmp_path / "a.take.csv")
 
@@ -90,7 +90,7 @@ def test_values_that_are_not_finite_are_not_written(tmp_path, generation, suffix
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("suffix", readable_suffixes())
+@pytest.mark.parametrize("suffix", list_read_suffixes())
 def test_a_missing_and_a_damaged_file_are_named(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     with pytest.raises(InputError, match=rf"a\{suffix}: cannot be read: No such file"):

@@ -14,10 +14,10 @@ from children import run_child
 from formats.examples import generation, of_motion, written
 from formats.examples import written as write
 from lipmotion import read_motion
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.bvh import CENTIMETRES
-from lipmotion.formats.live2d import TOLERANCE, mouth_form, mouth_open
+from lipmotion.formats.live2d import TOLERANCE, measure_mouth_form, measure_mouth_open
 from lipmotion.formats.vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import move_points, with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import gaze_to_weights, weights_to_gaze
@@ -62,7 +62,7 @@ def written_bvh(talking_bvh: Generation, tmp_path: Path) -> Path:
 def expected(talking_bvh: Generation) -> np.ndarray:
     """Return the places of the points in centimetres [shape=(T, 52, 3)]."""
     moved = move_points(talking_bvh.motion, talking_bvh.units).displacements
-    return (mouth_template().places + moved) * CENTIMETRES
+    return (build_mouth().places + moved) * CENTIMETRES
 
 
 def test_hierarchy_and_motion(talking_bvh, written_bvh):
@@ -80,7 +80,7 @@ def test_hierarchy_and_motion(talking_bvh, written_bvh):
 
 
 def _points():
-    template = mouth_template()
+    template = build_mouth()
     return template.points, template.jaw
 
 
@@ -279,8 +279,8 @@ def test_curves_through_the_keys_are_those_of_the_mouth(tmp_path, talking_live2d
     meta, curves = read(written(tmp_path / "a.motion3.json", talking_live2d))
     assert meta["Duration"] == pytest.approx(2.99)
     for name, values in (
-        ("ParamMouthOpenY", mouth_open(talking_live2d)),
-        ("ParamMouthForm", mouth_form(talking_live2d)),
+        ("ParamMouthOpenY", measure_mouth_open(talking_live2d)),
+        ("ParamMouthForm", measure_mouth_form(talking_live2d)),
     ):
         times_s, keys = curves[name]
         assert times_s[0] == 0
@@ -302,7 +302,7 @@ def test_held_poses_change_at_once(tmp_path, talking_live2d):
 
 
 def test_the_mouth_rests_opens_and_is_wide(talking_live2d):
-    opened, form = mouth_open(talking_live2d), mouth_form(talking_live2d)
+    opened, form = measure_mouth_open(talking_live2d), measure_mouth_form(talking_live2d)
     assert opened[:100].max() < 1e-9
     assert 0.75 < opened.max() < 0.95
     assert np.abs(form[:100]).max() < 1e-9
@@ -316,7 +316,7 @@ def test_blendshapes_open_it_as_well(tmp_path, talking_live2d):
     names = ("jawOpen", "mouthClose", "mouthPucker")
     motion = Motion(weights, 60.0, tuple(Channel(name, WEIGHT) for name in names))
     moved = replace(talking_live2d, motion=motion, spread=weights)
-    opened, form = mouth_open(moved), mouth_form(moved)
+    opened, form = measure_mouth_open(moved), measure_mouth_form(moved)
     assert opened[:100].max() < 1e-9
     assert opened[100:150].min() > 0.3
     assert opened[150:200].max() < 0.05

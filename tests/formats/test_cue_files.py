@@ -13,9 +13,9 @@ import programs
 from formats.examples import result, spoken
 from lipmotion import CueSheet, read_motion
 from lipmotion.articulation.cue_sheets import choose_cues
-from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.cues import CUE_FORMATS, cue_motion, format_of, read_cues, write_cue_file
+from lipmotion.formats.cues import CUE_FORMATS, convert_cues, format_of, read_cues, write_cue_file
 from lipmotion.formats.papagayo import UNKNOWN
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
@@ -324,7 +324,7 @@ def test_a_table_of_motion_is_none_of_cues(tmp_path: Path) -> None:
 
 
 def test_lips_close_in_a_and_are_as_open_as_the_drawings(motion_sheet: CueSheet) -> None:
-    mouth = spoken_mouth(*cue_motion(motion_sheet))
+    mouth = find_mouth(*convert_cues(motion_sheet))
     middle = {name: round(100 * (end_s - 0.0625)) for name, end_s in SHOWN}
     assert mouth.contact[middle["A"]]
     assert mouth.contact[:45].all()

@@ -10,7 +10,7 @@ import pytest
 
 from lipmotion import Request
 from lipmotion.errors import InputError
-from lipmotion.formats.label_files import read_labels, read_phones, read_transcript, speakers_in
+from lipmotion.formats.label_files import list_speakers, read_labels, read_phones, read_transcript
 from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.types import TimedTranscript
 from lipmotion.units import UNKNOWN_PHONES
@@ -189,7 +189,7 @@ def test_phones_of_a_speaker_are_chosen_by_the_request_too(write: Any, tmp_path:
     for path in (write(grid(**TWO), "a.TextGrid"), write(SPEAKERS["mfa.json"], "mfa.json")):
         assert phones(path, speaker="bob") == phones(path, tier="bob - phones") == ["p", "aa"]
         assert phones(path) == ["m", "aa", "p", "aa"]  # who began goes on
-        assert speakers_in(path) == ("ann", "bob")
+        assert list_speakers(path) == ("ann", "bob")
         request = Request(tmp_path / "a.wav", units=path, speaker="bob")
         units = read_request(request).units
         assert units is not None

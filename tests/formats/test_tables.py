@@ -7,7 +7,7 @@ import pytest
 from formats.examples import of_motion, written
 from lipmotion import read_motion
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.tables import CURVES, SPEECH_CURVES, is_live_link, speech_curves, timecode
+from lipmotion.formats.tables import CURVES, SPEECH_CURVES, is_live_link, read_speech_curves, timecode
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, with_mouth
 from lipmotion.meshes.model.shape_names import ARKIT_52, ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
@@ -203,10 +203,10 @@ def test_uneven_times_and_lost_frames_are_evened_out(tmp_path, curves):
 
 def test_curves_that_speech_moves(curves, tmp_path):
     write_take(tmp_path / "take.csv", curves)
-    kept = speech_curves(read_motion(tmp_path / "take.csv")[0])
+    kept = read_speech_curves(read_motion(tmp_path / "take.csv")[0])
     assert set(kept.names) == SPEECH_CURVES
     with pytest.raises(InputError, match="none of its curves is one of mouth or jaw"):
-        speech_curves(Motion(np.zeros((3, 1)), 60.0, (Channel("browInnerUp", WEIGHT),)))
+        read_speech_curves(Motion(np.zeros((3, 1)), 60.0, (Channel("browInnerUp", WEIGHT),)))
 
 
 def test_what_is_a_table_of_the_app():

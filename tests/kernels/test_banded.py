@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernels.conftest import load_numba
-from lipmotion.kernels.banded import normal_equations, pin, solve, solve_mlpg
+from lipmotion.kernels.banded import build_equations, pin, solve, solve_mlpg
 from oracles import trajectories
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -28,7 +28,7 @@ def dense(mean, precision, pins=()) -> list[tuple[np.ndarray, np.ndarray]]:
 @settings(max_examples=30)
 def test_agrees_with_the_dense_system(seed, frames):
     mean, precision = statistics(seed, frames)
-    values, variance = solve(normal_equations(mean, precision))
+    values, variance = solve(build_equations(mean, precision))
     for channel, (wanted, spread) in enumerate(dense(mean, precision)):
         assert values[:, channel] == pytest.approx(wanted, abs=1e-10)
         assert variance[:, channel] == pytest.approx(spread, abs=1e-10)
@@ -40,7 +40,7 @@ def test_pins_agree_with_elimination(seed, frames, data):
     mean, precision = statistics(seed, frames)
     where = data.draw(st.sets(st.tuples(st.integers(0, frames - 1), st.integers(0, 1))))
     pins = [(t, c, float(np.sin(7 * t + c))) for t, c in data.draw(st.permutations(sorted(where)))]
-    bands = normal_equations(mean, precision)
+    bands = build_equations(mean, precision)
     for t, c, value in pins:
         pin(bands, t, c, value)
     values, variance = solve(bands)
@@ -56,7 +56,7 @@ def test_pins_agree_with_elimination(seed, frames, data):
 def test_static_windows_alone_generate_the_means(seed, frames):
     mean, precision = statistics(seed, frames)
     precision[:, 1:] = 0
-    values, variance = solve(normal_equations(mean, precision))
+    values, variance = solve(build_equations(mean, precision))
     assert values == pytest.approx(mean[:, 0], abs=1e-12)
     assert variance == pytest.approx(1 / precision[:, 0], rel=1e-12)
 
@@ -66,7 +66,7 @@ def test_static_windows_alone_generate_the_means(seed, frames):
 def test_means_of_a_real_curve_generate_that_curve(seed, frames):
     curve = np.random.default_rng(seed).normal(0, 1, frames)
     mean = (trajectories.window_matrix(frames) @ curve).reshape(3, frames).T[:, :, None]
-    values, _ = solve(normal_equations(mean, statistics(seed, frames, 1)[1]))
+    values, _ = solve(build_equations(mean, statistics(seed, frames, 1)[1]))
     assert values[:, 0] == pytest.approx(curve, abs=1e-10)
 
 

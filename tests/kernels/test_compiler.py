@@ -12,7 +12,7 @@ from children import environment, run_child
 from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
 from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward, normals
-from lipmotion.kernels.compiler import blas_kernels, one_thread
+from lipmotion.kernels.compiler import limit_threads, list_blas_kernels
 from lipmotion_faces.kernels import affine, painting, raster, shading
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
@@ -46,9 +46,9 @@ def sequences() -> list[np.ndarray]:
     found: list[Any] = []
     for kind in (np.float32, np.float64):
         given = factorial_loops.FactorialLogLikelihoods.of(*(log.astype(kind) for log in logs))
-        posteriors = factorial.factorial_posteriors(loop, loop, given, 2)
+        posteriors = factorial.infer_factorial(loop, loop, given, 2)
         found += [*posteriors[:2], *posteriors.audio_counts, posteriors.log_likelihood]
-        found += factorial_loops.factorial_best_path(loop, loop, given)
+        found += factorial_loops.find_factorial_path(loop, loop, given)
         arrays, _ = phone_loop(1, units=9, states=2)
         found += network_posteriors(random.normal(-20, 4, (3, len(arrays["emission"]))).astype(kind), **arrays)
     log_emission, moves = random.normal(0, 3, (5, 2, 3)), np.log(random.uniform(0.2, 0.8, (2, 2, 3)))
@@ -83,7 +83,7 @@ def pictures() -> list[np.ndarray]:
     stacked = np.zeros((12, 16, 4), np.uint16)
     painting.stack(layer, layer, np.dstack([layer, layer[..., 0]]) / 255, target, stacked)
     drawn = [light, plain, textured, opacity, frame, layer, target, moved, stacked]
-    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), normals.normal_sums(points, triangles)]
+    return [*drawn, affine.resample(plain[None], to_source, (5, 6)), normals.sum_normals(points, triangles)]
 
 
 @pytest.mark.long
@@ -196,16 +196,16 @@ def two_outside():
 
 @pytest.mark.usefixtures("two_outside")
 def test_one_inside_and_as_before_afterwards_also_after_an_error():
-    with one_thread():
+    with limit_threads():
         assert threads() == {1}
-        with one_thread():
+        with limit_threads():
             assert threads() == {1}
         assert threads() == {1}
     assert threads() == {2}
-    with pytest.raises(KeyError), one_thread():
+    with pytest.raises(KeyError), limit_threads():
         raise KeyError
     assert threads() == {2}
-    counted = one_thread()(threads)
+    counted = limit_threads()(threads)
     assert [counted(), counted()] == [{1}, {1}]
 
 
@@ -215,12 +215,12 @@ def test_blocks_that_overlap_in_threads_of_python_leave_nothing_behind():
     both_in, first_out = Barrier(2), Barrier(2)
 
     def first():
-        with one_thread():
+        with limit_threads():
             both_in.wait(20)
         first_out.wait(20)
 
     def second():
-        with one_thread():
+        with limit_threads():
             both_in.wait(20)
             first_out.wait(20)
 
@@ -231,5 +231,5 @@ def test_blocks_that_overlap_in_threads_of_python_leave_nothing_behind():
 
 
 def test_kernels_are_named():
-    assert blas_kernels() == blas_kernels() == sorted(blas_kernels())
-    assert all(len(name.split()) >= 3 for name in blas_kernels())
+    assert list_blas_kernels() == list_blas_kernels() == sorted(list_blas_kernels())
+    assert all(len(name.split()) >= 3 for name in list_blas_kernels())

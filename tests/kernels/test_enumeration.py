@@ -12,7 +12,7 @@ import pytest
 
 from kernels.networks import arrays_of
 from lipmotion.kernels import factorial, forward_backward
-from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, find_factorial_path
 from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.kernels.paths import NetworkArrays, Windows, best_path
 from oracles import factorial as factorial_oracle
@@ -142,7 +142,7 @@ def of_factorial(draw, spread, extreme, kind=np.float64):
     frames = int(draw.integers(1, 5))
     audio, visual, logs = factorial_model(draw, frames, spread, extreme)
     logs = logs._replace(**{name: getattr(logs, name).astype(kind) for name in ("audio", "visual", "pair")})
-    found = factorial.factorial_posteriors(audio, visual, logs, stretch=int(draw.integers(1, 5)))
+    found = factorial.infer_factorial(audio, visual, logs, stretch=int(draw.integers(1, 5)))
     joint, counts, log_likelihood = factorial_oracle.posteriors(audio, visual, logs)
     single = kind is np.float32
     right = near(found.log_likelihood, log_likelihood, spread, single)
@@ -158,7 +158,7 @@ def of_factorial_path(draw, spread, extreme):
     """The best path of two loops."""
     frames = int(draw.integers(1, 4))
     audio, visual, logs = factorial_model(draw, frames, spread, extreme)
-    one, other, score = factorial_best_path(audio, visual, logs, stretch=int(draw.integers(1, 4)))
+    one, other, score = find_factorial_path(audio, visual, logs, stretch=int(draw.integers(1, 4)))
     log_density, *ends = factorial_oracle.joint_logs(audio, visual, logs)
     ways = factorial_oracle.best_arcs(audio, visual)
     states = np.arange(log_density.shape[1])

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from lipmotion.kernels.factorial import factorial_posteriors
-from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, factorial_best_path
+from lipmotion.kernels.factorial import infer_factorial
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, find_factorial_path
 
 
 def random_loop(draw, states: int, units: int) -> Loop:
@@ -25,7 +25,7 @@ def random_model(seed: int, frames: int, shapes=((2, 2), (2, 1)), spread: float 
 def test_posteriors_sum_to_one_and_counts_are_as_many_as_steps():
     audio, visual, logs = random_model(4, 150, ((3, 6), (3, 4)), 20.0, 10)
     logs = FactorialLogLikelihoods(*(part.astype(np.float32) for part in logs[:3]), logs.pairs)
-    found = factorial_posteriors(audio, visual, logs)
+    found = infer_factorial(audio, visual, logs)
     for posterior, counts in ((found.audio, found.audio_counts), (found.visual, found.visual_counts)):
         assert posterior.sum(axis=1) == pytest.approx(np.ones(150), abs=1e-6)
         assert sum(c.sum() for c in counts[:3]) == pytest.approx(149, abs=0.015)
@@ -36,10 +36,10 @@ def test_posteriors_sum_to_one_and_counts_are_as_many_as_steps():
 def test_a_recording_without_a_path_has_probability_0():
     audio, visual, logs = random_model(7, 5, pairs=0)
     logs.visual[3] = -np.inf
-    found = factorial_posteriors(audio, visual, logs)
+    found = infer_factorial(audio, visual, logs)
     assert found.log_likelihood == -np.inf
     assert not any(part.any() for part in (*found[:3], *found.audio_counts, *found.visual_counts))
-    assert factorial_best_path(audio, visual, logs)[2] == -np.inf
+    assert find_factorial_path(audio, visual, logs)[2] == -np.inf
 
 
 def test_single_precision_is_close_however_loud():
@@ -47,7 +47,7 @@ def test_single_precision_is_close_however_loud():
         audio, visual, logs = random_model(8, 60, ((3, 8), (3, 5)), spread, 30)
         single = FactorialLogLikelihoods(*(part.astype(np.float32) for part in logs[:3]), logs.pairs)
         double = FactorialLogLikelihoods(*(part.astype(np.float64) for part in single[:3]), logs.pairs)
-        found, wanted = (factorial_posteriors(audio, visual, given) for given in (single, double))
+        found, wanted = (infer_factorial(audio, visual, given) for given in (single, double))
         assert found.audio == pytest.approx(wanted.audio, abs=1e-4)
         assert found.pair == pytest.approx(wanted.pair, abs=1e-4)
         assert found.audio_counts.enter == pytest.approx(wanted.audio_counts.enter, abs=1e-3)

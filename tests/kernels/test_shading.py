@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.normals import normal_sums
+from lipmotion.kernels.normals import sum_normals
 from lipmotion_faces.kernels import shading
 from oracles import shading as oracle
 
@@ -34,7 +34,7 @@ def test_every_bit_is_that_of_the_definition(seed):
 @pytest.mark.usefixtures("form")
 def test_normals_are_those_of_the_triangles_around_a_vertex():
     places = np.array([[0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 5], [9, 9, 9]], float)
-    sums = normal_sums(places, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    sums = sum_normals(places, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     assert sums == pytest.approx(np.array([[15, 0, 6], [0, 0, 6], [15, 0, 6], [15, 0, 0], [0, 0, 0]], float))
 
 

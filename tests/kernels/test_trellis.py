@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.paths import best_segments, cheapest_arrivals, trace_back
+from lipmotion.kernels.paths import find_cheapest, find_segments, trace_back
 from oracles import paths
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -24,7 +24,7 @@ def costs(states: int, frames: int, seed: int):
 @given(states=st.integers(1, 6), frames=st.integers(1, 300), seed=SEEDS)
 def test_every_last_state_is_reached_at_least_cost_by_the_way_traced(states: int, frames: int, seed: int) -> None:
     start, steps = costs(states, frames, seed)
-    arrival, pointers = cheapest_arrivals(start, steps)
+    arrival, pointers = find_cheapest(start, steps)
     assert pointers.shape == (frames, states)
     assert arrival == pytest.approx(paths.arrivals(start, steps))
     for last in range(states):
@@ -36,20 +36,20 @@ def test_every_last_state_is_reached_at_least_cost_by_the_way_traced(states: int
 @given(frames=st.integers(2, 200), cut=st.integers(1, 199), seed=SEEDS)
 def test_stretches_are_the_whole(frames: int, cut: int, seed: int) -> None:
     start, steps = costs(4, frames, seed)
-    whole, pointers = cheapest_arrivals(start, steps)
+    whole, pointers = find_cheapest(start, steps)
     cut = min(cut, frames - 1)
-    between, first = cheapest_arrivals(start, steps[..., :cut])
-    arrival, second = cheapest_arrivals(between, steps[..., cut:])
+    between, first = find_cheapest(start, steps[..., :cut])
+    arrival, second = find_cheapest(between, steps[..., cut:])
     assert arrival == pytest.approx(whole)
     assert np.concatenate([first, second]).tolist() == pointers.tolist()
 
 
 def test_ties_go_to_the_lower_state_and_what_cannot_be_is_not_chosen() -> None:
-    _, pointers = cheapest_arrivals(np.zeros(3), np.zeros((3, 3, 20)))
+    _, pointers = find_cheapest(np.zeros(3), np.zeros((3, 3, 20)))
     assert not pointers.any()
     steps = np.zeros((2, 2, 10))
     steps[:, 0, 5] = np.inf
-    arrival, pointers = cheapest_arrivals(np.array([0.0, np.inf]), steps + np.array([0.0, 1.0])[:, None])
+    arrival, pointers = find_cheapest(np.array([0.0, np.inf]), steps + np.array([0.0, 1.0])[:, None])
     assert trace_back(pointers, int(arrival.argmin())).tolist() == [0, 0, 0, 0, 0, 1, 0, 0, 0, 0]
 
 
@@ -63,7 +63,7 @@ def test_ties_go_to_the_lower_state_and_what_cannot_be_is_not_chosen() -> None:
 )
 def test_no_division_is_cheaper(frames: int, labels: int, hold: int, change: float, seed: int) -> None:
     cost = np.random.default_rng(seed).normal(0, 1, (frames, labels))
-    found = best_segments(cost, hold, change)
+    found = find_segments(cost, hold, change)
     assert paths.is_division(found, frames, hold)
     _, least = paths.best_division(cost, hold, change)
     assert paths.division_cost(found, cost, change) == pytest.approx(least, abs=1e-9)
@@ -73,7 +73,7 @@ def test_no_division_is_cheaper(frames: int, labels: int, hold: int, change: flo
 @given(st.integers(1, 60), st.integers(1, 5), st.integers(0, 2**32 - 1))
 def test_ties_neither_split_nor_shorten(frames: int, hold: int, seed: int) -> None:
     cost = np.random.default_rng(seed).integers(0, 2, (frames, 3)).astype(float)
-    found = best_segments(cost, hold, 0.0)
+    found = find_segments(cost, hold, 0.0)
     assert all(before[1] != after[1] for before, after in pairwise(found))
     assert paths.is_division(found, frames, hold)
 
@@ -81,8 +81,8 @@ def test_ties_neither_split_nor_shorten(frames: int, hold: int, seed: int) -> No
 def test_without_a_hold_it_is_the_cheapest_of_every_frame_and_a_dear_change_leaves_one_segment() -> None:
     cost = np.random.default_rng(1).normal(0, 1, (200, 5))
     labels = np.empty(200, int)
-    for first, label in best_segments(cost, 1, 0.0):
+    for first, label in find_segments(cost, 1, 0.0):
         labels[first:] = label
     assert (labels == cost.argmin(axis=1)).all()
-    assert best_segments(np.empty((0, 9)), 2, 0.5) == []
-    assert best_segments(cost, 2, 1e6) == [(0, int(cost.sum(axis=0).argmin()))]
+    assert find_segments(np.empty((0, 9)), 2, 0.5) == []
+    assert find_segments(cost, 2, 1e6) == [(0, int(cost.sum(axis=0).argmin()))]

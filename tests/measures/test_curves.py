@@ -8,24 +8,24 @@ from lipmotion.measures import closures
 from lipmotion.measures.curves import (
     MIN_CLIPS,
     MIN_SCORE,
-    best_offset,
-    bootstrap_interval,
+    compare_jerk,
+    compare_variance,
+    compute_interval,
+    correlate_clips,
+    correlate_pooled,
     correlation,
-    global_variance_ratio,
-    jerk_ratio,
-    lag_ms,
-    landmark_distance,
-    lip_vertex_error,
-    mean_distance,
-    modulation_distance_db,
-    normalised_rmse,
-    per_clip_correlation,
-    pooled_correlation,
-    pooled_offset,
+    find_distance,
+    find_offset,
+    find_pooled_offset,
+    measure_lag,
+    measure_landmarks,
+    measure_lip_error,
+    measure_modulation_distance,
+    measure_upper_face,
+    normalise_rmse,
     rmse,
     select_moving,
     shift_scores,
-    upper_face_deviation,
 )
 from oracles import matching
 
@@ -61,22 +61,22 @@ def test_pooled_means_are_those_of_all_frames_and_per_clip_of_each():
     """Two clips with correlation 1 each, at two rest poses, one of which is generated wrong."""
     original = [column(0, 1, 0, 1), column(10, 11, 10, 11)]
     generated = [column(0, 1, 0, 1), column(0, 1, 0, 1)]
-    assert per_clip_correlation(generated, original)[0] == pytest.approx(1)
+    assert correlate_clips(generated, original)[0] == pytest.approx(1)
     a, b = np.concatenate(generated)[:, 0], np.concatenate(original)[:, 0]
-    assert pooled_correlation(generated, original)[0] == pytest.approx(np.corrcoef(a, b)[0, 1])
-    assert pooled_correlation(generated, original)[0] < 0.2
+    assert correlate_pooled(generated, original)[0] == pytest.approx(np.corrcoef(a, b)[0, 1])
+    assert correlate_pooled(generated, original)[0] < 0.2
 
 
 def test_distance_is_the_mean_norm_not_its_square():
     generated = [np.array([[3.0, 4.0], [0.0, 0.0]]), np.array([[0.0, 1.0]])]
     original = [np.zeros((2, 2)), np.zeros((1, 2))]
-    assert mean_distance(generated, original) == pytest.approx((5 + 0 + 1) / 3)
+    assert find_distance(generated, original) == pytest.approx((5 + 0 + 1) / 3)
 
 
 def test_error_is_in_units_of_the_channels_deviation():
     original = [column(0, 2), column(0, 2)]
     generated = [column(1, 2), column(0, 3)]
-    assert normalised_rmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4) / 1)
+    assert normalise_rmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4) / 1)
     assert rmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4))
 
 
@@ -85,14 +85,14 @@ def test_error_is_in_units_of_the_channels_deviation():
 def test_predicting_the_mean_is_an_error_of_one_and_a_range_of_none(seed):
     original = clips(seed)
     flat = [np.tile(np.concatenate(original).mean(axis=0), (len(clip), 1)) for clip in original]
-    assert normalised_rmse(flat, original) == pytest.approx([1, 1])
-    assert global_variance_ratio(flat, original) == pytest.approx([0, 0], abs=1e-12)
+    assert normalise_rmse(flat, original) == pytest.approx([1, 1])
+    assert compare_variance(flat, original) == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_range_is_the_ratio_of_mean_deviations():
     original = [column(0, 2), column(0, 6)]  # deviations 1 and 3
     generated = [column(5, 6), column(9, 10)]  # ½ each
-    assert global_variance_ratio(generated, original)[0] == pytest.approx(0.5 / 2)
+    assert compare_variance(generated, original)[0] == pytest.approx(0.5 / 2)
 
 
 @given(seed=SEEDS, gain=st.floats(0.1, 5))
@@ -100,7 +100,7 @@ def test_range_is_the_ratio_of_mean_deviations():
 def test_scaling_scales_range_and_jerk(seed, gain):
     original = clips(seed)
     scaled = [gain * clip + 3 for clip in original]
-    for ratio in (global_variance_ratio, jerk_ratio):
+    for ratio in (compare_variance, compare_jerk):
         assert ratio(original, original) == pytest.approx([1, 1])
         assert ratio(scaled, original) == pytest.approx([gain, gain])
 
@@ -108,7 +108,7 @@ def test_scaling_scales_range_and_jerk(seed, gain):
 def test_jerk_by_hand_never_looks_across_clips():
     original = [column(0, 0, 0, 1), column(100, 100, 100, 102), column(7, 8, 9)]  # third differences 1 and 2, none
     generated = [column(0, 0, 1, 0, 0), column(5, 5, 5, 5), column(0, 50, 0)]  # 3, 3 and 0
-    assert jerk_ratio(generated, original)[0] == pytest.approx(2 / 1.5)
+    assert compare_jerk(generated, original)[0] == pytest.approx(2 / 1.5)
 
 
 def smooth(seed: int, frames: int) -> np.ndarray:
@@ -122,14 +122,14 @@ def test_lag_is_the_shift_and_late_is_positive(seed, late, rate_hz):
     curves = [smooth(seed, 120), smooth(seed + 1, 90)]
     original = [curve[30:-30, None] for curve in curves]
     generated = [curve[30 - late : len(curve) - 30 - late, None] for curve in curves]
-    assert lag_ms(generated, original, rate_hz) == pytest.approx(1000 * late / rate_hz, abs=0.1 * 1000 / rate_hz)
+    assert measure_lag(generated, original, rate_hz) == pytest.approx(1000 * late / rate_hz, abs=0.1 * 1000 / rate_hz)
 
 
 def test_lag_between_frames_of_the_first_channel():
     time_s = np.arange(200) / 25
     original = np.stack([np.sin(4 * time_s), np.zeros(200)], axis=1)
     generated = np.stack([np.sin(4 * (time_s - 0.013)), np.arange(200.0)], axis=1)
-    assert lag_ms([generated], [original], 25.0) == pytest.approx(13, abs=1.5)
+    assert measure_lag([generated], [original], 25.0) == pytest.approx(13, abs=1.5)
 
 
 def test_channels_that_move():
@@ -150,7 +150,7 @@ def test_a_constant_with_rounding_is_a_constant():
         assert correlation(still, wave) == 0
         assert correlation(wave, still) == 0
         assert not select_moving([still], ["a"]).any()
-        for measure in (normalised_rmse, global_variance_ratio, jerk_ratio):
+        for measure in (normalise_rmse, compare_variance, compare_jerk):
             assert np.isnan(measure([wave], [still])).all()
             assert np.isfinite(measure([still], [wave])).all()
 
@@ -161,27 +161,27 @@ WAVES = np.stack([np.sin(2 * np.pi * 3 * TIME_S), np.sin(2 * np.pi * 7 * TIME_S)
 
 def test_half_the_movement_is_six_decibels_at_every_frequency_whatever_moves_when() -> None:
     noise = np.random.default_rng(0).normal(size=(200, 1))
-    assert modulation_distance_db([noise / 2], [noise], 25.0) == pytest.approx([20 * np.log10(2)])
-    assert modulation_distance_db([noise[::-1]], [noise], 25.0) == pytest.approx([0.0], abs=1.0)
+    assert measure_modulation_distance([noise / 2], [noise], 25.0) == pytest.approx([20 * np.log10(2)])
+    assert measure_modulation_distance([noise[::-1]], [noise], 25.0) == pytest.approx([0.0], abs=1.0)
 
 
 def test_movement_at_another_frequency_is_far_away() -> None:
-    assert (modulation_distance_db([WAVES[:, ::-1]], [WAVES], 25.0) > 10).all()
+    assert (measure_modulation_distance([WAVES[:, ::-1]], [WAVES], 25.0) > 10).all()
     faster = WAVES[:, :1] + 0.2 * np.sin(2 * np.pi * 30 * np.arange(800) / 100)[::4, None]
-    assert modulation_distance_db([faster], [WAVES[:, :1]], 25.0) > 1
+    assert measure_modulation_distance([faster], [WAVES[:, :1]], 25.0) > 1
 
 
 def test_a_channel_that_does_not_move_has_no_distance_and_one_that_should_move_a_finite_one() -> None:
     flat = np.zeros((200, 1))
-    assert np.isnan(modulation_distance_db([WAVES[:, :1]], [flat], 25.0)).all()
-    assert 20 < modulation_distance_db([flat], [WAVES[:, :1]], 25.0)[0] < 60
+    assert np.isnan(measure_modulation_distance([WAVES[:, :1]], [flat], 25.0)).all()
+    assert 20 < measure_modulation_distance([flat], [WAVES[:, :1]], 25.0)[0] < 60
 
 
 def test_frequencies_above_speech_do_not_count() -> None:
     time_s = np.arange(800) / 100
     slow = np.random.default_rng(0).normal(size=(80, 1)).repeat(10, axis=0)
     nervous = slow + np.sin(2 * np.pi * 40 * time_s)[:, None]
-    assert modulation_distance_db([nervous], [slow], 100.0) == pytest.approx([0.0], abs=0.1)
+    assert measure_modulation_distance([nervous], [slow], 100.0) == pytest.approx([0.0], abs=0.1)
 
 
 STILL = np.zeros((4, 3, 3))
@@ -192,9 +192,9 @@ def test_the_worst_vertex_of_every_frame_counts_and_the_mean_over_frames() -> No
     made[0, 1] = (3, 0, 4)
     made[0, 2] = (0, 1, 0)
     made[1, 0] = (0, 0, 2)
-    assert lip_vertex_error([made], [STILL]) == pytest.approx((5 + 2) / 4)
-    assert lip_vertex_error([made, STILL[:2]], [STILL, STILL[:2]]) == pytest.approx((5 + 2) / 6)  # frames, not clips
-    assert landmark_distance([made], [STILL]) == pytest.approx((5 + 1 + 2) / 12)
+    assert measure_lip_error([made], [STILL]) == pytest.approx((5 + 2) / 4)
+    assert measure_lip_error([made, STILL[:2]], [STILL, STILL[:2]]) == pytest.approx((5 + 2) / 6)  # frames, not clips
+    assert measure_landmarks([made], [STILL]) == pytest.approx((5 + 1 + 2) / 12)
 
 
 def test_upper_face_deviation_is_how_much_more_the_original_varies_about_its_rest() -> None:
@@ -203,14 +203,14 @@ def test_upper_face_deviation_is_how_much_more_the_original_varies_about_its_res
     original[:, 0, 1] += (0, 2, 0, 2)  # deviates by 1 from its mean
     made = np.repeat(rest[None], 4, axis=0)
     made[:, 0, 2] += (0, -1, 0, -1)  # by a half, elsewhere
-    assert upper_face_deviation([made], [original], rest) == pytest.approx((1 - 0.5) / 2)
-    assert upper_face_deviation([original], [made], rest) == pytest.approx(-(1 - 0.5) / 2)
+    assert measure_upper_face([made], [original], rest) == pytest.approx((1 - 0.5) / 2)
+    assert measure_upper_face([original], [made], rest) == pytest.approx(-(1 - 0.5) / 2)
     raised = made + np.array([0, 0.5, 0])  # a face that is held otherwise does not vary
-    assert upper_face_deviation([raised[:, 1:]], [made[:, 1:]], rest[1:]) == pytest.approx(0)
+    assert measure_upper_face([raised[:, 1:]], [made[:, 1:]], rest[1:]) == pytest.approx(0)
 
 
 def acc(generated, original) -> float:
-    return float(pooled_correlation(generated, original)[0])
+    return float(correlate_pooled(generated, original)[0])
 
 
 def bootstrap_clips(seed: int, count: int = 12):
@@ -223,7 +223,7 @@ def bootstrap_clips(seed: int, count: int = 12):
 @settings(max_examples=10)
 def test_the_interval_holds_the_figure_itself(seed):
     generated, original = bootstrap_clips(seed)
-    low, high = bootstrap_interval(acc, generated, original, seed=0, draws=200)
+    low, high = compute_interval(acc, generated, original, seed=0, draws=200)
     assert low < acc(generated, original) < high
     assert high - low < 0.3
 
@@ -231,14 +231,14 @@ def test_the_interval_holds_the_figure_itself(seed):
 def test_clips_are_drawn_whole_and_together():
     """Every clip has its own value, generated and original alike, so clips that were drawn separately would differ."""
     values = [np.full((3, 1), float(n)) for n in range(5)]
-    assert bootstrap_interval(mean_distance, values, values, seed=0, draws=50) == (0, 0)
+    assert compute_interval(find_distance, values, values, seed=0, draws=50) == (0, 0)
 
 
 def test_95_percent_of_the_draws_lie_inside():
     """The mean of 200 values is nearly normal: 1.96 standard errors to either side."""
     values = np.abs(np.random.default_rng(4).normal(5, 1, 200))
     generated, original = [np.full((1, 1), value) for value in values], [np.zeros((1, 1))] * 200
-    low, high = bootstrap_interval(mean_distance, generated, original, seed=0)
+    low, high = compute_interval(find_distance, generated, original, seed=0)
     assert (low + high) / 2 == pytest.approx(values.mean(), abs=0.02)
     assert high - low == pytest.approx(2 * 1.96 * values.std() / np.sqrt(200), rel=0.07)
 
@@ -266,7 +266,7 @@ def scores(late_frames: float, seed: int = 0, noise: float = 0.0, valid: NDArray
 @settings(max_examples=40)
 @given(st.floats(-30, 30), st.integers(0, 20))
 def test_a_shift_is_found(late_frames: float, seed: int) -> None:
-    found = best_offset(scores(late_frames, seed), RATE_HZ)
+    found = find_offset(scores(late_frames, seed), RATE_HZ)
     assert found.late_s == pytest.approx(late_frames / RATE_HZ, abs=0.002)
     assert found.known
     assert found.low_s == found.late_s == found.high_s
@@ -287,12 +287,12 @@ def test_frames_without_a_face_do_not_count() -> None:
     valid[80:140] = False
     measured = wave(0)
     measured[80:140] = 1e3
-    assert best_offset(shift_scores(wave(-7), measured, valid, REACH), RATE_HZ).late_s == pytest.approx(0.07, abs=0.001)
+    assert find_offset(shift_scores(wave(-7), measured, valid, REACH), RATE_HZ).late_s == pytest.approx(0.07, abs=0.001)
 
 
 def test_unlike_curves_are_not_known() -> None:
     found = [
-        best_offset(shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH), RATE_HZ)
+        find_offset(shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH), RATE_HZ)
         for n in range(20)
     ]
     assert sum(each.known for each in found) <= 4
@@ -301,15 +301,15 @@ def test_unlike_curves_are_not_known() -> None:
 def test_a_repeating_curve_is_not_known() -> None:
     time_s = np.arange(300) / RATE_HZ
     beat = np.sin(2 * np.pi * 5 * time_s)
-    found = best_offset(shift_scores(beat, beat, np.ones(300, bool), REACH), RATE_HZ)
+    found = find_offset(shift_scores(beat, beat, np.ones(300, bool), REACH), RATE_HZ)
     assert found.score > 0.9
     assert not found.known
 
 
 def test_clips_together_know_better_than_each() -> None:
     clips = [scores(6.0, seed, noise=12.0) for seed in range(30)]
-    found = pooled_offset(clips, RATE_HZ)
-    worst_s = max(abs(best_offset(clip, RATE_HZ).late_s - 0.06) for clip in clips)
+    found = find_pooled_offset(clips, RATE_HZ)
+    worst_s = max(abs(find_offset(clip, RATE_HZ).late_s - 0.06) for clip in clips)
     assert abs(found.late_s - 0.06) < 0.01 < worst_s
     assert found.low_s <= found.late_s <= found.high_s
     assert found.low_s < 0.06 < found.high_s or found.high_s - found.low_s < 0.01
@@ -318,14 +318,14 @@ def test_clips_together_know_better_than_each() -> None:
 def test_clips_that_correlate_little_and_agree_are_known_together() -> None:
     """As those of a voice that the prediction has not learned: 0 of 13 are known alone."""
     clips = [scores(6.0, seed, noise=12.0) for seed in range(13)]
-    assert not any(best_offset(clip, RATE_HZ).known for clip in clips)
-    found = pooled_offset(clips, RATE_HZ)
+    assert not any(find_offset(clip, RATE_HZ).known for clip in clips)
+    found = find_pooled_offset(clips, RATE_HZ)
     assert found.score < MIN_SCORE
     assert found.known
-    assert not pooled_offset(clips[: MIN_CLIPS - 1], RATE_HZ).known
+    assert not find_pooled_offset(clips[: MIN_CLIPS - 1], RATE_HZ).known
     others = [shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH) for n in range(len(clips))]
-    assert not pooled_offset(others, RATE_HZ).known
-    assert found == pooled_offset(clips, RATE_HZ)
+    assert not find_pooled_offset(others, RATE_HZ).known
+    assert found == find_pooled_offset(clips, RATE_HZ)
 
 
 def test_clips_shorter_than_the_shifts() -> None:
@@ -349,8 +349,8 @@ def opening(closed: list[int], frames: int = 30) -> np.ndarray:
 
 def test_threshold_is_a_tenth_of_the_95th_percentile_of_all_frames():
     curves = [np.linspace(0, 1, 101), np.linspace(0, 1, 101)]
-    assert closures.closed_threshold(curves) == pytest.approx(0.095, abs=1e-3)
-    assert closures.closed_threshold(curves, share=0.25) == pytest.approx(0.2375, abs=1e-3)
+    assert closures.find_threshold(curves) == pytest.approx(0.095, abs=1e-3)
+    assert closures.find_threshold(curves, share=0.25) == pytest.approx(0.2375, abs=1e-3)
 
 
 def test_a_closing_is_the_first_closed_frame_after_an_open_one():
@@ -388,11 +388,11 @@ def test_near_counts_whichever_is_near(some, others):
 
 def test_figures_by_hand():
     original, generated = [opening([5, 12, 20]), opening([3])], [opening([7, 20, 27]), opening([10])]
-    figures = closures.closure_figures(generated, original, 0.1, 25.0)
+    figures = closures.measure_closures(generated, original, 0.1, 25.0)
     assert (figures.score, figures.precision, figures.f1) == pytest.approx((2 / 4, 2 / 4, 2 * 2 / (4 + 4)))
     assert figures.timing_ms == pytest.approx(1000 * 1 / 25)  # the median of 2 frames late and on time
     assert (figures.original, figures.generated) == (4, 4)
-    figures = closures.closure_figures([opening([11])], [opening([10, 12])], 0.1, 25.0)
+    figures = closures.measure_closures([opening([11])], [opening([10, 12])], 0.1, 25.0)
     assert (figures.score, figures.precision) == (1, 1)  # Hofer's: a point for every original that has one near it
     assert figures.f1 == pytest.approx(2 / 3)  # matched once
     assert abs(figures.timing_ms) == pytest.approx(40)
@@ -400,10 +400,10 @@ def test_figures_by_hand():
 
 def test_a_mouth_that_never_moves_has_no_figures():
     flat = [np.ones(20)]
-    figures = closures.closure_figures(flat, flat, 0.1, 25.0)
+    figures = closures.measure_closures(flat, flat, 0.1, 25.0)
     assert (figures.original, figures.generated) == (0, 0)
     assert np.isnan([figures.score, figures.precision, figures.f1, figures.timing_ms]).all()
-    lost = closures.closure_figures(flat, [opening([5], 20)], 0.1, 25.0)
+    lost = closures.measure_closures(flat, [opening([5], 20)], 0.1, 25.0)
     assert lost.score == lost.f1 == 0
     assert np.isnan(lost.precision)
 
@@ -413,7 +413,7 @@ def test_phone_closures_by_hand():
     phones = [[(0.2, 0.28), (0.6, 0.68), (0.96, 1.04)]]
     original = [opening([6, 14, 20])]  # closes in the first, one frame ahead of the second, and elsewhere
     generated = [opening([8, 12, 25])]  # one frame behind the first, misses the second; the third does not count
-    figures = closures.phone_closures(generated, original, phones, speech_s=30.0, threshold=0.1, rate_hz=25.0)
+    figures = closures.measure_phones(generated, original, phones, speech_s=30.0, threshold=0.1, rate_hz=25.0)
     assert figures.intervals == 2
     assert figures.recall == pytest.approx(1 / 2)
     assert figures.false_per_minute == pytest.approx(1 / 0.5)  # frame 12
@@ -424,17 +424,17 @@ def test_intervals_are_taken_one_frame_longer_at_both_ends():
     """The frames at 0.20, 0.24 and 0.28 s lie inside, so 4 to 8 count."""
     for interval_s in ((0.2, 0.28), (0.165, 0.315)):
         for frame in range(30):
-            figures = closures.phone_closures([opening([frame])], [opening([frame])], [[interval_s]], 60.0, 0.1, 25.0)
+            figures = closures.measure_phones([opening([frame])], [opening([frame])], [[interval_s]], 60.0, 0.1, 25.0)
             assert figures.intervals == (4 <= frame <= 8)
             assert figures.false_per_minute == (not 4 <= frame <= 8 and frame > 0)  # closed from the start is none
 
 
 def test_phones_beyond_the_clip_and_clips_without_phones():
     curves = [opening([6]), opening([29])]
-    figures = closures.phone_closures(curves, curves, [[], [(1.16, 1.4), (2.0, 2.1)]], 60.0, 0.1, 25.0)
+    figures = closures.measure_phones(curves, curves, [[], [(1.16, 1.4), (2.0, 2.1)]], 60.0, 0.1, 25.0)
     assert (figures.recall, figures.intervals) == (1, 1)
     assert figures.false_per_minute == 1
-    nothing = closures.phone_closures(curves, curves, [[], []], 0.0, 0.1, 25.0)
+    nothing = closures.measure_phones(curves, curves, [[], []], 0.0, 0.1, 25.0)
     assert np.isnan([nothing.recall, nothing.false_per_minute, nothing.original_per_minute]).all()
 
 
@@ -447,6 +447,6 @@ def test_closings_found_clip_by_clip_add_up_to_the_score(clips):
         times = [closures.find_closings(side[:, 0], 0.5).tolist() for side in (g, o)]
         assert wanted.tolist() == [len(times[1])]
         assert hit.tolist() == [sum(any(abs(a - b) <= 2 for a in times[0]) for b in times[1])]
-    whole = closures.closure_figures([g[:, 0] for g in generated], [o[:, 0] for o in original], 0.5, 25)
+    whole = closures.measure_closures([g[:, 0] for g in generated], [o[:, 0] for o in original], 0.5, 25)
     assert whole.original == sum(count)
     assert whole.score == pytest.approx(np.sum(hits) / np.sum(count) if np.sum(count) else np.nan, nan_ok=True)

@@ -1,6 +1,6 @@
 from itertools import count
 
-from lipmotion.measures.evaluation_table import figures_table
+from lipmotion.measures.evaluation_table import format_figures
 
 
 def figures():
@@ -76,7 +76,7 @@ def figures():
 
 def test_every_figure_is_printed_as_often_as_it_is_there():
     result, printed = figures()
-    text = figures_table(result)
+    text = format_figures(result)
     assert len(set(printed)) == len(printed)
     words = text.replace(",", " ").replace(";", " ").replace(")", " ").replace("(", " ").split()
     missing = [number for number in printed if number not in words]
@@ -87,9 +87,9 @@ def test_every_figure_is_printed_as_often_as_it_is_there():
 
 def test_what_limits_the_figures_is_said():
     result, _ = figures()
-    assert "trained on some of these" not in figures_table(result)
-    assert "have no words" not in figures_table(result)
-    text = figures_table(result | {"seen_in_training": True, "without_words": 5, "clips": 18})
+    assert "trained on some of these" not in format_figures(result)
+    assert "have no words" not in format_figures(result)
+    text = format_figures(result | {"seen_in_training": True, "without_words": 5, "clips": 18})
     assert "the model was trained on some of these recordings" in text
     assert "no figures with transcript: 5 of 18 clips have no words" in text
 
@@ -99,12 +99,12 @@ def test_figures_that_do_not_exist_are_printed_too():
         result, _ = figures()
         condition = result["conditions"]["audio only"]
         condition[part] = {key: 0 if isinstance(value, int) else None for key, value in condition[part].items()}
-        assert "–" in figures_table(result)
+        assert "–" in format_figures(result)
 
 
 def test_pins_are_named_where_there_are_some():
     result, _ = figures()
-    assert "are pinned" in figures_table(result)
+    assert "are pinned" in format_figures(result)
     for condition in result["conditions"].values():
         del condition["unpinned"]
-    assert "pin" not in figures_table(result)
+    assert "pin" not in format_figures(result)

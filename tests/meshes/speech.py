@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 PHONES = (("sil", 0.0, 0.5), ("m", 0.5, 0.6), ("aa", 0.6, 0.9), ("p", 0.9, 1.0), ("uw", 1.0, 1.3), ("sil", 1.3, 2.0))
@@ -30,7 +30,7 @@ def motion(*, points: bool = True, rate_hz: float = 100.0) -> Motion:
     channels = [Channel("opening"), Channel("width")]
     columns = [opening, width]
     if points:
-        template = mouth_template()
+        template = build_mouth()
         rest = template.places
         half = template.width / 2
         middle = np.sqrt(1 - np.clip(rest[:, 0] / half, -1, 1) ** 2)

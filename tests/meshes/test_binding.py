@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from lipmotion import errors, types
-from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, build_mouth
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.meshes.fitting import blendshape_motion, lip_placement
 from lipmotion.meshes.fitting.shape_weights import (
@@ -46,7 +46,7 @@ def _moved(binding, mesh, chosen, way):
 
 
 def test_the_lower_lip_does_not_drag_the_upper(binding, mesh):
-    template = mouth_template()
+    template = build_mouth()
     moved = _moved(binding, mesh, template.lower | template.jaw, [0, -1, 0])
     middle = np.abs(template.places[:, 0]) < 0.2
     upper = binding.placement.vertices[template.upper & middle]
@@ -61,7 +61,7 @@ def test_the_face_beyond_the_mouth_stands_still(binding, mesh):
     assert binding.weights.min() >= 0
     assert binding.weights.sum(axis=1).max() <= 1 + 1e-9
     assert binding.controls.shape[1] <= MAX_WEIGHTS
-    template = mouth_template()
+    template = build_mouth()
     moved = _moved(binding, mesh, np.ones(len(template.points), bool), [0.3, 0.2, 0.1])
     far = mesh.vertices[:, 1] / SIZE > SEAM + 0.55
     assert np.abs(moved[far]).max() < 1e-9
@@ -70,7 +70,7 @@ def test_the_face_beyond_the_mouth_stands_still(binding, mesh):
 
 
 def test_teeth_follow_the_jaw(binding, mesh):
-    template = mouth_template()
+    template = build_mouth()
     teeth = next(part for part in mesh.parts if part.name == "teeth")
     rows = np.unique(mesh.triangles[teeth.first : teeth.stop])
     moved = _moved(binding, mesh, template.jaw, [0, -0.5, 0])
@@ -115,7 +115,7 @@ def test_painted_weights_replace_those_of_a_vertex(binding, mesh, tmp_path):
     paint = tmp_path / "paint.csv"
     paint.write_text(f"vertex,point,weight\n{vertex},152,0.25\n{vertex},17,0.5\n\n# more\n0,17,2e-1\n")
     after = paint_weights(binding, mesh, binding_files.read_weights(paint))
-    template = mouth_template()
+    template = build_mouth()
     moved = _moved(after, mesh, [template.row(17)], [0, 1, 0])
     assert moved[vertex, 1] == pytest.approx(0.5)
     assert moved[0, 1] == pytest.approx(0.2)
@@ -163,7 +163,7 @@ def _named(mesh):
 
 def _offsets(mesh, placement):
     """How far each lip point is from where the template would have it."""
-    template = mouth_template()
+    template = build_mouth()
     centre = np.array([0, SEAM, 0]) * SIZE
     lips = ~template.jaw & ~template.corner
     wanted = centre[:2] + SIZE * HALF * 2 / template.width * (template.places - template.centre)[lips, :2]
@@ -172,7 +172,7 @@ def _offsets(mesh, placement):
 
 @pytest.mark.parametrize("named", [False, True])
 def test_points_are_where_the_mouth_is_the_upper_ones_on_the_upper_lip(named):
-    mesh, template = head(), mouth_template()
+    mesh, template = head(), build_mouth()
     placement = _named(mesh) if named else lip_placement.place_lips_by_shape(mesh, build_surface(mesh))
     assert _offsets(mesh, placement) < 1.5 * GRID
     assert placement.scale == pytest.approx(SIZE * 2 * HALF / template.width, rel=0.25)
@@ -328,7 +328,7 @@ _EXACT = CurveCosts(ridge=1e-7, smooth=0.0)
 
 def _of(displacements, gap):
     """Motion whose points are displaced so."""
-    template = mouth_template()
+    template = build_mouth()
     places = template.places + displacements
     rest = np.tile(template.places, (30, 1, 1))
     places = np.concatenate([rest, places])
@@ -382,7 +382,7 @@ def test_the_weights_are_never_less_round_than_before():
 
 
 def test_points_of_round_lips_come_together_and_forward():
-    template = mouth_template()
+    template = build_mouth()
     moved = blendshape_motion.move_points(motion(points=False), units()).displacements
     right, left = moved[115, template.row(RIGHT_CORNER)], moved[115, template.row(LEFT_CORNER)]  # uw
     assert right[0] > 0.03

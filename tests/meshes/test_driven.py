@@ -9,7 +9,7 @@ from lipmotion import Staging
 from lipmotion.articulation.contact import CLOSED_OPENING, opening_to_gap
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
-from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting import driven, eyes_and_brows, lip_placement, shape_weights
 from lipmotion.meshes.fitting.blendshape_motion import (
@@ -109,13 +109,13 @@ def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_p
     write_glb(tmp_path / "head.glb", _expressive("Happy", "surprised"))
     character = load_character(tmp_path / "head.glb")
     moved = with_moods(motion(), parse_moods("happy:0.5, afraid at 1.5"))
-    mouth = spoken_mouth(moved, units())
+    mouth = find_mouth(moved, units())
     weights = character.expressions(moved, mouth)
     assert {*weights} == {"Happy", "surprised"}
     assert weights["Happy"][:100] == pytest.approx(0.5)
     assert weights["surprised"][-1] == pytest.approx(0.5)
     shut = with_moods(motion(), parse_moods("afraid"))
-    surprised = character.expressions(shut, spoken_mouth(shut, units()))["surprised"]
+    surprised = character.expressions(shut, find_mouth(shut, units()))["surprised"]
     assert surprised[[20, 75]] == pytest.approx(0.5, abs=0.05)
     assert surprised[[55, 95]] == pytest.approx(0, abs=0.01)  # m, p
     plain, happy = (next(character.vertices(of, units(), TIME_S)) for of in (motion(), moved))
@@ -125,7 +125,7 @@ def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_p
 def test_characters_with_finer_shapes_do_not_show_whole_expressions(files):
     character = load_character(files / "head.glb")
     moved = with_moods(motion(), parse_moods("happy"))
-    assert not character.expressions(moved, spoken_mouth(moved, units()))
+    assert not character.expressions(moved, find_mouth(moved, units()))
     weights, plain = (character.weights(of, units()) for of in (moved, motion()))
     assert weights["mouthSmileLeft"][20] > plain["mouthSmileLeft"][20] + 0.5
 
@@ -416,15 +416,13 @@ def test_the_3d_head_shows_what_was_captured() -> None:
 def test_every_phone_has_a_viseme_and_silence_and_closures_have_theirs():
     assert set(shape_weights.VISEME_OF_PHONE) == set(PHONES)
     assert set(shape_weights.VISEME_OF_PHONE.values()) == set(shape_names.VISEMES_15)
-    found = shape_weights.weigh_visemes(units(), spoken_mouth(motion(), units()))
+    found = shape_weights.weigh_visemes(units(), find_mouth(motion(), units()))
     assert found["viseme_sil"][[0, 20, 160, 200]] == pytest.approx([1, 1, 1, 1])
     assert found["viseme_PP"][[55, 95]] == pytest.approx([1, 1])
     assert found["viseme_aa"][75] > 0.9
     assert found["viseme_ou"][115] > 0.6
     nothing, closed = Timeline(()), Motion(np.zeros((5, 1)), 25.0, (Channel("opening"),))
-    assert shape_weights.weigh_visemes(nothing, spoken_mouth(closed, nothing))["viseme_sil"] == pytest.approx(
-        np.ones(5)
-    )
+    assert shape_weights.weigh_visemes(nothing, find_mouth(closed, nothing))["viseme_sil"] == pytest.approx(np.ones(5))
 
 
 @settings(max_examples=25)
@@ -441,13 +439,13 @@ def test_visemes_add_up_to_1_or_less_and_held_ones_to_1(phones, rate_hz, opening
     frames = int(rate_hz * (end + 0.5)) + 1
     still = Motion(np.full((frames, 1), opening), rate_hz, (Channel("opening"),))
     said = Timeline(tuple(spans))
-    motion = shape_weights.weigh_visemes(said, spoken_mouth(still, said))
-    held = shape_weights.weigh_visemes(said, spoken_mouth(still, said), held=True)
+    motion = shape_weights.weigh_visemes(said, find_mouth(still, said))
+    held = shape_weights.weigh_visemes(said, find_mouth(still, said), held=True)
     np.testing.assert_allclose(held.values.sum(axis=1), 1, atol=1e-9)
     assert motion.values.sum(axis=1).max() <= 1 + 1e-9
     assert motion.values.min() >= 0
     closed = motion["viseme_sil"] + motion["viseme_PP"]
-    contact = spoken_mouth(still, said).contact
+    contact = find_mouth(still, said).contact
     assert closed[contact] == pytest.approx(1)
     assert closed[~contact].max(initial=0) <= shape_weights.MAX_CLOSED_WEIGHT + 1e-9
 
@@ -457,7 +455,7 @@ def test_visemes_follow_how_open_and_how_round_the_mouth_is():
     found = {}
     for opening in (0.03, 0.1, 0.25):
         still = Motion(np.full((150, 1), opening), 100.0, (Channel("opening"),))
-        found[opening] = shape_weights.weigh_visemes(said, spoken_mouth(still, said))
+        found[opening] = shape_weights.weigh_visemes(said, find_mouth(still, said))
     hissed = [found[opening]["viseme_SS"][50] for opening in (0.03, 0.1)]
     assert 0.2 < hissed[0] < hissed[1] - 0.2
     assert found[0.25]["viseme_aa"][50] > found[0.1]["viseme_aa"][50] + 0.2

@@ -248,7 +248,7 @@ def test_expressions_of_a_vrm_animation(tmp_path: Path) -> None:
     motion, _ = read_motion(animated(tmp_path, [0, 1 / 30, 2 / 30], rows, "LINEAR", target, name="a.vrma"))
     assert (motion.rate_hz, motion.names) == (30, ("eyeBlinkLeft", "eyeBlinkRight"))
     assert motion["eyeBlinkRight"] == pytest.approx([0, 0.75, 1], abs=1e-6)
-    assert {".glb", ".gltf", ".vrma"} <= {*formats.readable_suffixes()}
+    assert {".glb", ".gltf", ".vrma"} <= {*formats.list_read_suffixes()}
 
 
 def test_what_moves_no_face_or_is_damaged_is_refused(tmp_path: Path) -> None:

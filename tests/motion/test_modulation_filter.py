@@ -3,7 +3,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.errors import ModelFormatError
-from lipmotion.measures.curves import modulation_distance_db
+from lipmotion.measures.curves import measure_modulation_distance
 from lipmotion.motion.modulation_filter import (
     HOLD_FRAMES,
     MODULATION,
@@ -26,8 +26,8 @@ FILTER = fit_modulation_filter(RECORDED, GENERATED)
 
 def test_the_filtered_motion_has_the_spectrum_of_the_recorded_motion() -> None:
     filtered = [FILTER.apply(clip) for clip in GENERATED]
-    before = modulation_distance_db(GENERATED, RECORDED, FRAME_RATE_HZ)
-    after = modulation_distance_db(filtered, RECORDED, FRAME_RATE_HZ)
+    before = measure_modulation_distance(GENERATED, RECORDED, FRAME_RATE_HZ)
+    after = measure_modulation_distance(filtered, RECORDED, FRAME_RATE_HZ)
     assert (after < 0.25 * before).all()
     same = fit_modulation_filter(RECORDED, RECORDED).apply(RECORDED[0])
     assert same == pytest.approx(RECORDED[0], abs=1e-9)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.engines import Engine, engine_from_settings, engine_named
+from lipmotion.engines import Engine, create_engine, engine_named
 from lipmotion.engines.trajectory.model import NETWORK_SHARE
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.extensions import GROUPS
@@ -92,11 +92,11 @@ def test_a_model_whose_predictor_is_not_installed_says_so() -> None:
 def test_a_name_that_is_none_is_refused_before_the_training(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("trajectory", "selection"):
         with pytest.raises(InputError, match="no predictor 'frames'; there are: network, posteriors, prior"):
-            engine_from_settings(name, settings=["predictor=frames"])
+            create_engine(name, settings=["predictor=frames"])
     point = metadata.EntryPoint("frames", "json:dumps", predictors.PREDICTORS.group)
     monkeypatch.setitem(predictors.PREDICTORS.__dict__, "_installed", {"frames": point})
     with pytest.raises(InputError, match="required a class of Predictor of this name"):
-        engine_from_settings("trajectory", settings=["predictor=frames"])
+        create_engine("trajectory", settings=["predictor=frames"])
     assert predictors.PREDICTORS.group in GROUPS
 
 

@@ -13,7 +13,7 @@ from formats.examples import of_motion
 from lipmotion import Delivery, Edits, Model, Request, Session, Staging, cues, read_motion
 from lipmotion.articulation.contact import LEAST_GAP, opening_to_gap
 from lipmotion.articulation.lip_points import FACING
-from lipmotion.articulation.mouth import LIP_SPEED, frame_times, spoken_mouth
+from lipmotion.articulation.mouth import LIP_SPEED, find_mouth, frame_times
 from lipmotion.formats import write_motion
 from lipmotion.formats.fap import FAP
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, vowel_mouth, with_mouth
@@ -185,7 +185,7 @@ def _readers(characters: dict[str, Any]) -> dict[str, Reader]:
 
 
 def _check(generation: Generation, fps: float, readers: dict[str, Reader]) -> None:
-    mouth = spoken_mouth(with_mouth(generation.motion), generation.units, fps)
+    mouth = find_mouth(with_mouth(generation.motion), generation.units, fps)
     assert 0 < mouth.contact.sum() < 0.8 * len(mouth.contact)
     for name, read in readers.items():
         wrong = np.flatnonzero(read(generation, fps) != mouth.contact)
@@ -206,14 +206,14 @@ def test_files_of_vowels_have_the_same_contact(kind, name, tmp_path):
     generation = deliver(KINDS[kind](), Delivery())
     write_motion(tmp_path / name, fit_to_format(Path(name), generation, generation, None), source={}, model={})
     read, _ = read_motion(tmp_path / name)
-    contact = spoken_mouth(with_mouth(generation.motion), generation.units, read.rate_hz).contact
+    contact = find_mouth(with_mouth(generation.motion), generation.units, read.rate_hz).contact
     assert np.flatnonzero(_closed(read)[: len(contact)] != contact).tolist() == []
 
 
 def _closures_kept(kind: str, mood: str) -> Generation:
     """Return motion in a mood; every p, b and m closes the lips in it for as long as in none."""
     generation, moody = (deliver(KINDS[kind](), Delivery(mood=name)) for name in ("", mood))
-    plain, mouth = (spoken_mouth(with_mouth(each.motion), each.units).contact for each in (generation, moody))
+    plain, mouth = (find_mouth(with_mouth(each.motion), each.units).contact for each in (generation, moody))
     time_s = generation.motion.time_s
     for span, closing in zip(generation.units, mark_closing_phones(generation.units), strict=True):
         within = (span.start_s <= time_s) & (time_s < span.end_s)

@@ -10,7 +10,7 @@ import pytest
 from lipmotion import Delivery, Request, animate, cues, read_motion, speak, write
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.liveliness import Liveliness
-from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import InputError
 from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_living_curves, eye_and_brow_weights
@@ -145,7 +145,7 @@ def test_files_of_motion_hold_moods(generation, tmp_path, suffix):
     write(generation, path, delivery=Delivery(mood="sad:0.5"))
     found = read_generation(path).motion
     assert found.channels[-1] == Channel("mood_sad", WEIGHT)
-    assert spoken_mouth(found, generation.units).frown.max() > 0.2
+    assert find_mouth(found, generation.units).frown.max() > 0.2
 
 
 def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(generation, tmp_path):

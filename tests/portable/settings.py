@@ -14,7 +14,7 @@ CORES = {
 Features have NumPy's names. On a processor without them a process ends at the first such instruction."""
 BEFORE_AVX = {"OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
 """A processor without AVX, also in NumPy's own loops."""
-KERNELS = "from lipmotion.kernels.compiler import blas_kernels; print('; '.join(blas_kernels()))"
+KERNELS = "from lipmotion.kernels.compiler import list_blas_kernels; print('; '.join(list_blas_kernels()))"
 
 
 def environment(changes: dict[str, str]) -> dict[str, str]:

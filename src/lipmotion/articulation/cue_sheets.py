@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import find_phrases
 from lipmotion.errors import InputError, shorten
-from lipmotion.kernels.paths import best_segments
+from lipmotion.kernels.paths import find_segments
 from lipmotion.types import CurveEdit, Generation, Hold, Motion, Span, Timeline, Unit
 from lipmotion.types.edits import Locked
 from lipmotion.types.values import parse_clock, parse_number
@@ -80,16 +80,16 @@ def frame_to_seconds(frame: int, fps: float) -> float:
     return (hundredths + (fps < 100 and int(fps * (hundredths / 100)) < frame)) / 100
 
 
-def cue_frame_count(duration_s: float, fps: float) -> int:
+def count_cue_frames(duration_s: float, fps: float) -> int:
     """Return the number of frames that begin before the end, which is cut to hundredths of a second."""
-    end_s = whole_hundredths(duration_s)
+    end_s = round_to_hundredths(duration_s)
     frames = int(np.ceil(end_s * fps))
     while frames and frame_to_seconds(frames - 1, fps) >= end_s:
         frames -= 1
     return frames
 
 
-def whole_hundredths(duration_s: float) -> float:
+def round_to_hundredths(duration_s: float) -> float:
     """Return a duration cut to hundredths of a second."""
     return int(duration_s * 100 + 1e-6) / 100
 
@@ -98,7 +98,7 @@ def lay_out_cues(segments: Sequence[tuple[int, str]], duration_s: float, fps: fl
     """Return the cue sheet of segments (first frame, shape); without segments, the mouth is at rest."""
     starts = [frame_to_seconds(frame, fps) for frame, _ in segments] or [0.0]
     shapes = [shape for _, shape in segments] or [choose_drawn_shape(REST, drawn)]
-    ends = [*starts[1:], whole_hundredths(duration_s)]
+    ends = [*starts[1:], round_to_hundredths(duration_s)]
     return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
 
 
@@ -153,7 +153,7 @@ ANY_SHAPE: tuple[PhoneShapes, ...] = (PhoneShapes(1, "ABCDEF"),)
 """For speech without known phones: the motion alone decides, also whether the lips are open."""
 
 
-def shapes_of_phone(phone: str) -> tuple[PhoneShapes, ...]:
+def list_phone_shapes(phone: str) -> tuple[PhoneShapes, ...]:
     """Return the shapes that suit each part of a phone; an empty text stands for an unknown phone."""
     return PHONE_SHAPES.get(phone, ANY_OPEN) if phone else ANY_SHAPE
 
@@ -180,20 +180,20 @@ _NAMES = "".join(SHAPES)
 _POSES = np.array([(shape.opening, shape.spread) for shape in SHAPES.values()])
 
 
-def frame_costs(generation: Generation, frames: int, fps: float, intensity: float = 1.0) -> Array:
+def compute_frame_costs(generation: Generation, frames: int, fps: float, intensity: float = 1.0) -> Array:
     """Return the cost of every one of ``SHAPES`` in every frame [shape=(frames, 9)].
 
     Frame k is shown from ``k / fps`` to ``(k + 1) / fps``; phones and motion count by their share of that time.
     """
     edges_s = np.arange(frames + 1) / fps
-    silence = _phone_values(shapes_of_phone(SILENCE)[0], silent=True)
+    silence = find_phone_values(list_phone_shapes(SILENCE)[0], silent=True)
     bounds_s, sums = [-LEAD_S], [np.zeros_like(silence)]
     for span in generation.units:
         start_s = span.start_s - LEAD_S
-        for part in shapes_of_phone(span.label.phone):
+        for part in list_phone_shapes(span.label.phone):
             duration_s = part.share * span.duration_s
             bounds_s += [start_s, start_s + duration_s]
-            sums += [sums[-1], sums[-1] + duration_s * (_phone_values(part, is_silent(span.label.phone)) - silence)]
+            sums += [sums[-1], sums[-1] + duration_s * (find_phone_values(part, is_silent(span.label.phone)) - silence)]
             start_s += duration_s
     phone_values = silence + _average_between(np.array(bounds_s), np.array(sums), edges_s)
     cost, voiced, nominal = phone_values[:, : len(_NAMES)].copy(), phone_values[:, -3], phone_values[:, -2:]
@@ -249,7 +249,7 @@ def _find_least_open_s(span: Span[Unit], motion: Motion) -> float:
     return float((first + int(motion["opening"][first:stop].argmin())) / motion.rate_hz + 1e-9)
 
 
-def _phone_values(part: PhoneShapes, silent: bool) -> Array:
+def find_phone_values(part: PhoneShapes, silent: bool) -> Array:
     """Return the costs of all shapes in a part of a phone, whether it is speech, opening and spread [shape=(12,)]."""
     costs = [(part.best, 0.0), (part.allowed, ALLOWED_COST), (SPECIAL, MISPLACED_COST), (_NAMES, OTHER_COST)]
     cost = [next(value for names, value in costs if name in names) for name in _NAMES]
@@ -288,11 +288,11 @@ def _average_between(time_s: Array, sums: Array, edges_s: Array) -> Array:
 
 
 CHANGE_COST = 0.35
-"""Cost of a change of shape, in the unit of ``frame_costs``."""
+"""Cost of a change of shape, in the unit of ``compute_frame_costs``."""
 HOLD_S = 2 / 24
 
 
-def default_hold_frames(fps: float) -> int:
+def choose_hold_frames(fps: float) -> int:
     """Return the number of frames nearest to two frames at 24 fps, the shortest hold of a mouth in animation."""
     return max(1, int(HOLD_S * fps + 0.5))
 
@@ -310,19 +310,19 @@ def choose_cues(
     hold_frames : minimum length of a cue in frames, > 0; a shorter recording has one cue
     optional    : which of the shapes G, H and X the character has
     intensity   : openings and spread so many times as large, before shapes are chosen
-    The result is exact: of all sequences that keep the hold, the one of least cost (``best_segments``).
+    The result is exact: of all sequences that keep the hold, the one of least cost (``find_segments``).
     Cost: about 10 µs a frame.
     """
     motion = generation.motion
     drawn = "".join(name for name, shape in SHAPES.items() if not shape.fallback or name in optional)
     duration_s = max(0.0, (len(motion.values) - 1) / motion.rate_hz, *(span.end_s for span in generation.units))
-    frames = cue_frame_count(duration_s, fps)
+    frames = count_cue_frames(duration_s, fps)
     cost = np.empty((0, len(drawn)))
     if frames:  # of the drawn shapes: the least cost of those that each one stands for
-        costs = frame_costs(generation, frames, fps, intensity)
+        costs = compute_frame_costs(generation, frames, fps, intensity)
         groups = [[choose_drawn_shape(other, drawn) == name for other in SHAPES] for name in drawn]
         cost = np.stack([costs[:, group].min(axis=1) for group in groups], axis=1)
-    segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE_COST)
+    segments = find_segments(cost, hold_frames or choose_hold_frames(fps), CHANGE_COST)
     sheet = lay_out_cues([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
     return replace(sheet, words=Timeline(tuple(span for span in group_words(generation.units) if span.label)))
 

@@ -52,7 +52,7 @@ def apply_curve_edits(
     for edit in edits:
         if isinstance(edit, Hold):
             frame = min(round(edit.start_s * motion.rate_hz), len(values) - 1)
-            share = span_weight(time_s, edit.start_s, edit.end_s, LOCK_EDGE_S)[:, None] * phonetic
+            share = weigh_span(time_s, edit.start_s, edit.end_s, LOCK_EDGE_S)[:, None] * phonetic
             values += share * (values[frame] - values)
         if isinstance(edit, Hold | Locked):
             continue
@@ -71,11 +71,11 @@ def apply_curve_edits(
                 drawn = PchipInterpolator(np.linspace(edit.start_s, edit.end_s, len(edit.values)), edit.values)
                 lacking = drawn(time_s[inside]) - values[inside, column]
                 nearest = np.clip(np.arange(len(values)), inside[0], inside[-1]) - inside[0]
-                share = span_weight(time_s, time_s[inside[0]], time_s[inside[-1]], PIN_REACH_S)
+                share = weigh_span(time_s, time_s[inside[0]], time_s[inside[-1]], PIN_REACH_S)
                 values[:, column] += lacking[nearest] * share
             continue
         still = 0.0 if is_weight else float(np.median(values[rest, column]))
-        factor = 1 + (edit.factor - 1) * span_weight(time_s, edit.start_s, edit.end_s, GAIN_EDGE_S)
+        factor = 1 + (edit.factor - 1) * weigh_span(time_s, edit.start_s, edit.end_s, GAIN_EDGE_S)
         values[:, column] = still + factor * (values[:, column] - still)
         if edit.channel == OPENING:  # closed lips are closer than at rest
             values[:, column] = np.maximum(values[:, column], 0)
@@ -85,7 +85,7 @@ def apply_curve_edits(
     values[:, weights] = np.clip(values[:, weights], 0, 1)
     for lock in locked:
         before = apply_curve_edits(motion, units, lock.edits, held=held).values
-        values += span_weight(time_s, lock.start_s, lock.end_s, LOCK_EDGE_S)[:, None] * (before - values)
+        values += weigh_span(time_s, lock.start_s, lock.end_s, LOCK_EDGE_S)[:, None] * (before - values)
     return replace(motion, values=values)
 
 
@@ -98,7 +98,7 @@ def check_drawn(edit: DrawnCurve, *, is_weight: bool) -> None:
 
 def apply_gain(generation: Generation, gain: Gain) -> Generation:
     """Return a generation whose mouth moves more, or less, for a time; what is closed stays so (``intensify``)."""
-    weight = span_weight(generation.motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
+    weight = weigh_span(generation.motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
     return apply_stretch(generation, _cut_stretch(intensify(generation, gain.factor), weight))
 
 
@@ -108,7 +108,7 @@ def hold_mouth(generation: Generation, hold: Hold) -> Generation:
     All that phones ask of lips and tongue becomes channels (``SAID``), which stay, too; the opening alone decides how
     far the lips are apart (``EDITED``). They leave the hold no faster than ``LIP_SPEED``.
     """
-    from lipmotion.articulation.mouth import LIP_SPEED, spoken_mouth
+    from lipmotion.articulation.mouth import LIP_SPEED, find_mouth
 
     units = generation.units
     generation = generation.with_motion(with_gestures(generation.motion, units, (*SAID, EDITED[OPENING])))
@@ -116,7 +116,7 @@ def hold_mouth(generation: Generation, hold: Hold) -> Generation:
     frame, after_s = min(round(hold.start_s * motion.rate_hz), len(motion.values) - 1), LOCK_EDGE_S
     pose = motion.values[frame].copy()
     if OPENING in motion.names:
-        column, gap = motion.column(OPENING), spoken_mouth(motion, units).gap[frame]
+        column, gap = motion.column(OPENING), find_mouth(motion, units).gap[frame]
         if abs(gap - read_gap(motion)[frame]) > SAME_GAP:
             further = gap_to_opening(gap) - pose[column]
             pose[[motion.column(name) for name in (OPENING, "outer") if name in motion.names]] += further
@@ -124,7 +124,7 @@ def hold_mouth(generation: Generation, hold: Hold) -> Generation:
         after_s = max(after_s, np.pi / 2 * np.abs(leaving - pose[column]).max(initial=0.0) / LIP_SPEED)
     pose[motion.column(EDITED[OPENING])] = 1.0
     still = replace(motion, values=np.broadcast_to(pose, motion.values.shape))
-    weight = span_weight(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S, after_s)
+    weight = weigh_span(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S, after_s)
     return apply_stretch(generation, _cut_stretch(replace(generation, motion=still), weight))
 
 
@@ -132,7 +132,7 @@ def mark_edited(motion: Motion, edits: Sequence[CurveEdit]) -> Motion:
     """Return motion that says where pins and what is drawn have decided its channels (``EDITED``)."""
     for channel, name in EDITED.items():
         decided = [edit for edit in edits if edit.channel == channel and isinstance(edit, Pin | DrawnCurve)]
-        share = edited_share(motion.time_s, decided)
+        share = weigh_edits(motion.time_s, decided)
         if share.any():
             motion = with_gestures(motion, Timeline(()), [name])
             values = motion.values.copy()
@@ -141,11 +141,11 @@ def mark_edited(motion: Motion, edits: Sequence[CurveEdit]) -> Motion:
     return motion
 
 
-def edited_share(time_s: Curve, edits: Sequence[CurveEdit]) -> Curve:
+def weigh_edits(time_s: Curve, edits: Sequence[CurveEdit]) -> Curve:
     """Return how far some of the edits act at each time, 0 to 1 [shape=(T,)]."""
     ends = [(edit.time_s,) * 2 if isinstance(edit, Pin) else (edit.start_s, edit.end_s) for edit in edits]
     none = np.zeros(len(time_s))
-    return np.max([none, *(span_weight(time_s, *each, PIN_REACH_S) for each in ends)], axis=0)
+    return np.max([none, *(weigh_span(time_s, *each, PIN_REACH_S) for each in ends)], axis=0)
 
 
 class MotionStretch(NamedTuple):
@@ -165,7 +165,7 @@ class MotionStretch(NamedTuple):
 
 def cut_locked_stretch(generation: Generation, start_s: float, end_s: float) -> MotionStretch:
     """Return what a lock keeps of motion from ``start_s`` to ``end_s``, and beside this span."""
-    return _cut_stretch(generation, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
+    return _cut_stretch(generation, weigh_span(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
 
 
 def _cut_stretch(generation: Generation, weight: Curve) -> MotionStretch:
@@ -185,7 +185,7 @@ def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
     return replace(first, motion=replace(first.motion, values=values), spread=variance)
 
 
-def span_weight(time_s: Curve, start_s: float, end_s: float, edge_s: float, after_s: float | None = None) -> Curve:
+def weigh_span(time_s: Curve, start_s: float, end_s: float, edge_s: float, after_s: float | None = None) -> Curve:
     """Return 1 within a span, falling to 0 within ``edge_s`` before it and ``after_s`` (None: the same) after it
     [shape=(T,)].
     """

@@ -105,7 +105,7 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
         motion=Motion(values, rate_hz, motion.channels),
         spread=generation.change_frames(lambda rows: rows[nearest]),
         units=shift_units(
-            generation.units, by_s, max(duration_s, _end_s(generation.units) + delivery.offset_ms / 1000)
+            generation.units, by_s, max(duration_s, _find_end(generation.units) + delivery.offset_ms / 1000)
         ),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
         curve_edits=_shift_edits(generation.curve_edits, by_s, duration_s),
@@ -238,9 +238,9 @@ def find_closed_times(generation: Generation) -> list[float]:
 def delay_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:
     """Return the phones in the time of the sound, for label files: later by the offset, without the anticipation."""
     later_s = delivery.offset_ms / 1000
-    return shift_units(units, later_s, max(_end_s(units), end_s) + later_s) if later_s else units
+    return shift_units(units, later_s, max(_find_end(units), end_s) + later_s) if later_s else units
 
 
-def _end_s(units: Timeline[Unit]) -> float:
+def _find_end(units: Timeline[Unit]) -> float:
     """Return the end of the last phone, which may be after the last frame; 0 without phones."""
     return max((span.end_s for span in units), default=0.0)

@@ -45,7 +45,7 @@ class MoodRow(NamedTuple):
 
 
 @cache
-def mood_rows() -> tuple[MoodRow, ...]:
+def list_mood_rows() -> tuple[MoodRow, ...]:
     """Return the rows of the table ``moods.csv``."""
     text = resources.files("lipmotion.articulation").joinpath("moods.csv").read_text(encoding="ascii")
     return tuple(
@@ -55,9 +55,9 @@ def mood_rows() -> tuple[MoodRow, ...]:
 
 
 @cache
-def mood_table() -> Mapping[str, Mapping[int, float]]:
+def read_mood_table() -> Mapping[str, Mapping[int, float]]:
     """Return the intensity of the action units of each mood, 0 to 1."""
-    return {mood: {row.unit: row.intensity for row in mood_rows() if row.mood == mood} for mood in MOODS}
+    return {mood: {row.unit: row.intensity for row in list_mood_rows() if row.mood == mood} for mood in MOODS}
 
 
 def is_mood(channel: str) -> bool:
@@ -88,7 +88,7 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
     return Motion(values, motion.rate_hz, channels)
 
 
-def action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
+def list_action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
     """Return the action units that moods ask for, 0 to 1 [each shape=(N,)], at times (None: all frames); none if
     neutral.
     """
@@ -98,7 +98,7 @@ def action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve
             strength = np.clip(motion[name].astype(np.float64), 0, 1)
             if time_s is not None:
                 strength = np.interp(time_s, motion.time_s, strength)
-            for unit, intensity in mood_table()[name[len(PREFIX) :]].items():
+            for unit, intensity in read_mood_table()[name[len(PREFIX) :]].items():
                 units[unit] = units.get(unit, 0.0) + intensity * strength
     return {unit: np.clip(curve, 0, 1) for unit, curve in units.items()}
 

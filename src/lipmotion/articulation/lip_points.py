@@ -77,7 +77,7 @@ class MouthTemplate:
 
 
 @cache
-def mouth_template() -> MouthTemplate:
+def build_mouth() -> MouthTemplate:
     """Return the template of the table ``lip_points.csv``."""
     text = resources.files("lipmotion.articulation").joinpath("lip_points.csv").read_text(encoding="ascii")
     rows = list(csv.DictReader(text.splitlines()))
@@ -101,7 +101,7 @@ def make_symmetrical(motion: Motion, asymmetry: float = 0.0) -> Motion:
     asymmetry : 0 to 1: the share that is left of the difference between the sides of the speaker's own mouth
     Points are in the head frame: x to the speaker's left, 0 between the eyes.
     """
-    template, names = mouth_template(), {*motion.names}
+    template, names = build_mouth(), {*motion.names}
     if asymmetry >= 1 or not names.issuperset(f"{axis}_{point}" for point in template.points for axis in "xyz"):
         return motion
     values = motion.values.copy()

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import smooth_step
-from lipmotion.articulation.expression import action_units
+from lipmotion.articulation.expression import list_action_units
 from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
 from lipmotion.units import group_words, is_silent
 
@@ -161,7 +161,7 @@ def compute_liveliness(  # noqa: PLR0913
     lids = lid_closure(time_s, blink_times(end_s, spoken, words, _generator(seed, 2))) if blinks else still
     aim = _aim_eyes(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
     raised = _raise_brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
-    mood, eyes = action_units(motion, time_s), aim - GAZE_COUNTER_SHARE * turn[:, :2]
+    mood, eyes = list_action_units(motion, time_s), aim - GAZE_COUNTER_SHARE * turn[:, :2]
     if mood and brows:  # it comes and goes in the upper face, and grows with accents
         slow = np.tanh(sway(time_s, _generator(seed, 5), 0.06, 0.3))
         accented = _at(_smooth(accent, 0.2), time_s + BROW_LEAD_S) - 0.4

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import GAP, close_lips, read_edited, read_gap, sample_pictures
-from lipmotion.articulation.expression import action_units
+from lipmotion.articulation.expression import list_action_units
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, SAID, TIP_OUT, TIP_UP, gesture_curves
 from lipmotion.articulation.rest import find_rest_frames, measure_at_rest
@@ -165,7 +165,7 @@ class MouthAtRest(NamedTuple):
 
 
 def measure_mouth_at_rest(motion: Motion, units: Timeline[Unit]) -> MouthAtRest:
-    """Return the sizes of the rest pose of a motion. Raises InputError: as ``spoken_mouth``."""
+    """Return the sizes of the rest pose of a motion. Raises InputError: as ``find_mouth``."""
     check_spoken(motion, motion.rate_hz)
     rest, across, thickness = find_rest_frames(motion, units), _width(motion), _thickness(motion)
     name = "width" if "width" in motion.names else "distance of the lip corners"
@@ -194,7 +194,7 @@ def frame_times(frames: int, rate_hz: float, fps: float) -> Curve:
     return np.arange(int(np.floor((frames - 1) / rate_hz * fps + 1e-9)) + 1) / fps
 
 
-def spoken_mouth(
+def find_mouth(
     motion: Motion, units: Timeline[Unit], fps: float | None = None, at_rest: MouthAtRest | None = None
 ) -> SpokenMouth:
     """Return the mouth of a motion and its phones in every frame.
@@ -216,7 +216,7 @@ def spoken_mouth(
     # w has half the press of p, with protruded lips: a hole that is almost closed
     weights["pursed"] = np.clip(weights["lip_press"] / (0.8 * PURSED_PRESS), 0, 1) * weights["protrusion"]
     weights["pursed"] *= np.clip((0.75 - weights["lip_press"]) / 0.15, 0, 1)
-    mood, gap = action_units(motion), read_gap(motion)
+    mood, gap = list_action_units(motion), read_gap(motion)
     parting = ((25, PARTED_GAP), (26, DROPPED_GAP), (10, RAISED_GAP))
     if any(unit in mood for unit, _ in parting):  # where the lips are free, hardly where they are far apart
         wanted = sum(length * mood[unit] for unit, length in parting if unit in mood)
@@ -230,7 +230,7 @@ def spoken_mouth(
     thickness, fullness = _thickness(motion), 1 - 0.4 * np.clip(opening, 0, 0.4)
     if thickness is not None and rest.thickness is not None:
         fullness = np.clip(thickness / rest.thickness, 0.75, 1.25)
-    jaw = usual = jaw_drop(gap)
+    jaw = usual = drop_jaw(gap)
     if rest.chin is not None:  # as tracked (point 152, y upwards), within limits that suit the gap
         drop = rest.chin - motion["y_152"].astype(np.float64)
         jaw = np.clip(drop, LEAST_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)
@@ -262,14 +262,14 @@ def check_spoken(motion: Motion, fps: float) -> None:
             )
 
 
-def upper_share(gap: Any) -> Any:
+def weigh_upper(gap: Any) -> Any:
     """Return how far the upper lip rises for a gap; the rest of the gap is the lower lip's. Source: GRID speaker 1."""
     return LARGEST_UPPER_RISE * (1 - np.exp(-UPPER_RATE * np.asarray(gap)))
 
 
-def jaw_drop(gap: Any) -> Any:
+def drop_jaw(gap: Any) -> Any:
     """Return how far the chin drops for a gap."""
-    return JAW_SHARE * (np.asarray(gap) - upper_share(gap))
+    return JAW_SHARE * (np.asarray(gap) - weigh_upper(gap))
 
 
 def _express(mood: dict[int, Curve], weights: dict[str, Curve]) -> dict[str, Curve]:

@@ -107,7 +107,7 @@ def find_pauses(units: Timeline[Unit]) -> list[tuple[float, float, bool, bool]]:
     return [each for each in pauses if each[1] - each[0] >= MIN_PAUSE_S - 1e-9 or not (each[2] and each[3])]
 
 
-def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
+def weigh_pauses(units: Timeline[Unit], time_s: Curve) -> Curve:
     """Return how far the mouth rests at each time, 0 to 1 [shape=(T,)]: 0 in speech and in short pauses."""
     weight = np.zeros(len(time_s))
     for start_s, end_s, after_speech, before_speech in find_pauses(units):
@@ -155,7 +155,7 @@ def rest_in_pauses(
     if style == NATURAL or not find_pauses(units) or not len(motion.values):
         return generation
     time_s = motion.time_s
-    weight = pause_weight(units, time_s)
+    weight = weigh_pauses(units, time_s)
     for pin_s in pinned_s:
         weight *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
     values, resting = motion.values.copy(), np.flatnonzero(weight)

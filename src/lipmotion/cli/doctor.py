@@ -20,7 +20,7 @@ from packaging.markers import Marker
 from packaging.specifiers import SpecifierSet
 
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
-from lipmotion.extensions import install_command, installed_version, load_provided
+from lipmotion.extensions import find_version, install_command, load_provided
 
 if TYPE_CHECKING:
     from lipmotion.types import Audio
@@ -70,7 +70,7 @@ def requirement(text: str) -> Requirement:
     return Requirement(found.name, str(found.specifier), EXTRA.sub("", marker).strip(), extra[1] if extra else "")
 
 
-def declared_requirements() -> tuple[Requirement, ...]:
+def list_requirements() -> tuple[Requirement, ...]:
     """Return all requirements of the installed lipmotion; none where it runs from its sources, without metadata."""
     try:
         return tuple(map(requirement, metadata.requires("lipmotion") or ()))
@@ -121,8 +121,8 @@ class InstalledPart:
 def doctor() -> Iterator[InstalledPart]:
     """Yield what is found out about this installation, the main path last. Nothing is left on the disk."""
     system = f"{platform.python_version()}, {platform.system()} {platform.machine()}"
-    yield InstalledPart("lipmotion", "works", f"{installed_version()}, Python {system}")
-    declared = declared_requirements()
+    yield InstalledPart("lipmotion", "works", f"{find_version()}, Python {system}")
+    declared = list_requirements()
     if not declared:
         yield InstalledPart(
             "packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install ."

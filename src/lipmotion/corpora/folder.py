@@ -300,7 +300,7 @@ def read_layouts(directory: Path) -> RecordingFolder | None:
     return gather_recordings(layout.kind, by_name, read_recording, directory)
 
 
-def _grid_words(directory: Path, video: Path, groups: Mapping[str, str]) -> Words | None:
+def _read_grid_words(directory: Path, video: Path, groups: Mapping[str, str]) -> Words | None:
     """Return the words of a word-time file, of the speaker or of all, or else of the video's name."""
     above = [folder for folder in video.parents if folder == directory or directory in folder.parents]
     folders = [video.parent, *(folder / "align" for folder in above)]
@@ -308,7 +308,7 @@ def _grid_words(directory: Path, video: Path, groups: Mapping[str, str]) -> Word
     return _find_words(video, folders)
 
 
-def _tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words | None:
+def _read_tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words | None:
     """Return the words of the script beside a video, ``SA1.txt`` of ``sa1.mp4``: lines of start, end, word; or text."""
     scripts = (video.with_name(f"{stem}.txt") for stem in (video.stem, video.stem.upper()))
     script = next((path for path in scripts if path.is_file()), None)
@@ -331,7 +331,7 @@ LAYOUTS = (
         KIND,
         re.compile(rf"(?i:(?:.*[^a-z0-9])?(?P<speaker>s[1-9]\d?)/(?:.*/)?)(?P<stem>{NAME.pattern})"),
         "{speaker}-{stem}",
-        _grid_words,
+        _read_grid_words,
         rights=RIGHTS,
     ),
     Layout(
@@ -347,7 +347,7 @@ LAYOUTS = (
             r"(?:.*/)?(?P<speaker>\d\d[MFT]|Lipspkr\d)/(?:Clips/)?(?P<camera>straight|30deg)cam/(?P<stem>[^/]+)"
         ),
         "{speaker}-{stem}",
-        _tcd_words,
+        _read_tcd_words,
         {"camera": "straight"},
         _research("TCD-TIMIT (Harte, Gillen 2015)"),
     ),

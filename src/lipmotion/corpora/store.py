@@ -111,7 +111,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
         "notes": utterance.track.notes,
         "source": utterance.source,
         "settings": settings,
-        "checksums": {name: _checksum(array) for name, array in arrays.items()},
+        "checksums": {name: _compute_checksum(array) for name, array in arrays.items()},
     }
     if crops is not None:  # read only where they are used, without a checksum
         arrays["crops"] = crops.astype(np.uint8)
@@ -149,7 +149,7 @@ def read_entry(folder: Path) -> dict[str, Any]:
     return entry
 
 
-def _checksum(array: NDArray[Any]) -> int:
+def _compute_checksum(array: NDArray[Any]) -> int:
     return zlib.crc32(array.tobytes())
 
 
@@ -398,7 +398,7 @@ class Corpus:
             motion = Motion(arrays["motion"].astype(np.float64), entry["rate_hz"], channels)
             check_curves(motion)
             for array, checksum in entry.get("checksums", {}).items():
-                if array in arrays and _checksum(arrays[array]) != checksum:
+                if array in arrays and _compute_checksum(arrays[array]) != checksum:
                     raise ValueError(f"{array} holds other bytes than were written")
             phones = entry.get("phones")
             if phones is not None:

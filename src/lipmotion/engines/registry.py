@@ -44,7 +44,7 @@ def engine_named(name: str, configuration: Mapping[str, Any] | None = None, *, s
         raise InputError(f"engine {name!r}: {error}") from error
 
 
-def engine_from_settings(
+def create_engine(
     name: str | None = None, *, preset: str | None = None, units: str | None = None, settings: Sequence[str] = ()
 ) -> Engine[Any]:
     """Return an engine whose configuration is parsed from texts, as on the command line.
@@ -72,7 +72,7 @@ def engine_from_settings(
     return engine
 
 
-def preset_visual(preset: str | None) -> str | None:
+def find_visual(preset: str | None) -> str | None:
     """Return the kind of motion that a preset is trained on where none is asked for; None: the default of ``train``."""
     kinds = [ENGINES.load(engine).Config.preset_visual for engine in ENGINES.names]
     return next((kind[each] for kind in kinds for each in (preset or "").split() if each in kind), None)

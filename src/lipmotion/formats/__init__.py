@@ -2,11 +2,11 @@
 
 from lipmotion.formats.base import (
     MotionFormat,
-    motion_suffix,
-    motion_suffixes,
+    find_suffix,
+    list_read_suffixes,
+    list_suffixes,
     read_motion,
-    readable_suffixes,
     write_motion,
 )
 
-__all__ = ["MotionFormat", "motion_suffix", "motion_suffixes", "read_motion", "readable_suffixes", "write_motion"]
+__all__ = ["MotionFormat", "find_suffix", "list_read_suffixes", "list_suffixes", "read_motion", "write_motion"]

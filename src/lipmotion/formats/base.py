@@ -129,30 +129,30 @@ CUE_LINE = re.compile(
 SHAPE_COLUMN = re.compile(rb"\b(?:mouth\w*|shape|viseme|phoneme|value|name|cue)\W*$", re.IGNORECASE)
 
 
-def motion_suffixes() -> tuple[str, ...]:
+def list_suffixes() -> tuple[str, ...]:
     """Return the suffixes of all motion formats, with the dot."""
     return tuple(f".{name}" for name in MOTION_FORMATS.names)
 
 
-def readable_suffixes() -> tuple[str, ...]:
+def list_read_suffixes() -> tuple[str, ...]:
     """Return the suffixes of all files that ``read_motion`` reads, with the dot."""
     suffixes = []
-    for suffix in motion_suffixes():
+    for suffix in list_suffixes():
         with suppress(InputError):  # of what a package adds
             suffixes += [suffix] if _format_of(Path(f"a{suffix}")).read is not None else []
     return (*suffixes, *(f".{name}" for name in MOTION_READERS.names))
 
 
-def motion_suffix(path: Path) -> str:
+def find_suffix(path: Path) -> str:
     """Return the suffix that chooses the motion format of a file, in lower case, with the dot; empty: there is none.
 
     The longest known suffix counts: ``take.livelink.csv`` has ``.livelink.csv``, ``take.1.csv`` ``.csv``.
 
     >>> from pathlib import Path
-    >>> motion_suffix(Path("take.1.CSV")), motion_suffix(Path("take.fbx"))
+    >>> find_suffix(Path("take.1.CSV")), find_suffix(Path("take.fbx"))
     ('.csv', '')
     """
-    return _longest(path, motion_suffixes())
+    return _longest(path, list_suffixes())
 
 
 def _longest(path: Path, known: Collection[str]) -> str:
@@ -162,13 +162,13 @@ def _longest(path: Path, known: Collection[str]) -> str:
     return next((ending for ending in endings if ending in known), "")
 
 
-def motion_format(path: Path) -> MotionFormat:
+def find_motion_format(path: Path) -> MotionFormat:
     """Return the motion format that the suffix of a file chooses. Raises ExportError: the suffix is unknown."""
     try:
         return _format_of(path)
     except InputError as error:
         raise ExportError(
-            f"{path}: cannot write motion as {_suffix(path)}; use one of {', '.join(motion_suffixes())}"
+            f"{path}: cannot write motion as {_suffix(path)}; use one of {', '.join(list_suffixes())}"
         ) from error
 
 
@@ -185,7 +185,7 @@ def write_motion(path: Path, generation: Generation, *, source: dict[str, str], 
 
 def check_motion(path: Path, motion: Motion) -> None:
     """Raise ExportError if motion cannot be written to a file of that name: unknown suffix, or unsuitable motion."""
-    chosen = motion_format(path)
+    chosen = find_motion_format(path)
     if motion.values.size and not np.isfinite([motion.values.min(), motion.values.max()]).all():  # no mask of an hour
         raise ExportError(f"{path}: the motion has values that are not finite; interpolate them before writing")
     chosen.check(motion)
@@ -209,15 +209,15 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     check_kind(path, "motion file")
     named = _name_by_content(path)
     other = _longest(named, [f".{name}" for name in MOTION_READERS.names])
-    if motion_suffix(named):
+    if find_suffix(named):
         read = _format_of(named).read
     else:
         read = MOTION_READERS.load(other.removeprefix(".")) if other else None
     if read is None:
-        known = ", ".join(readable_suffixes())
+        known = ", ".join(list_read_suffixes())
         raise InputError(f"{path}: cannot read motion from {_suffix(path)}; use one of {known}")
     check_regular(path, "motion file")
-    with _errors_name(path):
+    with _name_errors(path):
         size = path.stat().st_size
         if size > LARGEST_MOTION_BYTES:
             raise InputError(f"{size} bytes, required at most {LARGEST_MOTION_BYTES}: is it a motion file?")
@@ -242,7 +242,7 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 @contextmanager
-def _errors_name(path: Path) -> Iterator[None]:
+def _name_errors(path: Path) -> Iterator[None]:
     """Put a file's name before the message of an error of reading it, once."""
     try:
         yield
@@ -258,9 +258,9 @@ def read_units(path: Path) -> Timeline[Unit]:
 
     Raises InputError: as ``read_motion``.
     """
-    read = _format_of(path).units if motion_suffix(path) else None
+    read = _format_of(path).units if find_suffix(path) else None
     if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS_BYTES:
-        with _errors_name(path):
+        with _name_errors(path):
             units = read(path)
         if units is not None:
             return units
@@ -269,14 +269,14 @@ def read_units(path: Path) -> Timeline[Unit]:
 
 def _name_by_content(path: Path) -> Path:
     """Return a path, or for ``.json`` of another program, and cues, the name that such a file would have otherwise."""
-    if motion_suffix(path) not in (".json", ".csv") or not path.is_file():
+    if find_suffix(path) not in (".json", ".csv") or not path.is_file():
         return path
     try:
         with path.open("rb") as file:
             head = file.read(JSON_HEAD)
     except OSError:  # reported when it is read
         return path
-    if motion_suffix(path) == ".csv":
+    if find_suffix(path) == ".csv":
         from lipmotion.articulation.cue_sheets import is_shape
 
         names, *rows = [*head.splitlines()[:2], b""]
@@ -287,14 +287,14 @@ def _name_by_content(path: Path) -> Path:
 
 def _format_of(path: Path) -> MotionFormat:
     """Return the format of a file's suffix. Raises InputError: none, or what a package adds is no format."""
-    chosen = MOTION_FORMATS.load((motion_suffix(path) or path.suffix.lower()).removeprefix("."))
+    chosen = MOTION_FORMATS.load((find_suffix(path) or path.suffix.lower()).removeprefix("."))
     if not isinstance(chosen, MotionFormat):
         raise InputError(f"what an installed package adds as {_suffix(path)} is {chosen!r}, required a MotionFormat")
     return chosen
 
 
 def _suffix(path: Path) -> str:
-    return repr(motion_suffix(path) or path.suffix) if path.suffix else "a file without a suffix"
+    return repr(find_suffix(path) or path.suffix) if path.suffix else "a file without a suffix"
 
 
 DECIMALS = 5
@@ -350,7 +350,7 @@ def write_json(
         file.write(f"\n]{', ' if after else ''}{end}\n")
 
 
-def key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: bool) -> list[int]:
+def list_key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: bool) -> list[int]:
     """Return the frames of a curve that are keys in files with straight lines between keys, the first and last of them.
 
     Held values (``stepped``) have a key where they change; others where a line would be further off than a tolerance.
@@ -380,7 +380,7 @@ def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any
 
     def take_member(at: int) -> int:
         name, at = _DECODER.raw_decode(text, at)
-        at = next_at(text, _pass(text, next_at(text, at), ":"))
+        at = find_next_at(text, _pass(text, find_next_at(text, at), ":"))
         if text[at : at + 1] != "[":
             members[name], at = _DECODER.raw_decode(text, at)
             return at
@@ -399,7 +399,7 @@ def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any
 
         return _read_each(text, at, "[]", take_item)
 
-    end = next_at(text, _read_each(text, next_at(text, 0), "{}", take_member))
+    end = find_next_at(text, _read_each(text, find_next_at(text, 0), "{}", take_member))
     if end < len(text):
         raise json.JSONDecodeError("Extra data", text, end)
     return members
@@ -427,17 +427,17 @@ def _read_rows(text: str, at: int) -> tuple[NDArray[np.float64], int]:
 
 def _read_each(text: str, at: int, brackets: str, take: Callable[[int], int]) -> int:
     """Let ``take`` read each item between brackets; return the position after the closing bracket."""
-    at = next_at(text, _pass(text, at, brackets[0]))
+    at = find_next_at(text, _pass(text, at, brackets[0]))
     if text[at : at + 1] == brackets[1]:
         return at + 1
     while True:
-        at = next_at(text, take(at))
+        at = find_next_at(text, take(at))
         if text[at : at + 1] == brackets[1]:
             return at + 1
-        at = next_at(text, _pass(text, at, ","))
+        at = find_next_at(text, _pass(text, at, ","))
 
 
-def next_at(text: str, at: int) -> int:
+def find_next_at(text: str, at: int) -> int:
     """Return the position of the next character that is not blank."""
     match = _BLANK.match(text, at)
     return match.end() if match else at

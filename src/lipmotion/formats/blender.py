@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from lipmotion.errors import ExportError
-from lipmotion.extensions import installed_version
+from lipmotion.extensions import find_version
 from lipmotion.formats.base import MotionFormat
 from lipmotion.storage.files import atomic_file, check_target
 from lipmotion.types import Generation
@@ -103,7 +103,7 @@ def write_addon(program: str, path: str | Path) -> None:
         raise ExportError(f"{path}: unknown format {path.suffix!r}; Blender installs a .zip")
     check_target(path)
     texts = read_addon(MODULES)
-    version = re.match(r"\d+\.\d+\.\d+", installed_version())
+    version = re.match(r"\d+\.\d+\.\d+", find_version())
     texts["blender_manifest.toml"] = MANIFEST.format(version=version[0] if version else NO_VERSION)
     with atomic_file(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import MotionFormat, format_rows
 from lipmotion.meshes.fitting.blendshape_motion import move_points
@@ -36,7 +36,7 @@ def check(motion: Motion) -> None:
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write the points; of motion with distances alone, they move as mouths do (``fitting.blendshape_motion``)."""
-    motion, template = generation.motion, mouth_template()
+    motion, template = generation.motion, build_mouth()
     moved = move_points(motion, generation.units).expressed
     offsets = [" ".join(f"{value:.5f}" for value in place * CENTIMETRES) for place in template.places]
     lines = ["HIERARCHY", "ROOT head", "{", "  OFFSET 0 0 0", f"  CHANNELS 6 {ROOT_CHANNELS}"]

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import CHIN, mouth_template
+from lipmotion.articulation.lip_points import CHIN, build_mouth
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.markers import MARKER, MILLIMETRES, measure_markers, to_head_frame
@@ -287,7 +287,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     places += [np.broadcast_to([x, 0.0, 0.0], (frames, 3)) for _, x in EYES]
     placed = {f"{axis}_{point}" for point in points for axis in "xyz"}
     others = [column for column, name in enumerate(motion.names) if name not in placed]
-    template = mouth_template()
+    template = build_mouth()
     jaw = {CHIN, *np.array(template.points)[template.jaw].tolist()}
     content = C3dFile(
         labels=(*(f"{'JAW' if point in jaw else 'LIP'}_{point}" for point in points), *(name for name, _ in EYES)),

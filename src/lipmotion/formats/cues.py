@@ -19,7 +19,7 @@ import numpy as np
 
 from lipmotion.articulation.contact import gap_to_opening
 from lipmotion.articulation.cue_sheets import CueSheet
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.articulation.phone_targets import crossfade_phones
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import papagayo, rhubarb
@@ -36,7 +36,7 @@ PIXELS = 256
 """Width and height of a mouth until Spine has its picture."""
 
 
-def skeleton_text(sheet: CueSheet, sound_file: str) -> str:
+def write_skeleton(sheet: CueSheet, sound_file: str) -> str:
     """Return the content of the file, in ASCII; the last key is the end, with the shape at rest."""
     shapes = {shape: {"width": PIXELS, "height": PIXELS} for shape in sheet.drawn}
     moved: dict[str, Any] = {
@@ -66,12 +66,12 @@ class CueFormat(NamedTuple):
 
 
 CUE_FORMATS = {
-    "tsv": CueFormat(rhubarb.tsv_text, rhubarb.parse_tsv),
-    "xml": CueFormat(rhubarb.xml_text, rhubarb.parse_xml),
+    "tsv": CueFormat(rhubarb.format_tsv, rhubarb.parse_tsv),
+    "xml": CueFormat(rhubarb.format_xml, rhubarb.parse_xml),
     "json": CueFormat(rhubarb.json_text, rhubarb.parse_json),
-    "dat": CueFormat(rhubarb.dat_text, rhubarb.parse_dat),
+    "dat": CueFormat(rhubarb.format_dat, rhubarb.parse_dat),
     "pgo": CueFormat(papagayo.project_text, papagayo.parse_project),
-    "spine.json": CueFormat(skeleton_text),
+    "spine.json": CueFormat(write_skeleton),
 }
 """Formats by name; the end of a file's name is that of its format, of several the longest."""
 PHONE_OF = {"A": "p", "B": "s", "C": "eh", "D": "aa", "E": "ao", "F": "uw", "G": "f", "H": "l", "X": SILENCE}
@@ -123,10 +123,10 @@ def read_cues(path: Path, fps: float | None = None) -> CueSheet:
 
 def read_cue_motion(path: Path, fps: float | None = None) -> tuple[Motion, Timeline[Unit]]:
     """Return the cues of a file as motion and phones in time. Raises InputError: as ``read_cues``."""
-    return cue_motion(read_cues(path, fps))
+    return convert_cues(read_cues(path, fps))
 
 
-def cue_motion(sheet: CueSheet) -> tuple[Motion, Timeline[Unit]]:
+def convert_cues(sheet: CueSheet) -> tuple[Motion, Timeline[Unit]]:
     """Return the motion of cues: ``opening`` and ``width`` at 100 frames a second, and a phone for every shape."""
     words = sheet.words.spans
     starts_s = [span.start_s for span in words]
@@ -141,6 +141,6 @@ def cue_motion(sheet: CueSheet) -> tuple[Motion, Timeline[Unit]]:
     weights = crossfade_phones(units, time_s, lambda phone: SHAPE_OF.get(phone, REST))
     gap = np.sum([SHAPES[name].opening * weight for name, weight in weights.items()], axis=0) * WIDEST_GAP
     spread = np.sum([SHAPES[name].spread * weight for name, weight in weights.items()], axis=0)
-    width = mouth_template().width * (1 + WIDENING * spread)
+    width = build_mouth().width * (1 + WIDENING * spread)
     values = np.stack([gap_to_opening(np.where(gap < 1e-6, 0.0, gap)), width], axis=1)
     return Motion(values, RATE_HZ, (Channel("opening"), Channel("width"))), units

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.steady_rate import exact_rate
@@ -139,7 +139,7 @@ def move_faps(motion: Motion, units: Timeline[Unit]) -> Motion:
     Where the lips touch, ``lower_t_midlip`` and ``raise_b_midlip`` add up to 0.
     Raises InputError: as ``move_points``.
     """
-    moved, template = move_points(motion, units).expressed, mouth_template()
+    moved, template = move_points(motion, units).expressed, build_mouth()
     lengths = {"N": MOUTH_TO_NOSE, "W": template.width}
     columns = [
         np.rint(sign * moved[:, template.row(point), axis] / lengths[unit] * STEPS)

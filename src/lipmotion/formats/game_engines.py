@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.formats.base import MotionFormat, key_frames
+from lipmotion.formats.base import MotionFormat, list_key_frames
 from lipmotion.types import WEIGHT, Generation, Motion
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ def _choose_keys(
     """Return times and values of the keys of a weight, and whether it is held between them."""
     motion, held = generation.motion, name in generation.stepped
     values: Array = np.round(full * motion[name].astype(np.float64), decimals) + 0.0
-    frames = key_frames(motion.time_s, values, tolerance, stepped=held)
+    frames = list_key_frames(motion.time_s, values, tolerance, stepped=held)
     return motion.time_s[frames], values[frames], held
 
 

@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError, shorten
-from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, service_tiers
+from lipmotion.formats.label_services import DamagedJsonError, describe_json, is_json, parse_service_tiers
 from lipmotion.formats.label_tiers import (
     LINES,
     OTHER,
@@ -24,14 +24,14 @@ from lipmotion.formats.label_tiers import (
     map_to_inventory,
     merge_timelines,
     parse_seconds,
-    phone_timeline,
+    read_phone_tier,
+    read_transcript_tier,
     split_speakers,
-    tier_transcript,
     with_words,
 )
-from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, subtitle_tier, write_subrip, write_webvtt
+from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subrip, write_webvtt
 from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_textgrid
-from lipmotion.formats.timed_lines import line_tiers
+from lipmotion.formats.timed_lines import parse_line_tiers
 from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, read_xml_tiers
 from lipmotion.printable import is_line
 from lipmotion.storage.sources import read_text_file
@@ -179,7 +179,7 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
         raise InputError(f"{where}: {held}required {wanted}")
     _name_speakers(phones, where)
     units = merge_timelines(
-        [with_words(phone_timeline(each, (), where, with_gaps=True), _choose_words(each, tiers)) for each in phones]
+        [with_words(read_phone_tier(each, (), where, with_gaps=True), _choose_words(each, tiers)) for each in phones]
     )
     recognised = next((each.labels for each in tiers if each.role == RECOGNISED_PHONES), None)
     pairs = [(each, RECOGNISED_LABEL.fullmatch(each.text)) for each in recognised or ()]
@@ -187,7 +187,7 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
     return units if recognised is None else restore_confidences(units, rows)
 
 
-def speakers_in(path: Path) -> tuple[str, ...]:
+def list_speakers(path: Path) -> tuple[str, ...]:
     """Return the speakers whom a file of labels names, none of another or a damaged file."""
     if not path.is_file() or path.stat().st_size > LARGEST_LABELS:
         return ()
@@ -206,7 +206,7 @@ def holds_timings(path: Path) -> bool:
     try:
         if MOTION.search(text[:64]):
             return False
-        return bool(service_tiers(text, "")) if is_json(text) else line_tiers(text, "") is not None
+        return bool(parse_service_tiers(text, "")) if is_json(text) else parse_line_tiers(text, "") is not None
     except InputError as error:  # said by the reader, if it is damaged by that of motion
         return not isinstance(error, DamagedJsonError)
 
@@ -245,7 +245,7 @@ def _choose_labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
         return RecordingLabels(transcript)
     several = len(phones) > 1
     timeline = merge_timelines(
-        [phone_timeline(tier, _choose_words(tier, chosen), where, with_gaps=several) for tier in phones]
+        [read_phone_tier(tier, _choose_words(tier, chosen), where, with_gaps=several) for tier in phones]
     )
     unknown = [span for span in timeline if span.label.unit == UNKNOWN_PHONES]
     if unknown:
@@ -264,9 +264,9 @@ def _read_tiers(text: str, where: str) -> list[LabelTier] | None:
         elif (root := ROOT.match(text)) and root[1] in READ_ROOTS:
             tiers = read_xml_tiers(text, where)
         elif is_subtitles(text):
-            tiers = [subtitle_tier(text, where)]
+            tiers = [parse_subtitles(text, where)]
         else:
-            tiers = service_tiers(text, where) if is_json(text) else line_tiers(text, where)
+            tiers = parse_service_tiers(text, where) if is_json(text) else parse_line_tiers(text, where)
     except RecursionError as error:
         raise InputError(f"{where}: is nested too deeply; give the words in time alone") from error
     return None if tiers is None else [map_to_inventory(tier, where) for tier in tiers]
@@ -325,7 +325,7 @@ def _choose_transcript(tiers: list[LabelTier], where: str, tier: str = "", speak
         names = ", ".join(map(repr, others[:NAMED_TIERS]))
         LOG.warning("%s: the words of tier %r are read; others are %s; --tier chooses", where, first.name, names)
     _name_speakers(list(best.values()), where)
-    transcript = tier_transcript(list(best.values()), where)
+    transcript = read_transcript_tier(list(best.values()), where)
     return transcript if transcript.lines else None
 
 
@@ -355,7 +355,7 @@ def read_plain_text(path: Path) -> str:
 
 def check_plain_text(text: str, where: str) -> None:
     """Raise InputError unless a text is words alone: times and marks of labels and subtitles would be read as words."""
-    if is_textgrid(text) or line_tiers(text, where) is not None:
+    if is_textgrid(text) or parse_line_tiers(text, where) is not None:
         raise InputError(f"{where}: holds labels in time, required the words alone; write them into a text file")
     _check_no_labels(text, where)
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.base import next_at
+from lipmotion.formats.base import find_next_at
 from lipmotion.formats.label_tiers import (
     EARLIEST_S,
     LINES,
@@ -31,9 +31,9 @@ from lipmotion.formats.label_tiers import (
     add_pauses,
     check_count,
     find_tier,
-    ipa_labels,
+    find_time_unit,
     parse_seconds,
-    unit_of_times,
+    split_ipa,
 )
 from lipmotion.types import values
 from lipmotion.types.values import parse_clock, parse_number, require
@@ -180,7 +180,7 @@ def is_json(text: str) -> bool:
     return re.match(r'\s*(?:\{\s*["}]|\[\s*[\[{\]])', text) is not None
 
 
-def service_tiers(text: str, where: str) -> list[LabelTier] | None:
+def parse_service_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the tiers of words, lines and phones of the JSON of a service; None: it has none.
 
     Raises InputError: it is damaged (with its line), a symbol in it is not known, or a time is none.
@@ -226,7 +226,7 @@ def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         object_pairs_hook=lambda pairs: {plain(name): value for name, value in pairs},
         parse_constant=lambda _: None,  # NaN: missing
     )
-    at, line, counted = next_at(text, 0), 1, 0
+    at, line, counted = find_next_at(text, 0), 1, 0
     while at < len(text):
         line, counted = line + text.count("\n", counted, at), at
         try:
@@ -237,7 +237,7 @@ def _decode_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         except (ValueError, RecursionError) as error:
             raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
         yield line, value
-        at = next_at(text, at)
+        at = find_next_at(text, at)
 
 
 def _parse_number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
@@ -386,7 +386,7 @@ def _read_object(item: dict[str, Any], place: str, where: str, name: str, depth:
         return []
     if not lines and own is not None:  # a word, perhaps with Gentle's phones
         phones = _list_durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
-        spans = _chain_durations(phones, own.start, where) if phones else []
+        spans = _sum_durations(phones, own.start, where) if phones else []
         rows = ((span.start_s, span.end_s, span.text.partition("_")[0], span.position) for span in spans)
         return [own, *(Row(*row, own.times, own.speaker, PHONE_LABELS) for row in rows)]
     if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
@@ -413,9 +413,9 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
         return [] if lists and not any(lists) else None
-    phones = _last_until_next([row for row in rows if row.role == PHONE_LABELS], [])
+    phones = _extend_to_next([row for row in rows if row.role == PHONE_LABELS], [])
     silences = [row.start for row in phones if row.text == SILENCE]
-    spoken = _drop_first_pass(_last_until_next([row for row in rows if row.role != PHONE_LABELS], silences))
+    spoken = _drop_first_pass(_extend_to_next([row for row in rows if row.role != PHONE_LABELS], silences))
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
     counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in spoken]
@@ -436,7 +436,7 @@ def _drop_first_pass(rows: list[Row]) -> list[Row]:
     return rows[half:] if half and first == again and rows[0].speaker != rows[-1].speaker else rows
 
 
-def _last_until_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:
+def _extend_to_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:
     """Return rows, of which events last to the next one or to a silence, and the last one is open."""
     starts = [row.start for row in rows if row.times.start in EVENTS]
     if not starts:
@@ -455,7 +455,7 @@ def _scale_rows(rows: list[Row], role: str, where: str) -> list[TimedLabel]:
         frames = "its times are offsets in frames, whose length is not known"
         raise InputError(f"{where}: {frames}; required start and end in seconds")
     spans = [(row.start, row.end, row.text) for row in judged]
-    per_s = unit_of_times(spans, role, where, judged[0].times.usual) if judged else 1
+    per_s = find_time_unit(spans, role, where, judged[0].times.usual) if judged else 1
 
     def label(row: Row) -> TimedLabel:
         start_s, end_s = (time / (row.times.per_s or per_s) for time in (row.start, row.end))
@@ -477,7 +477,7 @@ def _list_durations(items: Any, text: str, length: str, place: str, per_s: float
     return [(f"{place} {number}", each.get(text), each.get(length), per_s) for number, each in enumerate(fields, 1)]
 
 
-def _chain_durations(items: Sequence[tuple[str, Any, Any, float]], start_s: float, where: str) -> list[TimedLabel]:
+def _sum_durations(items: Sequence[tuple[str, Any, Any, float]], start_s: float, where: str) -> list[TimedLabel]:
     """Return labels of which the lengths are given, one after another."""
     check_count(len(items), where)
     labels: list[TimedLabel] = []
@@ -490,7 +490,7 @@ def _chain_durations(items: Sequence[tuple[str, Any, Any, float]], start_s: floa
 
 def _make_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
     check_count(max(len(words), len(phones)), where)
-    phones = ipa_labels(phones, where)
+    phones = split_ipa(phones, where)
     tiers = (LabelTier(WORDS, tuple(words), WORDS), LabelTier(PHONE_LABELS, tuple(phones), PHONE_LABELS))
     return [tier for tier in tiers if tier.labels]
 
@@ -556,7 +556,7 @@ def _read_durations(objects: Objects, where: str) -> list[LabelTier] | None:
             )
         pairs = enumerate(zip(letters, item["preddur"], strict=True))
         items += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
-    phones = _chain_durations(items, 0.0, where)
+    phones = _sum_durations(items, 0.0, where)
     words = [row for item in kokoro for row in _find_rows({"tokens": item.get("tokens")}, "", where)]
     timed = _scale_rows([row for row in words if not math.isnan(row.start)], WORDS, where)
     return _make_tiers(timed, phones, where)

@@ -134,7 +134,7 @@ def require_time(text: str, place: str, where: str) -> float:
     return parse_number(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
 
 
-def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
+def find_time_unit(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
     """Return how many units of time are a second, by how long words, of a line each of them, or phones last.
 
     spans : start, end and text, in the unit
@@ -168,13 +168,13 @@ def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[
     """Return tiers in seconds; times of which a word would last a minute are in the unit that they seem to be.
 
     per_s : how many of their units are a second; 0: how long words last decides
-    Raises InputError: as ``unit_of_times``.
+    Raises InputError: as ``find_time_unit``.
     """
     spoken = [tier for tier in tiers if tier.role != OTHER]
     judged = next((tier for tier in spoken if tier.role == WORDS or holds_phones(tier)), next(iter(spoken), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
     role = PHONE_LABELS if judged and holds_phones(judged) else judged.role if judged else ""
-    per_s = per_s or unit_of_times(spans, role, where)
+    per_s = per_s or find_time_unit(spans, role, where)
     scaled = []
     for tier in tiers:
         labels = (replace(each, start_s=each.start_s / per_s, end_s=each.end_s / per_s) for each in tier.labels)
@@ -187,7 +187,7 @@ def holds_phones(tier: LabelTier) -> bool:
     spoken = [label for label in tier.labels if classify_label(label.text) is SpokenAs.SPEECH]
     if tier.role:
         return tier.role == PHONE_LABELS and any(label.text for label in tier.labels)
-    return bool(spoken) and sum(phone_of(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
+    return bool(spoken) and sum(to_phone(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
 
 
 def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
@@ -234,7 +234,7 @@ def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[
     return Timeline(tuple(spans))
 
 
-def tier_transcript(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
+def read_transcript_tier(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
     """Return the words of tiers with their times, in order; silence, sounds and markup are left out.
 
     Each label is a line; words have its time where it is one of words, or a single word.
@@ -273,7 +273,7 @@ def _reverse(label: TimedLabel, where: str) -> InputError:
     )
 
 
-def phone_timeline(
+def read_phone_tier(
     tier: LabelTier, words: Sequence[TimedLabel], where: str, *, with_gaps: bool = False
 ) -> Timeline[Unit]:
     """Return the phones of a tier in time; speech of unknown phones has the unit ``UNKNOWN_PHONES``.
@@ -299,7 +299,7 @@ def phone_timeline(
     labels = _join_states(tier.labels)
     phones: list[str] = []
     for label in labels:
-        phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
+        phone = to_phone(label.text) or to_phone(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
         if phone is None:
             which_label = f"{label.position} is {label.text[:40]!r}"
             raise InputError(f"{where}: {which_label}, which is no phone; the phones are: {' '.join(PHONES)}")
@@ -329,7 +329,7 @@ def merge_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
     return Timeline(tuple(merged))
 
 
-def phone_of(text: str) -> str | None:
+def to_phone(text: str) -> str | None:
     """Return the phone that a label stands for, ``UNKNOWN_PHONES`` for speech of unknown ones, or None."""
     text = STATE_NUMBER.sub("", text)
     inner = IN_CONTEXT.sub(r"\1", text)
@@ -372,7 +372,7 @@ def _reduce_vowels(labels: Sequence[TimedLabel], phones: Sequence[str], words: S
     return result
 
 
-def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
+def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
     """Return phones in IPA as phones of the inventory, in the same time.
 
     Symbols that are one sound together are one phone, as ``a`` and ``ɪ``; a symbol of several sounds is divided into
@@ -416,13 +416,13 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
 def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
     """Return a tier; one of phones in the phones of the inventory, from those, X-SAMPA or IPA, as they make sense.
 
-    Raises InputError: as ``ipa_labels``.
+    Raises InputError: as ``split_ipa``.
     """
     labels = tier.labels if tier.role == PHONE_LABELS else ()
     spoken = [
         WITH_GLIDES.get(label.text, label.text) for label in labels if classify_label(label.text) is SpokenAs.SPEECH
     ]
-    known = sum(phone_of(text) is not None for text in spoken)
+    known = sum(to_phone(text) is not None for text in spoken)
     in_xsampa = sum(bool(xsampa_to_ipa(text)) for text in spoken)
     if known == len(spoken) or (known >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):
         return tier
@@ -430,7 +430,7 @@ def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
     if all(map(str.isascii, spoken)) and in_xsampa >= PHONES_SHARE * len(spoken):
         as_ipa = {text: xsampa_to_ipa(text) or text for text in spoken}
     symbols = [replace(label, text=as_ipa.get(label.text, label.text)) for label in labels]
-    return replace(tier, labels=tuple(ipa_labels(symbols, where)))
+    return replace(tier, labels=tuple(split_ipa(symbols, where)))
 
 
 def add_pauses(phones: Sequence[TimedLabel]) -> tuple[TimedLabel, ...]:

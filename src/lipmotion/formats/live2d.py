@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
-from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, build_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import ExportError
-from lipmotion.formats.base import MotionFormat, key_frames
+from lipmotion.formats.base import MotionFormat, list_key_frames
 from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion
@@ -49,9 +49,9 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     """Write two curves, and how many keys they have."""
     motion = generation.motion
     curves, points, steps = [], 0, bool(SHOWING & set(generation.stepped))
-    for name, values in ((OPEN, mouth_open(generation)), (FORM, mouth_form(generation))):
+    for name, values in ((OPEN, measure_mouth_open(generation)), (FORM, measure_mouth_form(generation))):
         rounded = np.round(values, DECIMALS) + 0.0
-        frames = key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
+        frames = list_key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
         keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in frames]
         segments: list[float] = [*keys[0]]
         for time_s, value in keys[1:]:
@@ -66,23 +66,23 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     path.write_text(as_json({"Version": 3, "Meta": meta, "Curves": curves}) + "\n", encoding="utf-8")
 
 
-def mouth_open(generation: Generation) -> Array:
+def measure_mouth_open(generation: Generation) -> Array:
     """Return how far the mouth is open, 0 to 1 [shape=(T,)]; 0 where the lips touch."""
     motion = generation.motion
     if "opening" in motion.names:
-        gap = spoken_mouth(motion, generation.units).gap
+        gap = find_mouth(motion, generation.units).gap
     else:
         gap = _sum_effects(motion, arkit_mouth().gap)
     return np.clip(gap / FULL_GAP, 0.0, 1.0)
 
 
-def mouth_form(generation: Generation) -> Array:
+def measure_mouth_form(generation: Generation) -> Array:
     """Return the form of the mouth, −1 puckered to 1 wide [shape=(T,)]; 0 at rest, and where no channel says it."""
     motion = generation.motion
     if "opening" in motion.names and "width" in motion.names:
-        wider = (spoken_mouth(motion, generation.units).width - 1) * mouth_template().width
+        wider = (find_mouth(motion, generation.units).width - 1) * build_mouth().width
     else:
-        template = mouth_template()
+        template = build_mouth()
         corners = arkit_mouth().moved[:, [template.row(LEFT_CORNER), template.row(RIGHT_CORNER)], 0]
         wider = _sum_effects(motion, corners[:, 0] - corners[:, 1])
     return np.clip(wider / np.where(wider > 0, LARGEST_WIDENING, LARGEST_NARROWING), -1.0, 1.0)

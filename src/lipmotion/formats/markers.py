@@ -88,7 +88,7 @@ def to_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
         raise InputError("the two eye corners are in one place, required the outer corners of both eyes")
     if len(rigid) >= MIN_RIGID_MARKERS:
         across = np.broadcast_to(across.mean(axis=0), across.shape)
-    turned = np.einsum("tij,tnj->tni", _smallest_rotations(across), (places - centre)) / distance
+    turned = np.einsum("tij,tnj->tni", _find_rotations(across), (places - centre)) / distance
     _, y, z = turned[:, len(rigid) :].mean(axis=(0, 1))  # about x by quarters, so that the mouth is below the eyes
     cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[round(float(np.arctan2(z, -y) / (np.pi / 2))) % 4]
     turned = turned @ np.array([[1.0, 0, 0], [0, cosine, -sine], [0, sine, cosine]]).T
@@ -114,7 +114,7 @@ def _steady(places: Array, rigid: int) -> Array:
     return np.einsum("tij,tnj->tni", rotations, (places - centres)) + centres[0]
 
 
-def _smallest_rotations(across: Array) -> Array:
+def _find_rotations(across: Array) -> Array:
     """Return the least rotations that turn directions into the axis x [shape=(T, 3, 3)]; half turns are about y."""
     x, y, z = (across / np.linalg.norm(across, axis=1, keepdims=True)).T
     opposite = x < -1 + 1e-9

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.formats.base import MotionFormat, read_members, write_json
-from lipmotion.formats.steady_rate import TIME_COLUMN, column_key, resample_rows, tabulate_frames, times_to_seconds
+from lipmotion.formats.steady_rate import TIME_COLUMN, clean_column, convert_times, resample_rows, tabulate_frames
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
 from lipmotion.printable import is_line
 from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
@@ -274,7 +274,7 @@ def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """
     with json_errors("the file of frames of weights"):
         documents = list(_decode_documents(path.read_text(encoding="utf-8-sig")))
-        objects = [_key_members(each) for each in _find_objects(documents, DEEPEST)]
+        objects = [_list_key_members(each) for each in _find_objects(documents, DEEPEST)]
         pieces = [each for each in objects if "frameindex" in each and each.get("blendshapes")]
         if pieces:
             return _place_azure(pieces), Timeline(())
@@ -287,7 +287,7 @@ def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
             missing = sum(each.get(timed) is None for each, _ in frames)
             if missing:
                 raise InputError(f"{missing} of {len(frames)} frames have no {timed!r}, required a time in each")
-            time_s = times_to_seconds(np.array([float(each[timed]) for each, _ in frames]), timed)
+            time_s = convert_times(np.array([float(each[timed]) for each, _ in frames]), timed)
         else:
             rate_hz = next((float(each[key]) for each in objects for key in RATES if each.get(key)), 0.0)
             if not rate_hz > 0:
@@ -315,15 +315,15 @@ def _find_objects(value: Any, deepest: int) -> Iterator[dict[str, Any]]:
     elif isinstance(value, dict):
         yield value
         for name, each in value.items() if _find_weights(value) is None else ():
-            if column_key(name) in ANIMATION and isinstance(each, str) and each.strip():
-                offset = next((value[key] for key in value if column_key(key) in AUDIO_OFFSET), None)
+            if clean_column(name) in ANIMATION and isinstance(each, str) and each.strip():
+                offset = next((value[key] for key in value if clean_column(key) in AUDIO_OFFSET), None)
                 yield {**json.loads(each), "AudioOffset": offset}
             elif isinstance(each, list) and each and isinstance(each[0], dict):
                 yield from _find_objects(each, deepest - 1)
 
 
-def _key_members(each: dict[str, Any]) -> dict[str, Any]:
-    return {name if is_known(name) else column_key(name): value for name, value in each.items()}
+def _list_key_members(each: dict[str, Any]) -> dict[str, Any]:
+    return {name if is_known(name) else clean_column(name): value for name, value in each.items()}
 
 
 def _place_azure(pieces: list[dict[str, Any]]) -> Motion:
@@ -352,7 +352,7 @@ def _place_azure(pieces: list[dict[str, Any]]) -> Motion:
 
 def _find_weights(frame: Mapping[str, Any]) -> dict[str, float] | None:
     """Return the weights of a frame by their names; none where there is no face, and None where it is no frame."""
-    keyed = _key_members(dict(frame))
+    keyed = _list_key_members(dict(frame))
     for key in ("blendshapes", "faceblendshapes", "categories", "weights", "coefficients"):
         if key in keyed:
             return _name_weights(keyed[key])
@@ -372,7 +372,7 @@ def _name_weights(value: Any) -> dict[str, float] | None:
     for each in value if isinstance(value, list) else ():
         if not isinstance(each, dict) or "categories" in each:
             return _name_weights(each)
-        keyed = {column_key(name): member for name, member in each.items()}
+        keyed = {clean_column(name): member for name, member in each.items()}
         name = next((str(keyed[key]) for key in NAMED if keyed.get(key)), None)
         score = next((keyed[key] for key in SCORED if key in keyed), None)
         if name is None or score is None:

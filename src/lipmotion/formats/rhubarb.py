@@ -40,7 +40,7 @@ HEADER = re.compile(r"\W*(?:time|start|begin|seconds)\b[^\n]*", re.IGNORECASE)
 LONGEST_LINE = 200
 
 
-def tsv_text(sheet: CueSheet, _sound_file: str) -> str:
+def format_tsv(sheet: CueSheet, _sound_file: str) -> str:
     """Return the content of a ``.tsv``."""
     return "".join(f"{time_s:.2f}\t{shape}\n" for time_s, shape in sheet.rows)
 
@@ -66,7 +66,7 @@ def parse_tsv(text: str) -> CueSheet:
     return _build_sheet([(place, fields[0], fields[-2], fields[-1]) for place, fields in cues], chart)
 
 
-def xml_text(sheet: CueSheet, sound_file: str) -> str:
+def format_xml(sheet: CueSheet, sound_file: str) -> str:
     """Return the content of the file, in ASCII; characters that XML cannot hold are escaped as in Python."""
     name = _NOT_XML.sub(lambda match: match[0].encode("unicode_escape").decode(), sound_file)
     name = _CONTROL.sub(lambda match: f"&#{ord(match[0])};", escape(name, quote=False))
@@ -120,7 +120,7 @@ def parse_json(text: str) -> CueSheet:
     return _build_sheet(items, choose_chart((shape for *_, shape in items), LETTERS))
 
 
-def dat_text(sheet: CueSheet, _sound_file: str) -> str:
+def format_dat(sheet: CueSheet, _sound_file: str) -> str:
     """Return the content of the file: the first frame is 1, the last line is the frame after the end, at rest."""
     frames = {1 + int(sheet.fps * cue.start_s): cue.label for cue in reversed(sheet.cues.spans)}
     end = max(1 + int(sheet.fps * sheet.duration_s), max(frames) + 1)

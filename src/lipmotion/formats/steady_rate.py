@@ -67,7 +67,7 @@ def match_sound_rate(rate_hz: float, frames: int, duration_s: float) -> float:
     return rate_hz
 
 
-def even_out_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
+def resample_evenly(time_s: Array, rows: Array) -> tuple[Array, float]:
     """Return rows at a steady rate that begin at the first time, and the rate in hertz.
 
     time_s : increasing, seconds [shape=(N,)];  rows : one for each time [shape=(N, P)]
@@ -103,7 +103,7 @@ def even_out_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     return np.stack([np.interp(grid_s, passed_s, column) for column in rows.T], axis=1), round(hertz, 6)
 
 
-def column_key(name: str) -> str:
+def clean_column(name: str) -> str:
     """Return the name of a column as it is compared: ``Time (ms)`` is ``timems``."""
     return re.sub(r"[\s_()\[\].-]+", "", name).lower()
 
@@ -114,8 +114,8 @@ def tabulate_frames(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], A
     return names, np.array([[frame.get(name, np.nan) for name in names] for frame in frames], float)
 
 
-def times_to_seconds(times: Array, key: str) -> Array:
-    """Return times in seconds, told by their column (``column_key``) or their size. Raises InputError: no number."""
+def convert_times(times: Array, key: str) -> Array:
+    """Return times in seconds, told by their column (``clean_column``) or their size. Raises InputError: no number."""
     if not np.isfinite(times).all():
         raise InputError(f"the time of row {int(np.argmin(np.isfinite(times))) + 1} is no number, required one in each")
     per_second = next((scale for unit, scale in PER_SECOND.items() if key.endswith(unit)), 1.0)
@@ -135,7 +135,7 @@ def resample_rows(
     unit   : of curves that are neither blendshapes nor angles
     Before the first face and after the last one weights are 0 and other curves still; between faces is a straight line.
     Rows that are not later than all before are left out, frames that were lost and uneven times evened out
-    (``even_out_rows``). A warning says how many rows each of this was.
+    (``resample_evenly``). A warning says how many rows each of this was.
     Raises InputError: a row goes far back, too many are left out, no rows, or most of the time has none.
     """
     ordered = _find_ordered(time_s)
@@ -168,7 +168,7 @@ def resample_rows(
         first, last = np.flatnonzero(seen)[[0, -1]]
         weights = np.array([channel.unit == WEIGHT for channel in channels])
         values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
-    rows, rate_hz = even_out_rows(time_s, np.concatenate([values, seen[:, None]], axis=1))
+    rows, rate_hz = resample_evenly(time_s, np.concatenate([values, seen[:, None]], axis=1))
     return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
 
 

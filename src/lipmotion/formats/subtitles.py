@@ -67,7 +67,7 @@ def is_subtitles(text: str) -> bool:
     return text.startswith(("WEBVTT", HEADER)) or any(matches)
 
 
-def subtitle_tier(text: str, where: str) -> LabelTier:
+def parse_subtitles(text: str, where: str) -> LabelTier:
     """Return the lines of subtitles, a cue each; words that have times of their own are parts of it.
 
     Left out are notes and styles, the repetitions of captions that scroll, and what stands before the first cue.
@@ -80,9 +80,9 @@ def subtitle_tier(text: str, where: str) -> LabelTier:
     return LabelTier("subtitles", tuple(labels), LINES)
 
 
-def subtitle_words(text: str) -> str:
-    """Return what is said of subtitles as a text. Raises InputError: as ``subtitle_tier``."""
-    lines = [label.text for label in subtitle_tier(text, "the text").labels]
+def strip_markup(text: str) -> str:
+    """Return what is said of subtitles as a text. Raises InputError: as ``parse_subtitles``."""
+    lines = [label.text for label in parse_subtitles(text, "the text").labels]
     names = find_speaker_names(lines)
     return "\n".join(extract_spoken_text(WORD_TIME.sub("", line), names) for line in lines)
 

@@ -26,11 +26,11 @@ from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import MotionFormat, format_rows
 from lipmotion.formats.steady_rate import (
     TIME_COLUMN,
-    column_key,
+    clean_column,
+    convert_times,
     exact_rate,
     resample_rows,
     tabulate_frames,
-    times_to_seconds,
 )
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, is_known
 from lipmotion.storage.text_table import LONGEST_LINE, numbers_in, open_table
@@ -173,7 +173,7 @@ def is_live_link_file(path: Path) -> bool:
         return False
 
 
-def speech_curves(motion: Motion) -> Motion:
+def read_speech_curves(motion: Motion) -> Motion:
     """Return the curves that speech moves, without those of eyes, brows and head. Raises InputError: there are none."""
     names = [name for name in motion.names if name in SPEECH_CURVES]
     if not names:
@@ -197,7 +197,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     try:
         with open_table(path) as table:
             names = table.plain_names
-            keys = list(map(column_key, names))
+            keys = list(map(clean_column, names))
             timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
             used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
             if timed is None or not 0 < len(used) <= MAX_CURVES:
@@ -210,9 +210,9 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
             )
             coded = bool(re.search("[:;]", times[0][1]))
             if coded:
-                time_s = _codes_to_seconds([_parse_timecode(text, line) for line, text in times])
+                time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
             else:
-                time_s = times_to_seconds(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
+                time_s = convert_times(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
             return resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
     except (ValueError, OverflowError) as error:
         if isinstance(error, InputError):
@@ -301,7 +301,7 @@ def _parse_timecode(text: str, line: int) -> tuple[int, float, str]:
     return seconds, float(code[5].replace(",", ".")) if mark else 0.0, mark
 
 
-def _codes_to_seconds(codes: list[tuple[int, float, str]]) -> Array:
+def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
     """Return timecodes as seconds since the midnight before the first [shape=(N,)]."""
     seconds, frames = (np.array([code[part] for code in codes], float) for part in (0, 1))
     day_s, mark = DAY_S, codes[0][2]

@@ -25,8 +25,8 @@ from lipmotion.formats.label_tiers import (
     check_count,
     find_tier,
     parse_seconds,
-    phone_of,
     require_time,
+    to_phone,
 )
 
 SHORTEST_TICKS = 10_000
@@ -67,7 +67,7 @@ LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
 
 
-def line_tiers(text: str, where: str) -> list[LabelTier] | None:
+def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the labels of a text whose lines hold times, or None if they do not; the first line decides.
 
     HTK's lines are ``start end label`` in 100 ns (further columns are ignored), or ``start label``, where each label
@@ -153,7 +153,7 @@ def _read_spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
     short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and labels[-1].end_s < LAST_SAMPLE
     if is_timit or not short:
         return parse_seconds([tier], where, TIMIT_HZ if short else TICKS_PER_S)[0]
-    role = PHONE_LABELS if all(phone_of(label.text) for label in labels) else WORDS
+    role = PHONE_LABELS if all(to_phone(label.text) for label in labels) else WORDS
     return parse_seconds([replace(tier, role=role)], where)[0]
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import InputError
-from lipmotion.formats.base import MotionFormat, key_frames
+from lipmotion.formats.base import MotionFormat, list_key_frames
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_to_weights, weights_to_gaze
 from lipmotion.meshes.model.mesh import ANGLES, head_angles, head_quaternions
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, CLOSED, VRM_VOWELS, arkit_name, vowel_name
@@ -77,7 +77,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
         if all(name in motion.names for name in sources):
             values = np.mean([motion[name] for name in sources], axis=0)
             stepped = bool({*sources} & {*generation.stepped})
-            keys = key_frames(time_s, values, TOLERANCE, stepped=stepped)
+            keys = list_key_frames(time_s, values, TOLERANCE, stepped=stepped)
             if stepped:  # between keys everything is linear
                 keys = sorted({*keys, *(frame - 1 for frame in keys if frame)})
             morphs += [(frames[frame], morph, float(values[frame])) for frame in keys]

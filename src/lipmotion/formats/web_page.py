@@ -49,7 +49,7 @@ def escape_html(text: str) -> str:
     return escape(printable(text))
 
 
-def whole_page(title: str, style: str, *content: str, script: str = "") -> str:
+def build_page(title: str, style: str, *content: str, script: str = "") -> str:
     """Return a page that loads nothing but the pictures and videos in its own folder.
 
     style  : CSS, with ``SHARED_COLOURS`` in the place of the colours of all pages
@@ -63,14 +63,14 @@ def whole_page(title: str, style: str, *content: str, script: str = "") -> str:
         element("meta", name_="viewport", content_="width=device-width, initial-scale=1"),
         Html(GENERATOR),
         element("title", title),
-        Html(f"<style>\n{colour_code(style)}</style>"),
+        Html(f"<style>\n{find_colour(style)}</style>"),
     )
     scripts = Html(f"<script>\n{script}</script>" if script else "")
     body = element("body", *content, scripts)
     return f'<!DOCTYPE html>\n<html lang="en">\n{element("head", head)}\n{body}\n</html>\n'
 
 
-def colour_code(style: str) -> str:
+def find_colour(style: str) -> str:
     """Return a style with the colours of all pages, light and dark."""
     return style.replace(SHARED_COLOURS, resources.files(__package__).joinpath("colours.css").read_text("utf-8"))
 

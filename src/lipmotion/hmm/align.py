@@ -154,7 +154,7 @@ def place_words(
     slot_of = np.array([slot for _, slot, _ in nodes])
     of_states = None
     if windows is not None:
-        of_slots = _slot_windows(windows, log_likelihoods.frames)
+        of_slots = _list_slot_windows(windows, log_likelihoods.frames)
         of_states = Windows(of_slots.first[slot_of], of_slots.end[slot_of])
     network = builder.build()
     path = network.best_path(log_likelihoods, plain, windows=of_states)
@@ -176,7 +176,7 @@ def place_words(
     return placed
 
 
-def _slot_windows(windows: Windows, frames: int) -> Windows:
+def _list_slot_windows(windows: Windows, frames: int) -> Windows:
     """Return the windows of words with the silences and pauses before, between and after them [shape=(2 W + 1,)]."""
     first, end = np.zeros(2 * len(windows.first) + 1, np.intp), np.full(2 * len(windows.end) + 1, frames, np.intp)
     first[1::2], end[1::2] = windows
@@ -186,7 +186,7 @@ def _slot_windows(windows: Windows, frames: int) -> Windows:
 
 def spread_windows(spoken: Sequence[SpokenWord], windows: Windows, frames: int) -> Windows:
     """Return the windows of all units of words with silences and pauses, from those of the words."""
-    of_slots = _slot_windows(windows, frames)
+    of_slots = _list_slot_windows(windows, frames)
     slots, word = [], -1
     for item in spoken:
         word = max(word, item.word)

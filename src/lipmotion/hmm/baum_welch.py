@@ -34,7 +34,7 @@ def reestimate_states(model: UnitHmm, statistics: UnitStatistics) -> UnitHmm:
     """
     measured = statistics.stay / np.maximum(statistics.occupied, 1e-9)
     stay = np.where(statistics.occupied > 0, measured, np.exp(model.log_stay))
-    longest = max_mean_durations(model.table)[: len(stay)]
+    longest = limit_durations(model.table)[: len(stay)]
     log_stay = np.log(np.clip(stay, 0.05, 1 - 1 / longest)).astype(np.float32)
     return replace(model, mixtures=reestimate_mixtures(model, statistics), log_stay=log_stay)
 
@@ -95,7 +95,7 @@ def accumulate_statistics(
     states = [sum(hmm.table.count(unit) for unit in sequence) for sequence in sequences]
     batches = group_by_length([len(x) for x in data], states)
     shards = [([data[i] for i in batch], [sequences[i] for i in batch]) for batch in batches]
-    return unit_statistics(sum_statistics(_shard_sums, hmm, shards, work))
+    return sum_unit_statistics(sum_statistics(_shard_sums, hmm, shards, work))
 
 
 def _shard_sums(job: tuple[UnitHmm, tuple[list[NDArray[np.float32]], list[tuple[str, ...]]]]) -> Sums:
@@ -192,13 +192,13 @@ class UnitStatistics:
         return np.maximum(square - mean * mean, 0.0)
 
 
-def unit_statistics(sums: Sums) -> UnitStatistics:
+def sum_unit_statistics(sums: Sums) -> UnitStatistics:
     """Return sums by name as statistics."""
     total = float(sums.get("log likelihood", 0.0)), int(sums.get("frames", 0))
     return UnitStatistics(sums["stay"], sums["occupied"], sums["components"], sums["features"], *total)
 
 
-def max_mean_durations(table: StateTable) -> NDArray[np.float64]:
+def limit_durations(table: StateTable) -> NDArray[np.float64]:
     """Return the largest mean duration allowed for each state, in frames [shape=(G,)]."""
     units = [name.split(".")[0] for name in table.names]
     return np.array([LONGEST_SILENCE_FRAMES if unit in table.free else LONGEST_STATE_FRAMES for unit in units])

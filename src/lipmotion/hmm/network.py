@@ -201,7 +201,7 @@ def build_unit_loop(hmm: UnitHmm, inventory: Sequence[str]) -> UnitLoop:
         rows[unit] = []
         for state in range(table.count(unit)):
             row: StateNodes = {}
-            for neighbour in _distinct_neighbours(table, unit, state, inventory):
+            for neighbour in _list_neighbours(table, unit, state, inventory):
                 row[neighbour] = builder.state(table.density(unit, state, neighbour), hmm.stay(unit, state))
                 owners.append(unit)
             if rows[unit]:
@@ -247,7 +247,7 @@ def _node(row: StateNodes, neighbour: str) -> int:
     return row[neighbour] if neighbour in row else row[None]
 
 
-def _distinct_neighbours(table: StateTable, unit: str, state: int, inventory: Sequence[str]) -> list[Neighbour]:
+def _list_neighbours(table: StateTable, unit: str, state: int, inventory: Sequence[str]) -> list[Neighbour]:
     """Return the neighbours that need a node of their own; all others (None) share a node, as they share densities.
 
     A neighbour that any state on one side of the unit depends on has nodes for all states on that side: so a node

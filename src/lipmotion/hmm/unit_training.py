@@ -19,10 +19,10 @@ from lipmotion.hmm.baum_welch import (
     adapt_contexts,
     add_up,
     baum_welch,
-    max_mean_durations,
+    limit_durations,
     reestimate_mixtures,
     reestimate_states,
-    unit_statistics,
+    sum_unit_statistics,
 )
 from lipmotion.hmm.loudness import smooth_level
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_from_arrays, hmm_to_arrays, make_plain_states
@@ -242,7 +242,7 @@ def _make_flat_start(
     units = (*silence_and_pause, *sorted({u for s in sequences for u in s} - {inventory.silence}))
     counts = tuple(1 if unit == inventory.pause else config.states for unit in units)
     table = make_plain_states(units, counts, free=silence_and_pause)
-    log_stay = np.log(1 - 1 / max_mean_durations(table)).astype(np.float32)
+    log_stay = np.log(1 - 1 / limit_durations(table)).astype(np.float32)
     start = make_equal_gaussians(np.concatenate(data), len(table.names))
     hmm = UnitHmm(config, table, start, log_stay, estimate_bigram(units, []))
     chains, posteriors = [expand_states(hmm, sequence) for sequence in sequences], []
@@ -261,7 +261,7 @@ def _make_flat_start(
         path[offset:] = silence + speech + np.arange(tail) * (len(chain.plain) - silence - speech) // max(tail, 1)
         posterior[np.arange(len(x)), path] = 1
         posteriors.append((posterior, np.zeros(len(chain.plain))))
-    return replace(hmm, mixtures=reestimate_mixtures(hmm, unit_statistics(add_up(hmm, data, chains, posteriors))))
+    return replace(hmm, mixtures=reestimate_mixtures(hmm, sum_unit_statistics(add_up(hmm, data, chains, posteriors))))
 
 
 def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: Sequence[tuple[str, ...]]) -> UnitHmm:

@@ -31,7 +31,7 @@ def solve_mlpg(
     """
     if not pins and pays(len(mean)):
         return _generate(np.ascontiguousarray(mean, float), np.ascontiguousarray(precision, float))
-    bands = normal_equations(mean, precision)
+    bands = build_equations(mean, precision)
     for (frame, channel), value in (pins or {}).items():
         pin(bands, frame, channel, value)
     values, variance = solve(bands)
@@ -40,7 +40,7 @@ def solve_mlpg(
     return values, variance
 
 
-def normal_equations(mean: Array, precision: Array) -> Bands:
+def build_equations(mean: Array, precision: Array) -> Bands:
     """Return the system W'PW x = W'P m of maximum-likelihood parameter generation.
 
     mean, precision : [shape=(T, 3, P)], of the static value, Δ = (-½, 0, ½) and Δ² = (1, -2, 1)
@@ -85,11 +85,11 @@ def solve(bands: Bands) -> tuple[Array, Array]:
         return _solve(*bands)
     shape = bands[0].shape
     rows = (diagonal[:, 0].tolist() if shape[1] == 1 else list(diagonal) for diagonal in bands)
-    values, variance = _substituted(*_eliminated(*rows))
+    values, variance = _back_substitute(*_eliminate_rows(*rows))
     return values.reshape(shape), variance.reshape(shape)
 
 
-def _eliminated(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple[Rows, Rows, Rows, Rows]:
+def _eliminate_rows(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple[Rows, Rows, Rows, Rows]:
     """Return 1 / D and both diagonals of L of the factorisation LDLᵀ, and L⁻¹ times the right-hand side.
 
     Rows are arrays of all channels, or the numbers of a single one: these cost a twentieth.
@@ -108,7 +108,7 @@ def _eliminated(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple[Row
     return inverse, lower1, lower2, x
 
 
-def _substituted(inverse: Rows, lower1: Rows, lower2: Rows, x: Rows) -> tuple[Array, Array]:
+def _back_substitute(inverse: Rows, lower1: Rows, lower2: Rows, x: Rows) -> tuple[Array, Array]:
     values, variances = Rows(), Rows()
     value = next_value = variance = next_variance = 0.0
     beside = 0.0  # of the inverse, between the next row and the one after it

@@ -3,7 +3,7 @@
 Loading numba takes as long as a short recording's motion, so importing this or any kernel does not load it. Three
 kernels also have a form in NumPy, which gives the same bits, and say why in their first line (``pays`` chooses).
 Compiled functions take many arrays as separate arguments: numba compiles that to the fastest code.
-Matrix products (BLAS) run on one thread (``one_thread``).
+Matrix products (BLAS) run on one thread (``limit_threads``).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
+def limit_threads() -> Iterator[None]:
     """Compute matrix products in one thread inside the block (or the function that this decorates).
 
     The last bits of a product depend on the number of threads: with one, results do not depend on ``OMP_NUM_THREADS``,
@@ -62,7 +62,7 @@ def _list_libraries(_: int) -> Any:
     return ThreadpoolController()
 
 
-def blas_kernels() -> list[str]:
+def list_blas_kernels() -> list[str]:
     """Return the name, version and processor of each BLAS in use, sorted; where these differ, rounding does."""
     import scipy.linalg  # noqa: F401 # has a copy of its own
     from threadpoolctl import threadpool_info
@@ -88,7 +88,7 @@ def compiled(function: FunctionT, form: FunctionT | None = None) -> FunctionT:
     return cast(FunctionT, _Kernel(function, False, form))
 
 
-def compiled_to_rounding(function: FunctionT) -> FunctionT:
+def compile_to_rounding(function: FunctionT) -> FunctionT:
     """Compile a function as ``compiled`` does, but with sums in any order: results differ from NumPy's by rounding."""
     return cast(FunctionT, _Kernel(function, {"nnan", "nsz", "reassoc", "contract", "arcp"}))
 
@@ -140,7 +140,7 @@ class _Kernel:
 
         kernel = numba.njit(nogil=True, error_model="numpy", fastmath=self.fastmath)(self.function)
         with suppress(RuntimeError):  # neither beside the file nor in the user's cache folder can anything be written
-            kernel._cache = _disk_cache()(self.function)  # as its ``enable_caching``
+            kernel._cache = _open_disk_cache()(self.function)  # as its ``enable_caching``
         return kernel
 
     def _in_python(self) -> Callable[..., Any]:
@@ -154,7 +154,7 @@ def _warn_once() -> None:
 
 
 @cache
-def _disk_cache() -> Any:
+def _open_disk_cache() -> Any:
     """Return the class of numba's caches on disk; what is damaged is compiled again, what cannot be stored is not."""
     from numba.core.caching import FunctionCache
 
@@ -177,6 +177,6 @@ def _disk_cache() -> Any:
 def cache_folder() -> Path | None:
     """Return the folder where machine code is kept between processes; None: nowhere can be written."""
     try:
-        return Path(_disk_cache()(cache_folder).cache_path)
+        return Path(_open_disk_cache()(cache_folder).cache_path)
     except RuntimeError:
         return None

@@ -17,14 +17,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiler import compiled_to_rounding
+from lipmotion.kernels.compiler import compile_to_rounding
 from lipmotion.kernels.factorial_loops import (
     FactorialLogLikelihoods,
     FrameDensity,
     LogTransitions,
     Loop,
     LoopCounts,
-    kept_frames,
+    count_cached_frames,
     log_ends,
 )
 
@@ -71,7 +71,7 @@ class FactorialPosteriors(NamedTuple):
     log_likelihood: float
 
 
-def factorial_posteriors(
+def infer_factorial(
     audio: Loop, visual: Loop, logs: FactorialLogLikelihoods, stretch: int | None = None
 ) -> FactorialPosteriors:
     """Return the posteriors and expected counts of a recording in two loops.
@@ -89,10 +89,10 @@ def factorial_posteriors(
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     ways: list[_Scaled | _InLogs] = []
-    if min(_least_probability(loop) for loop in (audio, visual)) >= MIN_PROBABILITY:
+    if min(_find_min_probability(loop) for loop in (audio, visual)) >= MIN_PROBABILITY:
         ways += [_Scaled(audio, visual, logs, kind) for kind in OFF if kind in (DOUBLE, logs.audio.dtype)]
     found = (_forward_backward((audio, visual), logs, way, stretch) for way in (*ways, _InLogs(audio, visual, logs)))
-    result = next((each for each in found if each is not None), None) or _zero_posteriors(audio, visual, logs)
+    result = next((each for each in found if each is not None), None) or _create_posteriors(audio, visual, logs)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
 
@@ -129,7 +129,7 @@ def _forward_backward(
 ) -> FactorialPosteriors | None:
     """Return the posteriors, computed in a way; None: there is no path, or the precision is not enough."""
     frames, last = len(logs.audio), len(logs.audio) - 1
-    stretch = stretch or kept_frames(frames, way.frame_bytes)
+    stretch = stretch or count_cached_frames(frames, way.frame_bytes)
     starts, heads, log_likelihood = range(0, frames, stretch), list[Array | None](), 0.0
     forward: list[tuple[Array, Array]] = []
     for start in starts:
@@ -320,12 +320,12 @@ def _counted(loop: Loop, posterior: Double, entered: Double) -> LoopCounts:
     return LoopCounts(stay, left[:-1], enter, frames[0])
 
 
-def _least_probability(loop: Loop) -> float:
+def _find_min_probability(loop: Loop) -> float:
     parts = (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
     return min(float(part.min(where=part > 0, initial=1.0)) for part in parts)
 
 
-def _zero_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> FactorialPosteriors:
+def _create_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> FactorialPosteriors:
     counts = [
         LoopCounts(*(np.zeros_like(part) for part in (loop.stay, loop.onward, loop.enter, loop.initial)))
         for loop in (audio, visual)
@@ -334,7 +334,7 @@ def _zero_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -
     return FactorialPosteriors(in_audio, in_visual, in_pairs, counts[0], counts[1], -np.inf)
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
     """Return the last columns of joint probabilities, moved one frame on along axis 0 by those of entering [shape=(U,
     M)].
@@ -346,7 +346,7 @@ def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, co
     return after
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _move_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
     """Return joint backward probabilities, moved a frame back along axis 1; ``left``: of leaving last states [shape=(N,
     U)].
@@ -364,7 +364,7 @@ def _move_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
     return before
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _forward(
     before: Array, stay_0: Array, onward_0: Array, entering_0: Array, stay_1: Array, onward_1: Array, entering_1: Array,
     density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, least: float, whole: float,
@@ -389,7 +389,7 @@ def _forward(
     return total / whole
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _backward(
     before: Array, moved: Array, stay: Array, onward: Array, left: Array,
     density_0: Array, density_1: Array, pair: Array, pair_0: Index, pair_1: Index, least: float, whole: float,
@@ -423,14 +423,14 @@ def _backward(
     return total / whole
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _combine(one: Array, weight: float, other: Array, other_weight: float, into: Array) -> None:
     first, second = into.dtype.type(weight), into.dtype.type(other_weight)
     for j in range(len(into)):
         into[j] = first * one[j] + second * other[j]
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _move(before: Array, stay: Array, onward: Array, entering: Array, i: int, into: Array) -> None:
     """Fill in row i, one frame on along axis 0."""
     units = len(entering)
@@ -440,7 +440,7 @@ def _move(before: Array, stay: Array, onward: Array, entering: Array, i: int, in
         _combine(before[i], stay[i], before[i - units], onward[i - units], into)
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _move_along(before: Array, stay: Array, onward: Array, entering: Array, into: Array) -> None:
     """Fill in a row, one frame on along itself."""
     units = len(entering)
@@ -451,7 +451,7 @@ def _move_along(before: Array, stay: Array, onward: Array, entering: Array, into
         rest[j] = weight[j] * before_rest[j] + onward[j] * before[j]
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _emit(prior: Array, own: float, density: Array, least: float, into: Array) -> None:
     """Fill in a row times the densities of both axes; ``own`` is that of the row."""
     for j in range(len(prior)):
@@ -460,7 +460,7 @@ def _emit(prior: Array, own: float, density: Array, least: float, into: Array) -
         into[j] = product if product > least else 0.0
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _emit_pairs(
     prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, least: float, into: Array
 ) -> int:
@@ -472,7 +472,7 @@ def _emit_pairs(
     return p
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _sum(row: Array) -> float:
     total = np.float64(0)
     for j in range(len(row)):
@@ -480,7 +480,7 @@ def _sum(row: Array) -> float:
     return total
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _meet(one: Array, other: Array, sums: Array) -> float:
     """Add the products of two rows to ``sums``, and return their sum."""
     total = np.float64(0)
@@ -491,7 +491,7 @@ def _meet(one: Array, other: Array, sums: Array) -> float:
     return total
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _share(joint: Array, total: float, whole: float) -> None:
     """Make joint probabilities sum to ``whole``; raise the least of them to 1 / ``whole``."""
     flat = joint.reshape(joint.size)

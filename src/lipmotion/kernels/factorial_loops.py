@@ -167,7 +167,7 @@ class LogTransitions(NamedTuple):
         return state - units if decision > units else state
 
 
-def kept_frames(frames: int, frame_bytes: int) -> int:
+def count_cached_frames(frames: int, frame_bytes: int) -> int:
     """Return the number of frames that are stored at once, of ``frame_bytes`` each."""
     return max(math.isqrt(max(frames - 1, 0)) + 1, min(frames, ROOM_BYTES // frame_bytes))
 
@@ -180,19 +180,19 @@ def log_ends(audio: Loop, visual: Loop) -> tuple[Array, Array]:
     return initial, final
 
 
-def factorial_best_path(
+def find_factorial_path(
     audio: Loop, visual: Loop, logs: FactorialLogLikelihoods, stretch: int | None = None
 ) -> tuple[Index, Index, float]:
     """Return the most probable states of both loops [shapes=(T,)], and the log probability of path and recording.
 
     stretch : frames whose decisions are stored at once; those of the others are computed twice; None: as
-        ``factorial_posteriors``
+        ``infer_factorial``
     Where there is no path: states 0, and -inf.  Of equally probable paths, any one.
     Source: the Viterbi recursion, along one loop's axis and then along the other's.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     frames = len(logs.audio)
-    stretch = stretch or kept_frames(frames, 2 * logs.audio.shape[1] * logs.visual.shape[1])
+    stretch = stretch or count_cached_frames(frames, 2 * logs.audio.shape[1] * logs.visual.shape[1])
     search = _FactorialSearch(LogTransitions.of(audio), LogTransitions.of(visual), logs)
     initial, final = log_ends(audio, visual)
     score = initial + logs.joint(0)

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.kernels.arcs import PADDING_ROWS, ArcLayout, ArcWeights, arrange_weights, lay_out_arcs
-from lipmotion.kernels.compiler import compiled_to_rounding
+from lipmotion.kernels.compiler import compile_to_rounding
 from lipmotion.kernels.forward_backward import log_forward_backward
 
 Index = NDArray[np.intp]
@@ -243,7 +243,7 @@ def _products(
             joint[of_recording], best[of_recording] = _roots(log_densities[0][of_recording].take(columns[0], axis=1))
             continue
         roots, bests = zip(*(_roots(log[of_recording]) for log in log_densities), strict=True)
-        _joint_roots(np.hstack(roots), shifted, joint[of_recording], best[of_recording])
+        _fill_joint_roots(np.hstack(roots), shifted, joint[of_recording], best[of_recording])
         far = start + np.flatnonzero(best[of_recording] < LEAST_JOINT)
         with np.errstate(divide="ignore"):
             best[of_recording] = 8 * np.log(best[of_recording]) + np.sum(bests, axis=0, dtype=np.float64)
@@ -294,8 +294,8 @@ def _count_blocks(counts: Array, layout: ArcLayout, weights: ArcWeights, leaving
         start += targets
 
 
-@compiled_to_rounding
-def _joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, best: Array) -> None:
+@compile_to_rounding
+def _fill_joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, best: Array) -> None:
     """Fill in the roots of joint densities relative to the best of each frame, and the root of the best.
 
     roots   : float32 or float64 [shape=(T, G)], of all chains side by side, each relative to the chain's best
@@ -328,7 +328,7 @@ def _joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, best: 
             row[s] = root if root > LEAST_ROOT else 0.0
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _forward_backward(
     emission: Array, edges: Index, initial: Array, final: Array, runs: Unsigned, run_weight: Array,
     blocks: Unsigned, block_sources: Unsigned, block_weight: Array, transposed: Array,
@@ -387,7 +387,7 @@ def _forward_backward(
     return counts, leaving, entering, scales, ends
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _forward(
     alpha: Array, density: Array, scale: Array, initial: Array, runs: Unsigned, run_weight: Array,
     blocks: Unsigned, sources: Unsigned, block_weight: Array, leave: Array, room: Array, share: Array,
@@ -407,7 +407,7 @@ def _forward(
     return True
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _backward(
     alpha: Array, density: Array, scale: Array, initial: Array, beta: Array, onward: Array, runs: Unsigned,
     run_weight: Array, counts: Array, few: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, enter: Array,
@@ -432,7 +432,7 @@ def _backward(
     return abs(begun - 1) < off
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
     for r in range(len(runs)):
         target, source, length, first = runs[r, 0], runs[r, 1], runs[r, 2], runs[r, 3]
@@ -440,7 +440,7 @@ def _forward_runs(alpha: Array, t: int, runs: Unsigned, weight: Array) -> None:
             alpha[t, target + i] += weight[first + i] * alpha[t - 1, source + i]
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _forward_blocks(
     alpha: Array, t: int, blocks: Unsigned, sources: Unsigned, weight: Array, leaving: Array, room: Array, share: Array,
     least: float,
@@ -455,14 +455,14 @@ def _forward_blocks(
             alpha[t, target + i] += total * room[i]
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _density(root: float) -> float:
     """Return the eighth power of a root, in double precision."""
     square = np.float64(root) * np.float64(root)
     return square * square * (square * square)
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _emit(alpha: Array, emission: Array, t: int, scale: float, least: float) -> float:
     """Multiply the forward probabilities of a frame by its densities and a scale; return their sum."""
     total = 0.0
@@ -474,7 +474,7 @@ def _emit(alpha: Array, emission: Array, t: int, scale: float, least: float) -> 
     return total
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float, least: float) -> float:
     """Replace the densities of a frame by its posteriors, and fill in backward probabilities times densities; return
     the sum of the posteriors.
@@ -490,7 +490,7 @@ def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, sc
     return total
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _backward_runs(
     alpha: Array, t: int, onward: Array, beta: Array, runs: Unsigned, weight: Array, counts: Array
 ) -> None:
@@ -502,7 +502,7 @@ def _backward_runs(
             counts[first + i] += alpha[t, source + i] * onward[target + i]
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _backward_blocks(
     onward: Array, beta: Array, blocks: Unsigned, sources: Unsigned, transposed: Array, entering: Array, t: int,
     room: Array, share: Array, least: float,
@@ -519,7 +519,7 @@ def _backward_blocks(
         start += targets
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _shares(values: Array, t: int, first: Any, count: Any, share: Array, least: float) -> float:
     """Fill in values of a row divided by their sum, 0 where that is less than ``least``; return the sum."""
     total = 0.0
@@ -532,7 +532,7 @@ def _shares(values: Array, t: int, first: Any, count: Any, share: Array, least: 
     return total
 
 
-@compiled_to_rounding
+@compile_to_rounding
 def _times(row: Array, count: Any, matrix: Array, first: Any, product: Array) -> None:
     """Fill in the product of a row with as many rows of a matrix, four of them at a time."""
     wide = matrix.shape[1]

@@ -10,7 +10,7 @@ from lipmotion.kernels.compiler import compiled, pays
 Real = NDArray[np.float64]
 
 
-def normal_sums(places: Real, triangles: NDArray[np.int32]) -> Real:
+def sum_normals(places: Real, triangles: NDArray[np.int32]) -> Real:
     """Return the sum of the normals of the triangles around every vertex, twice as long as their areas [shape=(V, 3)].
 
     places : of the vertices [shape=(V, 3)];  triangles : counterclockwise from outside [shape=(F, 3)]

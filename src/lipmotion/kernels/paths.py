@@ -259,7 +259,7 @@ def _trace_back(
         state = path[t] = source
 
 
-def cheapest_arrivals(start: Array, steps: Array) -> tuple[Array, NDArray[np.uint8]]:
+def find_cheapest(start: Array, steps: Array) -> tuple[Array, NDArray[np.uint8]]:
     """Return the cost of the cheapest path to each last state [shape=(C,)], and back-pointers [shape=(T, C)].
 
     start : cost of each state before the first step [shape=(C,)]; infinite: impossible
@@ -271,7 +271,7 @@ def cheapest_arrivals(start: Array, steps: Array) -> tuple[Array, NDArray[np.uin
     Cost: O(T·C³) time in O(√T) array operations, O(T·C²) memory.
     """
     states, frames = len(start), steps.shape[2]
-    pieces = _in_pieces(steps)
+    pieces = _work_in_pieces(steps)
     before = np.empty((len(pieces), states, pieces.shape[3]))
     before[0] = _entries(start, _products(pieces))
     for frame in range(len(pieces) - 1):
@@ -290,7 +290,7 @@ def trace_back(pointers: NDArray[np.uint8], last: int) -> NDArray[np.intp]:
     return np.array(path[::-1], np.intp)
 
 
-def _in_pieces(steps: Array) -> Array:
+def _work_in_pieces(steps: Array) -> Array:
     """Return the steps [shape=(length, C, C, pieces)]; in padding, staying in a state costs nothing."""
     states, _, frames = steps.shape
     length = isqrt(frames - 1) + 1
@@ -329,7 +329,7 @@ def _cheapest(ways: Array) -> tuple[Array, NDArray[np.uint8]]:
     return least, which
 
 
-def best_segments(cost: NDArray[np.float64], hold: int, change: float) -> list[tuple[int, int]]:
+def find_segments(cost: NDArray[np.float64], hold: int, change: float) -> list[tuple[int, int]]:
     """Return the segments (first frame, label) of least cost, in order; neighbours differ in label.
 
     cost   : [shape=(T, S), finite], of label s in frame t

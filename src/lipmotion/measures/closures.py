@@ -49,7 +49,7 @@ class PhoneClosures:
     original_per_minute: float
 
 
-def closed_threshold(openings: Sequence[Curve], share: float = CLOSED_SHARE) -> float:
+def find_threshold(openings: Sequence[Curve], share: float = CLOSED_SHARE) -> float:
     """Return the opening below which the mouth is closed, from the openings of the training list."""
     return float(share * np.percentile(np.concatenate(openings), 95))
 
@@ -87,7 +87,7 @@ def count_matches(some: NDArray[np.intp], others: NDArray[np.intp], reach: int =
     return int((np.abs(some[:, None] - others) <= reach).any(axis=1).sum())
 
 
-def closure_figures(
+def measure_closures(
     generated: Sequence[Curve], original: Sequence[Curve], threshold: float, rate_hz: float
 ) -> Closures:
     """Return the closure figures of openings, which are given clip by clip."""
@@ -121,7 +121,7 @@ def clip_closure_counts(
     return [np.array([hit], float) for hit in hits], [np.array([len(o)], float) for o in expected]
 
 
-def phone_closures(
+def measure_phones(
     generated: Sequence[Curve],
     original: Sequence[Curve],
     intervals: Sequence[Sequence[tuple[float, float]]],

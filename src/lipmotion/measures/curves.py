@@ -22,7 +22,7 @@ FLOOR = 1e-6
 """Power under this share of the largest of the original counts as so much: rounding is no movement."""
 
 
-def modulation_distance_db(generated: Clips, original: Clips, rate_hz: float) -> Array:
+def measure_modulation_distance(generated: Clips, original: Clips, rate_hz: float) -> Array:
     """Return the root of the mean squared difference of two log modulation spectra, in dB [shape=(P,)].
 
     The mean is over frequencies up to ``HIGHEST_HZ``. NaN where the original is constant but for rounding.
@@ -58,17 +58,17 @@ def select_moving(original: Clips, units: Sequence[str]) -> NDArray[np.bool_]:
     return varies(values) & (extents > STILL_SHARE * np.array([widest[unit] for unit in units]))
 
 
-def pooled_correlation(generated: Clips, original: Clips) -> Array:
+def correlate_pooled(generated: Clips, original: Clips) -> Array:
     """Return the ``correlation`` over the frames of all clips together [shape=(P,)]."""
     return correlation(np.concatenate(generated), np.concatenate(original))
 
 
-def per_clip_correlation(generated: Clips, original: Clips) -> Array:
+def correlate_clips(generated: Clips, original: Clips) -> Array:
     """Return the mean over clips of each clip's ``correlation`` [shape=(P,)]."""
     return np.mean([correlation(g, o) for g, o in zip(generated, original, strict=True)], axis=0)
 
 
-def mean_distance(generated: Clips, original: Clips) -> float:
+def find_distance(generated: Clips, original: Clips) -> float:
     """Return the mean over frames of the Euclidean distance, in the channels' unit. Source: Xie & Liu, Eq. 20."""
     return float(np.linalg.norm(np.concatenate(generated) - np.concatenate(original), axis=1).mean())
 
@@ -78,42 +78,42 @@ def rmse(generated: Clips, original: Clips) -> Array:
     return np.sqrt(np.square(np.concatenate(generated) - np.concatenate(original)).mean(axis=0))
 
 
-def normalised_rmse(generated: Clips, original: Clips) -> Array:
+def normalise_rmse(generated: Clips, original: Clips) -> Array:
     """Return the RMSE of every channel in units of its standard deviation over all frames [shape=(P,)].
 
-    NaN where the original is constant but for rounding, as in ``global_variance_ratio`` and ``jerk_ratio``.
+    NaN where the original is constant but for rounding, as in ``compare_variance`` and ``compare_jerk``.
     """
-    return rmse(generated, original) / _where_moving(original, np.concatenate(original).std(axis=0))
+    return rmse(generated, original) / _mark_moving(original, np.concatenate(original).std(axis=0))
 
 
-def global_variance_ratio(generated: Clips, original: Clips) -> Array:
+def compare_variance(generated: Clips, original: Clips) -> Array:
     """Return mean over clips of std(generated) / mean over clips of std(original) [shape=(P,)]."""
     spread = np.mean([o.std(axis=0) for o in original], axis=0)
-    return np.mean([g.std(axis=0) for g in generated], axis=0) / _where_moving(original, spread)
+    return np.mean([g.std(axis=0) for g in generated], axis=0) / _mark_moving(original, spread)
 
 
-def jerk_ratio(generated: Clips, original: Clips) -> Array:
+def compare_jerk(generated: Clips, original: Clips) -> Array:
     """Return mean |third difference|, generated over original [shape=(P,)]."""
 
     def jerk(clips: Clips) -> Array:
         return np.abs(np.concatenate([np.diff(clip, 3, axis=0) for clip in clips if len(clip) > 3])).mean(axis=0)
 
-    return jerk(generated) / _where_moving(original, jerk(original))
+    return jerk(generated) / _mark_moving(original, jerk(original))
 
 
-def _where_moving(original: Clips, divisor: Array) -> Array:
+def _mark_moving(original: Clips, divisor: Array) -> Array:
     """Return the divisor [shape=(P,)], NaN for channels that do not move, and where it is 0."""
     return np.where(varies(np.concatenate(original)) & (divisor > 0), divisor, np.nan)
 
 
-def lag_ms(generated: Clips, original: Clips, rate_hz: float, reach_s: float = 0.4) -> float:
+def measure_lag(generated: Clips, original: Clips, rate_hz: float, reach_s: float = 0.4) -> float:
     """Return the lag of the first channel in ms, positive where it is late.
 
     It is the maximum of the cross-correlation within ``reach_s`` seconds, refined by a parabola.
     """
     reach = round(reach_s * rate_hz)
     shifts = range(-reach, reach + 1)
-    position, _ = _refine_peak(np.array([_shifted_correlation(generated, original, shift) for shift in shifts]))
+    position, _ = _refine_peak(np.array([_correlate_shifted(generated, original, shift) for shift in shifts]))
     return (position - reach) / rate_hz * 1000
 
 
@@ -125,21 +125,21 @@ def _refine_peak(scores: Array) -> tuple[float, float]:
     return best + (0.5 * (before - after) / curvature if curvature < 0 else 0.0), peak
 
 
-def _shifted_correlation(generated: Clips, original: Clips, shift: int) -> float:
+def _correlate_shifted(generated: Clips, original: Clips, shift: int) -> float:
     """Return the correlation of generated[t + shift] with original[t] over all clips; 0 where none is long enough."""
     pairs = [
         (g[max(shift, 0) : len(g) + min(shift, 0), :1], o[max(-shift, 0) : len(o) - max(shift, 0), :1])
         for g, o in zip(generated, original, strict=True)
         if len(g) > abs(shift) + 1
     ]
-    return float(pooled_correlation([g for g, _ in pairs], [o for _, o in pairs])[0]) if pairs else 0.0
+    return float(correlate_pooled([g for g, _ in pairs], [o for _, o in pairs])[0]) if pairs else 0.0
 
 
 DRAWS = 2000
 """Bootstrap samples of an interval."""
 
 
-def bootstrap_interval(
+def compute_interval(
     figure: Callable[[Clips, Clips], float], generated: Clips, original: Clips, seed: int, draws: int = DRAWS
 ) -> tuple[float, float]:
     """Return the 95 % bootstrap interval (lower and upper limit) of a figure over clips.
@@ -155,7 +155,7 @@ def bootstrap_interval(
     return float(low), float(high)
 
 
-def lip_vertex_error(generated: Clips, original: Clips) -> float:
+def measure_lip_error(generated: Clips, original: Clips) -> float:
     """Return the mean over frames of the largest distance of any lip vertex, in the unit of the places.
 
     Source: Richard et al. 2021 (MeshTalk), Fan et al. 2022 (FaceFormer, on VOCASET).
@@ -163,7 +163,7 @@ def lip_vertex_error(generated: Clips, original: Clips) -> float:
     return float(np.concatenate([each.max(axis=1) for each in _distances(generated, original)]).mean())
 
 
-def landmark_distance(generated: Clips, original: Clips) -> float:
+def measure_landmarks(generated: Clips, original: Clips) -> float:
     """Return the mean over frames and landmarks of their distance, in the unit of the places.
 
     Source: Chen et al. 2018 (LMD).
@@ -171,7 +171,7 @@ def landmark_distance(generated: Clips, original: Clips) -> float:
     return float(np.concatenate([each.mean(axis=1) for each in _distances(generated, original)]).mean())
 
 
-def upper_face_deviation(generated: Clips, original: Clips, rest: Array) -> float:
+def measure_upper_face(generated: Clips, original: Clips, rest: Array) -> float:
     """Return by how much more the vertices of the upper face vary in the original, in the unit of the places.
 
     rest : their places in a face at rest [shape=(V, D)]
@@ -247,13 +247,13 @@ def shift_scores(predicted: Array, measured: Array, valid: NDArray[np.bool_], re
     return scores
 
 
-def best_offset(scores: Array, rate_hz: float) -> Offset:
+def find_offset(scores: Array, rate_hz: float) -> Offset:
     """Return the offset of the highest score [shape=(2·reach + 1,)], refined by a parabola."""
     late_s, score, margin = _find_highest(scores, rate_hz)
     return Offset(late_s, score, margin, late_s, late_s)
 
 
-def pooled_offset(scores: Sequence[Array], rate_hz: float) -> Offset:
+def find_pooled_offset(scores: Sequence[Array], rate_hz: float) -> Offset:
     """Return the common offset of clips: that of the highest mean score, with a bootstrap interval over clips."""
     clips = np.stack(scores)
     late_s, score, margin = _find_highest(clips.mean(axis=0), rate_hz)

@@ -15,7 +15,7 @@ PINNED = (
 SEEN = "the model was trained on some of these recordings: figures of recordings that it does not know are lower"
 
 
-def figures_table(figures: Mapping[str, Any]) -> str:
+def format_figures(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``lipmotion.evaluate`` as text."""
     closed, still = figures["closed_under"], figures["still_channels"]
     lines = [f"split {figures['split']}: {figures['clips']} clips"]
@@ -34,9 +34,9 @@ def figures_table(figures: Mapping[str, Any]) -> str:
         lines += ["", name, f"  {'channel':{size}}{'ACC':>7}{'per clip':>10}{'nRMSE':>7}{'variance':>10}{'jerk':>7}"]
         for channel, row in rows.items():
             lines.append(
-                f"  {channel:{size}}{figure_text(row['acc'], '7.3f')}{figure_text(row['acc_per_clip'], '10.3f')}"
-                f"{figure_text(row['nrmse'], '7.3f')}{figure_text(row['global_variance'], '10.2f')}"
-                f"{figure_text(row['jerk'], '7.2f')}"
+                f"  {channel:{size}}{format_figure(row['acc'], '7.3f')}{format_figure(row['acc_per_clip'], '10.3f')}"
+                f"{format_figure(row['nrmse'], '7.3f')}{format_figure(row['global_variance'], '10.2f')}"
+                f"{format_figure(row['jerk'], '7.2f')}"
             )
         lines += _summary(condition)
     return "\n".join(map(printable, lines))
@@ -58,40 +58,40 @@ def _summary(condition: Mapping[str, Any]) -> list[str]:
     without_pins = []
     free = condition.get("unpinned")
     if free is not None:
-        acc, (free_low, free_high) = figure_text(free["channels"]["opening"]["acc"], ".3f"), free["opening_acc_95"]
+        acc, (free_low, free_high) = format_figure(free["channels"]["opening"]["acc"], ".3f"), free["opening_acc_95"]
         head = f"  without pins: ACC of opening {acc} ({free_low:.3f} to {free_high:.3f}), mean ACC {free['acc']:.3f}"
-        without_pins = [head, *(f"  {line}" for line in _closure_lines(free))]
+        without_pins = [head, *(f"  {line}" for line in _format_closures(free))]
     return [
         f"  opening ACC 95 % interval {low:.3f} to {high:.3f};{lines[0][1:]}",
         *lines[1:],
-        *_closure_lines(condition),
-        f"  silence: opening {figure_text(quiet['mean'], '.4f')} ± {figure_text(quiet['std'], '.4f')} "
-        f"(original {figure_text(original['mean'], '.4f')} ± {figure_text(original['std'], '.4f')}, "
+        *_format_closures(condition),
+        f"  silence: opening {format_figure(quiet['mean'], '.4f')} ± {format_figure(quiet['std'], '.4f')} "
+        f"(original {format_figure(original['mean'], '.4f')} ± {format_figure(original['std'], '.4f')}, "
         f"{quiet['frames']} frames)",
         *without_pins,
     ]
 
 
-def _closure_lines(condition: Mapping[str, Any]) -> list[str]:
+def _format_closures(condition: Mapping[str, Any]) -> list[str]:
     phones = condition["closures_p_b_m"]
     return [
-        closures_line(condition["closures"]),
-        f"  p b m: recall {figure_text(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
-        f"{figure_text(phones['false_per_minute'], '.1f')} a minute (original "
-        f"{figure_text(phones['original_per_minute'], '.1f')})",
+        format_closures(condition["closures"]),
+        f"  p b m: recall {format_figure(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
+        f"{format_figure(phones['false_per_minute'], '.1f')} a minute (original "
+        f"{format_figure(phones['original_per_minute'], '.1f')})",
     ]
 
 
-def closures_line(closures: Mapping[str, Any]) -> str:
+def format_closures(closures: Mapping[str, Any]) -> str:
     """Return the line of the figures of closings."""
     return (
-        f"  closures: score {figure_text(closures['score'], '.3f')} of {closures['original']}, precision "
-        f"{figure_text(closures['precision'], '.3f')} of {closures['generated']}, F1 "
-        f"{figure_text(closures['f1'], '.3f')}, timing {figure_text(closures['timing_ms'], '+.0f')} ms"
+        f"  closures: score {format_figure(closures['score'], '.3f')} of {closures['original']}, precision "
+        f"{format_figure(closures['precision'], '.3f')} of {closures['generated']}, F1 "
+        f"{format_figure(closures['f1'], '.3f')}, timing {format_figure(closures['timing_ms'], '+.0f')} ms"
     )
 
 
-def figure_text(value: float | None, form: str) -> str:
+def format_figure(value: float | None, form: str) -> str:
     """Return a figure as text, formatted by ``form``; None is a dash of the same width."""
     width = form.partition(".")[0].strip("+")
     return f"{'–':>{width or 0}}" if value is None else format(value, form)
@@ -109,7 +109,7 @@ COLUMNS = {
 """Head and form of every column, by the name of the figure."""
 
 
-def comparison_table(figures: Mapping[str, Any]) -> str:
+def format_comparison(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``lipmotion.compare`` as text."""
     lines = [f"reference: {figures['reference']}"]
     for pair in figures["others"]:
@@ -120,24 +120,24 @@ def comparison_table(figures: Mapping[str, Any]) -> str:
             head = "".join(f"{name:>{int(form.partition('.')[0])}}" for name, form in COLUMNS.values())
             lines.append(f"  {'channel':{size}}{head}")
             for channel, row in pair["channels"].items():
-                cells = "".join(figure_text(row[name], form) for name, (_, form) in COLUMNS.items())
+                cells = "".join(format_figure(row[name], form) for name, (_, form) in COLUMNS.items())
                 lines.append(f"  {channel:{size}}{cells}")
-            lines.append(f"  mean ACC {figure_text(pair['acc'], '.3f')}")
-        lines += [closures_line(pair["closures"])] if "closures" in pair else []
+            lines.append(f"  mean ACC {format_figure(pair['acc'], '.3f')}")
+        lines += [format_closures(pair["closures"])] if "closures" in pair else []
         if "points" in pair:
-            lines.append(f"  points: {', '.join(_point_figures(pair['points']))}")
+            lines.append(f"  points: {', '.join(_list_points(pair['points']))}")
         if "upper_face" in pair:
-            deviation = figure_text(pair["upper_face"]["deviation"], "+.4f")
+            deviation = format_figure(pair["upper_face"]["deviation"], "+.4f")
             lines.append(f"  upper face: deviation {deviation} over {pair['upper_face']['curves']} curves")
     return "\n".join(map(printable, lines))
 
 
-def _point_figures(points: Mapping[str, Any]) -> list[str]:
-    parts = [f"landmark distance {figure_text(points['landmark_distance_mm'], '.2f')} mm over {points['points']}"]
+def _list_points(points: Mapping[str, Any]) -> list[str]:
+    parts = [f"landmark distance {format_figure(points['landmark_distance_mm'], '.2f')} mm over {points['points']}"]
     if points["lip_points"]:
-        error = figure_text(points["lip_vertex_error_mm"], ".2f")
+        error = format_figure(points["lip_vertex_error_mm"], ".2f")
         parts.insert(0, f"lip vertex error {error} mm over {points['lip_points']}")
     if points["upper_points"]:
-        deviation = figure_text(points["upper_face_deviation_mm"], "+.2f")
+        deviation = format_figure(points["upper_face_deviation_mm"], "+.2f")
         parts.append(f"upper-face deviation {deviation} mm over {points['upper_points']}")
     return parts

@@ -16,7 +16,7 @@ from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.kernels.compiler import numba_works, one_thread
+from lipmotion.kernels.compiler import limit_threads, numba_works
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.analysis.language import resolve_language
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording, read_request
@@ -191,7 +191,7 @@ class Session:
 
         Raises InputError, AlignmentError: as ``animate``; or an edit is not possible.
         """
-        with self._one_at_a_time, one_thread():
+        with self._one_at_a_time, limit_threads():
             return self._edited_units(edits.steps)
 
     def generate(self, edits: Edits = NO_EDITS) -> Generation:
@@ -202,20 +202,20 @@ class Session:
         and hold in every output that has the curve.
         Raises InputError, AlignmentError: as ``units``; or a pin is not possible.
         """
-        with self._one_at_a_time, one_thread():
+        with self._one_at_a_time, limit_threads():
             return self._after(edits.steps)
 
     def deliver(self, edits: Edits = NO_EDITS) -> Generation:
         """Return the motion as files hold it: with its intensity, anticipation and offset (docs/controls.md)."""
         from lipmotion.pipeline.outputs.deliver import deliver  # curves, which ``animate`` needs not
 
-        with self._one_at_a_time, one_thread():
+        with self._one_at_a_time, limit_threads():
             key = (edits.steps, self.is_sketching)
             return self._cache.cached("delivered", key, lambda: deliver(self.generate(edits), edits.delivery()))
 
     def analyse(self, edits: Edits = NO_EDITS) -> SpeechAnalysis:
         """Return the speech as input of the engine, with the phones of ``units``."""
-        with self._one_at_a_time, one_thread():
+        with self._one_at_a_time, limit_threads():
             return self._edited_speech(edits.steps)
 
     @cached_property

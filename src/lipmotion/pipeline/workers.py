@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
-from lipmotion.extensions import install_command, installed_version
-from lipmotion.kernels.compiler import blas_kernels, one_thread
+from lipmotion.extensions import find_version, install_command
+from lipmotion.kernels.compiler import limit_threads, list_blas_kernels
 from lipmotion.types import ParallelMap
 
 ItemT = TypeVar("ItemT")
@@ -131,7 +131,7 @@ def worker_pool(count: int) -> Iterator[Workers]:
             if process.pid is not None:
                 process.join()
 
-    with one_thread(), ExitStack() as stack:
+    with limit_threads(), ExitStack() as stack:
         yield Workers([stack.enter_context(start_worker()) for _ in range(count if count > 1 else 0)])
 
 
@@ -227,7 +227,7 @@ def _signals_delayed() -> Iterator[None]:
 def _work(end: Any) -> None:
     """Apply the functions that come through the pipe to their items, until the pipe ends."""
     _begin_below()
-    with one_thread():
+    with limit_threads():
         while True:
             try:
                 function, item = end.recv()
@@ -274,7 +274,7 @@ def training_pool(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
 
 
 def _work_alone(function: Callable[[ItemT], ResultT], numbered: tuple[int, ItemT]) -> tuple[int, ResultT]:
-    with one_thread():
+    with limit_threads():
         return numbered[0], function(numbered[1])
 
 
@@ -349,8 +349,8 @@ def _check_worker(worker: str, answer: Any, out: str | Path) -> None:
             f"{worker}: this worker cannot run lipmotion ({answer}); install the same version there"
         ) from answer
     version, sees_folder, processor = answer
-    if version != installed_version():
-        raise InputError(f"{worker}: has lipmotion {version}, required {installed_version()}; install it there")
+    if version != find_version():
+        raise InputError(f"{worker}: has lipmotion {version}, required {find_version()}; install it there")
     if processor != describe_worker("")[2]:
         LOG.warning("%s: has another processor (%s): the last bits of results may differ", worker, processor)
     if not sees_folder:
@@ -359,4 +359,4 @@ def _check_worker(worker: str, answer: Any, out: str | Path) -> None:
 
 def describe_worker(out: str) -> tuple[str, bool, str]:
     """Return a worker's version of lipmotion, whether it sees a folder, and what kind of processor it has."""
-    return installed_version(), os.path.isdir(out), f"{platform.machine()} {blas_kernels()}"  # noqa: PTH112
+    return find_version(), os.path.isdir(out), f"{platform.machine()} {list_blas_kernels()}"  # noqa: PTH112

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 
 Array = NDArray[np.float32]
 NetworkT = TypeVar("NetworkT", bound="SequenceNetwork")
@@ -108,7 +108,7 @@ class TrainingPlan:
     seed: int
 
 
-@one_thread()
+@limit_threads()
 def fit_network(
     network: NetworkT,
     draw: Callable[[np.random.Generator, int], TrainingSequence],

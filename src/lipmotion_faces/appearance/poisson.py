@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -225,7 +225,7 @@ class CloningSystem:
                 part = values[start : start + step]
                 yield slice(first + start, first + start + len(part)), filler.fill(part)
 
-    @one_thread()
+    @limit_threads()
     def _solve_nodes(self, source: Pictures, background: Pictures, limit: float) -> NDArray[np.float32]:
         """Return the membranes of some pictures at the nodes [shape=(t, K, 3)]."""
         rows, columns = self.edge // self.grids.region.shape[1], self.edge % self.grids.region.shape[1]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import InputError, ModelFormatError, shorten
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.binding import MAX_WEIGHTS, ControlBinding
@@ -67,7 +67,7 @@ def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
     count = int(arrays["vertex_count"])
     if count != len(mesh.vertices):
         raise InputError(f"{path}: made for {count} vertices, the character has {len(mesh.vertices)}; bind it again")
-    template = mouth_template()
+    template = build_mouth()
     with format_errors(f"{path}: the binding", AGAIN):
         if tuple(arrays["points"].tolist()) != template.points:
             raise ValueError("its points are not those of motion")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights
@@ -108,7 +108,7 @@ def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sour
     inside = [at + share * PHONE_S for at in edges[:-1] for share in (0.3, 0.7)]
     keys = [0.0, float(edges[0]), *inside, float(edges[-1]), float(time_s[-1])]
     opening = np.interp(time_s, keys, [0, 0, *np.repeat(OPENINGS, 2), 0, 0])
-    width = np.interp(time_s, keys, [1, 1, *np.repeat(WIDTHS, 2), 1, 1]) * mouth_template().width
+    width = np.interp(time_s, keys, [1, 1, *np.repeat(WIDTHS, 2), 1, 1]) * build_mouth().width
     motion = Motion(np.stack([opening, width], axis=1), RATE_HZ, (Channel("opening"), Channel("width")))
     units, frames = Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
     if isinstance(curves, Path):

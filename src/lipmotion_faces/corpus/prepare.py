@@ -19,7 +19,7 @@ from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording, add_separate_sounds
 from lipmotion.corpora.store import UTTERANCES, Corpus, quantise, read_entry, write_utterance
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.extensions import installed_version
+from lipmotion.extensions import find_version
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
@@ -207,7 +207,7 @@ def _make_job(
     source = {
         "collection": collection,
         "file": recording.file.name,
-        "lipmotion": installed_version(),
+        "lipmotion": find_version(),
         **packages,
         **recording.rights,
     }

@@ -13,7 +13,7 @@ from lipmotion.corpora.captured_faces import MESH, list_mesh_files, read_bare_mo
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
-from lipmotion.formats.tables import is_live_link_file, read_curve_table, speech_curves
+from lipmotion.formats.tables import is_live_link_file, read_curve_table, read_speech_curves
 from lipmotion.pipeline.outputs.motion_files import correct_rate
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.audio_files import read_audio
@@ -64,7 +64,7 @@ def read_supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
             motion, seen = read_curve_table(curves.file)
         except InputError as error:
             raise InputError(f"{curves.file}: {error}") from error
-        motion = speech_curves(motion)
+        motion = read_speech_curves(motion)
     elif curves.file.suffix == MESH and curves.rate_hz:
         motion = read_mesh_motion(curves.file, curves.rate_hz)
     else:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, read_entry
-from lipmotion.kernels.compiler import one_thread
-from lipmotion.measures.curves import Offset, best_offset, pooled_offset, shift_scores
+from lipmotion.kernels.compiler import limit_threads
+from lipmotion.measures.curves import Offset, find_offset, find_pooled_offset, shift_scores
 from lipmotion.motion.space import resample_to_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import WINDOW
@@ -86,16 +86,16 @@ def offsets(corpus: Corpus) -> CorpusOffsets:
             collection = f"{utterance.source.get('collection', '')} {utterance.speaker}".strip()
             members.setdefault(collection, []).append(name)  # speakers are recorded separately, as a rule
     return CorpusOffsets(
-        clips={name: best_offset(score, FRAME_RATE_HZ) for name, score in scores.items()},
+        clips={name: find_offset(score, FRAME_RATE_HZ) for name, score in scores.items()},
         collections={
-            collection: pooled_offset([scores[name] for name in names], FRAME_RATE_HZ)
+            collection: find_pooled_offset([scores[name] for name in names], FRAME_RATE_HZ)
             for collection, names in members.items()
         },
         members={collection: tuple(names) for collection, names in members.items()},
     )
 
 
-@one_thread()
+@limit_threads()
 def sync(corpus: Corpus) -> dict[str, float]:
     """Move the sound of each collection by its offset, if it is known; return the offsets in seconds, by collection.
 

@@ -16,7 +16,7 @@ from lipmotion.corpora.folder import discover
 from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
 from lipmotion.corpora.store import MANIFEST, Corpus, read_entry
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
@@ -192,7 +192,7 @@ class _Filmed:
     sound: Audio | None
 
 
-@one_thread()
+@limit_threads()
 def build_face(
     source: str | Path,
     *,

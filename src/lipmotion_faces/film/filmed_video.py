@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import FULL_DEFICIT_GAP, close_lips, gap_to_opening, read_gap, sample_pictures
 from lipmotion.errors import InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Mark, Outputs
@@ -96,7 +96,7 @@ class Film:
     covered: tuple[float, float, float, float]
 
 
-@one_thread()
+@limit_threads()
 def make_film(  # noqa: PLR0913
     face: FilmedFace,
     motion: Motion,
@@ -240,7 +240,7 @@ def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
     return same
 
 
-@one_thread()
+@limit_threads()
 def write_film(
     path: Path, film: Film, sound: Audio, *, mark: Mark = "metadata", monitor: Monitor = silent_monitor
 ) -> None:

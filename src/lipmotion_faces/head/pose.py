@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lipmotion.articulation.liveliness import CALM, Liveliness, UpperFace
-from lipmotion.articulation.mouth import SpokenMouth, spoken_mouth, upper_share
+from lipmotion.articulation.mouth import SpokenMouth, find_mouth, weigh_upper
 from lipmotion.articulation.phone_targets import TIP_UP
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import Staging, stage_liveliness
@@ -77,8 +77,8 @@ class CharacterPose(NamedTuple):
 def head_poses(
     motion: Motion, units: Timeline[Unit], fps: float, staging: Staging | None = None, prosody: Prosody | None = None
 ) -> list[CharacterPose]:
-    """Return the pose at ``n / fps`` seconds, to the end of the motion. Raises InputError: as ``spoken_mouth``."""
-    mouth = spoken_mouth(motion, units, fps)
+    """Return the pose at ``n / fps`` seconds, to the end of the motion. Raises InputError: as ``find_mouth``."""
+    mouth = find_mouth(motion, units, fps)
     return pose_head(mouth, stage_liveliness(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
 
 
@@ -95,7 +95,7 @@ def pose_head(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
     closing, out = mouth.closing, mouth.between_teeth * (1 - mouth.closing)
     serious = np.maximum(np.maximum(mouth.tight, mouth.stretched), mouth.upper_raise)
     corners = MOOD_SMILE * mouth.smile - MOOD_FROWN * mouth.frown - MOOD_TIGHT * serious
-    rise = upper_share(gap)  # the upper lip rises little in round lips; spread lips and F bare the teeth
+    rise = weigh_upper(gap)  # the upper lip rises little in round lips; spread lips and F bare the teeth
     rise = rise + mouth.upper_raise * np.maximum(np.minimum(0.8 * gap, RAISED_LIP) - rise, 0)
     rise = rise + np.maximum(wide, 0.9 * teeth) * np.maximum(np.minimum(SPREAD_RISE * gap, 0.07) - rise, 0)
     rise = rise + roundness * (0.48 * gap - rise)

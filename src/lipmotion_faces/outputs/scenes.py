@@ -14,7 +14,7 @@ from lipmotion.articulation.contact import sample_pictures
 from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
-from lipmotion.articulation.mouth import frame_times, measure_mouth_at_rest, spoken_mouth
+from lipmotion.articulation.mouth import find_mouth, frame_times, measure_mouth_at_rest
 from lipmotion.articulation.rest import add_rest
 from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
@@ -133,12 +133,12 @@ def head_scene(
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
     around, wanted = _around(frames, MARGIN)
     if frames is None:
-        mouth = spoken_mouth(motion, units, hertz)
+        mouth = find_mouth(motion, units, hertz)
     else:  # made of the frames around those that are wanted
         wider, inner = _around(around, MOUTH_MARGIN)
         part = replace(motion, values=motion.values[wider])
         there = units.between(wider.start / motion.rate_hz, (wider.start + len(part.values)) / motion.rate_hz)
-        mouth = spoken_mouth(part, there, at_rest=measure_mouth_at_rest(motion, units)).within(inner)
+        mouth = find_mouth(part, there, at_rest=measure_mouth_at_rest(motion, units)).within(inner)
     moved = stage_liveliness(times_s[around], motion, units, staging, prosody)
     poses = pose_head(mouth, moved)
     has_mood = any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)
@@ -183,7 +183,7 @@ def character_scene(
     around, wanted = _around(frames, MOUTH_MARGIN)
     is_part = frames is not None and (around.start > 0 or around.stop < len(motion.values))
     part, phones, there = add_rest(motion, units, around) if is_part else (motion, units, slice(None))
-    solved, mouth = character.weights(part, phones), spoken_mouth(with_mouth(part), phones)
+    solved, mouth = character.weights(part, phones), find_mouth(with_mouth(part), phones)
     table = np.zeros((len(motion.values), len(solved.names)))
     table[around] = solved.values[there]
     weights = edit_weights(replace(solved, values=table), units, generation.curve_edits, character)

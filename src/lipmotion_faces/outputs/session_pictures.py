@@ -7,7 +7,7 @@ from threading import RLock
 from typing import Any
 
 from lipmotion.errors import InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import measure_prosody, shift_prosody
@@ -59,7 +59,7 @@ class SessionPictures:
                 seen.motion, seen.units, fps=fps
             )
 
-        with self._one_at_a_time, one_thread():
+        with self._one_at_a_time, limit_threads():
             pictures = self._cache.cached("drawn", (edits.steps, face, fps, self._session.is_sketching), draw)
             frame = frame_of(time_s, len(pictures), fps)
             if frame is None:

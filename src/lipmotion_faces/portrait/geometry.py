@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import smooth_step
 from lipmotion.articulation.liveliness import CALM, UpperFace
-from lipmotion.articulation.mouth import upper_share
+from lipmotion.articulation.mouth import weigh_upper
 from lipmotion_faces.portrait.design import LipDesign, open_curve
 from lipmotion_faces.portrait.layer import Window
 
@@ -103,7 +103,7 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     half_width = drawn_half_width(lips, pose)
     u = np.minimum(np.abs(x) / half_width, 1)
     out, wide = pose.protrusion, pose.spread
-    rise = float(upper_share(pose.gap))
+    rise = float(weigh_upper(pose.gap))
     rise += wide * max(min(SPREAD_RISE[0] * pose.gap, SPREAD_RISE[1]) - rise, 0)
     rise += pose.tuck * (1 - out) * max(min(0.9 * pose.gap, 0.045) - rise, 0) + out * (0.47 * pose.gap - rise)
     rise += pose.upper_raise * max(min(0.8 * pose.gap, RAISED_LIP) - rise, 0)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
-from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SCENE, Picture, Staging, stage_liveliness
 from lipmotion_faces.kernels.painting import stack, warp, warp_bytes
@@ -359,8 +359,8 @@ class FacePose(NamedTuple):
 def face_poses(
     motion: Motion, units: Timeline[Unit], fps: float, staging: Staging, prosody: Prosody | None = None
 ) -> list[FacePose]:
-    """Return the pose of every video frame, frame n at ``n / fps`` seconds. Raises InputError: as ``spoken_mouth``."""
-    mouth = spoken_mouth(motion, units, fps)
+    """Return the pose of every video frame, frame n at ``n / fps`` seconds. Raises InputError: as ``find_mouth``."""
+    mouth = find_mouth(motion, units, fps)
     moved = stage_liveliness(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody)
     gaze = LOOK * moved.gaze
     yaw, pitch, roll = np.clip(moved.turn, -LARGEST_TURN, LARGEST_TURN).T

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output, part_of
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
 from lipmotion.cli.terminal.progress import print_line, print_lines
 from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.request import Outputs
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
         return
     by_points = bool(options.control_points or options.write_weights or options.write_binding)
     try:
-        character = open_character(part_of(options, Outputs(), control_points=by_points))
+        character = open_character(pick_part(options, Outputs(), control_points=by_points))
     except InputError:
         table = table_path(path)
         if options.write_table and not is_file(table):  # the mouth was not found: the table is to be filled in

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.extensions import installed_version
+from lipmotion.extensions import find_version
 from lipmotion.printable import printable
 
 Frame = NDArray[np.uint8]
@@ -56,7 +56,7 @@ def mark_metadata(statement: str = STATEMENT) -> MarkMetadata:
     Source: IPTC Digital Source Type NewsCodes; IPTC Video Metadata Hub; Adobe, XMP Specification Part 1.
     """
     text = escape(printable(statement), quote=False)
-    xmp = _PACKET.format(statement=text, source_type=SOURCE_TYPE, tool=f"lipmotion {installed_version()}")
+    xmp = _PACKET.format(statement=text, source_type=SOURCE_TYPE, tool=f"lipmotion {find_version()}")
     return MarkMetadata({"comment": statement, "keywords": f"{LABEL}, {SOURCE_TYPE}"}, xmp)
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures import curves
-from lipmotion.measures.closures import clip_closure_counts, closure_figures, phone_closures
-from lipmotion.measures.curves import Clips, bootstrap_interval
+from lipmotion.measures.closures import clip_closure_counts, measure_closures, measure_phones
+from lipmotion.measures.curves import Clips, compute_interval
 from lipmotion.motion.frame_labels import is_away_from_speech
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser
@@ -53,11 +53,11 @@ def figures_of(clips: Sequence[held_out.ComparedClip], recordings: Compared, see
     generated, original = [clip.generated for clip in clips], [clip.original for clip in clips]
     rate_hz = float(1 / np.median(np.diff(clips[0].time_s)))
     measured = {
-        "acc": curves.pooled_correlation(generated, original),
-        "acc_per_clip": curves.per_clip_correlation(generated, original),
-        "nrmse": curves.normalised_rmse(generated, original),
-        "global_variance": curves.global_variance_ratio(generated, original),
-        "jerk": curves.jerk_ratio(generated, original),
+        "acc": curves.correlate_pooled(generated, original),
+        "acc_per_clip": curves.correlate_clips(generated, original),
+        "nrmse": curves.normalise_rmse(generated, original),
+        "global_variance": curves.compare_variance(generated, original),
+        "jerk": curves.compare_jerk(generated, original),
     }
     per_channel = {name: {key: float(of[i]) for key, of in measured.items()} for i, name in enumerate(compared)}
     eigenlips = {name: per_channel[name] for name in recordings.eigenlips_channels}
@@ -69,14 +69,14 @@ def figures_of(clips: Sequence[held_out.ComparedClip], recordings: Compared, see
     led = [clip[:, column] for clip in generated], [clip[:, column] for clip in original]
 
     def distance(columns: NDArray[np.bool_]) -> float:
-        return curves.mean_distance([clip[:, columns] for clip in generated], [clip[:, columns] for clip in original])
+        return curves.find_distance([clip[:, columns] for clip in generated], [clip[:, columns] for clip in original])
 
     figures = {
         "channels": {name: row for name, row in per_channel.items() if name not in eigenlips},
         "acc": float(measured["acc"][overall].mean()),
         "amse": distance(overall),
         "leading": compared[leading],
-        "lag_ms": curves.lag_ms(*led, rate_hz),
+        "lag_ms": curves.measure_lag(*led, rate_hz),
     }
     if eigenlips:  # means over channels: Xie & Liu 2007, Eq. 21, for the correlation
         rows = list(eigenlips.values())
@@ -100,12 +100,12 @@ def _opening_figures(
     other_s = sum(end - start for clip in clips for start, end, phone in clip.spoken if phone not in BILABIAL)
 
     def acc(generated: curves.Clips, original: curves.Clips) -> float:
-        return float(curves.pooled_correlation([g[:, None] for g in generated], [o[:, None] for o in original])[0])
+        return float(curves.correlate_pooled([g[:, None] for g in generated], [o[:, None] for o in original])[0])
 
     return {
-        "opening_acc_95": bootstrap_interval(acc, generated, original, seed),
-        "closures": asdict(closure_figures(generated, original, threshold, rate_hz)),
-        "closures_p_b_m": asdict(phone_closures(generated, original, bilabial, other_s, threshold, rate_hz)),
+        "opening_acc_95": compute_interval(acc, generated, original, seed),
+        "closures": asdict(measure_closures(generated, original, threshold, rate_hz)),
+        "closures_p_b_m": asdict(measure_phones(generated, original, bilabial, other_s, threshold, rate_hz)),
         "silence": {"generated": _silence(clips, generated), "original": _silence(clips, original)},
     }
 
@@ -118,7 +118,7 @@ def _silence(clips: Sequence[held_out.ComparedClip], values: curves.Clips) -> di
     return {"mean": mean, "std": deviation, "frames": len(quiet)}
 
 
-@one_thread()
+@limit_threads()
 def evaluate(
     model: Model,
     corpus: Corpus,
@@ -225,11 +225,11 @@ class ClipStatistic:
 
     def interval(self, seed: int) -> tuple[float, float]:
         """Return the 95 % bootstrap interval over clips."""
-        return bootstrap_interval(lambda own, _: self._value(own), self.sums, self.sums, seed)
+        return compute_interval(lambda own, _: self._value(own), self.sums, self.sums, seed)
 
     def gain(self, other: ClipStatistic, seed: int) -> tuple[float, float]:
         """Return the paired 95 % bootstrap interval of this statistic minus that of another system."""
-        return bootstrap_interval(
+        return compute_interval(
             lambda own, others: self._value(own) - other._value(others), self.sums, other.sums, seed
         )
 
@@ -243,7 +243,7 @@ def ratio(total: Array) -> float:
 
 
 def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
-    """Return the mean over channels of ``curves.pooled_correlation`` of clips [each shape=(T_i, P)]."""
+    """Return the mean over channels of ``curves.correlate_pooled`` of clips [each shape=(T_i, P)]."""
     middle, everything = np.concatenate(original).mean(axis=0), np.concatenate(generated)
     still = ~varies(everything)
 
@@ -261,7 +261,7 @@ def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
 
 
 def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
-    """Return ``curves.mean_distance`` of clips [each shape=(T_i, P)]."""
+    """Return ``curves.find_distance`` of clips [each shape=(T_i, P)]."""
     errors = [np.linalg.norm(g - o, axis=1) for g, o in zip(generated, original, strict=True)]
     sums = [np.array([error.sum(), len(error)]) for error in errors]
     return ClipStatistic(sums, ratio)

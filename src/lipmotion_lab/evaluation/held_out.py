@@ -13,7 +13,7 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
-from lipmotion.measures.closures import closed_threshold
+from lipmotion.measures.closures import find_threshold
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
 from lipmotion.pipeline.analysis.speech_analysis import build_speech, recognise_speech, with_voice
@@ -136,9 +136,7 @@ def load_held_out(  # noqa: PLR0913
     if OPENING in compared:
         training = [corpus.utterance(name) for name in corpus.names("train", selection.speakers)]
         tracks = [utterance.track for utterance in training or utterances]
-        threshold = closed_threshold(
-            [np.asarray(each.motion[OPENING], float)[np.asarray(each.seen)] for each in tracks]
-        )
+        threshold = find_threshold([np.asarray(each.motion[OPENING], float)[np.asarray(each.seen)] for each in tracks])
     recognised = with_progress(utterances, "phones: recognition", sub_monitor(monitor, 0.4, 0.9))
     found = [phones.recognition(utterance.audio, utterance.features) for utterance in recognised]
     conditions = {AUDIO_ONLY: [each.units for each in found]}

@@ -14,7 +14,7 @@ from PIL import Image
 from PIL.Image import Resampling
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.formats.web_page import Html, element, joined, whole_page
+from lipmotion.formats.web_page import Html, build_page, element, joined
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
@@ -195,7 +195,7 @@ def report_html(  # noqa: PLR0913
     overview = element("ul", *entries, class_="overview")
     main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_section, finished))
     footer = element("footer", element("h2", "The corpus and the run"), _list(about))
-    return whole_page(title, style, header, main, footer, script=SCRIPT)
+    return build_page(title, style, header, main, footer, script=SCRIPT)
 
 
 def _section(part: FinishedPart) -> Html:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.formats.web_page import Html, element, joined
-from lipmotion.measures.evaluation_table import figure_text
+from lipmotion.measures.evaluation_table import format_figure
 from lipmotion.printable import printable
 from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.storage.json_text import as_json
@@ -134,7 +134,7 @@ def _cell(column: Column, row: Row) -> tuple[str, str]:
     low, high = row.get(column.key + INTERVAL) or (None, None)
     form = column.form.replace("+", "")
     interval = "" if low is None or high is None else f"{low:{form}}–{high:{form}}"
-    return figure_text(value, column.form).strip() + mark, interval
+    return format_figure(value, column.form).strip() + mark, interval
 
 
 def _html_cell(column: Column, row: Row) -> Html:

@@ -14,10 +14,10 @@ from lipmotion.cli.arguments.options import (
     add_execution,
     add_figures_arguments,
     add_workers,
+    count_workers,
     list_or_all,
     numbers,
     report_figures,
-    worker_count,
 )
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
@@ -84,7 +84,7 @@ def run_experiment(
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
         stamp = Stamp()
-        settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=monitor)
+        settings = ExperimentSettings(lexicon=lexicon, workers=count_workers(options), monitor=monitor)
         corpus = Corpus.open(options.corpus)
         if getattr(options, "quick", False):
             corpus = take_quick_part(corpus, settings.seed)
@@ -276,7 +276,7 @@ def run_all(options: argparse.Namespace) -> None:
 
     with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=report.receive)
+        settings = ExperimentSettings(lexicon=lexicon, workers=count_workers(options), monitor=report.receive)
         found = experiment_report(
             Corpus.open(options.corpus), options.output, only=options.only, quick=options.quick, settings=settings
         )

@@ -27,11 +27,11 @@ def add_compare(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
 
 def run_compare(options: argparse.Namespace) -> None:
     """Call ``lipmotion.compare`` and print its figures."""
-    from lipmotion.measures.evaluation_table import comparison_table
+    from lipmotion.measures.evaluation_table import format_comparison
     from lipmotion_lab.compare import compare
 
     report_figures(
-        options, lambda _, monitor: compare(options.reference, *options.others, monitor=monitor), comparison_table
+        options, lambda _, monitor: compare(options.reference, *options.others, monitor=monitor), format_comparison
     )
 
 
@@ -50,7 +50,7 @@ def add_evaluate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 def run_evaluate(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
     from lipmotion.corpora.store import Corpus, Selection
-    from lipmotion.measures.evaluation_table import figures_table
+    from lipmotion.measures.evaluation_table import format_figures
     from lipmotion.pipeline.model import load_model
     from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
@@ -68,7 +68,7 @@ def run_evaluate(options: argparse.Namespace) -> None:
             monitor=monitor,
         )
 
-    report_figures(options, compute, figures_table)
+    report_figures(options, compute, format_figures)
 
 
 def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -17,7 +17,7 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.extensions import install_command
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures import curves
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
@@ -163,7 +163,7 @@ QUICK = ComparisonOptions(
 """A small comparison, for the recordings of ``runner.take_quick_part``; conversion by factorial chains is slow."""
 
 
-@one_thread()
+@limit_threads()
 def xieliu2007(  # noqa: PLR0913
     corpus: Corpus,
     options: ComparisonOptions = DEFAULT_OPTIONS,

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Animator, engine_named
-from lipmotion.engines.coupled.arrays import coupled_arrays
+from lipmotion.engines.coupled.arrays import coupled_to_arrays
 from lipmotion.engines.coupled.chains.structures import HMM, SYSTEMS, UNSEEN_LOSS
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledConfig
-from lipmotion.engines.coupled.training.coupled_training import growing_models
+from lipmotion.engines.coupled.training.coupled_training import grow_models
 from lipmotion.errors import InputError
 from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
@@ -68,7 +68,7 @@ def train_stages(
 ) -> Iterator[TrainedSystem]:
     """Yield coupled chains with 1, 2, 4, … Gaussians a state, up to those of the options."""
     config, count, begin_s = CoupledConfig(**options), 1, process_time()
-    for make_model in growing_models(examples, config, monitor):
+    for make_model in grow_models(examples, config, monitor):
         own = replace(config, mixtures=min(count, config.mixtures), visual_mixtures=min(count, config.visual_mixtures))
         model = make_model().model
         yield TrainedSystem(CoupledEngine(own), model, process_time() - begin_s)
@@ -271,7 +271,7 @@ def system_to_arrays(system: TrainedSystem) -> dict[str, NDArray[Any]]:
     """Return the coupled chains of a system as arrays, from which ``system_from_arrays`` makes it again."""
     about = {"config": system.engine.config.as_mapping(), "seconds": system.seconds}
     about["tried"] = [asdict(trial) for trial in system.tried]
-    return coupled_arrays(system.model) | {ABOUT: np.array(json.dumps(about))}
+    return coupled_to_arrays(system.model) | {ABOUT: np.array(json.dumps(about))}
 
 
 def system_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> TrainedSystem:

@@ -13,8 +13,8 @@ import numpy as np
 
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError
-from lipmotion.extensions import installed_version
-from lipmotion.formats.base import readable_suffixes
+from lipmotion.extensions import find_version
+from lipmotion.formats.base import list_read_suffixes
 from lipmotion.pipeline.job import Job, list_recordings, run
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
@@ -124,7 +124,7 @@ def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> C
     files: dict[str, Path] = {}
     for name in (sentence.name for sentence in sentences):
         there = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stem == name]
-        for suffixes in (VIDEO_SUFFIXES, readable_suffixes()):
+        for suffixes in (VIDEO_SUFFIXES, list_read_suffixes()):
             fitting = [path for path in there if path.suffix.lower() in suffixes]
             if len(fitting) > 1:
                 raise InputError(f"{fitting[0]} and {fitting[1]}: both are of the sentence {name!r}; move one away")
@@ -257,7 +257,7 @@ def design_study(
             },
             videos=tuple(videos),
             trials=(*practice, *trials, *anchored, *checks),
-            made_by={"lipmotion": installed_version()}
+            made_by={"lipmotion": find_version()}
             | {name: str(value) for name, value in asdict(settings).items() if name not in texts},
         )
         manifest.write_manifest(study, folder)

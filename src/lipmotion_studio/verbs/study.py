@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output, part_of
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
 from lipmotion.cli.arguments.options import add_figures_arguments, add_machine_readable, report_figures
 from lipmotion.cli.terminal.progress import flush_output, print_line
 from lipmotion.printable import printable
@@ -83,7 +83,7 @@ def run_design(options: argparse.Namespace) -> None:
             options.kind,
             options.conditions,
             options.sentence,
-            part_of(options, StudySettings()),
+            pick_part(options, StudySettings()),
             monitor=report.receive,
         )
         counts = {"videos": len(study.videos), "trials": len(study.trials)}

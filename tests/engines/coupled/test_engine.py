@@ -7,12 +7,12 @@ import pytest
 from engines.coupled.tiny import KINDS, chains, observations, structure
 from lipmotion import engines, types
 from lipmotion.engines.coupled.engine import (
-    chain_states,
     explain_frames,
-    joint_state,
+    find_joint_state,
+    infer_units,
     lead_posteriors,
     leads,
-    unit_posteriors,
+    list_chain_states,
 )
 from lipmotion.motion import generation
 from lipmotion.testing import CHANNELS, examples, speech, timeline
@@ -38,7 +38,7 @@ def test_the_asynchrony_is_that_of_all_paths(kind, sets, limit):
             expected = joint[:, product.lead[chain] == states].sum(axis=1)
             np.testing.assert_allclose(lead[:, column], expected, atol=2e-5)
     for row in range(len(joint)):
-        for chain, states in enumerate(chain_states(found, posteriors, row)):
+        for chain, states in enumerate(list_chain_states(found, posteriors, row)):
             if chain:
                 assert states.expected_lead == pytest.approx(joint[row] @ product.lead[chain], abs=5e-5)
 
@@ -48,10 +48,10 @@ def test_states_are_named_with_their_probabilities(kind, sets, limit):
     found, posteriors, joint = small(kind, sets, limit)
     product, of = found.transitions.product, found.structure
     for row in range(len(joint)):
-        best = joint_state(found, posteriors, row)
+        best = find_joint_state(found, posteriors, row)
         assert best.name == product.name(int(joint[row].argmax()))
         assert best.probability == pytest.approx(joint[row].max(), abs=2e-5)
-        for chain, explained in enumerate(chain_states(found, posteriors, row)):
+        for chain, explained in enumerate(list_chain_states(found, posteriors, row)):
             names = [of.state_name(chain, state) for state in range(of.state_counts[chain])]
             assert len(explained.states) <= 3
             for one in explained.states:
@@ -65,7 +65,7 @@ def test_states_are_named_with_their_probabilities(kind, sets, limit):
 
 def test_posteriors_of_units_are_sums_over_their_states():
     found, posteriors, _ = small(*KINDS[0])
-    first, second = unit_posteriors(found, posteriors, slice(1, 4))
+    first, second = infer_units(found, posteriors, slice(1, 4))
     for number, one in enumerate((first, second)):
         for unit, _ in enumerate(one.units):
             own = posteriors.chains[number][1:4, 2 * unit : 2 * unit + 2].sum(axis=1)
@@ -74,7 +74,7 @@ def test_posteriors_of_units_are_sums_over_their_states():
 
 
 def coupled_options(name):
-    config = engines.engine_from_settings(preset=name).config
+    config = engines.create_engine(preset=name).config
     return {key: getattr(config, key) for key in ("structure", "chains", "asynchrony")} | {"mixtures": 2}
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product, initial_transitions, reachable
+from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product, create_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
@@ -76,7 +76,7 @@ def chains(of: Structure | None = None, components=(2, 2), sizes=(2, 1), seed=0,
     """Chains of random densities and tables, one stream of speech and one visual stream."""
     of = of or structure()
     joint = joint_product(of, seed)
-    transitions = initial_transitions(joint)
+    transitions = create_transitions(joint)
     draw = np.random.default_rng([seed, 1])
     advance = tuple(draw.uniform(0.2, 0.8, len(table)) for table in transitions.advance)
     transitions = type(transitions)(joint, transitions.rows, advance)

@@ -169,7 +169,7 @@ def test_the_two_features_of_the_paper_alone() -> None:
 
 
 def test_the_preset_is_the_system_of_the_paper() -> None:
-    config = engines.engine_from_settings(preset="hofer2008").config
+    config = engines.create_engine(preset="hofer2008").config
     assert (config.units, config.states, config.f0) == ("eVis", 5, True)
     assert (config.closures, config.articulation) == (False, False)
     assert config.recognise_units
@@ -177,7 +177,7 @@ def test_the_preset_is_the_system_of_the_paper() -> None:
     assert config.hmm.both_neighbours
     assert config.hmm.recognition == StreamWeights(motion=0.0)
     settings = ["speech_weight=0.5", "f0_weight=0.25", "motion_weight=2", "recognition_f0_weight=0"]
-    weighted = engines.engine_from_settings(preset="hofer2008", settings=settings).config.hmm
+    weighted = engines.create_engine(preset="hofer2008", settings=settings).config.hmm
     assert weighted.training == StreamWeights(0.5, 0.25, 0.25, 0.25, 2.0)
     assert weighted.recognition == StreamWeights(1.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.windows import phone_windows
+from lipmotion.engines.selection.windows import list_windows
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
@@ -49,7 +49,7 @@ def recorded(*spoken: Timeline[Unit], levels: Sequence[float] = ()) -> RecordedU
     drawn = np.concatenate(
         [np.full((n, 1), float(x)) for n, x in zip(lengths, levels or [0.0] * len(spoken), strict=True)]
     )
-    windows = phone_windows(spoken)
+    windows = list_windows(spoken)
     usable = np.ones(len(windows), bool)
     names = tuple(f"r{number}" for number in range(len(spoken)))
     return RecordedUnits(names, windows, usable, first, np.array([[0, first[-1]]]), drawn, None)
@@ -57,7 +57,7 @@ def recorded(*spoken: Timeline[Unit], levels: Sequence[float] = ()) -> RecordedU
 
 def target_of(costs: Costs, text: str, stress: Sequence[int] | None = None) -> Target:
     """Return phones to be said, without a guide; their stress is not known unless given."""
-    windows = phone_windows([timeline(text)])
+    windows = list_windows([timeline(text)])
     known = np.full(len(windows), -1) if stress is None else np.array(stress)
     return costs.target(replace(windows, stress=known.astype(np.int8)), None, None)
 

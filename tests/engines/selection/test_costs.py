@@ -17,13 +17,13 @@ from engines.selection.drawn_units import (
     timeline,
     with_stress,
 )
-from lipmotion.engines import engine_from_settings, engine_named
+from lipmotion.engines import create_engine, engine_named
 from lipmotion.engines.selection import concatenation, windows
 from lipmotion.engines.selection import costs as search
-from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.concatenation import concatenated, to_pieces
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE, select
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.windows import phone_windows
+from lipmotion.engines.selection.windows import list_windows
 from lipmotion.types import Span, Timeline, Unit
 
 NAMED = {"protected": "p", "invisible": "t", "normal": "s"}
@@ -50,7 +50,7 @@ def test_each_edge_of_a_word_that_differs_costs_once() -> None:
     assert costs.target_costs(target_of(costs, "iy | aa | iy"), 1, every) == pytest.approx([0, 0.07, 0.07, 0.14])
     assert costs.target_costs(target_of(costs, "iy aa iy"), 1, every) == pytest.approx([0.14, 0.07, 0.07, 0])
     wordless = costs.target(
-        windows.phone_windows([Timeline(tuple(Span(n, n + 1.0, Unit("iy")) for n in range(3)))]), None, None
+        windows.list_windows([Timeline(tuple(Span(n, n + 1.0, Unit("iy")) for n in range(3)))]), None, None
     )
     assert costs.target_costs(wordless, 1, every) == pytest.approx(0)
 
@@ -71,7 +71,7 @@ def test_motion_unlike_the_guide_costs_unless_the_sounds_are_alike() -> None:
     predicted = np.stack([np.full((len(FRACTIONS), 1), each) for each in (0.5, 0.55, 0.9)]).astype(np.float16)
     costs = costs_of(replace(units, predicted=predicted), guide=2.0, trust=0.1)
     wanted = np.full((1, len(FRACTIONS), 1), 0.5)
-    target = costs.target(windows.phone_windows([timeline("aa")]), wanted, wanted)
+    target = costs.target(windows.list_windows([timeline("aa")]), wanted, wanted)
     distance = 0.3**2 * 2 * PHONE_S * 10
     assert costs.target_costs(target, 0, array(0, 1, 2)) == pytest.approx([0, distance / 4, distance], rel=1e-2)
 
@@ -114,7 +114,7 @@ def test_units_overlap_where_table_1_says() -> None:
         for after, share in row.items():
             for kind in (JOIN_BEFORE, JOIN_AFTER):
                 costs, target, units = overlapping(NAMED[before], NAMED[after], kind)
-                pieces = concatenation.pieces_of(costs, target, np.array(units))
+                pieces = concatenation.to_pieces(costs, target, np.array(units))
                 assert [piece.join for piece in pieces[1:]] == [kind]
                 middle_s = PHONE_S * (1 + share)
                 assert pieces[1].start_s == pytest.approx(middle_s), (before, after)
@@ -125,7 +125,7 @@ def test_units_overlap_where_table_1_says() -> None:
                 assert (
                     0 < motion[round((middle_s - reach_s) * 100)] < 0.5 < motion[round((middle_s + reach_s) * 100)] < 1
                 )
-                recording = concatenation.shown_units(target, pieces, 60) // 3
+                recording = concatenation.list_shown_units(target, pieces, 60) // 3
                 assert (recording == 1).sum() == pytest.approx((3 * PHONE_S - middle_s) * 100, abs=1)
 
 
@@ -155,8 +155,8 @@ def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
     """§4: "smoothed for the last 5% of the first unit, and the first 5% of the second unit"."""
     units = inventory("s iy", "uw n", levels=(0, 1), duration_s=1.0)
     costs = costs_of(units)
-    target = costs.target(windows.phone_windows([timeline("s iy uw n", 1.0)]), None, None)
-    motion = concatenation.concatenated(units, target, concatenation.pieces_of(costs, target, np.arange(4)), 401)[:, 0]
+    target = costs.target(windows.list_windows([timeline("s iy uw n", 1.0)]), None, None)
+    motion = concatenation.concatenated(units, target, concatenation.to_pieces(costs, target, np.arange(4)), 401)[:, 0]
     bent = np.flatnonzero((motion > 1e-9) & (motion < 1 - 1e-9))
     assert (bent[0], bent[-1]) == pytest.approx((200 - 0.05 * 200, 200 + 0.05 * 200), abs=1)
     assert np.diff(motion).min() >= 0
@@ -167,12 +167,12 @@ def test_by_default_units_merge_in_a_vowel_rather_than_abut_behind_a_plosive() -
     units = inventory("s p", "uw n", "s p uw", "uw n")
     costs = costs_of(units, engine_named("selection", {}).config)
     target = target_of(costs, "s p uw n")
-    pieces = concatenation.pieces_of(costs, target, search.select(costs, target).units)
+    pieces = concatenation.to_pieces(costs, target, search.select(costs, target).units)
     assert ABUTTING_JOIN not in [piece.join for piece in pieces[1:]]
     assert (pieces[0].unit, pieces[0].stop + (pieces[1].join == JOIN_AFTER)) == (4, 3)
 
 
-DEFAULT, PRINTED = engine_named("selection", {}).config, engine_from_settings(preset="minnis2000").config
+DEFAULT, PRINTED = engine_named("selection", {}).config, create_engine(preset="minnis2000").config
 BOTH = pytest.mark.parametrize("config", [DEFAULT, PRINTED], ids=["default", "printed"])
 PRESERVED = ("f", "v", "m", "em", "p", "b")
 HOMOPHONES = (
@@ -190,7 +190,7 @@ def list_recordings(
 ) -> set[int]:
     """Return the recordings of the phones that differ between two sentences by their stress or words, if any do."""
     costs = costs_of(units.without(config.suppressed_phones), config)
-    one, other = (costs.shown(phone_windows([each])) for each in (wanted, wrong))
+    one, other = (costs.shown(list_windows([each])) for each in (wanted, wrong))
     differs = (getattr(one, by) != getattr(other, by)).reshape(len(one), -1).any(axis=1)
     assert one.phones.tolist() == other.phones.tolist()
     found = select(costs, costs.target(one, None, None)).units
@@ -244,7 +244,7 @@ def test_closures_survive_hard_joins(phone: str) -> None:
     units = inventory("s iy", phone, "uw n", levels=(1, 0, 1))
     costs = costs_of(units, PRINTED)
     target = target_of(costs, f"s iy {phone} uw n")
-    pieces = pieces_of(costs, target, np.arange(5))
+    pieces = to_pieces(costs, target, np.arange(5))
     assert [piece.join for piece in pieces[1:]] == [ABUTTING_JOIN] * 2
     motion = concatenated(units, target, pieces, 101)[:, 0]
     assert motion[41:60] == pytest.approx(0, abs=1e-9)

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion import engines, errors, types
-from lipmotion.engines.selection.concatenation import TimeMap, concatenated, pieces_of, shown_units
+from lipmotion.engines.selection.concatenation import TimeMap, concatenated, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, select
-from lipmotion.engines.selection.selection_training import SEGMENT_S, target_of
-from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
+from lipmotion.engines.selection.selection_training import SEGMENT_S, build_target
+from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, find_lip_class, parse_invisible
 from lipmotion.testing import PHONES, example, examples, speech, timeline
 from lipmotion.types import Generation, Span, Timeline, Unit, silent_monitor
 
@@ -83,7 +83,7 @@ def test_silence_longer_than_any_recorded_one_stands_still(model, engine) -> Non
 def test_in_noise_the_sound_alone_chooses(model, engine) -> None:
     costs = model.costs(engine.config)
     unsure = replace(SPOKEN, units_known=False, confidence=0.0)
-    assert not target_of(model, costs, unsure).by_sound
+    assert not build_target(model, costs, unsure).by_sound
     guide = model.guide
     distorted = (guide.predict(unsure)[0], np.ones(len(unsure.features.values)))
 
@@ -92,12 +92,12 @@ def test_in_noise_the_sound_alone_chooses(model, engine) -> None:
             return distorted
 
     model = replace(model, guide=Noisy(**vars(guide)))
-    target = target_of(model, costs, unsure)
+    target = build_target(model, costs, unsure)
     assert target.by_sound
     assert target.windows.durations_s == pytest.approx(SEGMENT_S, rel=0.1)
-    assert not target_of(model, costs, SPOKEN).by_sound  # phones that are known are relied on
+    assert not build_target(model, costs, SPOKEN).by_sound  # phones that are known are relied on
     plain = replace(engine, config=replace(engine.config, guide=0.0))
-    assert not target_of(model, model.costs(plain.config), unsure).by_sound
+    assert not build_target(model, model.costs(plain.config), unsure).by_sound
     result = engine.generate(model, unsure)
     assert np.corrcoef(result.motion["opening"], distorted[0][:, 0])[0, 1] > 0.8
     assert len(result.units) == len(unsure.units)
@@ -153,7 +153,7 @@ SENTENCES = st.lists(st.sampled_from(PHONES), min_size=1, max_size=6)
 
 def wanted(model, engine, phones: list[str]):
     costs = model.costs(engine.config)
-    return costs, target_of(model, costs, speech(timeline(phones)))
+    return costs, build_target(model, costs, speech(timeline(phones)))
 
 
 def total(costs, target, units: list[int]) -> float:
@@ -196,8 +196,8 @@ LONGER = st.lists(st.sampled_from(PHONES), min_size=2, max_size=8)
 
 def laid_out(model, engine, units: types.Timeline):
     costs = model.costs(engine.config)
-    target = target_of(model, costs, speech(units))
-    pieces = pieces_of(costs, target, select(costs, target).units)
+    target = build_target(model, costs, speech(units))
+    pieces = to_pieces(costs, target, select(costs, target).units)
     return target, pieces
 
 
@@ -236,23 +236,23 @@ def test_classes_of_lip_reading_and_their_overlaps() -> None:
     assert OVERLAPS["symmetric"]["normal", "invisible"] == pytest.approx(1 - TABLE_1["invisible", "normal"])
     other = {pair: share for pair, share in OVERLAPS["anticipatory"].items() if share != pytest.approx(TABLE_1[pair])}
     assert other == pytest.approx({("invisible", "normal"): 0.23, ("normal", "invisible"): 0.73})
-    classes = [lip_reading_class(phone, parsed_invisible("t d g k")) for phone in ("b", "t", "l", "aa")]
+    classes = [find_lip_class(phone, parse_invisible("t d g k")) for phone in ("b", "t", "l", "aa")]
     assert classes == ["protected", "invisible", "normal", "normal"]
     for text in ("t xx", "sil", "p"):
         with pytest.raises(errors.InputError, match="cannot be invisible"):
-            parsed_invisible(text)
+            parse_invisible(text)
 
 
 @settings(max_examples=20)
 @given(LONGER, st.integers(0, 999))
 def test_every_unit_is_shown(model, engine, phones: list[str], seed: int) -> None:
     costs = model.costs(engine.config)
-    target = target_of(model, costs, speech(timeline(phones)))
+    target = build_target(model, costs, speech(timeline(phones)))
     excluded = np.random.default_rng(seed).random(len(model.inventory.windows)) < 0.7
     units = select(costs, target, excluded).units
-    pieces = pieces_of(costs, target, units)
+    pieces = to_pieces(costs, target, units)
     assert all(two.start_s - one.start_s > 0.01 for one, two in pairwise(pieces))
-    shown = shown_units(target, pieces, int(target.windows.times_s[-1, 1] * 100))
+    shown = list_shown_units(target, pieces, int(target.windows.times_s[-1, 1] * 100))
     assert set(units.tolist()) <= set(shown.tolist())
 
 

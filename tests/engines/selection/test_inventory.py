@@ -8,11 +8,11 @@ import pytest
 
 from engines.selection.drawn_units import costs_of, inventory, recorded, timeline
 from lipmotion import engines, types
-from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.concatenation import concatenated, to_pieces
 from lipmotion.engines.selection.costs import select
-from lipmotion.engines.selection.inventory import RecordedUnits, standing_in, unit_index
-from lipmotion.engines.selection.selection_training import target_of
-from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, PHONE_NUMBER, SILENT, TABLE_1, covering, phone_windows
+from lipmotion.engines.selection.inventory import RecordedUnits, find_substitutes, index_units
+from lipmotion.engines.selection.selection_training import build_target
+from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, PHONE_NUMBER, SILENT, TABLE_1, covering, list_windows
 from lipmotion.errors import InputError
 from lipmotion.testing import PHONES as SPOKEN
 from lipmotion.testing import examples, speech
@@ -40,7 +40,7 @@ def phones_of(text: str, word: str = "") -> Timeline[Unit]:
 
 
 def test_a_window_has_the_phones_around_and_silence_beyond_a_recording() -> None:
-    windows = phone_windows([phones_of("b aa t"), phones_of("iy")])
+    windows = list_windows([phones_of("b aa t"), phones_of("iy")])
     numbers = [[PHONE_NUMBER[p] for p in window] for window in ("sil sil b aa t".split(), "sil sil iy sil sil".split())]
     assert windows.contexts((), 2)[[0, 3]].tolist() == numbers
     assert windows.continues.tolist() == [True, True, False, False]
@@ -49,11 +49,11 @@ def test_a_window_has_the_phones_around_and_silence_beyond_a_recording() -> None
 def test_words_begin_and_end_where_the_word_changes_and_suppressed_phones_are_one_symbol() -> None:
     one, two = phones_of("b iy", "be"), phones_of("g aa", "go")
     both = Timeline((*one.spans, *two.shifted(0.2).spans))
-    assert phone_windows([both]).words.tolist() == [[True, False], [False, True], [True, False], [False, True]]
-    symbols = phone_windows([phones_of("t d k sp")]).symbols({"t", "d"})
+    assert list_windows([both]).words.tolist() == [[True, False], [False, True], [True, False], [False, True]]
+    symbols = list_windows([phones_of("t d k sp")]).symbols({"t", "d"})
     assert symbols.tolist() == [INVISIBLE_SYMBOL, INVISIBLE_SYMBOL, PHONE_NUMBER["k"], SILENT]
     with pytest.raises(InputError, match="unknown phone 'xx' at 0"):
-        phone_windows([phones_of("xx")])
+        list_windows([phones_of("xx")])
 
 
 def test_gaps_are_silence() -> None:
@@ -73,7 +73,7 @@ def test_each_bias_finds_the_longest_agreement_on_its_own_side_first() -> None:
     without = [context for context in contexts if context[1] != "iy" or context[3] != "m"]  # no match on both sides
     for kept in (contexts, contexts[1:16], contexts[3:16], contexts[9:16], without):
         units = recorded(*(phones_of(" ".join(context)) for context in kept))
-        index, wanted = unit_index(units, (), 5), phone_windows([phones_of("s iy aa m uw")]).contexts((), 2)[2]
+        index, wanted = index_units(units, (), 5), list_windows([phones_of("s iy aa m uw")]).contexts((), 2)[2]
         windows = index.contexts.tolist()
         for count in range(1, 12):
             found, (must, may) = set(index.candidates(wanted, count).tolist()), longest(wanted, windows, count)
@@ -85,7 +85,7 @@ def test_each_bias_finds_the_longest_agreement_on_its_own_side_first() -> None:
 
 def test_where_matches_are_excluded_the_next_shorter_ones_enter() -> None:
     units = recorded(*(phones_of(text) for text in ("s iy aa m uw", "f iy aa n s", "f uw aa m s", "f uw aa n s")))
-    index, wanted = unit_index(units, (), 5), phone_windows([phones_of("s iy aa m uw")]).contexts((), 2)[2]
+    index, wanted = index_units(units, (), 5), list_windows([phones_of("s iy aa m uw")]).contexts((), 2)[2]
     excluded = np.zeros(len(units.windows), bool)
     for left_out, entering in ((17, [2]), (2, [7, 12]), (7, [12]), (12, [])):
         excluded[left_out] = True
@@ -95,7 +95,7 @@ def test_where_matches_are_excluded_the_next_shorter_ones_enter() -> None:
 
 
 def test_a_phone_without_units_has_a_similar_one_in_its_place(model) -> None:
-    stand_ins = standing_in(model.inventory.windows, model.inventory.usable)
+    stand_ins = find_substitutes(model.inventory.windows, model.inventory.usable)
     assert stand_ins["ao"] == "aa"
     assert not set(SPOKEN) & set(stand_ins)
 
@@ -112,14 +112,14 @@ def test_what_was_not_measured_is_no_unit(model, engine) -> None:
     assert inventory.usable[4]
 
 
-PRESET = engines.engine_from_settings(preset="minnis2000")
+PRESET = engines.create_engine(preset="minnis2000")
 PRINTED = PRESET.config
 INVISIBLE = ("t", "d", "g", "k")
 
 
 def times_of(text: str) -> dict[str, tuple[float, float]]:
     """Return start and end of each phone that is left, by its name, in phones of a second."""
-    windows = phone_windows([timeline(text, 1.0)]).suppressed(INVISIBLE)
+    windows = list_windows([timeline(text, 1.0)]).suppressed(INVISIBLE)
     names = [PHONES[phone] for phone in windows.phones]
     return dict(zip(names, map(tuple, windows.times_s.tolist()), strict=True))
 
@@ -135,7 +135,7 @@ def test_the_vowel_that_follows_takes_the_time() -> None:
 
 
 def test_a_word_whose_edge_is_suppressed_keeps_it() -> None:
-    windows, kept = phone_windows([timeline("iy t | d uw | k ae t s")]).without(INVISIBLE)
+    windows, kept = list_windows([timeline("iy t | d uw | k ae t s")]).without(INVISIBLE)
     assert kept.tolist() == [0, 3, 5, 7]
     assert windows.words.tolist() == [[True, True], [True, True], [True, False], [False, True]]
     assert windows.hidden.tolist() == [False, True, True, True]
@@ -143,8 +143,8 @@ def test_a_word_whose_edge_is_suppressed_keeps_it() -> None:
 
 def joined(units: RecordedUnits, text: str, config=PRINTED):
     costs = costs_of(units.without(config.suppressed_phones), config)
-    target = costs.target(costs.shown(phone_windows([timeline(text)])), None, None)
-    pieces = pieces_of(costs, target, select(costs, target).units)
+    target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
+    pieces = to_pieces(costs, target, select(costs, target).units)
     return target, concatenated(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
 
 
@@ -173,7 +173,7 @@ def test_a_recorded_sentence_costs_nothing_without_its_suppressed_phones(model, 
     """Neither the phones that are wanted nor the recorded ones have them, so that its units succeed one another."""
     costs = model.costs(replace(PRINTED, guide=guide))
     for one in examples(4):
-        target = target_of(model, costs, one.speech)
+        target = build_target(model, costs, one.speech)
         assert not {PHONES[phone] for phone in target.windows.phones} & {*INVISIBLE}
         assert select(replace(costs, config=PRINTED), target).cost == pytest.approx(0)
     assert {PHONES[phone] for phone in costs.inventory.windows.phones} <= {"sil", "b", "aa", "iy", "m", "uw", "s", "p"}
@@ -191,7 +191,7 @@ def test_a_suppressed_phone_is_an_invisible_neighbour_in_table_1() -> None:
     for text, before, after in (("m aa t iy", "protected", "invisible"), ("s t aa m", "invisible", "protected"),
                                 ("k aa d s", "invisible", "invisible"), ("m aa s", "protected", "normal")):  # fmt: skip
         costs = costs_of(inventory("m aa s iy").without(INVISIBLE), config)
-        target = costs.target(costs.shown(phone_windows([timeline(text)])), None, None)
+        target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
         shared = [PHONES[phone] for phone in target.windows.phones].index("aa")
         assert costs.forward_share(target, shared) == TABLE_1[before, after], text
 
@@ -202,7 +202,7 @@ def test_the_preset_needs_nothing_but_phones() -> None:
     assert (needs.prior, needs.posteriors, needs.conditions) == (False, False, 0)
     assert (engine.config.candidates, engine.config.beam) == (0, 0)
     assert engine.without_closures() == engine
-    changed = engines.engine_from_settings(preset="minnis2000", settings=["candidates=300"])
+    changed = engines.create_engine(preset="minnis2000", settings=["candidates=300"])
     assert changed.config == replace(engine.config, candidates=300)  # type: ignore[attr-defined]
 
 

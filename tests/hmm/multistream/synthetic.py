@@ -44,7 +44,7 @@ def random_joint(
         for left, unit, right in product(sides, known.names, sides)
         for state in range(known.count(unit))
     ]
-    questions = model.context_questions(known, CLASSES)
+    questions = model.list_context_questions(known, CLASSES)
     parts = {}
     for name in streams:
         D, has_spaces = DIMENSIONS[name], name in densities.F0_STREAMS

@@ -70,7 +70,7 @@ def test_posteriors_are_those_of_all_paths():
         hmm = random_joint(1, states=2, components=components, training=StreamWeights(0.7, 1.2, 0.4, 1, 0.9))
         observed = only(noise(np.random.default_rng(0), 7), *(name for name in STREAMS if name != "f0_slope"))
         prepared = multistream_training.prepare_utterances(hmm, [(observed, ("a", "sp", "b"))])
-        ((item, found),) = multistream_training.batch_posteriors(hmm, prepared.leaves(hmm), prepared.items)
+        ((item, found),) = multistream_training.infer_batches(hmm, prepared.leaves(hmm), prepared.items)
         density = [
             [slow.log_density(hmm, observed, prepared.triphones[i], t, hmm.config.training) for i in item.triphones]
             for t in range(7)
@@ -164,7 +164,7 @@ SIDES = [name for name in NAMES if name != "sp"]
 
 
 def test_every_unit_that_is_spoken_has_a_leaf_of_its_own():
-    forest = model.unit_forest(KNOWN, ("sil", "a", "c"))
+    forest = model.build_unit_forest(KNOWN, ("sil", "a", "c"))
     leaves = {unit: forest.leaf((("sil", unit, "a"), 1)) for unit in NAMES if unit != "sp"}
     assert leaves["b"] == leaves["x"] == leaves["d"]
     assert len({leaves["a"], leaves["c"], leaves["x"], leaves["sil"]}) == 4
@@ -180,7 +180,7 @@ def tied(stream, mean_of, seen):
     means = np.array([mean_of(*state) for state in seen])[:, None]
     sums = densities.GaussianStatistics.zeros(len(seen), 1, 1)
     sums.add(np.arange(len(seen)), 20.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
-    questions, costs = model.context_questions(KNOWN, CLASSES), model.TreeCosts(1.0, 10.0, 0.02)
+    questions, costs = model.list_context_questions(KNOWN, CLASSES), model.TreeCosts(1.0, 10.0, 0.02)
     return model.grow_forest(stream, KNOWN, questions, seen, sums, has_spaces=False, costs=costs)
 
 
@@ -245,7 +245,7 @@ def test_an_inventory_that_is_none_and_an_unknown_unit_are_refused():
 
 
 def test_classes_of_other_units_are_left_out():
-    names = {question.name for question in model.context_questions(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
+    names = {question.name for question in model.list_context_questions(KNOWN, {"other": frozenset({"q"}), **CLASSES})}
     assert names == {*CLASSES, *NAMES}
 
 

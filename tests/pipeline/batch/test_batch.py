@@ -19,7 +19,7 @@ from children import LIPMOTION, NOWHERE, Child, child, run_child, wait_until
 from lipmotion import Delivery, Job, Outputs, Request, Run, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.formats import motion_suffixes
+from lipmotion.formats import list_suffixes
 from lipmotion.pipeline.batch import BatchLine, batch, read_lines
 from lipmotion.pipeline.batch import run as one_line
 from lipmotion.pipeline.batch import run as run_module
@@ -145,7 +145,7 @@ def test_what_no_line_could_do_ends_it_before_the_first_line(sounds, settings, t
 
 
 def test_silence_can_have_every_form_that_speech_can(settings):
-    kinds = tuple(suffix.removeprefix(".") for suffix in motion_suffixes())
+    kinds = tuple(suffix.removeprefix(".") for suffix in list_suffixes())
     late = Delivery(offset_ms=-5000, stepped=True)
     one_line.check_line_job(replace(settings, outputs=Outputs(kinds=kinds, articulation=True), delivery=late), "first")
     one_line.check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)), "second")

@@ -15,7 +15,7 @@ from lipmotion import evaluate as evaluated
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.measures import curves
-from lipmotion.measures.evaluation_table import figures_table
+from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.pipeline.generation import generate_for
 from lipmotion.speech.features.speaker_similarity import voice_knowledge
 from lipmotion.speech.recognition.recogniser import cached_recogniser
@@ -126,7 +126,7 @@ def test_all_figures_are_there(figures):
                 assert list(row) == ["acc", "acc_per_clip", "nrmse", "global_variance", "jerk"]
     assert json.loads(json.dumps(figures)) is not None
     for name in CONDITIONS:
-        assert name in figures_table(figures)
+        assert name in format_figures(figures)
 
 
 def test_the_toy_model_is_good_on_sentences_it_has_not_seen(figures):
@@ -168,8 +168,8 @@ def test_figures_without_pins_are_those_of_the_engine_without_them(toy_model, to
         assert condition["unpinned"] == perfect["conditions"][name]
         assert condition["closures"]["generated"] == 0
         assert condition["unpinned"]["closures"]["generated"] > 4
-    assert "without pins" in figures_table(figures)
-    assert "pin" not in figures_table(perfect)
+    assert "without pins" in format_figures(figures)
+    assert "pin" not in format_figures(perfect)
 
 
 def test_a_late_model_is_late(toy_model, toy_corpus, known):
@@ -254,7 +254,7 @@ def test_other_channels_than_lip_distances(toy_model, toy_corpus, known, tmp_pat
         assert condition["leading"] in ("jaw", "pout")
         assert condition["lag_ms"] == pytest.approx(0, abs=0.5)
     json.dumps(figures, allow_nan=False)
-    assert "left out, for they do not move: brow, noise" in figures_table(figures)
+    assert "left out, for they do not move: brow, noise" in format_figures(figures)
 
 
 def test_a_model_of_two_features_is_compared_by_these(toy_model, toy_corpus, known):
@@ -307,7 +307,7 @@ def test_labelled_phones_are_the_reference(toy_model, toy_corpus, tmp_path):
         assert condition["closures_p_b_m"]["intervals"] == 0
         assert condition["closures_p_b_m"]["recall"] is None
     json.dumps(figures, allow_nan=False)
-    assert "recall – of 0" in figures_table(figures)
+    assert "recall – of 0" in format_figures(figures)
 
 
 def test_closings_elsewhere_are_counted_per_minute_of_other_speech():
@@ -352,14 +352,14 @@ def test_figures_are_those_of_the_measures():
     columns = [SPEECH.column(name) for name in pair["channels"]]
     sides = ([late.values[:, columns]], [SPEECH.values[:, columns]])
     for name, of in (
-        ("acc", curves.pooled_correlation),
-        ("variance", curves.global_variance_ratio),
-        ("jerk", curves.jerk_ratio),
-        ("nrmse", curves.normalised_rmse),
+        ("acc", curves.correlate_pooled),
+        ("variance", curves.compare_variance),
+        ("jerk", curves.compare_jerk),
+        ("nrmse", curves.normalise_rmse),
     ):
         assert [row[name] for row in pair["channels"].values()] == pytest.approx(of(*sides)), name
     assert pair["channels"]["opening"]["lag_ms"] == pytest.approx(3000 / SPEECH.rate_hz, abs=10)
-    assert pair["acc"] == pytest.approx(np.mean(curves.pooled_correlation(*sides)))
+    assert pair["acc"] == pytest.approx(np.mean(curves.correlate_pooled(*sides)))
 
 
 def test_points_are_compared_in_millimetres():
@@ -399,7 +399,7 @@ def test_blendshapes_are_found_however_they_are_spelt():
     assert "mouthClose" in pair["notes"][0]
     still = moved(other, "brow_inner_up", np.full(60, 0.2))
     upper = compare(reference, still)["others"][0]["upper_face"]
-    wanted = curves.upper_face_deviation(
+    wanted = curves.measure_upper_face(
         [np.zeros((60, 1, 1))], [np.array(reference.values[:, 1:2, None], float)], np.zeros((1, 1))
     )
     assert upper == {"curves": 1, "deviation": pytest.approx(wanted)}

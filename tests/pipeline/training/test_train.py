@@ -11,7 +11,7 @@ from conftest import quickly
 from lipmotion import Corpus, Run, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.measures.evaluation_table import figures_table
+from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.labels import (
@@ -378,8 +378,8 @@ def test_figures_of_pictures(models, toy_corpus):
         assert (condition["acc"], condition["amse"]) == (lips["acc"], lips["amse"])
         assert lips["channels"]["lips_r_01"]["acc"] > 0.85
         assert condition["leading"] in lips["channels"]
-    assert "90 eigenlips" in figures_table(figures)
-    assert "lips_r_01 " not in figures_table(figures).replace("lag of lips_r_01 ", "")
+    assert "90 eigenlips" in format_figures(figures)
+    assert "lips_r_01 " not in format_figures(figures).replace("lag of lips_r_01 ", "")
 
 
 def test_figures_of_both(models, toy_model, toy_corpus):
@@ -396,7 +396,7 @@ def test_figures_of_both(models, toy_model, toy_corpus):
         assert condition["amse"] < 0.1  # eye distances
         assert condition["eigenlips"]["amse"] > 10  # grey levels
         assert condition["leading"] == "opening"
-    assert "AMSE of the eigenlips" in figures_table(figures)
+    assert "AMSE of the eigenlips" in format_figures(figures)
 
 
 def test_originals_are_the_projected_pictures(models, toy_corpus):

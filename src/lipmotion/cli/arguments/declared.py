@@ -61,11 +61,11 @@ def add_input(
     **more: Any,
 ) -> None:
     """Add an argument that names an input, with the further arguments of ``add_argument``."""
-    action = parser.add_argument(*names, **({"type": _path_or_url if what == "corpus" else Path} | more))
+    action = parser.add_argument(*names, **({"type": _parse_path_or_url if what == "corpus" else Path} | more))
     _declare(parser, "reads", InputArgument(action.dest, what, replaceable, action.type is str, default_path))
 
 
-def _path_or_url(text: str) -> Path | str:
+def _parse_path_or_url(text: str) -> Path | str:
     return text if "://" in text else Path(text)
 
 
@@ -225,7 +225,7 @@ def add_options(
     known = {each.name: each for each in fields(part) if "help" in each.metadata}
     seen: set[str] = set()
     for each in map(known.__getitem__, names or (name for name in known if name not in but)):
-        flags = _flags(each)
+        flags = _list_flags(each)
         if not seen.intersection(flags):
             _add(parser, flags, each, changes.get(each.name, {}))
         seen.update(flags)
@@ -256,7 +256,7 @@ def add_job_file(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(start=Job())
 
 
-def part_of(options: argparse.Namespace, start: PartT, **given: Any) -> PartT:
+def pick_part(options: argparse.Namespace, start: PartT, **given: Any) -> PartT:
     """Return a job, or a part of one, with what was given on the command line.
 
     start : what has the values that the verb has no options for
@@ -268,7 +268,7 @@ def part_of(options: argparse.Namespace, start: PartT, **given: Any) -> PartT:
         if each.name in given:
             continue
         if isinstance(value, Configuration):
-            given[each.name] = part_of(options, value)
+            given[each.name] = pick_part(options, value)
         elif "help" in each.metadata and hasattr(options, _name(each)):
             found = getattr(options, _name(each))
             given[each.name] = _moves(each, found) if "still" in each.metadata else found
@@ -285,7 +285,7 @@ def _moves(each: Field[Any], still: str) -> bool:
     return each.name not in listed
 
 
-def _flags(each: Field[Any]) -> tuple[str, ...]:
+def _list_flags(each: Field[Any]) -> tuple[str, ...]:
     usual = each.metadata.get("still", "--" + each.name.replace("_", "-"))
     flags: tuple[str, ...] = each.metadata.get("flags", (usual,))
     return flags
@@ -293,7 +293,7 @@ def _flags(each: Field[Any]) -> tuple[str, ...]:
 
 def _name(each: Field[Any]) -> str:
     """Return the name of an option among those that were parsed."""
-    return _flags(each)[-1].lstrip("-").replace("-", "_")
+    return _list_flags(each)[-1].lstrip("-").replace("-", "_")
 
 
 def _add(parser: argparse.ArgumentParser, flags: tuple[str, ...], each: Field[Any], changes: Mapping[str, Any]) -> None:

@@ -26,9 +26,9 @@ class Version(argparse.Action):
 
     def __call__(self, *_: object) -> None:  # noqa: D102
         from lipmotion.cli.terminal.progress import print_line
-        from lipmotion.extensions import installed_version
+        from lipmotion.extensions import find_version
 
-        print_line(f"lipmotion {installed_version()}{self.const or ''}")
+        print_line(f"lipmotion {find_version()}{self.const or ''}")
         sys.exit(0)
 
 
@@ -48,7 +48,7 @@ def add_execution(parser: argparse.ArgumentParser) -> None:
     add_machine_readable(parser)
 
 
-def worker_count(options: argparse.Namespace) -> int:
+def count_workers(options: argparse.Namespace) -> int:
     """Return the number of processes of ``--workers``; by default, that of the processor's cores."""
     from lipmotion.pipeline.workers import process_count
 
@@ -137,7 +137,7 @@ def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namesp
         name = str(each.request.recording)
         part = sub_monitor(report.receive, number / len(jobs), (number + 1) / len(jobs))
         try:
-            run(each, face=face, model=model, words_beside=True, workers=worker_count(options), monitor=part)
+            run(each, face=face, model=model, words_beside=True, workers=count_workers(options), monitor=part)
             written += each.outputs.files
             report.receive(Item(name, "animated"))
         except Exception as error:

@@ -135,7 +135,7 @@ class JsonLines(Events):
         """Write one event; nothing after the last one. Raises ExportError: standard output cannot be written."""
         if self._ended:
             return
-        from lipmotion.cli.terminal.progress import output_error, print_error_json, print_json
+        from lipmotion.cli.terminal.progress import explain_output_error, print_error_json, print_json
         from lipmotion.errors import ExportError
 
         try:
@@ -145,7 +145,7 @@ class JsonLines(Events):
             raise
         except BrokenPipeError as error:  # nor if the reader has gone
             self._ended = True
-            raise output_error(error) from error
+            raise explain_output_error(error) from error
 
     def succeed(self, **figures: Any) -> None:
         """Report success with the figures of the result."""

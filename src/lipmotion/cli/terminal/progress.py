@@ -31,20 +31,20 @@ LINE_START = "\r\x1b[K"
 
 def print_line(text: object) -> None:
     """Print one line on standard output."""
-    with _failure_reported():
+    with _catch_failure():
         print(printable(text))
 
 
 def print_lines(text: str) -> None:
     """Print lines on standard output, line ends and tabs kept; other control characters are escaped."""
-    with _failure_reported():
+    with _catch_failure():
         print("\n".join("\t".join(map(printable, line.split("\t"))) for line in text.split("\n")))
 
 
 def write_bytes(path: Path) -> None:
     """Write the content of a file to standard output as it is. Raises ExportError: it cannot be written."""
     flush_output()
-    with path.open("rb") as file, _failure_reported():
+    with path.open("rb") as file, _catch_failure():
         shutil.copyfileobj(file, sys.stdout.buffer)
         sys.stdout.buffer.flush()
 
@@ -58,7 +58,7 @@ def print_error(text: object) -> None:
 def print_usage(text: str, *, is_wanted: bool) -> None:
     """Print text of the program itself as it is: on standard output, where it was asked for; else on standard error."""
     if is_wanted:
-        with _failure_reported():
+        with _catch_failure():
             print(text, end="", flush=True)
     elif sys.stderr is not None:
         try:
@@ -74,7 +74,7 @@ def with_program_name(text: object) -> str:
 
 def print_json(document: Any) -> None:
     """Print a JSON document as one line of ASCII on standard output. Raises ExportError: it cannot be written."""
-    with _failure_reported():
+    with _catch_failure():
         print(as_json(nan_as_null(document)), flush=True)
 
 
@@ -100,20 +100,20 @@ def _spaced(document: Any) -> str:
 
 def flush_output() -> None:
     """Flush standard output now: when Python ends, a failure could not be reported. Raises ExportError: it failed."""
-    with _failure_reported():
+    with _catch_failure():
         if sys.stdout is not None:
             sys.stdout.flush()
 
 
 @contextmanager
-def _failure_reported() -> Iterator[None]:
+def _catch_failure() -> Iterator[None]:
     """Raise ExportError if standard output cannot be written; BrokenPipeError: its reader has gone."""
     try:
         yield
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise output_error(error) from error
+        raise explain_output_error(error) from error
 
 
 def discard_pending_output() -> None:
@@ -125,7 +125,7 @@ def _discard_pending(stream: TextIO) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def output_error(error: OSError) -> ExportError:
+def explain_output_error(error: OSError) -> ExportError:
     """Discard pending output; return the error that says that standard output cannot be written."""
     discard_pending_output()
     return ExportError(f"standard output cannot be written: {error.strerror or error}")
@@ -264,7 +264,7 @@ _NAMES = {number: name.capitalize() for name, number in LEVELS.items()}
 
 
 @contextmanager
-def status_lines(options: argparse.Namespace) -> Iterator[Callable[[float], None]]:
+def print_status_lines(options: argparse.Namespace) -> Iterator[Callable[[float], None]]:
     """Yield a function that reports progress, 0 to 1; report success at the end.
 
     Warnings become events, too, where events are asked for, and go to the log file, where there is one, which is told

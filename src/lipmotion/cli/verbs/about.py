@@ -45,17 +45,17 @@ def add_cite(verbs: Verbs) -> None:
 
 def _run_cite(options: argparse.Namespace) -> None:
     """Print the entries. Raises InputError: nothing has that name.  Raises ModelFormatError: the file is no model."""
-    from lipmotion.citations import bibliography, engine_citations, model_citations
+    from lipmotion.citations import bibliography, list_engine_citations, list_model_citations
     from lipmotion.engines import ENGINES
     from lipmotion.pipeline.model import read_header, shipped_path
 
     name = options.name or str(shipped_path())
     if name in ENGINES.names:
-        print_lines(engine_citations(name))
+        print_lines(list_engine_citations(name))
     elif name in bibliography():
         print_lines(bibliography()[name])
     elif Path(name).exists():
-        print_lines(model_citations(read_header(Path(name))))
+        print_lines(list_model_citations(read_header(Path(name))))
     else:
         known = ", ".join((*ENGINES.names, *bibliography()))
         raise InputError(f"nothing to cite is called {name!r}; give a model file, or one of: {known}")

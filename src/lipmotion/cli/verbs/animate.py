@@ -12,11 +12,11 @@ from lipmotion.cli.arguments.declared import (
     add_outputs,
     add_pipe_format,
     is_pipe,
-    part_of,
+    pick_part,
     read_pipe,
     write_pipe,
 )
-from lipmotion.cli.arguments.options import add_execution, animate_one_by_one, worker_count
+from lipmotion.cli.arguments.options import add_execution, animate_one_by_one, count_workers
 from lipmotion.cli.terminal.progress import print_error
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Outputs, Request
@@ -42,14 +42,14 @@ def run(options: argparse.Namespace) -> None:
     note = ""
     recordings = options.speech if isinstance(options.speech, list) else [options.speech]
     with report_progress(options) as report:
-        request = part_of(options, options.start.request, recording=recordings[0])
-        job = part_of(options, options.start, request=request)
+        request = pick_part(options, options.start.request, recording=recordings[0])
+        job = pick_part(options, options.start, request=request)
         if animate_one_by_one(job, recordings, options, report):
             return
         piped = is_pipe(recordings[0])
         with read_pipe(recordings[0]) as speech, write_pipe(options) as (files, pipe):
             job = job.of(speech, files)
-            done = run_job(job, temporary=piped, workers=worker_count(options), monitor=report.receive)
+            done = run_job(job, temporary=piped, workers=count_workers(options), monitor=report.receive)
             note = done.outlook.text if done.outlook is not None else ""
         written = [str(path) for path in (*files, job.outputs.posteriors) if path and not pipe]
         report.finish("\n".join(map(printable, written)), files=written)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_detail, add_input, add_job_file, add_options, add_output, part_of
+from lipmotion.cli.arguments.declared import add_detail, add_input, add_job_file, add_options, add_output, pick_part
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.printable import printable
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.types import Item
 
     with report_progress(options) as report:
-        job, monitor = part_of(options, options.start), report.receive
+        job, monitor = pick_part(options, options.start), report.receive
         if options.check:
             checked = check(options.source, job, jobs=options.jobs, monitor=monitor)
             if not checked.findings:

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lipmotion.cli.arguments.declared import add_options, add_output, check_paths, is_pipe, part_of, read_pipe
+from lipmotion.cli.arguments.declared import add_options, add_output, check_paths, is_pipe, pick_part, read_pipe
 from lipmotion.cli.arguments.options import Version, place_outputs
-from lipmotion.cli.terminal.progress import LEVELS, flush_output, print_line, print_lines, status_lines
+from lipmotion.cli.terminal.progress import LEVELS, flush_output, print_line, print_lines, print_status_lines
 from lipmotion.errors import shorten
 from lipmotion.pipeline.request import Request
 from lipmotion.storage.sources import is_file
@@ -104,11 +104,11 @@ def run(options: argparse.Namespace) -> None:
 
     piped = is_pipe(options.speech)
     placed = place_outputs(options.speech, options.output, options.format or "tsv")
-    with status_lines(options) as set_progress, placed as options.output, read_pipe(options.speech) as speech:
+    with print_status_lines(options) as set_progress, placed as options.output, read_pipe(options.speech) as speech:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
         check_paths(options)  # in a folder it may be a file that is read
-        delivery, asked = part_of(options, Delivery()), part_of(options, Request(), recording=speech)
+        delivery, asked = pick_part(options, Delivery()), pick_part(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, speech, options.format)
         set_progress(0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_output, part_of
+from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> None:
             raise InputError(f"{options.file}: no such file; begin one: lipmotion edit {options.file} --of RECORDING")
         if options.of is not None and options.file.exists():
             raise InputError(f"{options.file}: exists; add edits without --of, or delete it to begin again")
-        asked = part_of(options, Request(), recording=options.of)
+        asked = pick_part(options, Request(), recording=options.of)
         file = create_edit_file(asked)[0] if options.of is not None else read_edits(options.file)
         after = file.undo(options.undo).then(*options.sentences)
         session, edits = file.session(), after.edits

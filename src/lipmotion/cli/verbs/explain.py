@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import asdict
 
-from lipmotion.cli.arguments.declared import add_options, part_of
+from lipmotion.cli.arguments.declared import add_options, pick_part
 from lipmotion.cli.terminal.progress import print_json, print_lines
 from lipmotion.pipeline.request import Request
 
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> None:
     )
     from lipmotion.pipeline.model import load_model
 
-    asked = part_of(options, Request())
+    asked = pick_part(options, Request())
     request, model = read_request(asked), load_model(asked.model)
     if options.at is not None:
         explanations = explain(request, at=options.at, model=model)

@@ -7,7 +7,7 @@ import logging
 from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, add_pipe_format, part_of, write_pipe
+from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, add_pipe_format, pick_part, write_pipe
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.job import run as run_job
@@ -47,14 +47,14 @@ def run(options: argparse.Namespace) -> None:
         with write_pipe(options) as (files, pipe):
             path = options.motion
             if is_edit_file(path):
-                job, edits = part_of(options, Job()).of(options.sound, files), read_edits(path)
+                job, edits = pick_part(options, Job()).of(options.sound, files), read_edits(path)
                 if job.request.recording or job.request.units:
                     raise InputError(f"{path}: names its recording and holds its phones; leave --sound and --units out")
                 if edits.named.recording is None:
                     raise InputError(f"{path}: names no recording; give it: lipmotion animate RECORDING --edits {path}")
                 run_job(replace(job, request=replace(edits.named, edits=path)), monitor=report.receive)
             else:
-                job = part_of(options, Job()).of(options.sound or _find_sound(path), files)
+                job = pick_part(options, Job()).of(options.sound or _find_sound(path), files)
                 import numpy as np
 
                 from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, part_of
+from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, pick_part
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.request import Request
@@ -62,7 +62,7 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.pipeline.generate.speak import read_text, speak
     from lipmotion.pipeline.model import load_model
 
-    job = part_of(options, Job())
+    job = pick_part(options, Job())
     face = open_face(job.outputs)
     check_outputs(job, face)
     request, text = job.request, read_text(options.text) if options.text else options.words

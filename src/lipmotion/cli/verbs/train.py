@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
-from lipmotion.cli.arguments.options import add_machine_readable, list_or_all, worker_count
+from lipmotion.cli.arguments.options import add_machine_readable, count_workers, list_or_all
 from lipmotion.pipeline.request import Request
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-m
 NONE = "none"
 
 
-def model_to_start_from(name: str, engine: Engine[Any]) -> Model | None:
+def load_start_model(name: str, engine: Engine[Any]) -> Model | None:
     """Return the model of ``--from``: a file, the one that ships (nothing given), or none.
 
     Raises InputError: a model is given, but the engine's models do not stand on others.
@@ -78,18 +78,18 @@ def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
     from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora.store import Corpus, Selection
-    from lipmotion.engines import engine_from_settings, preset_visual
+    from lipmotion.engines import create_engine, find_visual
     from lipmotion.pipeline.model import GEOMETRY, save_model
     from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.storage.locks import unfinished_work
     from lipmotion.units import Lexicon
 
-    workers = options.workers if isinstance(options.workers, str) else worker_count(options)
+    workers = options.workers if isinstance(options.workers, str) else count_workers(options)
     preset = " ".join(options.preset) if options.preset else None
     with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        engine = engine_from_settings(options.engine, preset=preset, units=options.units, settings=options.set)
+        engine = create_engine(options.engine, preset=preset, units=options.units, settings=options.set)
         voices = other_voices(
             synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
         )
@@ -99,9 +99,9 @@ def run(options: argparse.Namespace) -> None:
                 selection=Selection(list_or_all(options.split), tuple(options.speaker)),
                 engine=engine,
                 lexicon=lexicon,
-                visual=options.visual or preset_visual(preset) or GEOMETRY,
+                visual=options.visual or find_visual(preset) or GEOMETRY,
                 voices=voices,
-                prior=model_to_start_from(options.start, engine),
+                prior=load_start_model(options.start, engine),
                 run=Run(report.receive, work, workers),
             )
             save_model(model, options.output)

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
-from lipmotion.cli.arguments.options import add_execution, worker_count
+from lipmotion.cli.arguments.options import add_execution, count_workers
 from lipmotion.pipeline.request import Request
 
 
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> None:
     with report_progress(options) as report:
         check_word_outputs(options.output, options.speech)
         request = Request(options.speech, recogniser=options.recogniser)
-        found = recognise_words(request, model=options.model, workers=worker_count(options))
+        found = recognise_words(request, model=options.model, workers=count_workers(options))
         write_words(found.words, options.output, options.speech)
         text = "\n".join(map(str, options.output)) or format_words(found.words).removesuffix("\n")
         report.finish(

@@ -38,7 +38,7 @@ from lipmotion.storage.schema import (
 from lipmotion.units import UnitSet
 
 
-def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
+def coupled_to_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
     """Serialise a model: return its arrays by name. The configuration is not among them."""
     chains = model.chains
     product = chains.transitions.product
@@ -63,7 +63,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
             f"visual_{number}/columns": stream.columns,
             f"visual_{number}/scale": np.stack([stream.mean, stream.deviation]),
         }
-    return arrays | _regression_arrays(model) | filter_to_arrays(model.modulation) | predictor_to_arrays(model.encoding)
+    return arrays | _pack_regression(model) | filter_to_arrays(model.modulation) | predictor_to_arrays(model.encoding)
 
 
 def _group_arrays(group: StreamGroup) -> dict[str, NDArray[Any]]:
@@ -77,7 +77,7 @@ def _group_arrays(group: StreamGroup) -> dict[str, NDArray[Any]]:
     }
 
 
-def _regression_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
+def _pack_regression(model: CoupledModel) -> dict[str, NDArray[Any]]:
     if model.regression is None:
         return {}
     inputs, regressions = model.regression

@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
-from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
-from lipmotion.engines.coupled.chains.densities import Single, component_posteriors
+from lipmotion.engines.coupled.arrays import coupled_from_arrays, coupled_to_arrays
+from lipmotion.engines.coupled.chains.densities import Single, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
-from lipmotion.engines.coupled.conversion.em_conversion import convert, group_index, path_means
-from lipmotion.engines.coupled.conversion.mean_regression import regression_weights
+from lipmotion.engines.coupled.conversion.em_conversion import convert, group_index, path_to_means
+from lipmotion.engines.coupled.conversion.mean_regression import weigh_regressions
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
-from lipmotion.engines.coupled.training.alignment import allowed_units
+from lipmotion.engines.coupled.training.alignment import mark_allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import Statistics, slice_dynamics, unseen_share
@@ -110,22 +110,22 @@ def explain_frames(
     return [
         replace(
             frame,
-            chains=chain_states(model.chains, inference.posteriors, row),
-            joint=joint_state(model.chains, inference.posteriors, row),
-            gaussians=tuple(_dominant_gaussian(model, inference, row, stream) for stream in streams),
+            chains=list_chain_states(model.chains, inference.posteriors, row),
+            joint=find_joint_state(model.chains, inference.posteriors, row),
+            gaussians=tuple(_find_dominant_gaussian(model, inference, row, stream) for stream in streams),
             regressions=regressions,
         )
-        for frame, row, regressions in zip(frames, rows, _regressed_means(model, inference, rows), strict=True)
+        for frame, row, regressions in zip(frames, rows, _list_means(model, inference, rows), strict=True)
     ]
 
 
-def chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tuple[ChainStates, ...]:
+def list_chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tuple[ChainStates, ...]:
     """Return the most probable states of each chain in a frame, and the probabilities of its asynchrony."""
     structure = chains.structure
     return tuple(
         ChainStates(
             unit_set.name,
-            _most_probable(
+            _rank_by_probability(
                 [structure.state_name(number, state) for state in range(count)], posteriors.chains[number][row]
             ),
             dict(zip(leads(chains, number), lead[row].tolist(), strict=True)),
@@ -136,7 +136,7 @@ def chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -> tup
     )
 
 
-def joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) -> NamedProbability | None:
+def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) -> NamedProbability | None:
     """Return the most probable joint state in a frame; None where joint states are not listed."""
     if posteriors.joint is None:
         return None
@@ -164,7 +164,7 @@ def lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[Singl
     return result
 
 
-def unit_posteriors(chains: Chains, posteriors: LatticePosteriors, kept: slice) -> list[ChainPosteriors]:
+def infer_units(chains: Chains, posteriors: LatticePosteriors, kept: slice) -> list[ChainPosteriors]:
     """Return the posteriors of the units of each chain in some frames."""
     structure = chains.structure
     return [
@@ -187,18 +187,18 @@ def concatenated(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
     return replace(parts[0], probability=probability, lead=lead)
 
 
-def _most_probable(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
+def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
     best = np.argsort(-probability, kind="stable")[:MOST_STATES]
     named = [NamedProbability(names[i], float(probability[i])) for i in best]
     return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
 
 
-def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:
+def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:
     chains = model.chains
     number = group_index(chains, stream)
     group, responsibilities = chains.groups[number], inference.emissions.responsibilities[number]
     posterior = inference.posteriors.densities[number][row : row + 1]
-    weight = component_posteriors(posterior, None if responsibilities is None else responsibilities[row : row + 1])[0]
+    weight = infer_components(posterior, None if responsibilities is None else responsibilities[row : row + 1])[0]
     component, position = np.unravel_index(weight.argmax(), weight.shape)
     density = int(inference.lattice.densities[number][position])
     mixtures = group.stream_mixtures(stream)
@@ -207,7 +207,7 @@ def _dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stre
     if stream:
         visual = model.visual[stream - 1]
         means, precisions = visual.unstandardised(mean[None], 1 / variance[None])
-        channels = _channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
+        channels = _list_channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
     states = chains.transitions.product.chain_states[:, group.tie == density]
     return DominantGaussian(
         chains.streams[stream],
@@ -231,7 +231,7 @@ def _distance(inference: Inference, stream: int, row: int, mean: Array, variance
     return float(np.sqrt(np.mean(error * error / variance)))
 
 
-def _regressed_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
+def _list_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
     """Return, for each frame, expected means of visual streams and their regressions; empty without dynamics."""
     if not all(stream.dynamic for stream in model.visual):
         return [() for _ in rows]
@@ -239,28 +239,28 @@ def _regressed_means(model: CoupledModel, inference: Inference, rows: Sequence[i
     away, result = model.is_away_from_speech(inference.posteriors.chains[0]), []
     rest: list[tuple[NamedProbability, ...]] = [(NamedProbability(REST, 1.0),)] * len(model.visual)
     for row in rows:
-        shares = rest if away[row] else _regression_shares(model, inference, row)
+        shares = rest if away[row] else _list_regression_shares(model, inference, row)
         regressed = []
         for stream, own in zip(model.visual, shares, strict=False):
             mean, variance = means[row, 0, stream.columns], 1 / precisions[row, 0, stream.columns]
-            regressed.append(RegressedMean(stream.name, own, _channel_values(model, stream, mean, variance)))
+            regressed.append(RegressedMean(stream.name, own, _list_channel_values(model, stream, mean, variance)))
         result.append(tuple(regressed))
     return result
 
 
-def _regression_shares(model: CoupledModel, inference: Inference, row: int) -> list[tuple[NamedProbability, ...]]:
+def _list_regression_shares(model: CoupledModel, inference: Inference, row: int) -> list[tuple[NamedProbability, ...]]:
     """Return the weights of the most important regressions of every visual stream in a frame; empty without any."""
     structure, result = model.chains.structure, []
     for number, regression in enumerate(model.regression[1] if model.regression is not None else ()):
         chain, regression_of_state = structure.chain_of(number + 1), regression.regression_of_state
         posterior = inference.posteriors.chains[chain][row : row + 1]
-        weights = regression_weights(posterior, regression_of_state, len(regression.coefficients))[0]
-        names = [_regression_name(structure, chain, regression_of_state, k) for k in range(len(weights))]
-        result.append(_most_probable(names, weights))
+        weights = weigh_regressions(posterior, regression_of_state, len(regression.coefficients))[0]
+        names = [_name_regression(structure, chain, regression_of_state, k) for k in range(len(weights))]
+        result.append(_rank_by_probability(names, weights))
     return result
 
 
-def _regression_name(structure: Structure, chain: int, regression_of_state: NDArray[np.intp], regression: int) -> str:
+def _name_regression(structure: Structure, chain: int, regression_of_state: NDArray[np.intp], regression: int) -> str:
     """Return the viseme of the states that share a regression, with their position if it is the same: ``bi.2``."""
     units, positions = np.divmod(np.flatnonzero(regression_of_state == regression), structure.states)
     phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
@@ -268,7 +268,7 @@ def _regression_name(structure: Structure, chain: int, regression_of_state: NDAr
     return f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme
 
 
-def _channel_values(
+def _list_channel_values(
     model: CoupledModel, stream: VisualStream, means: Array, variances: Array
 ) -> Mapping[str, ChannelValue]:
     """Return values and standard deviations of the channels of a stream, by name, from means and variances."""
@@ -342,7 +342,7 @@ class CoupledEngine(Engine[CoupledModel]):
         if not speech.units_decide:
             return chains.full_lattice
         frames = len(speech.features.values)
-        allowed = allowed_units(chains.structure, speech.units, frames)[wanted]
+        allowed = mark_allowed_units(chains.structure, speech.units, frames)[wanted]
         return chains.lattice(allowed)
 
     def _statistics(self, model: CoupledModel, speech: Speech, frames: slice) -> tuple[Statistics, NDArray[np.intp]]:
@@ -351,7 +351,7 @@ class CoupledEngine(Engine[CoupledModel]):
         if self.config.conversion == PATH:
             observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
             path, _ = chains.best_path(chains.emission_log_densities(observations, lattice), lattice)
-            return model.frame_statistics([path_means(chains, path, s + 1) for s in range(len(model.visual))]), path
+            return model.frame_statistics([path_to_means(chains, path, s + 1) for s in range(len(model.visual))]), path
         inference = self.infer(model, speech, frames)
         if self.config.conversion != TRAJECTORY:
             streams = convert(chains, inference.observations, inference.lattice, self.config.em, inference).streams[1:]
@@ -391,14 +391,14 @@ class CoupledEngine(Engine[CoupledModel]):
         for inner, outer in split_into_blocks(len(speech.features.values)):
             inference = self.infer(model, speech, outer)
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
-            blocks.append(unit_posteriors(model.chains, inference.posteriors, kept))
+            blocks.append(infer_units(model.chains, inference.posteriors, kept))
         return tuple(concatenated(parts) for parts in zip(*blocks, strict=True))
 
     def describe(self, model: CoupledModel) -> str:  # noqa: D102
         return describe(model)
 
     def to_arrays(self, model: CoupledModel) -> dict[str, NDArray[Any]]:  # noqa: D102
-        return coupled_arrays(model)
+        return coupled_to_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> CoupledModel:  # noqa: D102
         return coupled_from_arrays(arrays, self.config)

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single
 from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream, speech_observations
-from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, unit_sets
+from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import (
     EXACT,
     SOFT,
     STARTS,
     UPDATES,
     ConversionSettings,
-    precision_statistics,
+    sum_precisions,
 )
 from lipmotion.engines.coupled.conversion.mean_regression import RegressionInputs, VisualRegression
 from lipmotion.motion.articulation import ArticulationPrior
@@ -112,7 +112,7 @@ class CoupledConfig(Configuration):
     }
 
     def check_files(self) -> None:  # noqa: D102
-        self.structure_with(unit_sets(self.chains))
+        self.structure_with(list_unit_sets(self.chains))
 
     def structure_with(self, chains: tuple[UnitSet, ...]) -> Structure:
         """Return the structure of chains of these unit sets. Raises InputError: as ``Structure``."""
@@ -228,7 +228,7 @@ class CoupledModel:
         inputs = self.regression_inputs(inference)
         for number, stream in enumerate(self.visual):
             if inputs is None or self.regression is None:
-                precision, weighted = precision_statistics(self.chains, inference, number + 1)
+                precision, weighted = sum_precisions(self.chains, inference, number + 1)
                 mean = weighted / np.maximum(precision, 1e-300)
             else:
                 posterior = inference.posteriors.chains[self.chains.structure.chain_of(number + 1)]

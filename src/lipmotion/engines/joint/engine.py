@@ -17,7 +17,7 @@ from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, Stre
 from lipmotion.hmm.multistream.generate import merge_gaussians, select_densities
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, train_joint, with_durations
-from lipmotion.hmm.multistream.recognise import StatePath, align, joint_recogniser
+from lipmotion.hmm.multistream.recognise import StatePath, align, build_recogniser
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.arrays import (
@@ -299,7 +299,7 @@ class JointEngine(Engine[JointModel]):
         else:
             units = speech.units
             if self.config.own_alignment and speech.units_known and not speech.times_given:
-                units = _own_times(model, observations, units, speech.features.duration_s)
+                units = _restore_times(model, observations, units, speech.features.duration_s)
             path = _aligned(model, observations, units)
         means, precisions = merge_gaussians(select_densities(model.hmm, path))
 
@@ -359,13 +359,13 @@ class JointEngine(Engine[JointModel]):
     def _recognised(
         self, model: JointModel, observations: StreamObservations, duration_s: float
     ) -> tuple[Timeline[Unit], StatePath]:
-        segments = joint_recogniser(model.hmm).recognise(observations)
+        segments = build_recogniser(model.hmm).recognise(observations)
         units = frames_to_units(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
         bounds = np.array([*(segment.first for segment in segments), observations.frames])
         return units, align(model.hmm, observations, [segment.unit for segment in segments], bounds)
 
 
-def _own_times(
+def _restore_times(
     model: JointModel, observations: StreamObservations, units: Timeline[Unit], duration_s: float
 ) -> Timeline[Unit]:
     """Return given units at the times that the model gives them by forced alignment."""

@@ -52,7 +52,7 @@ class Piece:
     overlap_s: float
 
 
-def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
+def to_pieces(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
     """Return the pieces of a selection, in order; of two overlaps in one phone, the second gives way."""
     kinds = [ABUTTING_JOIN]
     for number in range(1, len(units)):
@@ -104,7 +104,7 @@ def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], 
     return result
 
 
-def shown_units(target: Target, pieces: Sequence[Piece], frames: int) -> UnitNumbers:
+def list_shown_units(target: Target, pieces: Sequence[Piece], frames: int) -> UnitNumbers:
     """Return the unit that leads in every frame: where pieces overlap, the one with the larger weight [shape=(T,)]."""
     time_s = np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S
     leading = np.maximum(np.searchsorted([piece.start_s for piece in pieces], time_s, side="right") - 1, 0)
@@ -204,7 +204,7 @@ class Chosen:
     pieces: list[Piece]
 
 
-def motion_of_units(
+def join_motion(
     model: SelectionModel,
     costs: Costs,
     chosen: Chosen,
@@ -225,7 +225,7 @@ def motion_of_units(
         return means[block].copy(), precisions[block].copy()
 
     learned = model.motion.for_voice(speech.voice)
-    reliability = _substituted(costs, chosen.target, chosen.units, frames)
+    reliability = _substitute_rest(costs, chosen.target, chosen.units, frames)
     return learned.generate(statistics, frames, speech.units, constraints, close=close, reliability=reliability)
 
 
@@ -244,7 +244,7 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
     return np.convolve(padded, window / window.sum(), "valid")
 
 
-def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
+def _substitute_rest(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
     """Return 1 in the frames whose unit was recorded between other phones than are wanted, else 0 [shape=(T,)]."""
     middle = costs.config.window // 2
     around = slice(middle - 1, middle + 2)

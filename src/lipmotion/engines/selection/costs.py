@@ -14,9 +14,9 @@ from lipmotion.engines.selection.inventory import (
     RecordedUnits,
     UnitIndex,
     UnitNumbers,
-    replaced,
-    standing_in,
-    unit_index,
+    find_substitutes,
+    index_units,
+    substitute_symbols,
 )
 from lipmotion.engines.selection.windows import (
     INVISIBLE,
@@ -26,8 +26,8 @@ from lipmotion.engines.selection.windows import (
     SILENT,
     VISEME_NUMBER,
     PhoneWindows,
-    lip_reading_class,
-    parsed_invisible,
+    find_lip_class,
+    parse_invisible,
 )
 from lipmotion.errors import InputError
 from lipmotion.motion.modulation_filter import STRENGTH
@@ -122,7 +122,7 @@ class SelectionConfig(Configuration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        parsed_invisible(self.invisible)
+        parse_invisible(self.invisible)
         if self.window > LARGEST_WINDOW:
             raise InputError(f"window is {self.window}, required an odd number from 3 to {LARGEST_WINDOW}")
 
@@ -132,7 +132,7 @@ class SelectionConfig(Configuration):
     @property
     def invisible_phones(self) -> frozenset[str]:
         """The phones of ``invisible``."""
-        return parsed_invisible(self.invisible)
+        return parse_invisible(self.invisible)
 
     @property
     def suppressed_phones(self) -> frozenset[str]:
@@ -192,12 +192,12 @@ class Costs:
     @cached_property
     def index(self) -> UnitIndex:
         """The index of the windows."""
-        return unit_index(self.inventory, self.config.invisible_phones, self.config.window)
+        return index_units(self.inventory, self.config.invisible_phones, self.config.window)
 
     @cached_property
     def stand_ins(self) -> dict[str, str]:
         """The phone that stands in for each phone which the inventory lacks."""
-        return standing_in(self.inventory.windows, self.inventory.usable)
+        return find_substitutes(self.inventory.windows, self.inventory.usable)
 
     def shown(self, windows: PhoneWindows) -> PhoneWindows:
         """Return the phones of one recording without those that are suppressed, if any are."""
@@ -207,7 +207,7 @@ class Costs:
         self, windows: PhoneWindows, guided: Array | None, predicted: Array | None, *, by_sound: bool = False
     ) -> Target:
         """Return phones to compare with units, and motion predicted at ``POINTS`` [each shape=(U, POINTS, Q)]."""
-        known = replaced(windows, self.stand_ins)
+        known = substitute_symbols(windows, self.stand_ins)
         contexts = known.contexts(self.config.invisible_phones, self.config.window // 2)
         if guided is None or predicted is None:
             return Target(known, contexts, None, None)
@@ -269,7 +269,7 @@ class Costs:
         """Return the forward share of a phone of the target in which units overlap."""
         invisible = self.config.invisible_phones
         phones = [PHONES[target.windows.phones[n]] if 0 <= n < len(target) else "sil" for n in (shared - 1, shared + 1)]
-        before, after = (lip_reading_class(phone, invisible) for phone in phones)
+        before, after = (find_lip_class(phone, invisible) for phone in phones)
         hidden = target.windows.hidden
         if hidden is not None:
             before = INVISIBLE if 0 <= shared < len(target) and hidden[shared] else before

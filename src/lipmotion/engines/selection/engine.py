@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
-from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, motion_of_units, pieces_of, shown_units
+from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, join_motion, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
-from lipmotion.engines.selection.inventory import SOURCE, RecordedUnits, inventory_text, source_of, units_by_source
+from lipmotion.engines.selection.inventory import SOURCE, RecordedUnits, count_by_source, find_source, list_inventory
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
-from lipmotion.engines.selection.selection_training import fit_selection, target_of
-from lipmotion.engines.selection.windows import PHONE_NUMBER, phone_windows
+from lipmotion.engines.selection.selection_training import build_target, fit_selection
+from lipmotion.engines.selection.windows import PHONE_NUMBER, list_windows
 from lipmotion.errors import InputError
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
@@ -65,10 +65,10 @@ def source_pieces(
     """Return pieces of recordings and the phones with their sources, as of ``SelectsRecordings``."""
     inventory = _with_sound(model.inventory, recorded_features)
     costs = Costs(inventory, replace(config, **SOUND), 1 / np.maximum(inventory.acoustic.std(axis=0), 1e-9))
-    target = costs.target(phone_windows([units]), None, None)
+    target = costs.target(list_windows([units]), None, None)
     chosen = select(costs, target).units
-    pieces = pieces_of(costs, target, chosen)
-    sources = [source_of(inventory, unit) for unit in chosen.tolist()]
+    pieces = to_pieces(costs, target, chosen)
+    sources = [find_source(inventory, unit) for unit in chosen.tolist()]
     found = [
         _source_piece(inventory, target, piece, following)
         for piece, following in zip(pieces, [*pieces[1:], None], strict=True)
@@ -169,17 +169,17 @@ class SelectionEngine(Engine[SelectionModel]):
 
     def generate(self, model: SelectionModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         costs = model.costs(self.config)
-        target = target_of(model, costs, speech)
+        target = build_target(model, costs, speech)
         frames = len(speech.features.values)
         given = _given(costs, target, speech.units)
         units = select(costs, target, given=given).units
-        pieces = pieces_of(costs, target, units)
+        pieces = to_pieces(costs, target, units)
         chosen = Chosen(target, units, pieces)
-        motion, variance = motion_of_units(model, costs, chosen, speech, constraints, close=self.config.closures)
-        sources = [source_of(costs.inventory, unit) for unit in units.tolist()]
+        motion, variance = join_motion(model, costs, chosen, speech, constraints, close=self.config.closures)
+        sources = [find_source(costs.inventory, unit) for unit in units.tolist()]
         starts_s = target.windows.times_s[:, 0]
-        shown, places = np.unique(shown_units(target, pieces, frames), return_inverse=True)
-        trace = StateTrace(tuple(source_of(costs.inventory, unit) for unit in shown.tolist()), places.astype(np.intp))
+        shown, places = np.unique(list_shown_units(target, pieces, frames), return_inverse=True)
+        trace = StateTrace(tuple(find_source(costs.inventory, unit) for unit in shown.tolist()), places.astype(np.intp))
         return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
 
     def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
@@ -198,7 +198,7 @@ class SelectionEngine(Engine[SelectionModel]):
         return source_pieces(model, self.config, units, features)
 
     def describe(self, model: SelectionModel) -> str:  # noqa: D102
-        return inventory_text(model.inventory)
+        return list_inventory(model.inventory)
 
     def to_arrays(self, model: SelectionModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         return model_arrays(model)
@@ -211,7 +211,7 @@ def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int
     """Return the units that edited labels name, by phone; those of another symbol than their phone are ignored."""
     if target.by_sound:
         return {}
-    named = units_by_source(costs.inventory, (span.label.unit for span in units if span.label.unit))
+    named = count_by_source(costs.inventory, (span.label.unit for span in units if span.label.unit))
     starts_s, symbols = target.windows.times_s[:, 0], costs.index.contexts[:, costs.config.window // 2]
     given, useless = {}, []
     for span in units:

@@ -18,41 +18,41 @@ from lipmotion.units import PHONES, find_similar_lips
 
 LINE = 110
 SOURCE = re.compile(r" \d+\.\d+-\d+\.\d+ s \S+$")
-"""The end of what ``source_of`` returns."""
+"""The end of what ``find_source`` returns."""
 
 
-def source_of(inventory: RecordedUnits, unit: int) -> str:
+def find_source(inventory: RecordedUnits, unit: int) -> str:
     """Return the recording of a unit, and its time and phone there: ``bbaf2n 0.530-0.610 s b``."""
     windows = inventory.windows
     start_s, end_s = windows.times_s[unit].tolist()
     return f"{inventory.names[windows.recording[unit]]} {start_s:.3f}-{end_s:.3f} s {PHONES[windows.phones[unit]]}"
 
 
-def units_by_source(inventory: RecordedUnits, sources: Iterable[str]) -> dict[str, int]:
-    """Return the units that some texts of ``source_of`` name; other texts are left out."""
+def count_by_source(inventory: RecordedUnits, sources: Iterable[str]) -> dict[str, int]:
+    """Return the units that some texts of ``find_source`` name; other texts are left out."""
     wanted = set(sources)
     recordings = {source.split(" ")[0] for source in wanted}
     numbers = [number for number, name in enumerate(inventory.names) if name.split(" ")[0] in recordings]
     units = np.flatnonzero(np.isin(inventory.windows.recording, numbers) & inventory.usable).tolist()
-    named = {source_of(inventory, unit): unit for unit in units}
+    named = {find_source(inventory, unit): unit for unit in units}
     return {source: named[source] for source in wanted if source in named}
 
 
-def inventory_text(inventory: RecordedUnits) -> str:
+def list_inventory(inventory: RecordedUnits) -> str:
     """Return how many units each phone has, and what stands in for phones without units."""
     windows, usable = inventory.windows, inventory.usable
     counts = {phone: int((usable & (windows.phones == n)).sum()) for n, phone in enumerate(PHONES)}
-    stand_ins = standing_in(windows, usable)
+    stand_ins = find_substitutes(windows, usable)
     lines = [f"{int(usable.sum())} units of {len(inventory.names)} recordings"]
-    lines += _wrapped("units of each phone", [f"{phone} {count}" for phone, count in counts.items() if count])
+    lines += _wrap_text("units of each phone", [f"{phone} {count}" for phone, count in counts.items() if count])
     if stand_ins:
-        lines += _wrapped(
+        lines += _wrap_text(
             "phones without units, and what stands in for them", [f"{p} ({q})" for p, q in stand_ins.items()]
         )
     return "\n".join(lines)
 
 
-def _wrapped(name: str, items: list[str]) -> list[str]:
+def _wrap_text(name: str, items: list[str]) -> list[str]:
     return [f"{name}:", *(f"  {line}" for line in wrap(", ".join(items), LINE))]
 
 
@@ -172,7 +172,7 @@ class UnitIndex:
         return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
 
 
-def unit_index(inventory: RecordedUnits, invisible: Collection[str], window: int) -> UnitIndex:
+def index_units(inventory: RecordedUnits, invisible: Collection[str], window: int) -> UnitIndex:
     """Return the index of an inventory."""
     contexts = inventory.windows.contexts(invisible, window // 2)
     usable = np.flatnonzero(inventory.usable)
@@ -193,13 +193,13 @@ def digits(bias: int, window: int) -> list[int]:
     return [middle, *sides[bias]]
 
 
-def standing_in(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[str, str]:
+def find_substitutes(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[str, str]:
     """Return for every phone that no usable unit has the phone that stands in for it."""
     known = {PHONES[number] for number in np.unique(windows.phones[usable])}
     return {phone: find_similar_lips(phone, known) for phone in PHONES if phone not in known} if known else {}
 
 
-def replaced(windows: PhoneWindows, stand_ins: dict[str, str]) -> PhoneWindows:
+def substitute_symbols(windows: PhoneWindows, stand_ins: dict[str, str]) -> PhoneWindows:
     """Return windows in which each missing phone is the one that stands in for it."""
     table = np.array([PHONE_NUMBER[stand_ins.get(phone, phone)] for phone in PHONES], np.int16)
     return replace(windows, phones=table[windows.phones])

@@ -57,7 +57,7 @@ def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequenc
     return Guide(predictor, recorded.mean(axis=0), np.clip(ratio, LEAST_EXPANSION, MOST_EXPANSION))
 
 
-def at_points(motion: Array, times_s: Array) -> Array:
+def interpolate_at(motion: Array, times_s: Array) -> Array:
     """Return motion of one recording [shape=(T, Q)] at the points of each of its phones [shape=(U, POINTS, Q)]."""
     start_s, end_s = times_s.T[:, :, None]
     points_s = start_s + FRACTIONS * (end_s - start_s)

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.concatenation import Chosen, concatenated, motion_of_units, pieces_of
+from lipmotion.engines.selection.concatenation import Chosen, concatenated, join_motion, to_pieces
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.model import Guide, SelectionModel, at_points, fit_guide
-from lipmotion.engines.selection.windows import covering, phone_windows
+from lipmotion.engines.selection.model import Guide, SelectionModel, fit_guide, interpolate_at
+from lipmotion.engines.selection.windows import covering, list_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
@@ -33,7 +33,7 @@ LEAST_RELIABILITY = 0.5
 """Mean reliability of the phones from which on they choose."""
 
 
-def target_of(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
+def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     """Return the phones of speech, with the motion that the guide predicts from its sound.
 
     Where noise makes the recognised phones of a recording unreliable on the whole, the target is segments of equal
@@ -44,11 +44,11 @@ def target_of(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     duration_s = (frames - 1) / FRAME_RATE_HZ
     units, guide = covering(speech.units, duration_s), model.guide
     if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
-        return costs.target(costs.shown(phone_windows([units])), None, None)
+        return costs.target(costs.shown(list_windows([units])), None, None)
     motion, distortion = guide.predict(speech)
     by_sound = bool(rate_phones(speech, distortion, frames).mean() < LEAST_RELIABILITY)
-    windows = phone_windows([_segments(duration_s)]) if by_sound else costs.shown(phone_windows([units]))
-    predicted = at_points(motion, windows.times_s)
+    windows = list_windows([_segments(duration_s)]) if by_sound else costs.shown(list_windows([units]))
+    predicted = interpolate_at(motion, windows.times_s)
     return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
 
 
@@ -91,7 +91,7 @@ def fit_selection(
         training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
         guide = fit_guide(kind.fit(training).predictor, examples, values)
     monitor(Progress(_STAGE, 1, 3, 0.9))
-    inventory = inventory_of(examples, values, guide)
+    inventory = build_inventory(examples, values, guide)
     monitor(Progress(_STAGE, 2, 3, 0.92))
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     deviations = np.maximum(recorded.std(axis=0), 1e-9)
@@ -102,7 +102,7 @@ def fit_selection(
     scale = np.sqrt(weights) / deviations
     rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
     model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
-    costs, left_out = model.costs(config), _left_out(model, config, examples)
+    costs, left_out = model.costs(config), _list_left_out(model, config, examples)
     errors = []
     for one in left_out:
         original, chosen = values[one.number], one.chosen
@@ -114,7 +114,7 @@ def fit_selection(
     compared = (
         (values[out.number][out.frames], motion.space.reduce(made.values.astype(float))[out.frames])
         for out in left_out
-        for made, _ in [motion_of_units(model, costs, out.chosen, examples[out.number].speech)]
+        for made, _ in [join_motion(model, costs, out.chosen, examples[out.number].speech)]
     )
     modulation = learn_filter(config.modulation_filter, compared, examples, values)
     model = replace(model, motion=replace(motion, modulation=modulation))
@@ -122,10 +122,10 @@ def fit_selection(
     return model, np.sqrt(model.variances[0])
 
 
-def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
+def build_inventory(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
     """Return the inventory of some examples, from reduced motion. Raises CorpusError: no phone was measured whole."""
     timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
-    windows = phone_windows(timelines)
+    windows = list_windows(timelines)
     first = np.concatenate([[0], np.cumsum([len(x) for x in values])]).astype(np.intp)
     known = np.concatenate([example.valid for example in examples])
     begin = first[windows.recording] + np.floor(windows.times_s[:, 0] * FRAME_RATE_HZ).astype(np.intp)
@@ -143,7 +143,7 @@ def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Gu
     if guide is not None:
         predicted = np.concatenate(
             [
-                at_points(guide.predict(example.speech)[0], windows.times_s[windows.recording == number])
+                interpolate_at(guide.predict(example.speech)[0], windows.times_s[windows.recording == number])
                 for number, example in enumerate(examples)
             ]
         ).astype(np.float16)
@@ -187,7 +187,7 @@ class _LeftOut:
     chosen: Chosen
 
 
-def _left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence[Example]) -> list[_LeftOut]:
+def _list_left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence[Example]) -> list[_LeftOut]:
     """Return what is chosen for some examples without their own units; nothing for a single example."""
     costs, found = model.costs(config), list[_LeftOut]()
     if len(examples) < 2:
@@ -201,6 +201,6 @@ def _left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence
 
 
 def _chosen(model: SelectionModel, costs: Costs, example: Example, excluded: NDArray[np.bool_]) -> Chosen:
-    target = target_of(model, costs, example.speech)
+    target = build_target(model, costs, example.speech)
     units = select(costs, target, excluded).units
-    return Chosen(target, units, pieces_of(costs, target, units))
+    return Chosen(target, units, to_pieces(costs, target, units))

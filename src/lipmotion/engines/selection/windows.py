@@ -44,14 +44,14 @@ OVERLAPS: Mapping[str, Overlaps] = {"learned": LEARNED, "printed": TABLE_1, "sym
                                     "anticipatory": ANTICIPATORY, "middle": MIDDLE}  # fmt: skip
 
 
-def lip_reading_class(phone: str, invisible: Collection[str]) -> str:
+def find_lip_class(phone: str, invisible: Collection[str]) -> str:
     """Return the class of a phone: ``protected``, ``invisible`` or ``normal``."""
     if phone in PROTECTED_PHONES:
         return PROTECTED
     return INVISIBLE if phone in invisible else NORMAL
 
 
-def parsed_invisible(text: str) -> frozenset[str]:
+def parse_invisible(text: str) -> frozenset[str]:
     """Return the phones of a text such as ``t d g k``. Raises InputError: one that cannot be invisible."""
     phones = frozenset(text.split())
     for phone in sorted(phones):
@@ -172,7 +172,7 @@ def covering(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
     return Timeline(spans or (Span(0.0, SHORTEST_S, Unit(SILENCE)),))
 
 
-def phone_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
+def list_windows(timelines: Sequence[Timeline[Unit]]) -> PhoneWindows:
     """Return the phones of some recordings. Raises InputError: an unknown phone."""
     recording, phones, times_s, words, stress = [], [], [], [], []
     for number, units in enumerate(timelines):

@@ -145,7 +145,7 @@ def add_acoustic_regression(
         means[frames] += (z[frames] @ regression.coefficients[row]).reshape(len(frames), *means.shape[1:])
 
 
-def emission_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
+def emission_to_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
     """Serialise the densities; means and coefficients are stored at half precision."""
     arrays = trees_to_arrays(emission.forest) | {
         "means": emission.means.astype(np.float16),
@@ -187,7 +187,7 @@ REGRESSION = {
     "coefficient_rows": ArraySpec(np.int32, "L", -1, 1e6),
 }
 EMISSION = (*TREES, *DENSITIES, *REGRESSION)
-"""Names of the arrays of ``emission_arrays``: L densities, C regressions on A components."""
+"""Names of the arrays of ``emission_to_arrays``: L densities, C regressions on A components."""
 
 
 def _regression_from_arrays(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
@@ -323,7 +323,7 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     network = predictor_to_arrays(model.network)
     if model.network is not None:
         network |= {"network_share": np.array([model.network_share])}
-    return arrays | emission_arrays(model.emission) | network | recogniser | filter_to_arrays(model.modulation)
+    return arrays | emission_to_arrays(model.emission) | network | recogniser | filter_to_arrays(model.modulation)
 
 
 def model_from_arrays(

@@ -69,7 +69,7 @@ class TrainingClip:
         return [self.states[frame] for frame in self.frames]
 
 
-def density_rows(emission: Emission, states: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
+def find_density_rows(emission: Emission, states: Sequence[FullContextState], layout: StateLayout) -> NDArray[np.intp]:
     """Return the number of the density of each state [shape=(len(states),)]."""
     distinct = {state: emission.row(state, layout) for state in dict.fromkeys(states)}
     return np.array([distinct[state] for state in states], np.intp)
@@ -123,7 +123,7 @@ def _frames(
     nodes, of_row = list(numbers), np.array([numbers[node] for node in owners])
     for start in range(0, len(clips), CLIPS_PER_BLOCK):
         block = clips[start : start + CLIPS_PER_BLOCK]
-        rows = np.concatenate([density_rows(emission, clip.training_states, layout) for clip in block])
+        rows = np.concatenate([find_density_rows(emission, clip.training_states, layout) for clip in block])
         z = np.concatenate([context(clip.features, clip.frames) for clip in block])
         error = np.concatenate([clip.rows for clip in block]) - emission.means[rows]
         order = np.argsort(of_row[rows], kind="stable")
@@ -161,7 +161,7 @@ def _variances(
     """Return the variances around the regressed means, shrunk towards those of all frames together."""
     squares, counts = np.zeros(emission.means.shape), np.zeros(len(emission.means))
     for clip in clips:
-        rows = density_rows(emission, clip.training_states, layout)
+        rows = find_density_rows(emission, clip.training_states, layout)
         means = emission.means[rows].astype(float)
         add_acoustic_regression(means, regression, rows, regression.context(clip.features, clip.frames))
         np.add.at(squares, rows, np.square(clip.rows - means))
@@ -192,7 +192,7 @@ def fit_trajectory(
         phone_recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     monitor = sub_monitor(monitor, 0.3, 1)
     layout = options.training_layout
-    clips = [training_clip(example, x, layout) for example, x in zip(examples, values, strict=True)]
+    clips = [build_training_clip(example, x, layout) for example, x in zip(examples, values, strict=True)]
     states = (state for clip in clips for state in clip.training_states)
     covered = {layout.name(state) for state in states if state.unit not in layout.units.silence}
     if len(covered) < layout.speech:
@@ -214,8 +214,8 @@ def fit_trajectory(
             PredictorTraining(examples, values, direct, options.epochs, of_predictor, checkpoint)
         )
         if held_out is not None:
-            share = _share_of_predictor(held_out, clips, options, layout, direct)
-    recorded, generated = _recorded_and_generated(emission, network, prior, share, clips, layout)
+            share = _weigh_predictor(held_out, clips, options, layout, direct)
+    recorded, generated = _generate_pairs(emission, network, prior, share, clips, layout)
     factors = fit_scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
     scaled = ((original, factors * made) for original, made in zip(recorded, generated, strict=True))
     modulation = learn_filter(options.modulation_filter, scaled, examples, values)
@@ -229,7 +229,7 @@ def fit_trajectory(
 _STAGE = "trees"
 
 
-def _share_of_predictor(
+def _weigh_predictor(
     predictions: Sequence[Array],
     clips: Sequence[TrainingClip],
     options: TrajectoryConfig,
@@ -247,7 +247,7 @@ def _share_of_predictor(
             emission = fit_acoustic_regression(emission, learned, options, layout)
         for number in outside:
             clip = clips[number]
-            rows = density_rows(emission, clip.states, layout)
+            rows = find_density_rows(emission, clip.states, layout)
             states = solve_mlpg(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
             recorded, predicted = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
             spread = np.maximum(recorded.std(axis=0), 1e-6)
@@ -257,7 +257,7 @@ def _share_of_predictor(
     return float(np.clip(products / max(squares, 1e-12), 0, 1))
 
 
-def _recorded_and_generated(
+def _generate_pairs(
     emission: Emission,
     network: Predictor | None,
     prior: ArticulationPrior | None,
@@ -271,14 +271,14 @@ def _recorded_and_generated(
     for clip in clips:
         if len(clip.frames) < 2:
             continue
-        rows = density_rows(emission, clip.states, layout)
+        rows = find_density_rows(emission, clip.states, layout)
         means, precisions = Experts(emission, rows, clip.speech, network, prior, share).statistics(slice(None))
         recorded.append(clip.rows[:, 0])
         generated.append(solve_mlpg(means, precisions)[0][clip.frames])
     return recorded, generated
 
 
-def training_clip(example: Example, values: Array, layout: StateLayout) -> TrainingClip:
+def build_training_clip(example: Example, values: Array, layout: StateLayout) -> TrainingClip:
     """Return an example prepared for training."""
     frames = np.nonzero(mark_known_dynamics(example.valid))[0]
     states = label_full_context(example.speech.units, len(values), layout)
@@ -294,15 +294,15 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layo
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
     least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
     scale = np.sqrt(np.maximum(overall, least))
-    grouped = _context_moments(clips, layout, centre, scale)
+    grouped = _sum_context_moments(clips, layout, centre, scale)
     forest = {name: _grow_tree(contexts, 2 * overall.size, options, layout) for name, contexts in grouped.items()}
     leaves = [
         gaussian
         for name, tree in forest.items()
-        for gaussian in _leaf_gaussians(tree, grouped[name], overall.size, options)
+        for gaussian in _fit_leaves(tree, grouped[name], overall.size, options)
     ]
     means, variances = (np.array(rows).reshape(-1, *overall.shape) for rows in zip(*leaves, strict=True))
-    rest_mean, rest_variance = _rest_gaussian(clips, options, layout, centre, overall)
+    rest_mean, rest_variance = _estimate_rest(clips, options, layout, centre, overall)
     means = np.concatenate([means * scale + centre, rest_mean[None]])
     variances = np.concatenate([variances * scale * scale, rest_variance[None]])
     return Emission(forest, means.astype(np.float32), np.maximum(variances, least).astype(np.float32), None)
@@ -326,7 +326,7 @@ _Contexts = dict[tuple[str, str, str], Array]
 """Count, sums and sums of squares of the frames of every context [each shape=(1 + 2·3·Q,)]."""
 
 
-def _context_moments(
+def _sum_context_moments(
     clips: Sequence[TrainingClip], layout: StateLayout, centre: Array, scale: Array
 ) -> dict[str, _Contexts]:
     """Return the moments of the standardised frames of every context, for each state by name."""
@@ -345,7 +345,7 @@ def _context_moments(
     return grouped
 
 
-def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: TrajectoryConfig) -> list[tuple[Array, Array]]:
+def _fit_leaves(tree: Tree, contexts: _Contexts, size: int, options: TrajectoryConfig) -> list[tuple[Array, Array]]:
     """Return mean and variance [each shape=(3·Q,)] of every leaf, in standardised units."""
     totals = np.zeros((len(tree.asked), 1 + 2 * size))
     parents = np.full(len(tree.asked), -1)
@@ -363,7 +363,7 @@ def _leaf_gaussians(tree: Tree, contexts: _Contexts, size: int, options: Traject
     return [(means[leaf], variances[leaf]) for leaf in tree.leaves]
 
 
-def _rest_gaussian(
+def _estimate_rest(
     clips: Sequence[TrainingClip], options: TrajectoryConfig, layout: StateLayout, fallback: Array, overall: Array
 ) -> tuple[Array, Array]:
     """Return mean and variance [each shape=(3, Q)] of the rest pose: the median pose in silence away from speech."""

@@ -12,7 +12,7 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import MOTION
 from lipmotion.hmm.multistream.model import JointHmm, StreamModel
 from lipmotion.hmm.multistream.recognise import StatePath
-from lipmotion.kernels.banded import normal_equations, pin, solve
+from lipmotion.kernels.banded import build_equations, pin, solve
 from lipmotion.stats.curves import with_dynamics
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Trajectory:
 
 def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
     """Return the densities of motion along a path of states. Raises InputError: no motion, or its weight is 0."""
-    model, means, precisions = _motion_gaussians(hmm)
+    model, means, precisions = _collect_gaussians(hmm)
     chosen = model.forest.leaves(path.states.triphones)[path.frames]
     precisions = precisions[chosen]
     precisions[[0, -1], :, 1:] = 0  # Δ and Δ² of the first and last frame count for nothing
@@ -110,7 +110,7 @@ def _merge(densities: FrameDensities, share: Array) -> tuple[Array, Array]:
 
 def _solve(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
     """Return the trajectory and its variance [each shape=(T, Q)], given posteriors of the Gaussians [shape=(T, M)]."""
-    bands = normal_equations(*_merge(densities, share))
+    bands = build_equations(*_merge(densities, share))
     for (frame, dimension), value in pins.items():
         pin(bands, frame, dimension, value)
     values, variance = solve(bands)
@@ -119,7 +119,7 @@ def _solve(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int
     return values, variance
 
 
-def _motion_gaussians(hmm: JointHmm) -> tuple[StreamModel, Array, Array]:
+def _collect_gaussians(hmm: JointHmm) -> tuple[StreamModel, Array, Array]:
     """Return the model of motion, its leaves' means and weighted precisions [shape=(G, M, 3, Q)]. Raises InputError:
     none.
     """

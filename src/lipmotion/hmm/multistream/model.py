@@ -122,7 +122,7 @@ class Forest:
         return "\n".join(f"state {printable(name)}\n{tree.text()}" for name, tree in self.trees.items())
 
 
-def unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:
+def build_unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:
     """Return trees with one leaf for each unit in ``spoken``, and one for all other units together."""
     questions = tuple(Question(1, unit, frozenset([unit])) for unit in inventory.names)
     number = {unit: i for i, unit in enumerate(inventory.names)}
@@ -136,7 +136,7 @@ def unit_forest(inventory: Inventory, spoken: Sequence[str]) -> Forest:
     return Forest(inventory, trees)
 
 
-def context_questions(inventory: Inventory, classes: Mapping[str, frozenset[str]]) -> tuple[Question, ...]:
+def list_context_questions(inventory: Inventory, classes: Mapping[str, frozenset[str]]) -> tuple[Question, ...]:
     """Return all questions about the left neighbour, the unit, and the right neighbour.
 
     classes : sets of units, by name

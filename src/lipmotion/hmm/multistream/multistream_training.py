@@ -29,9 +29,9 @@ from lipmotion.hmm.multistream.model import (
     JointHmm,
     StreamModel,
     TreeCosts,
-    context_questions,
+    build_unit_forest,
     grow_forest,
-    unit_forest,
+    list_context_questions,
 )
 from lipmotion.hmm.multistream.recognise import check_bounds, measure_durations
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
@@ -134,7 +134,7 @@ def prepare_utterances(
     return PreparedUtterances(tuple(items), tuple(index))
 
 
-def batch_posteriors(
+def infer_batches(
     hmm: JointHmm, leaves: Leaves, items: Sequence[PreparedUtterance]
 ) -> Iterator[tuple[PreparedUtterance, StatePosteriors]]:
     """Give utterances with the posteriors of their states; those without a path are left out."""
@@ -183,7 +183,7 @@ def accumulate_statistics(
 
 def _shard_sums(job: tuple[_Accounts, Sequence[PreparedUtterance]]) -> Sums:
     accounts, items = job
-    return _add_up(accounts, batch_posteriors(accounts.hmm, accounts.leaves, items))
+    return _add_up(accounts, infer_batches(accounts.hmm, accounts.leaves, items))
 
 
 def _add_up(accounts: _Accounts, posteriors: Iterable[tuple[PreparedUtterance, StatePosteriors]]) -> Sums:
@@ -237,11 +237,11 @@ def reestimate_hmm(hmm: JointHmm, statistics: StreamStatistics) -> JointHmm:
     }
     measured = statistics.stay / np.maximum(statistics.occupied, 1e-9)
     stay = np.where(statistics.occupied > 1, measured, np.exp(hmm.log_stay))
-    log_stay = np.log(np.clip(stay, MIN_STAY_PROBABILITY, max_stay_probability(hmm.inventory)))
+    log_stay = np.log(np.clip(stay, MIN_STAY_PROBABILITY, limit_stay(hmm.inventory)))
     return replace(hmm, models=models, log_stay=log_stay)
 
 
-def max_stay_probability(inventory: Inventory) -> NDArray[np.float64]:
+def limit_stay(inventory: Inventory) -> NDArray[np.float64]:
     """Return the largest probability of staying allowed for each state without context [shape=(R,)]."""
     longest = [
         LONGEST_SILENCE_FRAMES if unit in inventory.free else LONGEST_STATE_FRAMES for unit, _ in inventory.monophones
@@ -308,7 +308,7 @@ def grow_joint(
     widths = [config.plain_iterations, 1, config.iterations, *(2 * config.iterations * count for count in splits), 1]
     plain, trees, tied, *mixed, last = _split_monitor(monitor, widths)
     hmm = _run_em(hmm, prepared, "units", config.plain_iterations, plain, work)
-    hmm = _tie_states(hmm, prepared, context_questions(inventory, classes), trees, work)
+    hmm = _tie_states(hmm, prepared, list_context_questions(inventory, classes), trees, work)
     hmm = _run_em(hmm, prepared, "units in context", config.iterations, tied, work)
     yield hmm
     for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
@@ -362,12 +362,12 @@ def _make_equal_models(
     models = {}
     for name in streams:
         scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
-        forest = unit_forest(inventory, spoken)
+        forest = build_unit_forest(inventory, spoken)
         tied = make_standard_normals(forest.size, len(scale.mean), name in F0_STREAMS, known)
         models[name] = StreamModel(scale, forest, tied)
     free, silence = inventory.free, inventory.silence
     sequences = [tuple(silence if unit in free else unit for unit in utterance.units) for utterance in utterances]
-    log_stay = np.log(max_stay_probability(inventory))
+    log_stay = np.log(limit_stay(inventory))
     durations = np.full((len(log_stay), 2), np.nan)
     bigram = estimate_bigram(inventory.names, sequences)
     return JointHmm(config, inventory, models, log_stay, durations, spoken, bigram)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.densities import SPEECH, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
-from lipmotion.hmm.multistream.recognise import joint_recogniser
+from lipmotion.hmm.multistream.recognise import build_recogniser
 from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays
@@ -50,10 +50,10 @@ class OwnPhoneRecogniser:
         observations = _observations(speech)
         if observations.frames > LONGEST_S * FRAME_RATE_HZ or not speech.features.values.any():
             return None
-        if _similarity_score(self.hmm, observations) < self.training_score + SIMILARITY_MARGIN:
+        if _score_similarity(self.hmm, observations) < self.training_score + SIMILARITY_MARGIN:
             return None
         try:
-            segments = joint_recogniser(self.hmm).recognise(observations)
+            segments = build_recogniser(self.hmm).recognise(observations)
         except AlignmentError:  # shorter than any phone
             return None
         return frames_to_units(segments, speech.features.duration_s)
@@ -88,7 +88,7 @@ def fit_phone_recogniser(
         arrays = joint_to_arrays(hmm, np.float32)
         checkpoint.save("joint", arrays)
     hmm = joint_from_arrays(arrays, CONFIG)
-    scores = [_similarity_score(hmm, _observations(example.speech)) for example in examples]
+    scores = [_score_similarity(hmm, _observations(example.speech)) for example in examples]
     return OwnPhoneRecogniser(hmm, float(np.mean(scores)))
 
 
@@ -114,7 +114,7 @@ def _observations(speech: Speech) -> StreamObservations:
     return stream_observations(np.asarray(speech.features.values), speech.log_f0)
 
 
-def _similarity_score(hmm: JointHmm, observations: StreamObservations) -> float:
+def _score_similarity(hmm: JointHmm, observations: StreamObservations) -> float:
     """Return the speaker similarity score: the mean over frames of the log density of the leaf that fits best."""
     part = hmm.models[SPEECH]
     rows = hmm.standardise(observations, hmm.config.recognition)[SPEECH]

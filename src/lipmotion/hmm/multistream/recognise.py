@@ -268,6 +268,6 @@ class JointRecogniser:
 
 
 @lru_cache(maxsize=4)
-def joint_recogniser(hmm: JointHmm) -> JointRecogniser:
+def build_recogniser(hmm: JointHmm) -> JointRecogniser:
     """Return the recogniser of a model; the last few recognisers, with their networks, are cached."""
     return JointRecogniser(hmm)

@@ -24,9 +24,9 @@ from lipmotion.articulation.lip_points import (
     LOWER_EDGE,
     RIGHT_CORNER,
     UPPER_EDGE,
-    mouth_template,
+    build_mouth,
 )
-from lipmotion.articulation.mouth import LEAST_CHIN_DROP_SHARE, SpokenMouth, jaw_drop, spoken_mouth, upper_share
+from lipmotion.articulation.mouth import LEAST_CHIN_DROP_SHARE, SpokenMouth, drop_jaw, find_mouth, weigh_upper
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.face_shapes import FaceShapes
@@ -58,7 +58,7 @@ ARTICULATORY = {
 def arkit_mouth() -> FaceShapes:
     """Return ARKit's blendshapes of the mouth as displacements of the lip and jaw points."""
     moved = np.array([_displace_points(name) for name in ARKIT_MOUTH])
-    template = mouth_template()
+    template = build_mouth()
     facing = [(template.row(upper), template.row(lower)) for upper, lower in FACING[:3]]
     gap = np.mean([moved[:, upper, 1] - moved[:, lower, 1] for upper, lower in facing], axis=0)
     return FaceShapes(ARKIT_MOUTH, ARKIT_MOUTH, moved, gap, "arkit")
@@ -81,7 +81,7 @@ class _Regions:
     """Where the points are: 1 in the middle of a region, 0 outside it [each shape=(52,)]."""
 
     def __init__(self) -> None:
-        template = mouth_template()
+        template = build_mouth()
         self.places = template.places
         self.across = np.clip(self.places[:, 0] / (template.width / 2), -1.0, 1.0)
         middle = np.sqrt(1 - self.across**2)
@@ -124,7 +124,7 @@ def _open_jaw(regions: _Regions) -> Array:
 
 def _close_before_jaw(regions: _Regions) -> Array:
     """Return the lips closed in front of the open jaw: the exact opposite of the gap that ``jawOpen`` makes."""
-    jaw, template = _open_jaw(regions), mouth_template()
+    jaw, template = _open_jaw(regions), build_mouth()
     where, gaps = [-1.0, 1.0], [0.0, 0.0]  # the gap from the right corner to the left
     below = np.flatnonzero(template.lower & template.inner)
     for row in np.flatnonzero(template.upper & template.inner):
@@ -176,7 +176,7 @@ def with_mouth(motion: Motion) -> Motion:
     """
     if not is_of_blendshapes(motion):
         return motion
-    weights, mouth, template = arkit_weights(motion), arkit_mouth(), mouth_template()
+    weights, mouth, template = arkit_weights(motion), arkit_mouth(), build_mouth()
     rows = np.stack([weights.get(name, np.zeros(len(motion.values))) for name in mouth.known], axis=1)
     jaw, close = mouth.known.index(OPENS), mouth.known.index("mouthClose")
     rows[:, close] = np.minimum(rows[:, close], rows[:, jaw])
@@ -254,7 +254,7 @@ class PointMotion:
     @property
     def expressed(self) -> Array:
         """The displacements with those of a mood: corners that rise, or fall, and less beside them."""
-        template, mouth = mouth_template(), self.mouth
+        template, mouth = build_mouth(), self.mouth
         across = np.clip(np.abs(template.places[:, 0]) / (template.width / 2), 0, 1)
         moved = self.displacements.copy()
         moved[..., 1] += np.outer(CORNER_RISE * mouth.smile - CORNER_FALL * mouth.frown, across**3 * ~template.jaw)
@@ -266,15 +266,15 @@ def move_points(motion: Motion, units: Timeline[Unit]) -> PointMotion:
 
     Motion that has points is taken as it is; of motion with distances alone (``opening``, perhaps ``width``, ``outer``)
     the points are made up, as mouths usually move. Motion of blendshapes alone moves ``blendshape_motion.arkit_mouth``.
-    Gap, width and protrusion are those of the mouth (``articulation.mouth.spoken_mouth``).
+    Gap, width and protrusion are those of the mouth (``articulation.mouth.find_mouth``).
     units : phones in time
-    Raises InputError: as ``spoken_mouth``, or values that are not finite.
+    Raises InputError: as ``find_mouth``, or values that are not finite.
     """
     motion = with_mouth(motion)
-    mouth = spoken_mouth(motion, units)
+    mouth = find_mouth(motion, units)
     if not np.isfinite(motion.values).all():
         raise InputError("the motion has values that are not finite; interpolate the missing frames first")
-    rest, template = find_rest_frames(motion, units), mouth_template()
+    rest, template = find_rest_frames(motion, units), build_mouth()
     names = [[f"{axis}_{point}" for axis in "xyz"] for point in template.points]
     if all(name in motion.names for row in names for name in row):
         places = np.stack([np.stack([motion[name] for name in row], axis=1) for row in names], axis=1)
@@ -289,14 +289,14 @@ def move_points(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     forward = np.maximum(MIN_PROTRUSION * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
     moved[:, lips, 2] += forward[:, None]
     moved[:, :, 1] += _part_lips(moved[:, :, 1], across, mouth.gap)
-    higher = moved[:, template.row(CHIN), 1] + LEAST_CHIN_DROP_SHARE * jaw_drop(mouth.gap) * (1 - mouth.tuck)
+    higher = moved[:, template.row(CHIN), 1] + LEAST_CHIN_DROP_SHARE * drop_jaw(mouth.gap) * (1 - mouth.tuck)
     moved[:, template.jaw, 1] -= np.maximum(higher, 0)[:, None]
     return PointMotion(moved, mouth)
 
 
 def _part_lips(heights: Array, across: Array, gap: Array) -> Array:
     """Return how the points of both lips move up or down for a gap between their middles [shape=(T, 52)]."""
-    template = mouth_template()
+    template = build_mouth()
     pairs = np.array([(template.row(upper), template.row(lower)) for upper, lower in FACING])
     pairs = pairs[np.argsort(across[pairs[:, 0]], kind="stable")]
     places, half = across[pairs[:, 0]], len(pairs) // 2
@@ -319,10 +319,10 @@ def _part_lips(heights: Array, across: Array, gap: Array) -> Array:
 
 def _invent_points(motion: Motion, rest: NDArray[np.bool_], mouth: SpokenMouth) -> Array:
     """Return displacements of the points from distances alone [shape=(T, 52, 3)]."""
-    template = mouth_template()
+    template = build_mouth()
     across = np.clip(template.places[:, 0] / (template.width / 2), -1, 1)
     middle = np.sqrt(1 - across**2)
-    rise = upper_share(mouth.gap)
+    rise = weigh_upper(mouth.gap)
     drop = mouth.gap - rise
     moved = np.zeros((len(mouth.gap), len(template.points), 3))
     moved[:, template.upper, 1] = np.outer(rise, middle[template.upper])

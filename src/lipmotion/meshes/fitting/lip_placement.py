@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE, mouth_template
+from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE, build_mouth
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import arkit_name, viseme_name, vowel_name
@@ -92,7 +92,7 @@ def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
             f"the blendshape {shorten(shape.name)!r} parts no lips; name the lip points by their vertices "
             "(docs/meshes.md)"
         )
-    template = mouth_template()
+    template = build_mouth()
     right, left = middle[middle[:, 0].argmin()], middle[middle[:, 0].argmax()]
     scale = float(left[0] - right[0]) / template.inner_width
     order = np.argsort(middle[:, 0], kind="stable")
@@ -112,7 +112,7 @@ def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, i
             the eye corners (33, 263) the head may be turned any way; without, it must stand upright and look along +z
     Raises InputError: a required point is missing, a vertex does not exist, or the lips are one surface without a slit.
     """
-    template = mouth_template()
+    template = build_mouth()
     _check_named(named, len(mesh.vertices))
     place = {point: mesh.vertices[vertex] for point, vertex in named.items()}
     centre = (place[RIGHT_CORNER] + place[LEFT_CORNER]) / 2
@@ -231,7 +231,7 @@ def _max_depths(places: Places, reach: float) -> Places:
 
 def _aim(scale: float, centre: Places, middle: Places) -> Places:
     """Return where the points should be where lips meet along ``middle``, right to left [shape=(52, 3)]."""
-    template = mouth_template()
+    template = build_mouth()
     targets = centre + scale * (template.places - template.centre)
     seam = np.interp(targets[:, 0], middle[:, 0], middle[:, 1])
     depth = np.interp(targets[:, 0], middle[:, 0], middle[:, 2])
@@ -246,7 +246,7 @@ def _choose_vertices(
     places: Places, forward: Places, targets: Places, skin: NDArray[np.bool_], upper: NDArray[np.bool_]
 ) -> Rows:
     """Return the vertex of each point: the nearest one of the skin on its side of the lips that faces forwards."""
-    template, stretch = mouth_template(), np.array([1.0, 1.0, DEPTH_WEIGHT])
+    template, stretch = build_mouth(), np.array([1.0, 1.0, DEPTH_WEIGHT])
     facing = skin & (forward > 0.0)
     chosen = np.zeros(len(targets), np.int64)
     sides = ((template.upper, upper), (template.lower | template.jaw, ~upper), (template.corner, np.ones_like(upper)))
@@ -261,7 +261,7 @@ def _choose_vertices(
 
 
 def _check_named(named: Mapping[int, int], vertices: int) -> None:
-    points = mouth_template().points
+    points = build_mouth().points
     missing = [point for point in NEEDED if point not in named]
     if missing:
         raise InputError(

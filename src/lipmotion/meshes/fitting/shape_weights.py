@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import LEAST_GAP, read_gap
-from lipmotion.articulation.lip_points import FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
+from lipmotion.articulation.lip_points import FACING, LEFT_CORNER, RIGHT_CORNER, build_mouth
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.articulation.phone_targets import crossfade_phones
 from lipmotion.articulation.rest import share_short_pauses
@@ -298,7 +298,7 @@ def fit_bounded_curves(
 
 def _weigh_rows(displacements: Array, gap: Array) -> Array:
     """Return displacements of the points [shape=(N, 52, 3)] and gaps as rows of the least squares problem."""
-    template = mouth_template()
+    template = build_mouth()
     weights = np.where(template.jaw[:, None], JAW_WEIGHT, 1.0) * np.array([1.0, 1.0, DEPTH_WEIGHT])
     weights[template.corner, 0] *= CORNER_WEIGHT
     inner = [template.row(point) for pair in FACING[:3] for point in pair]
@@ -361,7 +361,7 @@ def cancel_opposed(weights: Array, known: Sequence[str]) -> Array:
 
 def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
     """Return weights with lips at least as round as they are protruded, 0 to 1 [shapes=(T, S), (T,)]."""
-    result, template = weights.copy(), mouth_template()
+    result, template = weights.copy(), build_mouth()
     right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
     present = {row: full for name, full in ROUNDING.items() if (row := shapes.row(name)) is not None}
     narrower = sum(

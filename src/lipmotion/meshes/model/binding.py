@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.mesh import Mesh
@@ -114,7 +114,7 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
     upper lip does not drag the lower, however near it is. Pieces inside the mouth below the lips follow the jaw as one.
     Source: Hofer 2008, Eq. 12, which gives no form of the weights; Franke & Nielson 1980 (modified Shepard weights).
     """
-    template = mouth_template()
+    template = build_mouth()
     reach = np.where(template.jaw, JAW_REACH, np.where(template.lower, LOWER_REACH, UPPER_REACH))[:, None]
     limit = float(reach.max()) * placement.scale
     distances = surface.place_distances(placement.vertices, limit)

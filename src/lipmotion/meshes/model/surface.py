@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.normals import normal_sums
+from lipmotion.kernels.normals import sum_normals
 from lipmotion.meshes.model.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def build_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSur
 
 def compute_normals(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     """Return the area-weighted unit normal of every vertex [shape=(V, 3)]; (0, 0, 1) where no triangle is."""
-    total = normal_sums(places, triangles)
+    total = sum_normals(places, triangles)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0, total / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.analysis.read_request import read_lexicon, read_recording
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
@@ -133,7 +133,7 @@ LINE_PAUSE_S = 0.5
 """A longer pause between words ends a line of text."""
 
 
-@one_thread()
+@limit_threads()
 def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = None, workers: int = 1) -> Recognition:
     """Return the English words of a recording in time, with the phones that they or free recognition decided.
 

@@ -82,9 +82,9 @@ def _speaker_of_labels(request: Request, *, is_typed: bool) -> str:
     files = [Path(name) for name in sources if isinstance(name, kinds) and _file_exists(Path(name))]
     if not files:
         return ""
-    from lipmotion.formats.label_files import speakers_in
+    from lipmotion.formats.label_files import list_speakers
 
-    speakers = (name.lower() for file in files for name in speakers_in(file))
+    speakers = (name.lower() for file in files for name in list_speakers(file))
     return request.speaker if request.speaker.lower() in speakers else ""
 
 
@@ -132,14 +132,14 @@ def read_units(path: str | Path, tier: str = "", speaker: str = "") -> Timeline[
     tier, speaker : of labels, which tier and whose phones (``read_phones``)
     Raises InputError: no such file, not one of these, or without phones.
     """
-    from lipmotion.formats.base import motion_suffix
+    from lipmotion.formats.base import find_suffix
     from lipmotion.formats.base import read_units as read_units_of_motion
     from lipmotion.formats.label_files import holds_timings, read_phones
 
     path = Path(path)
     check_kind(path, "motion file", "units file")
     is_label = path.suffix.lower() in LABEL_SUFFIXES
-    if motion_suffix(path) and not (is_label and holds_timings(path)):
+    if find_suffix(path) and not (is_label and holds_timings(path)):
         return read_units_of_motion(path)
     if is_label:
         return read_phones(path, tier, speaker)

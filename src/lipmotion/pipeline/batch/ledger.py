@@ -19,8 +19,8 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.extensions import installed_version, load_provided
-from lipmotion.formats.base import motion_suffixes
+from lipmotion.extensions import find_version, load_provided
+from lipmotion.formats.base import list_suffixes
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.formats.label_files import LABEL_SUFFIXES, find_label_files
 from lipmotion.meshes.model.rig_tables import table_path
@@ -58,7 +58,7 @@ def check_job(job: Job) -> None:
 
 def check_kinds(kinds: Sequence[str]) -> None:
     """Raise ExportError for a kind of output that a batch cannot write, one that is given twice, or none at all."""
-    plain = (*motion_suffixes(), *LABEL_SUFFIXES, *load_provided("video_suffixes"), *load_provided("scene_suffixes"))
+    plain = (*list_suffixes(), *LABEL_SUFFIXES, *load_provided("video_suffixes"), *load_provided("scene_suffixes"))
     known = (*(suffix.removeprefix(".") for suffix in plain), *(f"{CUES}{name}" for name in CUE_FORMATS))
     unknown = [kind for kind in kinds if kind not in known]
     if unknown or not kinds:
@@ -85,7 +85,7 @@ def fingerprint_job(job: Job) -> str:
     table = table_path(job.outputs.character) if job.outputs.character else None
     if table and is_file(table):
         parts.append({"table": sha256_of(table)})
-    return _digest(as_json([*parts, installed_version(), installed_phone_recogniser()]))
+    return _digest(as_json([*parts, find_version(), installed_phone_recogniser()]))
 
 
 def fingerprint_line(line: BatchLine, of_settings: str) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shorten
-from lipmotion.formats.base import motion_suffixes
+from lipmotion.formats.base import list_suffixes
 from lipmotion.storage.files import portable_name
 from lipmotion.storage.sources import check_listable, read_text_file
 from lipmotion.storage.text_table import read_table
@@ -91,7 +91,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
     """
     taken = dict.fromkeys(OWN_FILES, "the batch itself")
     folders: dict[str, str] = {}
-    longer = {kind: [each for each in motion_suffixes() if each[1:].endswith(f".{kind}")] for kind in kinds}
+    longer = {kind: [each for each in list_suffixes() if each[1:].endswith(f".{kind}")] for kind in kinds}
     for line in lines:
         if CONTROL.search(line.name + line.recording):
             raise InputError(f"{line.recording!r}, {line.name!r}: control characters in a name; rename the recording")

@@ -15,7 +15,7 @@ from typing import Any
 from urllib.parse import quote
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.web_page import colour_code
+from lipmotion.formats.web_page import find_colour
 from lipmotion.pipeline.batch.ledger import FAILED, Ledger, Record
 from lipmotion.pipeline.batch.lines import LARGEST_LIST_BYTES, BatchLine
 from lipmotion.printable import printable
@@ -111,7 +111,7 @@ def write_reports(
     order = sorted(range(len(lines)), key=lambda number: (-doubts[number], lines[number].name))
     table, page = out / CSV_REPORT, out / HTML_REPORT
     marks = marks or {}
-    page_text = colour_code(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
+    page_text = find_colour(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
     rows_of_marks = as_json([[name, mark.kind, mark.when] for name, mark in marks.items()])
     page_text = page_text.replace(BASIS, hashlib.sha256(rows_of_marks.encode()).hexdigest())
     before, _, after = page_text.partition(ROWS)

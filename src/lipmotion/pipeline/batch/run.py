@@ -21,7 +21,7 @@ import numpy as np
 
 from lipmotion.errors import CorpusError, ExportError, LipMotionError, shorten
 from lipmotion.extensions import describe_failed_extension, load_provided
-from lipmotion.formats.base import motion_suffix
+from lipmotion.formats.base import find_suffix
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, find_closable_ranges
 from lipmotion.motion.frame_labels import list_speech_intervals
@@ -260,7 +260,7 @@ def check_line_job(job: Job, of_run: str) -> None:
     (model, face, _), anywhere = _share(job, of_run), Path(tempfile.gettempdir())
     files = tuple(str(anywhere / f"line.{kind}") for kind in job.outputs.kinds)
     check_outputs(job.of(anywhere, files), face)
-    kinds = [kind for kind in job.outputs.kinds if motion_suffix(Path(f"line.{kind}")) and not kind.startswith(CUES)]
+    kinds = [kind for kind in job.outputs.kinds if find_suffix(Path(f"line.{kind}")) and not kind.startswith(CUES)]
     if not kinds or face.other_person(model, job.request.speaker) is not None:
         return
     silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)

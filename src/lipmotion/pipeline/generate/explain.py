@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import ExportError, InputError
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generation import map_explanation
@@ -72,7 +72,7 @@ def explain(
     return explain_session(session, NO_EDITS, [at] if isinstance(at, int | float) else at)
 
 
-@one_thread()
+@limit_threads()
 def explain_session(session: Session, edits: Edits, times: Sequence[float]) -> tuple[Explanation, ...]:
     """Return what determined the frames nearest to some times, in seconds, of a session's motion with some edits.
 
@@ -183,7 +183,7 @@ def _list_values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, st
         yield "", f"and {len(channels) - min(len(names), SHOWN_CHANNELS)} more channels (--json has all)"
 
 
-@one_thread()
+@limit_threads()
 def chain_posteriors(session: Session, edits: Edits) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
     """Return the motion of a session with some edits, and the posterior probabilities of every chain of its model.
 
@@ -284,7 +284,7 @@ COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
 """The colours of the chains, in their order."""
 
 
-@one_thread()
+@limit_threads()
 def check_picture(path: Path, speech: str | Path | Audio | None = None) -> None:
     """Raise ExportError if a picture cannot be written to a path."""
     if path.suffix.lower() != SUFFIX:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus, quantise
 from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
-from lipmotion.formats.subtitles import is_subtitles, subtitle_words
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.formats.subtitles import is_subtitles, strip_markup
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generation import speaker_map
@@ -39,7 +39,7 @@ FEATURES = 13
 """The static acoustic features, whose differences joins cost."""
 
 
-@one_thread()
+@limit_threads()
 def speak_from_corpus(
     text: str, corpus: Corpus, model: Model, request: Request | None = None, constraints: Constraints | None = None
 ) -> SpokenText:
@@ -152,7 +152,7 @@ LARGEST_TEXT_BYTES = 4 * MAX_CHARACTERS
 """Most bytes of a text file: a character takes up to four."""
 
 
-@one_thread()
+@limit_threads()
 def speak(  # noqa: PLR0913
     text: str,
     *,
@@ -191,7 +191,7 @@ def speak(  # noqa: PLR0913
     """
     if is_subtitles(text):
         LOG.warning("the text is that of subtitles: times, and sounds in brackets, are left out")
-        text = subtitle_words(text)
+        text = strip_markup(text)
     text, tags = parse_tagged_text(text)
     request = Request(
         lexicon=lexicon, speaker=speaker, onto=onto, onto_speaker=onto_speaker, pauses=pauses, asymmetry=asymmetry

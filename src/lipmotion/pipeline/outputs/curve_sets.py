@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import EDITED, GAP, gap_to_opening, read_edited, read_gap
-from lipmotion.articulation.curve_edits import apply_curve_edits, check_drawn, edited_share
+from lipmotion.articulation.curve_edits import apply_curve_edits, check_drawn, weigh_edits
 from lipmotion.articulation.expression import is_mood, read_moods
-from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import InputError, shorten
 from lipmotion.formats.fap import NAMES, PARAMETERS, move_faps
@@ -209,7 +209,7 @@ def _make_set(
         mouth = solve_shape_weights(motion, units, arkit_mouth())
         return join_channels(mouth, compute_living_curves(motion, units, staging, prosody))
     if name == VOWELS:  # with how far the lips are pressed together, and VRM's expressions of moods
-        lips, moods = spoken_mouth(motion, units), expression_weights(read_moods(motion))
+        lips, moods = find_mouth(motion, units), expression_weights(read_moods(motion))
         curves = {CLOSED: lips.closing if CLOSED not in motion.names else motion[CLOSED]}
         curves |= {
             mood: curve * lips.free for mood, curve in moods.items()
@@ -219,7 +219,7 @@ def _make_set(
         vowels = join_channels(solve_shape_weights(motion, units, vowel_mouth()), pressed)
         return join_channels(vowels, compute_living_curves(motion, units, staging, prosody))
     if name in (VISEMES, HELD_VISEMES):
-        return weigh_visemes(units, spoken_mouth(motion, units), held=name == HELD_VISEMES)
+        return weigh_visemes(units, find_mouth(motion, units), held=name == HELD_VISEMES)
     return move_faps(motion, units)
 
 
@@ -257,9 +257,9 @@ def _move_mouth(
 ) -> Motion:
     """Return motion whose mouth changes as that of curves without and with edits; ``calm``: the motion in no mood."""
     before, after = map(with_mouth, curves)
-    share = edited_share(motion.time_s, [edit for edit in edits if edit.channel in curves[0].names])
+    share = weigh_edits(motion.time_s, [edit for edit in edits if edit.channel in curves[0].names])
     motion = with_gestures(motion, units, (*GESTURES, EDITED["opening"]))
-    values, gap = motion.values.astype(np.float64), spoken_mouth(calm, units).gap
+    values, gap = motion.values.astype(np.float64), find_mouth(calm, units).gap
     for column, channel in enumerate(motion.channels):
         if channel.name in after.names and channel.name not in (*curves[0].names, *GAP_CHANNELS):
             changed = values[:, column] + after[channel.name] - before[channel.name]

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from lipmotion.articulation.curve_edits import GAIN_EDGE_S, span_weight
+from lipmotion.articulation.curve_edits import GAIN_EDGE_S, weigh_span
 from lipmotion.articulation.delivery import (
     Delivery,
     close_on_frame_grid,
@@ -64,7 +64,7 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
     for key, later in pairwise((*manners, last)):
         if key.time_s < later.time_s:
             near = slice(*np.searchsorted(time_s, (key.time_s - GAIN_EDGE_S, later.time_s + GAIN_EDGE_S)))
-            share = span_weight(time_s[near], key.time_s, later.time_s, GAIN_EDGE_S)
+            share = weigh_span(time_s[near], key.time_s, later.time_s, GAIN_EDGE_S)
             intensity[near] *= 1 + share * key.strength * (FACTORS[key.mood] - 1)
     return intensify(generation, intensity)
 

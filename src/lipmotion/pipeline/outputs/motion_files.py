@@ -13,14 +13,14 @@ import numpy as np
 from lipmotion.articulation.contact import sample_pictures
 from lipmotion.articulation.delivery import close_on_frame_grid, find_closed_times
 from lipmotion.articulation.expression import is_mood
-from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.mouth import find_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.base import (
     check_motion,
-    motion_format,
-    motion_suffix,
-    motion_suffixes,
+    find_motion_format,
+    find_suffix,
+    list_suffixes,
     read_motion,
     write_motion,
 )
@@ -64,17 +64,17 @@ class MotionOutput(Output):
 
     @classmethod
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
-        return motion_suffixes()
+        return list_suffixes()
 
     @classmethod
     def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102, ARG003
-        return bool(motion_suffix(path))
+        return bool(find_suffix(path))
 
     def check(self) -> None:  # noqa: D102
         check_rate(self.path, self.settings.outputs.rate_hz)
 
     def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
-        settings, form = self.settings, motion_format(self.path)
+        settings, form = self.settings, find_motion_format(self.path)
         spoken, chosen, requested = performance.cached(_choose)
         lives = form.curves in LIVING_SETS or settings.curves in LIVING_SETS
         prosody = performance.cached(measure_recorded_prosody) if lives else None
@@ -83,7 +83,7 @@ class MotionOutput(Output):
         names = held.motion.names
         is_replaced = form.mouth and OPENING in names and OPENING not in requested
         if requested and (is_replaced or not {*requested} & {*names}):
-            suffix = motion_suffix(self.path)
+            suffix = find_suffix(self.path)
             LOG.warning(
                 "%s: %s holds channels of its own, none of those that were asked for", *(self.path.name, suffix)
             )
@@ -103,7 +103,7 @@ class MotionOutput(Output):
         source = {"file": as_text(speech.name)} if speech else {}
         if speech and sound_s:
             source["start_s"] = f"{sound_s:.9g}"
-        if speech and motion_format(self.path).names_sound:
+        if speech and find_motion_format(self.path).names_sound:
             source["path"] = sound_reference(speech, self.path)
         write_motion(self.path, held, source=source, model=model)
 
@@ -185,7 +185,7 @@ def fit_to_format(
     already, by any spelling of ARKit's names, are taken as they are.
     Raises ExportError: unknown suffix. Raises InputError: curves that cannot be computed.
     """
-    form = motion_format(path)
+    form = find_motion_format(path)
     held = chosen
     is_all = held.motion.names == generation.motion.names and _blendshapes(generation.motion) is not None
     others = form.other_curves and not is_all and all(channel.unit in CURVES for channel in held.motion.channels)
@@ -214,17 +214,17 @@ def resample_curves(held: Generation, generation: Generation, rate_hz: float) ->
     resampled, shown = held.resampled(rate_hz), with_mouth(generation.motion)
     if OPENING not in shown.names or len(held.motion.values) != len(shown.values):
         return resampled
-    contact = spoken_mouth(shown, generation.units).contact
+    contact = find_mouth(shown, generation.units).contact
     rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
 
 
 def check_rate(path: Path, rate_hz: float | None) -> None:
     """Raise ExportError if a motion file cannot have a rate that the user asks for."""
-    form = motion_format(path)
+    form = find_motion_format(path)
     if form.fixed_rate and rate_hz is not None and rate_hz != form.rate_hz:
         required = f"required {form.rate_hz:g}: leave --rate out"
-        raise ExportError(f"{path}: {rate_hz:g} frames a second in {motion_suffix(path)}, {required}")
+        raise ExportError(f"{path}: {rate_hz:g} frames a second in {find_suffix(path)}, {required}")
 
 
 def _make_curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
-from lipmotion.extensions import installed_version
+from lipmotion.extensions import find_version
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.kernels.compiler import blas_kernels
+from lipmotion.kernels.compiler import list_blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.agreement import transcript_fit
@@ -182,9 +182,9 @@ def fingerprint_training(
         "recogniser": recogniser.as_mapping(),
         "words": lexicon.user,
         "visual": visual,
-        "versions": [installed_version(), *map(metadata.version, ("numpy", "scipy", "pocketsphinx"))],
+        "versions": [find_version(), *map(metadata.version, ("numpy", "scipy", "pocketsphinx"))],
         "phone recogniser": installed_phone_recogniser(),
-        "machine": [platform.machine(), blas_kernels()],
+        "machine": [platform.machine(), list_blas_kernels()],
     }
     if prior is not None:
         for name, array in sorted(prior.engine.to_arrays(prior.learned).items()):

@@ -17,10 +17,10 @@ import numpy as np
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.extensions import installed_version
+from lipmotion.extensions import find_version
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
-from lipmotion.kernels.compiler import one_thread
+from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track
 from lipmotion.motion.speaker_maps import add_habits, map_to_mean_person
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise, warn_of_guesses
@@ -134,7 +134,7 @@ class Run:
 DEFAULT_RUN, TRAINING_LIST = Run(), Selection("train")
 
 
-@one_thread()
+@limit_threads()
 def train(  # noqa: PLR0913
     corpus: Corpus,
     *,
@@ -345,11 +345,11 @@ def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: st
         "minutes": round(minutes, 1),
         "licence": sorted({source["licence"] for source in sources if "licence" in source}),
         "attribution": sorted({source["attribution"] for source in sources if "attribution" in source}),
-        "versions": {"lipmotion": installed_version()} | {name: metadata.version(name) for name in ("numpy", "scipy")},
+        "versions": {"lipmotion": find_version()} | {name: metadata.version(name) for name in ("numpy", "scipy")},
     }
 
 
-@one_thread()
+@limit_threads()
 def adapt(model: Model | str | Path | None, recordings: Sequence[str | Path | Audio]) -> Model:
     """Return a model whose phone models are adapted to one speaker, for recognition and alignment.
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.kernels.paths import cheapest_arrivals, trace_back
+from lipmotion.kernels.paths import find_cheapest, trace_back
 from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import Audio, Prosody
@@ -73,7 +73,7 @@ def log_f0(audio: Audio) -> Floats:
         block = slice(start, min(start + BLOCK, frames))
         pitch[:-1, block], cost = candidates(correlations(samples, block, silence))
         before = pitch[:-1, max(start - 1, 0)]  # the first frame continues what it is
-        arrival, pointers[block] = cheapest_arrivals(arrival - arrival.min(), _steps(before, pitch[:-1, block], cost))
+        arrival, pointers[block] = find_cheapest(arrival - arrival.min(), _steps(before, pitch[:-1, block], cost))
     return pitch[trace_back(pointers, int(arrival.argmin())), np.arange(frames)]
 
 

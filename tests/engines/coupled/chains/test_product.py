@@ -17,12 +17,12 @@ from engines.coupled.tiny import (
     observations,
     structure,
 )
-from lipmotion.engines import engine_from_settings
+from lipmotion.engines import create_engine
 from lipmotion.engines.coupled.chains import densities, model, structures
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
-from lipmotion.engines.coupled.chains.product import JointState, Transitions, initial_transitions, reachable
-from lipmotion.engines.coupled.chains.structures import unit_sets
-from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert, precision_statistics
+from lipmotion.engines.coupled.chains.product import JointState, Transitions, create_transitions, reachable
+from lipmotion.engines.coupled.chains.structures import list_unit_sets
+from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert, sum_precisions
 from lipmotion.engines.coupled.training.chain_training import (
     LEAST_FRAMES,
     with_joint_state_densities,
@@ -46,8 +46,8 @@ def even(of):
 )
 def test_joint_states_of_the_papers_systems(system, cross_units, joints):
     """47 × (5 + 4 + 4) when all leave a unit together; beyond that, one chain waits in the last state for the other."""
-    config = engine_from_settings(preset=system, settings=[f"cross_units={cross_units}"]).config
-    of = config.structure_with(unit_sets(config.chains))
+    config = create_engine(preset=system, settings=[f"cross_units={cross_units}"]).config
+    of = config.structure_with(list_unit_sets(config.chains))
     assert len(even(of).joint_states) == joints
 
 
@@ -131,7 +131,7 @@ def test_the_next_unit_has_the_probability_of_the_bigram():
 
 @pytest.mark.parametrize("kind", [COUPLED, FACTORIAL])
 def test_probabilities_out_of_every_state_sum_to_one(kind):
-    transitions = initial_transitions(even(structure(kind)))
+    transitions = create_transitions(even(structure(kind)))
     left = np.bincount(transitions.product.arc_from, np.exp(transitions.arc_log))
     np.testing.assert_allclose(left, 1, rtol=1e-12)
     one_chain = even(structure(HMM, (THREE,), states=3, limit=1))  # the HMM of its units
@@ -150,7 +150,7 @@ def test_structures_that_do_not_fit_together():
         with pytest.raises(InputError, match=message):
             structure(kind, sets, states=2, limit=limit)
     with pytest.raises(InputError, match="no chains"):
-        unit_sets(" ")
+        list_unit_sets(" ")
 
 
 def expected_log_likelihood(transitions: Transitions, counts) -> float:
@@ -249,7 +249,7 @@ def test_the_best_path_is_the_best_of_all(kind, sets, limit):
 @every
 def test_expected_precisions_and_means(kind, sets, limit):
     model, data = made(kind, sets, limit), observations()
-    precision, weighted = precision_statistics(model, model.infer(data, model.full_lattice), 1)
+    precision, weighted = sum_precisions(model, model.infer(data, model.full_lattice), 1)
     number = 0 if kind == HMM else 1
     expected = oracle.component_statistics(model, data, number, 1)
     np.testing.assert_allclose(precision, expected[0], rtol=1e-4)

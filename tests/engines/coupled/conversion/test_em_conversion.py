@@ -13,7 +13,7 @@ from lipmotion.engines.coupled.conversion.em_conversion import (
     VITERBI,
     ConversionSettings,
     convert,
-    path_means,
+    path_to_means,
     without_visual_streams,
 )
 from lipmotion.stats.curves import with_dynamics
@@ -62,7 +62,7 @@ def test_the_viterbi_start_is_the_means_along_the_best_path():
         for d in group.tie[list(path)]
     ]
     np.testing.assert_allclose(result.streams[1], expected, rtol=1e-5)
-    np.testing.assert_allclose(path_means(model, np.array(path), 1), expected, rtol=1e-5)
+    np.testing.assert_allclose(path_to_means(model, np.array(path), 1), expected, rtol=1e-5)
 
 
 def test_the_maximiser_is_where_the_derivative_vanishes():
@@ -129,7 +129,7 @@ def test_the_regressions_are_ridges_one_towards_the_other():
     target = np.concatenate([one.targets[0][one.observed] for one in data]).astype(float)
     weight = np.concatenate(
         [
-            mean_regression.regression_weights(one.chain_posteriors[0], regression_of_state, 3)[one.observed]
+            mean_regression.weigh_regressions(one.chain_posteriors[0], regression_of_state, 3)[one.observed]
             for one in data
         ]
     ).astype(float)

@@ -27,10 +27,10 @@ from lipmotion.engines.coupled.chains import densities, model
 from lipmotion.engines.coupled.chains.densities import (
     LEAST_COMPONENT_FRAMES,
     AudioVisualObservations,
-    reestimated_group,
+    reestimate_group,
 )
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
-from lipmotion.engines.coupled.chains.structures import unit_sets
+from lipmotion.engines.coupled.chains.structures import list_unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import EXACT, VITERBI, ConversionSettings, convert
 from lipmotion.engines.coupled.training import alignment, chain_training
 from lipmotion.engines.coupled.training import chain_training as em_steps
@@ -38,11 +38,11 @@ from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.chain_training import (
     CONVERGENCE_GAIN,
     MixtureSchedule,
-    growing_chains,
-    lattice_utterance,
+    build_lattice_utterance,
+    grow_chains,
 )
 from lipmotion.engines.coupled.training.coupled_training import train_on_speech
-from lipmotion.measures.curves import pooled_correlation
+from lipmotion.measures.curves import correlate_pooled
 from lipmotion.motion.frame_labels import frames_away
 from lipmotion.testing import examples
 from lipmotion.types import FRAME_RATE_HZ, GREY, Channel, Example, Motion, Span, Timeline, Unit, silent_monitor
@@ -79,7 +79,7 @@ def test_the_likelihood_rises_at_every_step(kind, sets, limit):
     steps = []
     how = MixtureSchedule((4,) if kind == HMM else (4, 2), (1.0, 1.0), most_steps=8)
     of = structure(kind, sets, states=3, limit=limit)
-    *_, grown = growing_chains(of, ("speech", "seen"), sentences(), how, steps.append)
+    *_, grown = grow_chains(of, ("speech", "seen"), sentences(), how, steps.append)
     assert grown.converged is bool(steps[-1].log_likelihood - steps[-2].log_likelihood < CONVERGENCE_GAIN)
     assert {step.mixtures[0] for step in steps} == {1, 2, 4}
     if limit is None:
@@ -97,7 +97,7 @@ def test_densities_are_weighted_means_and_variances():
     joints = [oracle.posteriors(model, one)[0] for one in data]
     compared = 0
     for stream, (group, own) in enumerate(zip(model.groups, statistics.emissions, strict=True)):
-        better = reestimated_group(group, own, [np.float32([1e-6])], 0.0, (0, 1)).mixtures
+        better = reestimate_group(group, own, [np.float32([1e-6])], 0.0, (0, 1)).mixtures
         values = np.concatenate([one.streams[stream] for one in data]).astype(float)
         for density in range(group.mixtures.size[0]):
             gamma = np.concatenate(
@@ -133,7 +133,7 @@ def test_no_recording_has_a_path_and_options_that_cannot_be():
 def test_allowed_units_are_those_of_labels_near_a_frame():
     of = structure()
     phones = Timeline((Span(0.0, 0.2, Unit("p")), Span(0.2, 0.4, Unit("aa"))))
-    allowed = alignment.allowed_units(of, phones, 60)
+    allowed = alignment.mark_allowed_units(of, phones, 60)
     closed, opened = of.units[0].index("closed"), of.units[0].index("open")
     assert allowed[:25, closed].all()
     assert not allowed[26:34, closed].any()
@@ -146,7 +146,7 @@ def test_allowed_units_are_those_of_labels_near_a_frame():
 def test_labels_are_divided_into_equal_parts():
     of = structure(states=3)
     product = chains(of).transitions.product
-    path = alignment.uniform_path(product, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
+    path = alignment.split_evenly(product, Timeline((Span(0.0, 0.06, Unit("uw")), Span(0.06, 0.09, Unit("p")))), 9)
     states = [product.joint_states[s].states for s in path]
     assert states == [(0, 0), (0, 0), (1, 1), (1, 1), (2, 2), (2, 2), (0, 0), (1, 1), (2, 2)]
 
@@ -155,7 +155,7 @@ def test_floors_are_of_observed_frames():
     seen = np.arange(40) < 20
     values = np.where(seen, np.tile([0.0, 2.0], 20), 1e6)[:, None].astype(np.float32)
     data = AudioVisualObservations((np.zeros((40, 2), np.float32), values), (None, seen))
-    assert em_steps.variance_floors([data])[1] == pytest.approx(0.01)
+    assert em_steps.compute_variance_floors([data])[1] == pytest.approx(0.01)
 
 
 def test_frames_away_from_speech_are_silence():
@@ -197,7 +197,7 @@ def test_a_preset_is_the_system_of_the_paper(name):
     """Table 2: 47 phones, or 13 visemes, of five states; 39 features of speech; eigenlips; streams of equal weight."""
     data = [with_pictures(number) for number in range(2)]
     lips = [replace(one, motion=one.motion.selected(["lips_r_01"])) for one in data]
-    chains = engines.engine_from_settings(preset=f"xieliu2007 {name}").fit(lips, silent_monitor).model.chains
+    chains = engines.create_engine(preset=f"xieliu2007 {name}").fit(lips, silent_monitor).model.chains
     of, streams = chains.structure, [group.streams for group in chains.groups]
     visual = {"HMM": [], "MSHMM": []}.get(name[3:], [13 if "-vi-" in name else 47])
     assert [len(units) for units in of.units] == [47, *visual]
@@ -234,10 +234,10 @@ def second_stage(mixtures: int, steps: int, weight: float) -> Any:
 
 @cache
 def trained(kind: str = "coupled", mixtures: int = 2) -> Any:
-    of = structure(kind, unit_sets(STRUCTURES[kind]))
+    of = structure(kind, list_unit_sets(STRUCTURES[kind]))
     groups = 1 if kind == "hmm" else 2
     how = chain_training.MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
-    *_, grown = chain_training.growing_chains(of, ("speech", "lips"), aligned(examples(4)), how)
+    *_, grown = chain_training.grow_chains(of, ("speech", "lips"), aligned(examples(4)), how)
     return grown.model
 
 
@@ -318,7 +318,7 @@ def test_a_step_is_that_of_the_split_model() -> None:
     other = replace(own, observations=own.observations.without_stream(1))
     found = train_on_speech(chains, [own], [other], second_stage(2, 1, 49.0)).groups[0].mixtures
     gamma, x = 50 * speech_posteriors(chains, own), own.observations.streams[0]
-    before, (floor, _) = chains.groups[0].mixtures, em_steps.variance_floors([own.observations])
+    before, (floor, _) = chains.groups[0].mixtures, em_steps.compute_variance_floors([own.observations])
     visited = np.flatnonzero(gamma.sum(axis=0) >= 3)
     assert len(visited) >= 3
     for density in visited:
@@ -450,18 +450,18 @@ def lagged(count: int, lag: int, seed: int) -> list[AlignedUtterance]:
 def trained_on(lag: int, kind: str, limit: int | None = 1, **more: object) -> tuple[model.Chains, float]:
     """Return chains, and the correlation of the lips that they make from speech alone, as the paper converts."""
     of = structure(kind, (THREE,) if kind == MULTISTREAM else (THREE, THREE), STATES, limit, **more)
-    *_, grown = growing_chains(of, ("speech", "seen"), lagged(20, lag, 0), MixtureSchedule((1, 1), (1.0, 1.0)))
+    *_, grown = grow_chains(of, ("speech", "seen"), lagged(20, lag, 0), MixtureSchedule((1, 1), (1.0, 1.0)))
     how, held_out, full = ConversionSettings(VITERBI, EXACT, 5), lagged(8, lag, 1), grown.model.full_lattice
     lips = [convert(grown.model, one.observations, full, how).streams[1] for one in held_out]
     recorded = [one.observations.streams[1].astype(float) for one in held_out]
-    return grown.model, float(pooled_correlation(lips, recorded).mean())
+    return grown.model, float(correlate_pooled(lips, recorded).mean())
 
 
 def lead_shares(chains: model.Chains, lag: int) -> np.ndarray:
     """Return the shares of frames in which the lips are a state behind, in step and a state ahead, by both streams."""
     shares = np.zeros(3)
     for one in lagged(20, lag, 0):
-        joint = chains.infer(one.observations, lattice_utterance(chains, one).lattice).posteriors.joint
+        joint = chains.infer(one.observations, build_lattice_utterance(chains, one).lattice).posteriors.joint
         shares += np.bincount(chains.transitions.product.lead[1][joint.states] + 1, joint.probability.sum(axis=0), 3)
     return shares / shares.sum()
 

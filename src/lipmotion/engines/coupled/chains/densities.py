@@ -131,7 +131,7 @@ class EmissionStatistics:
         posterior        : of these densities [shape=(T, G')]
         responsibilities : of their components [shape=(T, M, G')]; None: one component
         """
-        weight = component_posteriors(posterior, responsibilities)
+        weight = infer_components(posterior, responsibilities)
         flat = weight.reshape(len(weight), -1).T
         for stream, products in zip(group.streams, self.products, strict=True):
             observed = observations.observed[stream]
@@ -144,7 +144,7 @@ class EmissionStatistics:
         self.occupancy[:, densities] += weight.sum(axis=0, dtype=np.float64)
 
 
-def zero_emission_statistics(group: StreamGroup) -> EmissionStatistics:
+def create_emission_statistics(group: StreamGroup) -> EmissionStatistics:
     """Return zero statistics for a stream group."""
     count, components, _ = group.mixtures.size
     widths = [columns.stop - columns.start for columns in group.columns]
@@ -152,12 +152,12 @@ def zero_emission_statistics(group: StreamGroup) -> EmissionStatistics:
     return EmissionStatistics(products, np.zeros((components, count)))
 
 
-def component_posteriors(posterior: Single, responsibilities: Single | None) -> Single:
+def infer_components(posterior: Single, responsibilities: Single | None) -> Single:
     """Return γ(q, k) [shape=(T, M, G')], from γ(q) [shape=(T, G')] and responsibilities (None: M is 1)."""
     return posterior[:, None] if responsibilities is None else responsibilities * posterior[:, None]
 
 
-def reestimated_group(
+def reestimate_group(
     group: StreamGroup, statistics: EmissionStatistics, floors: Sequence[Single], least: float, streams: Sequence[int]
 ) -> StreamGroup:
     """Return the group with the mixtures that maximise the expected log likelihood (M-step).

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.product import Grammar
 from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.kernels.factorial import factorial_posteriors
-from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, LoopCounts, factorial_best_path
+from lipmotion.kernels.factorial import infer_factorial
+from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, LoopCounts, find_factorial_path
 
 Index = NDArray[np.intp]
 
@@ -82,7 +82,7 @@ class LatticePosteriors:
     joint: JointPosteriors | None = None
 
 
-def tied_posteriors(posterior: Single, tie: Index, count: int) -> Single:
+def tie_posteriors(posterior: Single, tie: Index, count: int) -> Single:
     """Return the posteriors of densities, or of states of a chain, that joint states share [shape=(T, G)].
 
     posterior : of joint states [shape=(T, S)]
@@ -195,7 +195,7 @@ class FactorialLattice(Lattice):
         return (speech, *visual)
 
     def posteriors(self, transitions: FactorialTransitions, logs: Sequence[Single]) -> LatticePosteriors:  # noqa: D102
-        expected = factorial_posteriors(*self._loops(transitions), self._log_likelihoods(logs))
+        expected = infer_factorial(*self._loops(transitions), self._log_likelihoods(logs))
         state_posteriors = expected.audio, expected.visual
         structure = transitions.product.structure
         speech, visual = self._density_posteriors(state_posteriors, expected.pair.astype(np.float32))
@@ -215,7 +215,7 @@ class FactorialLattice(Lattice):
         )
 
     def best_path(self, transitions: FactorialTransitions, logs: Sequence[Single]) -> tuple[Index, float]:  # noqa: D102
-        first, second, score = factorial_best_path(*self._loops(transitions), self._log_likelihoods(logs))
+        first, second, score = find_factorial_path(*self._loops(transitions), self._log_likelihoods(logs))
         count = transitions.product.structure.state_counts[1]
         return self.states[0][first] * count + self.states[1][second], score
 
@@ -243,7 +243,7 @@ class FactorialLattice(Lattice):
         )
 
 
-def factorial_lattice(
+def build_factorial_lattice(
     transitions: FactorialTransitions, ties: Sequence[Index], allowed_units: NDArray[np.bool_] | None
 ) -> FactorialLattice:
     """Return the lattice of the units that are allowed in some frame.
@@ -252,12 +252,12 @@ def factorial_lattice(
     allowed_units : the units of the first chain that each frame may belong to [shape=(T, U)]; None: all
     """
     structure = transitions.product.structure
-    visible_units = None if allowed_units is None else _visible_units(structure, allowed_units)
+    visible_units = None if allowed_units is None else _find_visible_units(structure, allowed_units)
     first, second = (
         np.arange(len(units)) if allowed is None else np.flatnonzero(allowed.any(axis=0))
         for units, allowed in zip(structure.units, (allowed_units, visible_units), strict=True)
     )
-    states = _kernel_states(first, structure.states), _kernel_states(second, structure.states)
+    states = _map_kernel_states(first, structure.states), _map_kernel_states(second, structure.states)
     columns, index, start = [], [], 0
     for chain, (own, count) in enumerate(zip(states, structure.state_counts, strict=True)):
         position = np.full(count, -1)
@@ -283,7 +283,7 @@ def factorial_lattice(
     )
 
 
-def _visible_units(structure: Structure, allowed_units: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _find_visible_units(structure: Structure, allowed_units: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the units of the second chain that correspond to those allowed within 100 ms [shape=(T, V)]."""
     padded = np.pad(allowed_units.astype(np.intp), ((VISIBLE_FRAMES + 1, VISIBLE_FRAMES), (0, 0)))
     total = np.cumsum(padded, axis=0)
@@ -293,7 +293,7 @@ def _visible_units(structure: Structure, allowed_units: NDArray[np.bool_]) -> ND
     return visible
 
 
-def _kernel_states(units: Index, states: int) -> Index:
+def _map_kernel_states(units: Index, states: int) -> Index:
     """Return the states of some units in the order of the kernel: the first state of every unit, then the second."""
     return np.concatenate([units * states + state for state in range(states)])
 

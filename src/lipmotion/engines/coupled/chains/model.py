@@ -16,8 +16,8 @@ from lipmotion.engines.coupled.chains.lattice import (
     JointPosteriors,
     Lattice,
     LatticePosteriors,
-    factorial_lattice,
-    tied_posteriors,
+    build_factorial_lattice,
+    tie_posteriors,
 )
 from lipmotion.engines.coupled.chains.product import Transitions
 from lipmotion.engines.coupled.chains.structures import Structure
@@ -51,11 +51,11 @@ class NetworkLattice(Lattice):
         structure = transitions.product.structure
         return LatticePosteriors(
             tuple(
-                tied_posteriors(expected.posterior, states[order], count)
+                tie_posteriors(expected.posterior, states[order], count)
                 for states, count in zip(self.chain_states, structure.state_counts, strict=True)
             ),
             tuple(
-                tied_posteriors(expected.posterior, tie, len(densities))
+                tie_posteriors(expected.posterior, tie, len(densities))
                 for tie, densities in zip(ordered_ties, self.densities, strict=True)
             ),
             self.states[order[expected.posterior.argmax(axis=1)]],
@@ -87,7 +87,7 @@ class NetworkLattice(Lattice):
         return self.states[path], score
 
 
-def network_lattice(
+def build_network_lattice(
     transitions: Transitions, ties: Sequence[Index], allowed_units: NDArray[np.bool_] | None
 ) -> NetworkLattice:
     """Return the lattice of joint states whose units are allowed in some frame [shape=(T, U)]; None: all."""
@@ -161,8 +161,8 @@ class Chains:
     def _lattice(self, allowed_units: NDArray[np.bool_] | None) -> Lattice:
         ties = [group.tie for group in self.groups]
         if isinstance(self.transitions, FactorialTransitions):
-            return factorial_lattice(self.transitions, ties, allowed_units)
-        return network_lattice(self.transitions, ties, allowed_units)
+            return build_factorial_lattice(self.transitions, ties, allowed_units)
+        return build_network_lattice(self.transitions, ties, allowed_units)
 
     @cached_property
     def evaluators(self) -> tuple[EmissionEvaluator, ...]:

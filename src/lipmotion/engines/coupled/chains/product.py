@@ -319,7 +319,7 @@ class Transitions:
         return replace(self, advance=(*self.advance[:chain], advance, *self.advance[chain + 1 :]))
 
 
-def initial_transitions(product: Product) -> Transitions:
+def create_transitions(product: Product) -> Transitions:
     """Return untrained transitions, in coupled chains with a row for each joint state, in others for each state."""
     coupled = product.structure.kind == COUPLED
     own = np.arange(len(product.joint_states))

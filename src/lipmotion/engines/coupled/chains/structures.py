@@ -94,7 +94,7 @@ class Structure:
         """The units of every chain; those of the first are sorted by the corresponding units of the others."""
         first, *others = self.chains
         key = {
-            unit: [chain.units.index(corresponding_unit(chain, first, unit)) for chain in others]
+            unit: [chain.units.index(find_matching_unit(chain, first, unit)) for chain in others]
             for unit in first.units
         }
         return (tuple(sorted(first.units, key=lambda unit: key[unit])), *(chain.units for chain in others))
@@ -103,7 +103,7 @@ class Structure:
     def corresponding_units(self) -> tuple[tuple[int, ...], ...]:
         """For each chain, the number of its unit that corresponds to each unit of the first chain."""
         return tuple(
-            tuple(units.index(corresponding_unit(chain, self.chains[0], unit)) for unit in self.units[0])
+            tuple(units.index(find_matching_unit(chain, self.chains[0], unit)) for unit in self.units[0])
             for chain, units in zip(self.chains, self.units, strict=True)
         )
 
@@ -133,7 +133,7 @@ class Structure:
         return unit * self.states + state
 
 
-def unit_sets(names: str) -> tuple[UnitSet, ...]:
+def list_unit_sets(names: str) -> tuple[UnitSet, ...]:
     """Return the unit sets named, or read from files, in a text. Raises InputError: none, or no such set."""
     sets = tuple(load_unit_set(name) for name in names.split())
     if not sets:
@@ -141,7 +141,7 @@ def unit_sets(names: str) -> tuple[UnitSet, ...]:
     return sets
 
 
-def corresponding_unit(chain: UnitSet, first: UnitSet, unit: str) -> str:
+def find_matching_unit(chain: UnitSet, first: UnitSet, unit: str) -> str:
     """Return the unit of a chain that corresponds to a unit of the first chain: that of most of its phones."""
     if chain is first:
         return unit

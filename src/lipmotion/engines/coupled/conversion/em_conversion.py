@@ -11,7 +11,7 @@ from lipmotion.engines.coupled.chains.densities import (
     AudioVisualObservations,
     Single,
     StreamGroup,
-    component_posteriors,
+    infer_components,
 )
 from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Chains, Inference
@@ -71,7 +71,7 @@ def convert(
         result = run_em(
             streams,
             lambda streams: chains.infer(_with_visual_streams(speech, streams), lattice),
-            lambda _, inference: _updated_streams(chains, inference, settings.update),
+            lambda _, inference: _update_streams(chains, inference, settings.update),
             settings.most_steps,
             least_gain=CONVERGENCE_GAIN,
             maximise_converged=False,
@@ -92,17 +92,17 @@ def group_index(chains: Chains, stream: int) -> int:
     return next(number for number, group in enumerate(chains.groups) if stream in group.streams)
 
 
-def precision_statistics(chains: Chains, inference: Inference, stream: int) -> tuple[Array, Array]:
+def sum_precisions(chains: Chains, inference: Inference, stream: int) -> tuple[Array, Array]:
     """Return expected precisions and precision-weighted means of a stream [each shape=(T, D)].
 
     These are Σ γ(q, k) Σ⁻¹ and Σ γ(q, k) Σ⁻¹ μ over the states q and components k of the stream.
     """
     number = group_index(chains, stream)
-    weight = component_posteriors(inference.posteriors.densities[number], inference.emissions.responsibilities[number])
-    return _weighted_precisions(chains.groups[number], stream, inference.lattice.densities[number], weight)
+    weight = infer_components(inference.posteriors.densities[number], inference.emissions.responsibilities[number])
+    return _weigh_precisions(chains.groups[number], stream, inference.lattice.densities[number], weight)
 
 
-def path_means(chains: Chains, path: NDArray[np.intp], stream: int) -> Array:
+def path_to_means(chains: Chains, path: NDArray[np.intp], stream: int) -> Array:
     """Return the mean of a stream's mixture in every state along a path of joint states [shape=(T, D)]."""
     group = chains.groups[group_index(chains, stream)]
     mixtures = group.stream_mixtures(stream)
@@ -120,13 +120,13 @@ def _start(
     """Return the visual streams before the first step of EM [each shape=(T, D_s)]."""
     if settings.start == VITERBI:
         path, _ = chains.best_path(chains.emission_log_densities(speech, lattice), lattice)
-        return tuple(path_means(chains, path, stream) for stream in range(1, len(chains.streams)))
-    return _updated_streams(chains, given_speech or chains.infer(speech, lattice), EXACT)
+        return tuple(path_to_means(chains, path, stream) for stream in range(1, len(chains.streams)))
+    return _update_streams(chains, given_speech or chains.infer(speech, lattice), EXACT)
 
 
-def _updated_streams(chains: Chains, inference: Inference, update: str) -> tuple[Array, ...]:
+def _update_streams(chains: Chains, inference: Inference, update: str) -> tuple[Array, ...]:
     """Return the visual streams that the posteriors make most likely (M-step) [each shape=(T, D_s)]."""
-    statistics = precision_statistics if update == EXACT else _printed_statistics
+    statistics = sum_precisions if update == EXACT else _sum_smoothed
     streams = []
     for stream in range(1, len(chains.streams)):
         precision, weighted = statistics(chains, inference, stream)
@@ -134,19 +134,17 @@ def _updated_streams(chains: Chains, inference: Inference, update: str) -> tuple
     return tuple(streams)
 
 
-def _printed_statistics(chains: Chains, inference: Inference, stream: int) -> tuple[Array, Array]:
+def _sum_smoothed(chains: Chains, inference: Inference, stream: int) -> tuple[Array, Array]:
     """Return precisions and precision-weighted means of a stream as Eq. 9 sums them [each shape=(T, D)]."""
     number = group_index(chains, stream)
     group, densities = chains.groups[number], inference.lattice.densities[number]
     joint_states = np.bincount(inference.lattice.ties[number], minlength=len(densities))
     factors = (np.exp(group.mixtures.log_weights[densities]).T * joint_states).astype(np.float32)
-    posteriors = component_posteriors(
-        inference.posteriors.densities[number], inference.emissions.responsibilities[number]
-    )
-    return _weighted_precisions(group, stream, densities, posteriors * factors)
+    posteriors = infer_components(inference.posteriors.densities[number], inference.emissions.responsibilities[number])
+    return _weigh_precisions(group, stream, densities, posteriors * factors)
 
 
-def _weighted_precisions(
+def _weigh_precisions(
     group: StreamGroup, stream: int, densities: NDArray[np.intp], weight: Single
 ) -> tuple[Array, Array]:
     """Return the sums of weighted precisions, and of these times means, of a stream [each shape=(T, D)]."""

@@ -84,7 +84,7 @@ class VisualRegression:
 
     def means(self, inputs: Single, posterior: Single) -> Array:
         """Return the expected means [shape=(T, D)] for regression inputs and posteriors [shape=(T, N_v)]."""
-        weights = regression_weights(posterior, self.regression_of_state, len(self.coefficients))
+        weights = weigh_regressions(posterior, self.regression_of_state, len(self.coefficients))
         means = np.zeros((len(inputs), self.coefficients.shape[2]))
         for weight, matrix in zip(weights.T, self.coefficients, strict=True):
             rows = np.flatnonzero(weight > 0)
@@ -96,7 +96,7 @@ class VisualRegression:
         return (posterior @ (1 / self.variances)).astype(float)
 
 
-def regression_weights(posterior: Single, regression_of_state: NDArray[np.intp], count: int) -> Single:
+def weigh_regressions(posterior: Single, regression_of_state: NDArray[np.intp], count: int) -> Single:
     """Return the weight of each regression [shape=(T, count)], rows summing to 1, by posteriors of states."""
     weight = posterior @ np.eye(count, dtype=np.float32)[regression_of_state]
     weight[weight < LEAST_WEIGHT] = 0
@@ -121,7 +121,7 @@ class RegressionUtterance:
     observed: NDArray[np.bool_]
 
 
-def posterior_axes(posteriors: Iterable[Single]) -> Single:
+def fit_axes(posteriors: Iterable[Single]) -> Single:
     """Return the principal axes of posteriors as columns [shape=(N, R)]. Raises CorpusError: no posteriors."""
     total: Array | None = None
     for posterior in posteriors:
@@ -129,15 +129,15 @@ def posterior_axes(posteriors: Iterable[Single]) -> Single:
         total = products if total is None else total + products
     if total is None:
         raise CorpusError("no recording to learn from")
-    return _principal_axes(total, POSTERIOR_AXES)
+    return _find_principal_axes(total, POSTERIOR_AXES)
 
 
 def fit_regression_inputs(posterior_basis: Single, utterances: Sequence[RegressionUtterance]) -> RegressionInputs:
-    """Return regression inputs along the principal axes of some utterances, with the basis of ``posterior_axes``."""
+    """Return regression inputs along the principal axes of some utterances, with the basis of ``fit_axes``."""
     acoustic = fit_acoustic_context((utterance.features for utterance in utterances), ACOUSTIC_AXES)
     contexts = (_context(acoustic, each.features, each.reduced_posteriors) for each in utterances)
     mean, covariance = measure_covariance(contexts)
-    basis = _principal_axes(covariance, INPUT_AXES)
+    basis = _find_principal_axes(covariance, INPUT_AXES)
     return RegressionInputs(acoustic, posterior_basis, mean.astype(np.float32), basis)
 
 
@@ -157,7 +157,7 @@ def fit_visual_regression(
     statistics = [zero_statistics(size, outputs) for _ in range(count)]
     for utterance in utterances:
         z = inputs.observed_frames(utterance)
-        weights = regression_weights(utterance.chain_posteriors[stream], regression_of_state, count)[utterance.observed]
+        weights = weigh_regressions(utterance.chain_posteriors[stream], regression_of_state, count)[utterance.observed]
         target = utterance.targets[stream][utterance.observed]
         for number, weight in enumerate(weights.T):
             rows = np.flatnonzero(weight)
@@ -193,7 +193,7 @@ def _variances(
     return np.maximum(variances, 1e-6).astype(np.float32)
 
 
-def _principal_axes(covariance: Array, size: int) -> Single:
+def _find_principal_axes(covariance: Array, size: int) -> Single:
     return np.ascontiguousarray(find_principal_axes(covariance, size).T.astype(np.float32))
 
 

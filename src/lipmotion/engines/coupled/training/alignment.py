@@ -31,12 +31,12 @@ class AlignedUtterance:
     phones: Timeline[Unit]
 
 
-def allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
+def mark_allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
     """Return the units that each frame may belong to [shape=(T, U)]: labelled near it; without a label, silence."""
     names, first = structure.units[0], structure.chains[0]
     allowed = np.zeros((frames, len(names)), bool)
     slack = round(SLACK_S * FRAME_RATE_HZ)
-    for unit, start, stop in unit_segments(structure, phones, frames):
+    for unit, start, stop in list_unit_segments(structure, phones, frames):
         allowed[max(start - slack, 0) : stop + slack, unit] = True
     unlabelled = ~allowed.any(axis=1)
     for silence in first.silence:
@@ -44,19 +44,19 @@ def allowed_units(structure: Structure, phones: Timeline[Unit], frames: int) -> 
     return allowed
 
 
-def unit_segments(structure: Structure, phones: Timeline[Unit], frames: int) -> list[tuple[int, int, int]]:
+def list_unit_segments(structure: Structure, phones: Timeline[Unit], frames: int) -> list[tuple[int, int, int]]:
     """Return the unit of the first chain, the first frame, and the frame after the last, of every non-empty label."""
     names, bounds = units_to_frames(phones, frames, SILENCE)
     units = [structure.units[0].index(structure.chains[0].unit(name)) for name in names]
     return list(zip(units, bounds[:-1].tolist(), bounds[1:].tolist(), strict=True))
 
 
-def uniform_path(product: Product, phones: Timeline[Unit], frames: int) -> Index:
+def split_evenly(product: Product, phones: Timeline[Unit], frames: int) -> Index:
     """Return the joint states [shape=(T,)] of uniform segmentation: all chains divide every label into equal parts."""
     structure, chains = product.structure, range(len(product.structure.chains))
     number = {joint: index for index, joint in enumerate(product.joint_states)}
     path = np.empty(frames, np.intp)
-    for unit, start, stop in unit_segments(structure, phones, frames):
+    for unit, start, stop in list_unit_segments(structure, phones, frames):
         units = tuple(structure.corresponding_units[c][unit] for c in chains)
         for frame in range(start, stop):
             state = (frame - start) * structure.states // (stop - start)
@@ -64,10 +64,10 @@ def uniform_path(product: Product, phones: Timeline[Unit], frames: int) -> Index
     return path
 
 
-def estimated_grammar(structure: Structure, data: Sequence[AlignedUtterance]) -> Grammar:
+def estimate_grammar(structure: Structure, data: Sequence[AlignedUtterance]) -> Grammar:
     """Return the bigrams, and the probabilities of the first unit, of every chain, from labels."""
     sentences = [
-        [unit for unit, _, _ in unit_segments(structure, utterance.phones, utterance.observations.frames)]
+        [unit for unit, _, _ in list_unit_segments(structure, utterance.phones, utterance.observations.frames)]
         for utterance in data
     ]
     bigrams, initials = [], []

@@ -15,18 +15,18 @@ from lipmotion.engines.coupled.chains.densities import (
     EmissionStatistics,
     Single,
     StreamGroup,
-    reestimated_group,
-    zero_emission_statistics,
+    create_emission_statistics,
+    reestimate_group,
 )
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions, Lattice
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Transitions, initial_transitions, reachable
+from lipmotion.engines.coupled.chains.product import Transitions, create_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
 from lipmotion.engines.coupled.training.alignment import (
     AlignedUtterance,
-    allowed_units,
-    estimated_grammar,
-    uniform_path,
+    estimate_grammar,
+    mark_allowed_units,
+    split_evenly,
 )
 from lipmotion.errors import InputError
 from lipmotion.stats.em import EmResult, Sums, run_em, sum_statistics
@@ -51,9 +51,9 @@ class LatticeUtterance:
     weight: float = 1.0
 
 
-def lattice_utterance(chains: Chains, utterance: AlignedUtterance, weight: float = 1.0) -> LatticeUtterance:
+def build_lattice_utterance(chains: Chains, utterance: AlignedUtterance, weight: float = 1.0) -> LatticeUtterance:
     """Return an utterance, which counts ``weight`` times, with the joint states that its phone labels allow."""
-    allowed = allowed_units(chains.structure, utterance.phones, utterance.observations.frames)
+    allowed = mark_allowed_units(chains.structure, utterance.phones, utterance.observations.frames)
     return LatticeUtterance(utterance.observations, chains.lattice(allowed), weight)
 
 
@@ -101,7 +101,7 @@ def m_step(
 ) -> Chains:
     """Return the chains that maximise the expected log likelihood, with variances of ``floors`` at least."""
     groups = [
-        reestimated_group(group, own, [floors[s] for s in group.streams], LEAST_DENSITY_FRAMES, streams)
+        reestimate_group(group, own, [floors[s] for s in group.streams], LEAST_DENSITY_FRAMES, streams)
         if set(group.streams) & set(streams)
         else group
         for group, own in zip(chains.groups, statistics.emissions, strict=True)
@@ -112,7 +112,7 @@ def m_step(
     return replace(chains, groups=tuple(groups), transitions=new_transitions)
 
 
-def variance_floors(observations: Sequence[AudioVisualObservations]) -> tuple[Single, ...]:
+def compute_variance_floors(observations: Sequence[AudioVisualObservations]) -> tuple[Single, ...]:
     """Return the least variance of every stream [each shape=(D_s,)], from its variance where it was observed."""
     floors = []
     for stream in range(len(observations[0].streams)):
@@ -127,7 +127,7 @@ def variance_floors(observations: Sequence[AudioVisualObservations]) -> tuple[Si
 
 def _shard_sums(job: tuple[Chains, Sequence[LatticeUtterance]]) -> Sums:
     chains, utterances = job
-    emission_statistics = tuple(zero_emission_statistics(group) for group in chains.groups)
+    emission_statistics = tuple(create_emission_statistics(group) for group in chains.groups)
     transition_counts = np.zeros(chains.transitions.statistic_count)
     log_likelihood, frames = 0.0, 0.0
     for utterance in utterances:
@@ -175,7 +175,7 @@ def with_joint_state_densities(
     new_transitions: Transitions | FactorialTransitions = transitions
     chain_states = product.chain_states
     if structure.limit is None:
-        new_transitions = _unlimited(transitions, structure, frequent)
+        new_transitions = _remove_limits(transitions, structure, frequent)
         chain_states = new_transitions.product.chain_states
     number = np.full(structure.state_counts, -1)
     number[tuple(frequent.T)] = np.arange(len(frequent))
@@ -189,11 +189,11 @@ def with_joint_state_densities(
     return Chains(chains.streams, new_transitions, tuple(groups))
 
 
-def _unlimited(transitions: Transitions, structure: Structure, frequent: NDArray[np.intp]) -> FactorialTransitions:
+def _remove_limits(transitions: Transitions, structure: Structure, frequent: NDArray[np.intp]) -> FactorialTransitions:
     """Return transitions of independent chains, which move on with the mean probability of joint states."""
     product = transitions.product
     first, second = (
-        _mean_by_state(product.chain_states[chain], advance[rows], count)
+        _average_by_state(product.chain_states[chain], advance[rows], count)
         for chain, (advance, rows, count) in enumerate(
             zip(transitions.advance, transitions.rows, structure.state_counts, strict=True)
         )
@@ -201,7 +201,7 @@ def _unlimited(transitions: Transitions, structure: Structure, frequent: NDArray
     return FactorialTransitions(FactorialProduct(structure, product.grammar), (first, second), frequent)
 
 
-def _mean_by_state(states: NDArray[np.intp], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def _average_by_state(states: NDArray[np.intp], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the mean, for each of ``count`` states, of the values [shape=(S,)] of the joint states that have it."""
     return np.bincount(states, values, count) / np.maximum(np.bincount(states, minlength=count), 1)
 
@@ -210,7 +210,7 @@ Index = NDArray[np.intp]
 VITERBI_STEPS = 2
 
 
-def initial_chains(
+def create_chains(
     structure: Structure,
     streams: tuple[str, ...],
     data: Sequence[AlignedUtterance],
@@ -227,12 +227,12 @@ def initial_chains(
         if structure.limit is None
         else structure
     )
-    transitions = initial_transitions(reachable(limited, estimated_grammar(limited, data)))
-    chains = _untrained_chains(streams, transitions, data, weights)
-    utterances = [lattice_utterance(chains, utterance) for utterance in data]
-    paths = [uniform_path(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
+    transitions = create_transitions(reachable(limited, estimate_grammar(limited, data)))
+    chains = _create_untrained_chains(streams, transitions, data, weights)
+    utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
+    paths = [split_evenly(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
     for _ in range(1 + VITERBI_STEPS):
-        chains, transitions = _reestimated_along(chains, transitions, utterances, paths, floors)
+        chains, transitions = _reestimate_along(chains, transitions, utterances, paths, floors)
         paths = [_best_path(chains, utterance) for utterance in utterances]
     visits = np.bincount(np.concatenate(paths), minlength=len(transitions.product.joint_states))
     if structure.kind == COUPLED:
@@ -242,7 +242,7 @@ def initial_chains(
     return chains
 
 
-def _untrained_chains(
+def _create_untrained_chains(
     streams: tuple[str, ...], transitions: Transitions, data: Sequence[AlignedUtterance], weights: Sequence[float]
 ) -> Chains:
     """Return chains whose densities are all standard normal."""
@@ -268,7 +268,7 @@ def _untrained_chains(
     return Chains(streams, transitions, tuple(groups))
 
 
-def _reestimated_along(
+def _reestimate_along(
     chains: Chains,
     transitions: Transitions,
     utterances: Sequence[LatticeUtterance],
@@ -278,7 +278,7 @@ def _reestimated_along(
     """Return the chains, and their transitions, that are most likely along paths of joint states [each shape=(T,)]."""
     emission_statistics = []
     for group in chains.groups:
-        statistics = zero_emission_statistics(group)
+        statistics = create_emission_statistics(group)
         for utterance, path in zip(utterances, paths, strict=True):
             densities, column = np.unique(group.tie[path], return_inverse=True)
             posterior = np.eye(len(densities), dtype=np.float32)[column]
@@ -361,7 +361,7 @@ class MixtureSchedule:
     most_steps: int = 6
 
 
-def growing_chains(
+def grow_chains(
     structure: Structure,
     streams: tuple[str, ...],
     data: Sequence[AlignedUtterance],
@@ -375,13 +375,13 @@ def growing_chains(
     report  : is called after every step; while the number of components stays, the log likelihood never falls
     Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
     """
-    floors = variance_floors([utterance.observations for utterance in data])
-    chains = initial_chains(structure, streams, data, schedule.weights, floors)
-    utterances = [lattice_utterance(chains, utterance) for utterance in data]
+    floors = compute_variance_floors([utterance.observations for utterance in data])
+    chains = create_chains(structure, streams, data, schedule.weights, floors)
+    utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
     while True:
         result = train_to_convergence(chains, utterances, floors, schedule.most_steps, report, work)
         yield result
-        counts = component_counts(result.model)
+        counts = count_components(result.model)
         if all(count >= most for count, most in zip(counts, schedule.mixtures, strict=True)):
             return
         chains = with_split_components(result.model, schedule.mixtures, result.statistics)
@@ -404,12 +404,12 @@ def train_to_convergence(
         lambda chains: e_step(chains, utterances, work),
         lambda chains, statistics: m_step(chains, statistics, floors, streams=streams, transitions=not speech_only),
         most_steps,
-        lambda _, chains, statistics: report(TrainingStep(component_counts(chains), statistics.mean_log_likelihood)),
+        lambda _, chains, statistics: report(TrainingStep(count_components(chains), statistics.mean_log_likelihood)),
         least_gain=CONVERGENCE_GAIN,
     )
 
 
-def component_counts(chains: Chains) -> tuple[int, ...]:
+def count_components(chains: Chains) -> tuple[int, ...]:
     """Return the number of Gaussians per density of each stream group."""
     return tuple(group.mixtures.size[1] for group in chains.groups)
 
@@ -422,7 +422,7 @@ def with_split_components(chains: Chains, most: Sequence[int], statistics: Chain
     groups = [
         replace(group, mixtures=_split(group.mixtures, own.occupancy)) if count < target else group
         for group, own, count, target in zip(
-            chains.groups, statistics.emissions, component_counts(chains), most, strict=True
+            chains.groups, statistics.emissions, count_components(chains), most, strict=True
         )
     ]
     return replace(chains, groups=tuple(groups))

@@ -24,15 +24,15 @@ from lipmotion.engines.coupled.chains.model import (
     fit_visual_streams,
     speech_observations,
 )
-from lipmotion.engines.coupled.chains.structures import HMM, Structure, unit_sets
+from lipmotion.engines.coupled.chains.structures import HMM, Structure, list_unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import without_visual_streams
 from lipmotion.engines.coupled.conversion.mean_regression import (
     RegressionInputs,
     RegressionUtterance,
     VisualRegression,
+    fit_axes,
     fit_regression_inputs,
     fit_visual_regression,
-    posterior_axes,
 )
 from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
@@ -41,12 +41,12 @@ from lipmotion.engines.coupled.training.chain_training import (
     MixtureSchedule,
     Report,
     TrainingStep,
-    component_counts,
-    growing_chains,
-    lattice_utterance,
+    build_lattice_utterance,
+    compute_variance_floors,
+    count_components,
+    grow_chains,
     no_report,
     train_to_convergence,
-    variance_floors,
     with_split_components,
 )
 from lipmotion.errors import CorpusError
@@ -82,21 +82,21 @@ def train_on_speech(
                   falls
     Where speech and motion share their components (``hmm``), these stay as many, but their weights are re-estimated.
     """
-    floors = variance_floors([utterance.observations for utterance in data])
+    floors = compute_variance_floors([utterance.observations for utterance in data])
     utterances = [
-        lattice_utterance(
+        build_lattice_utterance(
             chains, replace(utterance, observations=without_visual_streams(utterance.observations)), weight
         )
         for group, weight in ((data, 1.0), (speech_only, config.speech_only_weight))
         for utterance in group
     ]
-    present = component_counts(chains)
+    present = count_components(chains)
     most = present if chains.structure.kind == HMM else (max(config.speech_only_mixtures, present[0]), *present[1:])
     while True:
         result = train_to_convergence(
             chains, utterances, floors, config.speech_only_steps, report, work, speech_only=True
         )
-        if component_counts(result.model) == most:
+        if count_components(result.model) == most:
             return result.model
         chains = with_split_components(result.model, most, result.statistics)
 
@@ -107,13 +107,13 @@ ResultT = TypeVar("ResultT")
 SPEECH = "speech"
 
 
-def _threaded(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+def _run_threaded(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
     """Kernels and matrix products release the interpreter's lock."""
     with ThreadPoolExecutor(min(os.cpu_count() or 1, 8)) as pool:
         yield from pool.map(function, items)
 
 
-THREADS = Checkpoint(parallel_map=_threaded)
+THREADS = Checkpoint(parallel_map=_run_threaded)
 """Nothing is stored; threads of this process share the work."""
 
 
@@ -130,14 +130,14 @@ def fit_coupled(
     Raises CorpusError: no example with observed motion, or examples of different channels.
     Raises InputError: no such unit set, or a structure that does not fit together.
     """
-    return deque(growing_models(examples, config, monitor, work), maxlen=1)[0]()
+    return deque(grow_models(examples, config, monitor, work), maxlen=1)[0]()
 
 
-def growing_models(
+def grow_models(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor, work: Checkpoint = THREADS
 ) -> Iterator[Callable[[], Fit[CoupledModel]]]:
     """Yield functions that return the models of 1, 2, 4, … Gaussians on the way to that of ``fit_coupled``."""
-    structure = config.structure_with(unit_sets(config.chains))
+    structure = config.structure_with(list_unit_sets(config.chains))
     moving = [example for example in examples if mark_known_dynamics(example.valid).any()]
     space, values = fit_reduced_motion(moving or examples, config.components)
     if all(is_silent(span.label.phone) for example in moving for span in example.speech.units):
@@ -172,7 +172,7 @@ def growing_models(
         model = replace(model, encoding=encoding)
         if config.dynamic and config.acoustic_regression:
             monitor(Progress("regression of visual means", 1, 1, 0.75))
-            model = replace(model, regression=_fitted_regression(model, data))
+            model = replace(model, regression=_estimate_regression(model, data))
         if config.filtered or (config.dynamic and config.variance_scaling):
             recorded = [x[mask] for x, mask in zip(values, valid, strict=True)]
             generated = _generated(model, data)
@@ -189,7 +189,7 @@ def growing_models(
     names, schedule = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
     most_steps = schedule.most_steps * max(schedule.mixtures).bit_length()
     report = _reporter("chains", most_steps, sub_monitor(monitor, 0, first_share))
-    for grown in growing_chains(structure, names, data, schedule, report, work):
+    for grown in grow_chains(structure, names, data, schedule, report, work):
         yield partial(finished, grown)
 
 
@@ -235,16 +235,16 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequ
     return np.median(poses, axis=0)
 
 
-def _fitted_regression(
+def _estimate_regression(
     model: CoupledModel, data: Sequence[AlignedUtterance]
 ) -> tuple[RegressionInputs, tuple[VisualRegression, ...]]:
     """Return the regression of visual means on acoustic features and on the posteriors given speech alone."""
     structure = model.chains.structure
     visual_chains = [structure.chain_of(stream + 1) for stream in range(len(model.visual))]
     posteriors = list(
-        _threaded(lambda utterance: _chain_posteriors(model.chains, utterance, (0, *visual_chains)), data)
+        _run_threaded(lambda utterance: _chain_posteriors(model.chains, utterance, (0, *visual_chains)), data)
     )
-    axes = posterior_axes(first for first, *_ in posteriors)
+    axes = fit_axes(first for first, *_ in posteriors)
     utterances = [
         RegressionUtterance(
             utterance.observations.streams[0],
@@ -257,7 +257,7 @@ def _fitted_regression(
     ]
     inputs = fit_regression_inputs(axes, utterances)
     return inputs, tuple(
-        fit_visual_regression(inputs, utterances, stream, *_state_regressions(structure, chain))
+        fit_visual_regression(inputs, utterances, stream, *_list_state_regressions(structure, chain))
         for stream, chain in enumerate(visual_chains)
     )
 
@@ -270,7 +270,7 @@ def _chain_posteriors(
     return tuple(posteriors.chains[number] for number in numbers)
 
 
-def _state_regressions(structure: Structure, chain: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _list_state_regressions(structure: Structure, chain: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the regression of each state of a chain [shape=(N,)], and the viseme of each regression [shape=(E,)]."""
     visemes = [VISEME_OF[structure.chains[chain].phones(unit)[0]] for unit in structure.units[chain]]
     numbers = np.unique(visemes, return_inverse=True)[1]
@@ -287,4 +287,4 @@ def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Ar
         motion, _ = solve_mlpg(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
         return motion[utterance.observations.observed[1]]
 
-    return list(_threaded(generated, data))
+    return list(_run_threaded(generated, data))
