@@ -31,7 +31,7 @@ from lipmotion.live.network import STEP_S
 from lipmotion.motion.articulation import read_articulation_table
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
-from lipmotion.speech.sound.acoustic_conditions import noisy_audio
+from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Track
 from lipmotion_faces.tracking.track import track
@@ -118,10 +118,10 @@ def conditions(corpora: Path) -> dict[str, Callable[[Audio, int], Audio]]:
 
     return {
         "quiet": lambda audio, _: audio,
-        "babble 20 dB": lambda audio, seed: noisy_audio(audio, "babble", 20, voices, seed),
-        "babble 10 dB": lambda audio, seed: noisy_audio(audio, "babble", 10, voices, seed),
-        "white 20 dB": lambda audio, seed: noisy_audio(audio, "white", 20, seed=seed),
-        "white 10 dB": lambda audio, seed: noisy_audio(audio, "white", 10, seed=seed),
+        "babble 20 dB": lambda audio, seed: mix_noise(audio, "babble", 20, voices, seed),
+        "babble 10 dB": lambda audio, seed: mix_noise(audio, "babble", 10, voices, seed),
+        "white 20 dB": lambda audio, seed: mix_noise(audio, "white", 20, seed=seed),
+        "white 10 dB": lambda audio, seed: mix_noise(audio, "white", 10, seed=seed),
         "room": in_room,
         "telephone": over_telephone,
     }

@@ -37,8 +37,8 @@ from lipmotion.corpora.folder import spell_name
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_recogniser
-from lipmotion.speech.sound.acoustic_conditions import noisy_audio
+from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, open_recogniser
+from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, split_words
@@ -106,7 +106,7 @@ def conditions(corpora: Path, model: Model, _: Path | None) -> None:
             sounds = {"clean": samples, "room": samples + echo * np.sqrt(0.5) * samples.std() / echo.std()}
             sounds |= {"telephone": np.round(narrow * 127) / 127}
             for kind, db in (("white", 20), ("white", 10), ("babble", 20), ("babble", 10)):
-                sounds[f"{kind}, {db} dB"] = noisy_audio(clean, kind, db, voices, number).samples
+                sounds[f"{kind}, {db} dB"] = mix_noise(clean, kind, db, voices, number).samples
             for condition, sound in sounds.items():
                 motion = animate(Request(Audio(sound.astype(np.float32), RATE_HZ)), model=model).motion
                 pair = np.interp(tracked.motion.time_s, motion.time_s, motion["opening"]), tracked.motion["opening"]
@@ -122,10 +122,10 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         text = (folder / name).with_suffix(".txt")
         words = split_words((text if text.exists() else text.with_suffix(".lab")).read_text())
         audio = read_audio(folder / name)
-        aligned = cached_recogniser(model.phones, "general").align(audio, analysed(audio).mfcc(), words, Lexicon())
+        aligned = open_recogniser(model.phones, "general").align(audio, analysed(audio).mfcc(), words, Lexicon())
         recordings.append((audio, spoken(span.label.phone for span in aligned)))
     for kind in RECOGNISER_KINDS:
-        phone_recogniser = cached_recogniser(model.phones, kind)
+        phone_recogniser = open_recogniser(model.phones, kind)
         found = [phone_recogniser.recognition(audio, analysed(audio).mfcc()) for audio, _ in recordings]
         errors = [
             count_phone_edits(wanted, spoken(s.label.phone for s in each.units))
@@ -232,7 +232,7 @@ def silence(corpora: Path, model: Model, _: Path | None) -> None:
 
 def foreign(corpora: Path, model: Model, _: Path | None) -> None:
     """Print how far words decide of speech that is not English."""
-    recogniser = cached_recogniser(model.phones, "auto")
+    recogniser = open_recogniser(model.phones, "auto")
     for name in (
         "speech-open/common_voice_ja_24511055.mp3",
         "speech-open/13697_11991_000000.opus",

@@ -49,17 +49,17 @@ from lipmotion.pipeline.analysis.transcribe import transcribe
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, transcript_fit
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, measure_fit
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     PhonePosteriors,
-    installed_phone_recogniser,
+    find_installed,
     phone_recogniser,
 )
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.recognition.transcript_evidence import transcript_evidence
+from lipmotion.speech.recognition.transcript_evidence import find_evidence
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.installed import installed_voices, speak_sentences
+from lipmotion.speech.voices.installed import list_installed, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import FRAME_RATE_HZ, Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import VISEME_OF, Lexicon, is_silent, split_words
@@ -143,7 +143,7 @@ def _synthetic_sentences() -> list[tuple[NDArray[np.float32], list[Row]]]:
     """Return sentences in the voices of flite: samples, and words in time."""
     texts = [prompt.text for prompt in prompts(count=400).chosen]
     texts = [text for text in texts if len(split_words(text)) > 2]
-    voices = [voice for voice in installed_voices() if voice.synthesiser == "flite"]
+    voices = [voice for voice in list_installed() if voice.synthesiser == "flite"]
     spoken = [item for voice in voices for item in zip(texts, speak_sentences(texts, voice), strict=True)]
     timed = [(text, audio.samples, _word_times(units)) for text, (audio, units) in spoken]
     return [
@@ -244,7 +244,7 @@ def _sets(corpora: Path) -> dict[str, list[Said]]:
     sets = {f"GRID s1, {split}": _clips(corpora / "grid-s1", split) for split in ("val", "test")}
     sets |= {"speech-open": _open_recordings(corpora / "speech-open")}
     for makers in (("flite", "festival"), ("espeak-ng",)):
-        sets[" and ".join(makers)] = _voiced([voice for voice in installed_voices() if voice.synthesiser in makers])
+        sets[" and ".join(makers)] = _voiced([voice for voice in list_installed() if voice.synthesiser in makers])
     return sets
 
 
@@ -303,11 +303,11 @@ def _doubts(phones: Recogniser, audio: AnalysedAudio, words: tuple[str, ...], he
         units = phones.align(audio, audio.mfcc(), words, Lexicon())
     except AlignmentError:
         return dict.fromkeys(("refused", "either", "heard_either"), True)
-    fit = transcript_fit(audio, units)
+    fit = measure_fit(audio, units)
     found = {"doubted": fit.score < DOUBTFUL_SCORE, "left_out": bool(fit.missing)}
     found["either"] = any(found.values())
     if hear is not None:
-        evidence = transcript_evidence(hear(audio.samples), HEARD_S, units)
+        evidence = find_evidence(hear(audio.samples), HEARD_S, units)
         heard = {"doubted": evidence.is_doubtful, "left_out": evidence.gaps, "words": evidence.unsaid}
         found |= {f"heard_{key}": bool(value) for key, value in heard.items()}
         found["heard_either"] = any(heard.values())
@@ -364,7 +364,7 @@ def _transcripts(recordings: Sequence[Said]) -> Iterator[tuple[str, NDArray[np.f
 
 def _network() -> Hearing | None:
     """Return what hears phones; None where no phone recogniser is installed."""
-    name = installed_phone_recogniser()
+    name = find_installed()
     if name is None:
         return None
     network, step = phone_recogniser(name), PIECE_S * RATE_HZ

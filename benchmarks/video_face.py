@@ -64,8 +64,8 @@ from lipmotion.measures.curves import compute_interval, correlate_pooled
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.training.train import label_phones
-from lipmotion.pipeline.workers import worker_pool
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.pipeline.workers import open_workers
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.types import Audio, Motion, Track
 from lipmotion.units import Lexicon, is_silent
 from lipmotion_faces.appearance.placing import cut
@@ -133,7 +133,7 @@ def report(options: argparse.Namespace, corpus: Corpus, names: Sequence[str], se
         Job(setting, name, names[number - 1], options.frames if number in with_sheets else 0)
         for number, name in enumerate(names)
     ]
-    with worker_pool(options.processes) as workers:
+    with open_workers(options.processes) as workers:
         judged = {
             name: load_judged(path) for name, path in zip(names, workers.ordered_map(stored_judge, jobs), strict=True)
         }
@@ -316,7 +316,7 @@ def sheets_of(clip: RecordedClip, frames: Pictures, count: int, badness: dict[st
 
 def phones(corpus: Corpus, names: Sequence[str], model: Model) -> list[list[tuple[float, float, str]]]:
     """Return start and end in seconds of every spoken phone, clip by clip, by forced alignment."""
-    recogniser = cached_recogniser(model.phones, "auto", model.adaptation)
+    recogniser = open_recogniser(model.phones, "auto", model.adaptation)
     found = [label_phones(corpus.utterance(name), recogniser, Lexicon()) for name in names]
     return [[(s.start_s, s.end_s, s.label.phone) for s in units if not is_silent(s.label.phone)] for units in found]
 

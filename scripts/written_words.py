@@ -14,7 +14,7 @@ from pathlib import Path
 
 from hama.inference import G2PModel
 
-from lipmotion.speech.recognition.network.beam_search import english_words
+from lipmotion.speech.recognition.network.beam_search import load_english
 from lipmotion.speech.recognition.network.posteriors import Hama
 from lipmotion.units import Lexicon
 from lipmotion.units.ipa_phones import read_tokens
@@ -29,7 +29,7 @@ def main() -> None:
     network = G2PModel()
     tokens = sorted((token for token in Hama().tokens if not token.startswith("<")), key=len, reverse=True)
     lines = []
-    for word in english_words().language.words[:MOST_WORDS]:
+    for word in load_english().language.words[:MOST_WORDS]:
         known = {tuple(FULL_FORMS.get(phone, phone) for phone in each) for each in Lexicon().pronunciations(word)}
         phones = spelt(unicodedata.normalize("NFC", network.predict(word).ipa), tokens)
         if word.replace("'", "").isalpha() and phones and phones not in known:

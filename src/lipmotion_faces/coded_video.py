@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
-from lipmotion.storage.sources import MAX_PIXELS, bound_allocations, x264_instructions
+from lipmotion.storage.sources import MAX_PIXELS, bound_allocations, read_x264
 
 Frame = NDArray[np.uint8]
 ReadFrames = Callable[[int, int], Iterable[Frame]]
@@ -273,7 +273,7 @@ def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) 
         "crf": f"{crf:g}",
         "preset": "medium",
         "x264-params": f"keyint={group}:min-keyint={group}:scenecut=0:bframes=0:aud=1:repeat-headers=1:threads=1"
-        + x264_instructions(),
+        + read_x264(),
     }
     return context
 

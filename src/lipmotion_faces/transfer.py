@@ -17,7 +17,7 @@ from lipmotion.motion.space import resample_track
 from lipmotion.motion.speaker_maps import SpeakerMap, count_speech_s, fit_transfer_map, select_channels
 from lipmotion.pipeline.analysis.read_request import read_recording
 from lipmotion.pipeline.analysis.speech_analysis import analyse
-from lipmotion.pipeline.generation import generate_for, speaker_map
+from lipmotion.pipeline.generation import find_speaker_map, generate_for
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Onto, Request
 from lipmotion.speech.sound.audio_files import read_audio
@@ -64,7 +64,7 @@ def map_onto(
     """
     if isinstance(onto, SpeakerMap):
         return onto
-    person = speaker_map(model.speakers, speaker)
+    person = find_speaker_map(model.speakers, speaker)
     opened, where = _open(onto)
     source, target = [], []
     for name, request, measured in _list_takes(opened, where, onto_speaker, speech):
@@ -106,7 +106,7 @@ def measure_pair(
         motion, valid = resample_track(measured, len(speech.features.values))
     else:
         same = analyse(measured, Request(read_recording(request), units=speech.units))
-        of_speaker = speaker_map(measured.speakers, speaker)
+        of_speaker = find_speaker_map(measured.speakers, speaker)
         motion = generate_for(of_speaker, measured.engine, measured.learned, same).motion
         valid = np.ones(len(motion.values), bool)
     motion = select_channels(motion, generated.channels, where)

@@ -17,7 +17,7 @@ from lipmotion.motion.posterior_network import ROWS, fit_components, limit_logar
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
 from lipmotion.stats.recurrence import RecurrentNetwork, make_recurrent_network
-from lipmotion.stats.trees import ridge, zero_statistics
+from lipmotion.stats.trees import create_statistics, ridge
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -103,7 +103,7 @@ class ContextRidge(Baseline):
         statistics, frames = None, 0
         for speech, targets, mask in recordings:
             rows = self.regressors(speech)[mask]
-            statistics = statistics or zero_statistics(rows.shape[1], targets.shape[1])
+            statistics = statistics or create_statistics(rows.shape[1], targets.shape[1])
             statistics.add(rows, targets[mask])
             frames += len(rows)
         if statistics is None:

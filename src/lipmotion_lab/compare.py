@@ -16,9 +16,9 @@ from lipmotion.formats.markers import MILLIMETRES
 from lipmotion.measures import curves
 from lipmotion.measures.closures import find_threshold, measure_closures
 from lipmotion.measures.curves import measure_modulation_distance
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, to_arkit
 from lipmotion.pipeline.outputs.motion_files import read_generation
-from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import WEIGHT, Generation, Monitor, Motion, Track, silent_monitor, with_progress
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.trackers import LIP_POINTS
@@ -62,7 +62,7 @@ def compare(reference: Source, *others: Source, monitor: Monitor = silent_monito
         raise InputError("there is nothing to compare the reference with; give another motion file or video")
     items = list(enumerate((reference, *others)))
     first, *rest = [_read_side(item, number) for number, item in with_progress(items, "reading", monitor)]
-    return nan_as_null({"reference": first.name, "others": [_compare_pair(first, other) for other in rest]})
+    return replace_nan({"reference": first.name, "others": [_compare_pair(first, other) for other in rest]})
 
 
 def _read_side(source: Source, number: int) -> _Side:
@@ -77,7 +77,7 @@ def _read_side(source: Source, number: int) -> _Side:
     if not np.isfinite(motion.values).all():
         raise InputError(f"{name}: there are values that are not finite; interpolate them first")
     seen = np.asarray(source.seen) if isinstance(source, Track) else np.ones(len(motion.values), bool)
-    names = [(arkit_name(each.name) if each.unit == WEIGHT else None) or each.name for each in motion.channels]
+    names = [(to_arkit(each.name) if each.unit == WEIGHT else None) or each.name for each in motion.channels]
     if len(set(names)) == len(names):  # else there are two spellings of one
         channels = (replace(each, name=name) for each, name in zip(motion.channels, names, strict=True))
         motion = replace(motion, channels=tuple(channels))

@@ -15,8 +15,8 @@ from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, describe_training, train
 from lipmotion.storage.files import make_folder
-from lipmotion.storage.json_text import nan_as_null
-from lipmotion.storage.locks import unfinished_work
+from lipmotion.storage.json_text import replace_nan
+from lipmotion.storage.locks import list_unfinished
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
 from lipmotion_lab import runner
@@ -67,7 +67,7 @@ def engine_models(
         if folder is None:
             model = train_engine(corpus, engine, here)
         else:
-            with unfinished_work(paths[name]) as work:
+            with list_unfinished(paths[name]) as work:
                 save_model(train_engine(corpus, engine, here, work), paths[name])
             model = load_model(paths[name])  # as the next run finds it
         models[name] = EngineModel(model, perf_counter() - start_s)
@@ -152,7 +152,7 @@ def engines(
         for name, each in trained.items()
     }
     conditions = {name: {"systems": _rows(recordings, found, settings.seed)} for name, found in made.items()}
-    return nan_as_null(about | {"conditions": conditions})
+    return replace_nan(about | {"conditions": conditions})
 
 
 def _rows(

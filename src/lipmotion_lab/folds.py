@@ -20,7 +20,7 @@ from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures.closures import find_threshold
 from lipmotion.measures.curves import correlate_pooled
-from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.json_text import replace_nan
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import clip_statistics, figures_of
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings, choose_channels
@@ -109,7 +109,7 @@ def folds(
     about |= {"trained_on": [result.used for result in results], "closed_under": results[0].closed_under}
     shared = [name for name in results[0].clips if all(name in result.clips for result in results)]
     conditions = {name: _make_row(results, name, settings.seed, by_speaker=by_speaker) for name in shared}
-    return nan_as_null(about | {"conditions": conditions})
+    return replace_nan(about | {"conditions": conditions})
 
 
 def _make_row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, by_speaker: bool) -> dict[str, Any]:
@@ -181,7 +181,7 @@ def in_blocks(
     about: dict[str, Any] = {"blocks": count, "seed": settings.seed, "clips": len(names), "minutes": minutes}
     about |= {"closed_under": threshold, "channels": results[0].channels, "references": list(references)}
     rows = {name: _make_rows(results[0], systems, references, settings.seed) for name, systems in conditions.items()}
-    return nan_as_null(about | {"conditions": rows})
+    return replace_nan(about | {"conditions": rows})
 
 
 def _run_block(

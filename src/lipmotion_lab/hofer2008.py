@@ -17,7 +17,7 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import MOTION, SPEECH
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import UNIT_SETS
 from lipmotion_lab import runner
@@ -109,7 +109,7 @@ def hofer2008(
         {"condition": condition, "pins": pins} | _table(recordings, rows, settings.seed) | {"states": states}
         for (states, condition, pins), rows in made.items()
     ]
-    return nan_as_null(about | {"tables": tables})
+    return replace_nan(about | {"tables": tables})
 
 
 def _engine(**options: Any) -> JointEngine:

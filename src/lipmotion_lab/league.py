@@ -29,9 +29,9 @@ from lipmotion.measures.closures import REACH, find_closings, find_threshold, ma
 from lipmotion.motion.frame_labels import is_away_from_speech
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.train import label_phones
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.storage.files import atomic_file, make_folder
-from lipmotion.storage.json_text import as_json, from_json, nan_as_null
+from lipmotion.storage.json_text import as_json, from_json, replace_nan
 from lipmotion.types import Audio, Monitor, Span, Timeline, Unit, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import Lexicon, is_silent
@@ -136,7 +136,7 @@ def load_recordings(corpus: Corpus, names: Sequence[str], work: Path, monitor: M
     """Return recordings, their sound as a file in ``work``. Raises CorpusError: no lips were measured in one."""
     from scipy.signal import resample_poly
 
-    phones, recordings = cached_recogniser(load_model().phones), []
+    phones, recordings = open_recogniser(load_model().phones), []
     make_folder(work / "sound")
     for utterance in with_progress([corpus.utterance(name) for name in names], "recordings", monitor):
         motion, seen = utterance.track.motion, np.asarray(utterance.track.seen)
@@ -551,7 +551,7 @@ def describe_league(found: League) -> Section:
             row |= {name: figure.value, f"{name}_95": figure.interval(0)}
             if best is not None and best is not each:
                 row[f"{name}_gain_95"] = figure.gain(best.figures[name], 0)
-        rows[each.rival.title] = nan_as_null(row)
+        rows[each.rival.title] = replace_nan(row)
     verdict = "nothing could be compared"
     if found.standings:
         first = found.standings[0]
@@ -577,7 +577,7 @@ def write_league(found: League, folder: Path) -> dict[str, Any]:
     figures |= {"rivals": section.table.rows, "absent": found.absent, "failed": found.failed}
     figures["chosen"] = {each.rival.title: each.chosen for each in found.standings}
     figures["each"] = {title: dict(zip(names, of, strict=True)) for title, of in accs.items()}
-    figures = nan_as_null(figures)
+    figures = replace_nan(figures)
     section.write_tables(part / "tables")
     write_text(part / "figures.json", as_json(figures) + "\n")
     record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": found.about}

@@ -14,7 +14,7 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track
-from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import Example, Speech, Timeline
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
@@ -72,7 +72,7 @@ def learning_curve(
         rows.append(row)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "closed_under": closed_under}
-    return nan_as_null(about | {"rows": rows})
+    return replace_nan(about | {"rows": rows})
 
 
 def choose_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:

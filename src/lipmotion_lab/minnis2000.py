@@ -34,7 +34,7 @@ from lipmotion.engines.selection.selection_training import build_target
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.model import Model
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab import runner
 from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
@@ -195,7 +195,7 @@ def minnis2000(
         name: {key: value for key, value in vars(config).items() if value != printed[key]}
         for name, config in rows(guided=guided).items()
     }
-    return nan_as_null(about | {"lists": found})
+    return replace_nan(about | {"lists": found})
 
 
 def _on_list(

@@ -29,9 +29,9 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.compiler import list_blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.pipeline.training.labels import digest_corpus, fingerprint_training
-from lipmotion.pipeline.training.train import Run, phones_and_examples, train
-from lipmotion.pipeline.workers import training_pool
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.pipeline.training.train import Run, fit_phones, train
+from lipmotion.pipeline.workers import open_training
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.files import make_folder
 from lipmotion.types import Example, Monitor, Utterance, silent_monitor, sub_monitor, with_progress
@@ -134,7 +134,7 @@ def recognise_held_out(
     corpus: Corpus, phones: UnitHmm, names: Sequence[str], settings: ExperimentSettings, **of_model: Any
 ) -> HeldOutRecordings:
     """Return the recordings of some names, as ``load_held_out``, with phones in time by given phone models."""
-    recogniser, chosen = cached_recogniser(phones), Selection(names=names)
+    recogniser, chosen = open_recogniser(phones), Selection(names=names)
     lexicon, monitor = settings.lexicon, settings.monitor
     return load_held_out(corpus, recogniser, selection=chosen, lexicon=lexicon, monitor=monitor, **of_model)
 
@@ -144,9 +144,9 @@ def train_phones(
 ) -> tuple[UnitHmm, list[Example]]:
     """Return phone models of some utterances, and these as examples for an engine."""
     lexicon = settings.lexicon or Lexicon()
-    with training_pool(settings.workers, len(utterances)) as each:
+    with open_training(settings.workers, len(utterances)) as each:
         kept = replace(checkpoint, parallel_map=each)
-        phones, examples, _ = phones_and_examples(utterances, settings.recogniser, lexicon, settings.monitor, kept)
+        phones, examples, _ = fit_phones(utterances, settings.recogniser, lexicon, settings.monitor, kept)
     return phones, examples
 
 

@@ -28,13 +28,13 @@ from lipmotion.storage.files import (
     create_folders,
     is_link,
     make_folder,
-    portable_name,
+    make_portable,
     remove,
     sound_reference,
 )
 from lipmotion.storage.json_text import as_json, as_json_rows, from_json
 from lipmotion.storage.locks import lock_folder, remove_unfinished
-from lipmotion.storage.sources import read_text_file, sha256_of
+from lipmotion.storage.sources import hash_file, read_text_file
 from lipmotion.types.languages import AUTO, ENGLISH
 from lipmotion.units import Lexicon
 from lipmotion_studio.project import (
@@ -230,7 +230,7 @@ class ProjectFolder:
         if not (recording.sha256 and file.sha256):
             sound = self.sound(recording)
             LOG.warning("%s: is taken to be the recording that was edited; from now on no other is", sound)
-            digest = digest or sha256_of(sound)
+            digest = digest or hash_file(sound)
             self.change_recording(recording.number, lambda now: replace(now, sha256=digest))
         if not file.sha256:
             file = replace(file, sha256=digest)
@@ -305,10 +305,10 @@ class ProjectFolder:
             known = {os.path.realpath(self.sound(each)) for each in self.project.lines.values()}
             taken, file = self._taken_names(), self.path.absolute() / PROJECT
             added: list[ProjectRecording] = []
-            for sound, name, transcript in sources or [(source, portable_name(source.stem), "")]:
+            for sound, name, transcript in sources or [(source, make_portable(source.stem), "")]:
                 if os.path.realpath(sound) not in known:
                     number, reference = self.project.next_number + len(added), sound_reference(sound.absolute(), file)
-                    recording = ProjectRecording(number, name, reference, sha256_of(sound), transcript)
+                    recording = ProjectRecording(number, name, reference, hash_file(sound), transcript)
                     added.append(self._choose_name(recording, taken))
             project = self.project.with_recordings(added)
             check_recordings(project)
@@ -323,7 +323,7 @@ class ProjectFolder:
         """
         if not is_recording(Path(name)):
             raise InputError(f"{name!r} is no name of a recording; required one as speech.wav, speech.flac, take.mp4")
-        digest, suffix = sha256_of(content), Path(name).suffix.lower()
+        digest, suffix = hash_file(content), Path(name).suffix.lower()
         with self.lock:
             folder = self.path / SOUNDS
             make_folder(folder)
@@ -426,7 +426,7 @@ def project_path(source: Path | None, out: Path | None = None) -> Path:
     if _is_project(source):
         return source.parent if source.name == PROJECT else source
     place = source.absolute()
-    usual = place.with_name(portable_name(f"{place.name if place.is_dir() else place.stem}{SUFFIX}"))
+    usual = place.with_name(make_portable(f"{place.name if place.is_dir() else place.stem}{SUFFIX}"))
     if out is None and is_link(usual):
         raise InputError(f"{usual}: is a link, required a folder beside {source}; open {usual} itself, or give -o")
     return out or usual
@@ -484,4 +484,4 @@ def clean_name(name: str, default: str = "line") -> str:
     ('Anna_s take', 'voice')
     """
     plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", name)).strip(" ._")
-    return portable_name(plain[:MAX_NAME]) or default
+    return make_portable(plain[:MAX_NAME]) or default

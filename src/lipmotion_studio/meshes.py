@@ -10,7 +10,7 @@ import numpy as np
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.errors import InputError, shorten
 from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
-from lipmotion.storage.locks import temporary_folder
+from lipmotion.storage.locks import open_temporary
 from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.delivery import MOODS, MoodKey
 from lipmotion_faces.characters.character_files import load_character
@@ -81,7 +81,7 @@ class Faces:
             scene = head_scene(_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
         else:
             raise InputError(f"no mesh {shorten(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
-        with temporary_folder() as folder:
+        with open_temporary() as folder:
             write_scene(folder / "face.glb", scene)
             self._meshes[name] = (folder / "face.glb").read_bytes()
         return self._meshes[name]

@@ -17,7 +17,7 @@ from starlette.responses import FileResponse, Response
 from lipmotion.errors import InputError, shorten
 from lipmotion.storage.files import TEMPORARY, remove
 from lipmotion.storage.json_text import as_json
-from lipmotion.storage.locks import temporary_folder
+from lipmotion.storage.locks import open_temporary
 from lipmotion.types import Motion, values
 from lipmotion.types.configuration import kind_of
 from lipmotion.types.values import items
@@ -214,7 +214,7 @@ class RecordingReplies:
             self._studio.folder.check_sound(self._studio.folder.recording(number))
             face = self._studio.faces.shown(name)
             recording = self._studio.vary(number, opened, by, name)
-            with temporary_folder() as folder:
+            with open_temporary() as folder:
                 path = folder / "stretch.mp4"
                 if isinstance(face, ShownPerson):
                     recording.write_film(path, start_s, end_s, face)

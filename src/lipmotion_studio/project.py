@@ -12,7 +12,7 @@ from typing import Any
 from lipmotion.errors import InputError, shorten
 from lipmotion.extensions import find_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
-from lipmotion.pipeline.outputs.output import OutputSettings, output_suffixes
+from lipmotion.pipeline.outputs.output import OutputSettings, list_outputs
 from lipmotion.types import values
 from lipmotion_faces.outputs.shown_faces import shown_face
 
@@ -290,5 +290,5 @@ def find_preset(name: str, files: tuple[str, ...]) -> Preset:
 
 def suffixes() -> tuple[str, ...]:
     """Return the suffixes of all files that can be exported."""
-    everything = output_suffixes(OutputSettings(shown_face("head")))
+    everything = list_outputs(OutputSettings(shown_face("head")))
     return tuple(suffix for suffix in everything if _SUFFIX.fullmatch(suffix))

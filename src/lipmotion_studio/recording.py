@@ -18,7 +18,7 @@ from lipmotion.pipeline.analysis.read_request import read_lexicon, read_request
 from lipmotion.pipeline.analysis.transcribe import guess_pronunciations
 from lipmotion.pipeline.edit_files import EditFile, create_edit_file
 from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, parse_step
-from lipmotion.pipeline.generate.explain import explain_session, explanation_text
+from lipmotion.pipeline.generate.explain import explain_session, write_explanation
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
 from lipmotion.pipeline.request import Request
@@ -294,7 +294,7 @@ class OpenRecording:
             "end_s": span.end_s if span else None,
             "experts": [{"name": share.name, "share": share.probability} for share in shares],
             "confidence": explanation.confidence,
-            "text": explanation_text(explanation),
+            "text": write_explanation(explanation),
         }
 
     def doubts(self) -> list[dict[str, Any]]:

@@ -22,13 +22,13 @@ from lipmotion.formats.sound import write_sound
 from lipmotion.pipeline.edit_files import write_edits
 from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, parse_step
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run
-from lipmotion.pipeline.model import Model, load_model, shipped_path
+from lipmotion.pipeline.model import Model, find_shipped, load_model
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.request import Outputs
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.storage.files import create_folders
-from lipmotion.storage.locks import temporary_folder
-from lipmotion.storage.sources import has_video, open_media, sha256_of, video_streams
+from lipmotion.storage.locks import open_temporary
+from lipmotion.storage.sources import has_video, hash_file, list_video, open_media
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import MANNERS, MOODS, Delivery, Staging
 from lipmotion.units import PHONES, is_silent, split_words
@@ -82,7 +82,7 @@ def media_type(path: Path) -> str | None:
     if not kind:
         return None
     with open_media(path) as container:
-        is_known = video_streams(container)[0].codec_context.name.removeprefix("lib") in codecs
+        is_known = list_video(container)[0].codec_context.name.removeprefix("lib") in codecs
         return kind if is_known and (container.start_time or 0) < IN_STEP_S * 1e6 else None
 
 
@@ -147,8 +147,8 @@ class KnownModel:
 
 def known_model(file: Path | None) -> KnownModel:
     """Return the model of a file; None: the one that ships. Raises as ``load_model``."""
-    model, path = load_model(file), file or shipped_path()
-    return KnownModel(model, path.stem, sha256_of(path))
+    model, path = load_model(file), file or find_shipped()
+    return KnownModel(model, path.stem, hash_file(path))
 
 
 class Studio:
@@ -170,7 +170,7 @@ class Studio:
         self.trainer = Trainer(folder)
         self.faces = Faces(places, lambda: self.trainer.files(FACE))
         self._run = ExitStack()
-        self._sounds = self._run.enter_context(temporary_folder())
+        self._sounds = self._run.enter_context(open_temporary())
         self._exporting: dict[str, int] | None = None
 
     def close(self) -> None:
@@ -450,7 +450,7 @@ class Studio:
             if face and any(isinstance(each, VideoOutput) for each in check_outputs(job, shown, request.recording)):
                 shown = self.faces.shown(face)
             run(job, face=shown, model=self.used.model)
-        digests = {Path(path).relative_to(self.folder.path).as_posix(): sha256_of(Path(path)) for path in files}
+        digests = {Path(path).relative_to(self.folder.path).as_posix(): hash_file(Path(path)) for path in files}
         record = ExportRecord(
             preset.name,
             digests,

@@ -19,7 +19,7 @@ from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.pipeline.workers import start_process
 from lipmotion.storage.files import atomic_file, make_folder, remove
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.storage.locks import UNFINISHED, work_folder
+from lipmotion.storage.locks import UNFINISHED, name_work_folder
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import values
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
@@ -176,7 +176,7 @@ class Trainer:
             order = self._order(request)
             for folder, _ in PLACES.values():  # what was begun and will not be gone on with
                 for left in (self._folder.path / folder).glob(f"*{UNFINISHED}"):
-                    if left.name != work_folder(order.target).name:
+                    if left.name != name_work_folder(order.target).name:
                         remove(left)
             before = self._request, self._status
             self._request, self._status = request, {"state": WORKING, **_empty_status()}

@@ -16,7 +16,7 @@ from lipmotion.cli import main
 from lipmotion.cli.verbs.about import SHELLS
 from lipmotion.engines import ENGINES
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
-from lipmotion.pipeline.model import read_header, shipped_path
+from lipmotion.pipeline.model import find_shipped, read_header
 
 STOPPED = "lipmotion: stopped; run the same command again to go on"
 VERBS = ["animate", "corpus", "train", "evaluate", "info"]
@@ -225,7 +225,7 @@ def test_the_chains_of_a_coupled_model(run, coupled_model_file):
 
 def test_the_shipped_model_is_the_default(run):
     done = run("info")
-    assert done.out == run("info", shipped_path()).out
+    assert done.out == run("info", find_shipped()).out
     assert any(line.startswith("attribution") and "GRID" in line for line in done.out)
 
 
@@ -240,7 +240,7 @@ def test_the_shipped_model_is_cited_by_default(run):
     done = run("cite")
     assert (done.code, done.err) == (0, [])
     assert keys(done.out) == ["lipmotion", *ENGINE_KEYS["trajectory"], "cooke2006"]
-    assert done.out == run("cite", shipped_path()).out
+    assert done.out == run("cite", find_shipped()).out
 
 
 def test_a_model_of_other_recordings(run, coupled_model_file):

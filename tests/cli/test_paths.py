@@ -12,7 +12,7 @@ from cli.conftest import check_refused, is_one_error
 from lipmotion import Corpus, Request, Run, animate, cues, load_model, prepare, train, write, write_cues
 from lipmotion.cli.command_line import parser
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.model import shipped_path
+from lipmotion.pipeline.model import find_shipped
 
 TALKING = "a.wav --transcript t.txt --lexicon l.txt --units u.json --model m.lipmotion"
 FIGURES = "c --lexicon l.txt"
@@ -79,10 +79,10 @@ def test_however_it_is_spelled(run, laid):
 
 
 def test_the_model_that_ships_is_an_input_too(run, laid):
-    before = shipped_path().read_bytes()
-    done = run("adapt", laid / "a.wav", "-o", shipped_path())
+    before = find_shipped().read_bytes()
+    done = run("adapt", laid / "a.wav", "-o", find_shipped())
     check_refused(done, 7, "is the model itself")
-    assert shipped_path().read_bytes() == before
+    assert find_shipped().read_bytes() == before
 
 
 @pytest.mark.usefixtures("laid")

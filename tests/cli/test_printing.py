@@ -26,7 +26,7 @@ from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
 from lipmotion.cli.terminal.progress import outcome, print_json, print_line, print_lines, report_progress
 from lipmotion.errors import InputError
 from lipmotion.measures.evaluation_table import format_figures
-from lipmotion.pipeline.generate.explain import explanation_text
+from lipmotion.pipeline.generate.explain import write_explanation
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
 from robustness.case import changed_model
 
@@ -189,7 +189,7 @@ def test_tables_have_a_line_a_row():
     assert OBEYED.search(format_figures(figures)) is None
     span = Span(0.0, 1.0, Unit(EVIL, EVIL, EVIL))
     explained = Explanation(0.0, 0, span, EVIL, {EVIL: ChannelValue(0.0, 1.0)})
-    assert OBEYED.search(explanation_text(explained)) is None
+    assert OBEYED.search(write_explanation(explained)) is None
 
 
 def test_what_is_laid_out_stays_so(capsys):

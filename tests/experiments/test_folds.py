@@ -11,7 +11,7 @@ import pytest
 from experiments.copies import SETTINGS, copied, renamed
 from lipmotion import Corpus, Selection, errors, train
 from lipmotion.measures import closures, curves
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion_lab import folds as module
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate
@@ -41,7 +41,7 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
     made = []
     for held_out in (mixed[0::3], mixed[1::3], mixed[2::3]):
         model = train(toy_corpus, selection=Selection(names=sorted(set(names) - set(held_out))), recogniser=SMALL)[0]
-        found = load_held_out(toy_corpus, cached_recogniser(model.phones), selection=Selection(names=sorted(held_out)))
+        found = load_held_out(toy_corpus, open_recogniser(model.phones), selection=Selection(names=sorted(held_out)))
         made += generate_clips(found, "with transcript", model.engine, model.learned)
     return made
 

@@ -13,7 +13,7 @@ from lipmotion import Corpus, engines, evaluate, train
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.measures import curves
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.storage.archive import read_archive
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.report.sections import xie_liu_section
@@ -80,7 +80,7 @@ def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     for key, array in arrays.items():
         np.testing.assert_array_equal(array, kept[key])
     system, learned = systems.system_from_arrays(kept), model.engine.from_arrays(arrays)
-    recordings = load_held_out(toy_corpus, cached_recogniser(model.phones))
+    recordings = load_held_out(toy_corpus, open_recogniser(model.phones))
     made = generate_clips(recordings, "audio only", model.engine, learned)
     for ours, theirs in zip(made, generate_clips(recordings, "audio only", system.engine, system.model), strict=True):
         np.testing.assert_array_equal(ours.generated, theirs.generated)

@@ -19,7 +19,7 @@ from lipmotion import CueSheet, citations, errors, formats, read_motion, types
 from lipmotion.formats import label_files, textgrid
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
-from lipmotion.pipeline.batch.report import Mark, _field, _for_page
+from lipmotion.pipeline.batch.report import Mark, _field, _show_on_page
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import as_text
 from lipmotion_faces.characters import gltf_document, gltf_writer, usd_writer
@@ -183,7 +183,7 @@ def _glb(folder: Path, name: str) -> None:
 
 def _report(_: Path, name: str) -> None:
     record = {"outputs": [name], "name": name, "recording": f"/{name}"}
-    page = _for_page(record, [name], Path("/"), Mark("redo", name))
+    page = _show_on_page(record, [name], Path("/"), Mark("redo", name))
     assert "<" not in page
     assert "\n" not in page
     assert json.loads(page)[0] == printable(name)

@@ -22,7 +22,7 @@ from lipmotion.formats import (
 from lipmotion.formats.base import MOTION_FORMATS, format_rows, read_members
 from lipmotion.formats.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.resampling import at_speech_rate
+from lipmotion.speech.sound.resampling import resample_speech
 from lipmotion.types import Audio, Channel, Generation, Motion, ReducedVariance, Timeline, from_sixteen_bits
 
 EXACT = (".json", ".csv", ".npz", ".c3d")
@@ -247,7 +247,7 @@ def test_sixteen_bits_come_back_as_they_were_and_are_read_so(tmp_path: Path, rat
     for name in ("a.wav", "a.flac"):
         write_sound(tmp_path / name, sound)
         assert np.array_equal(read_audio(tmp_path / name, rate_hz).samples, sound.samples)
-        assert np.array_equal(read_audio(tmp_path / name).samples, at_speech_rate(sound).samples)
+        assert np.array_equal(read_audio(tmp_path / name).samples, resample_speech(sound).samples)
 
 
 @pytest.mark.parametrize(("name", "level"), [("a.wav", 0.5), ("a.FLAC", 0.5), ("a.wav", 2.0)])

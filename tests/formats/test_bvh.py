@@ -21,7 +21,7 @@ from lipmotion.formats.live2d import TOLERANCE, measure_mouth_form, measure_mout
 from lipmotion.formats.vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import move_points, with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import gaze_to_weights, weights_to_gaze
-from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
+from lipmotion.meshes.model.mesh import ANGLES, turn_head
 from lipmotion.pipeline.outputs.motion_files import check_rate
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion_faces.characters.gltf_document import read_gltf_document
@@ -389,7 +389,7 @@ def test_three_vrm_reads_it(path: Path, talking_vrm: Generation) -> None:
         track = found["expressions"][name]
         assert track["times"] == pytest.approx(talking_vrm.motion.time_s, abs=1e-6)
         assert track["values"] == pytest.approx(talking_vrm.motion[name], abs=1e-6)
-    turned = head_quaternions(np.stack([talking_vrm.motion[name] for name in ANGLES], axis=1))
+    turned = turn_head(np.stack([talking_vrm.motion[name] for name in ANGLES], axis=1))
     assert found["rotations"]["head"]["values"] == pytest.approx(turned.reshape(-1), abs=1e-6)
 
 

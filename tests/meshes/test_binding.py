@@ -35,7 +35,7 @@ def mesh():
 @pytest.fixture(scope="module")
 def binding(mesh):
     named = lip_points(mesh)
-    surface = lip_placement.part_named_lips(mesh, named)
+    surface = lip_placement.separate_named_lips(mesh, named)
     return bind(mesh, surface, lip_placement.place_lips_by_points(mesh, surface, named))
 
 
@@ -158,7 +158,7 @@ GRID = 0.05 * SIZE
 
 def _named(mesh):
     named = lip_points(mesh)
-    return lip_placement.place_lips_by_points(mesh, lip_placement.part_named_lips(mesh, named), named)
+    return lip_placement.place_lips_by_points(mesh, lip_placement.separate_named_lips(mesh, named), named)
 
 
 def _offsets(mesh, placement):
@@ -189,8 +189,8 @@ def test_a_turned_head_is_found_by_its_eye_corners():
     for point, x in ((33, -0.5), (263, 0.5)):
         named[point] = int(np.abs(mesh.vertices[:, :2] / SIZE - [x, 0.0]).sum(axis=1).argmin())
     turned = Mesh(mesh.vertices @ turn.T, mesh.triangles)
-    placement = lip_placement.place_lips_by_points(turned, lip_placement.part_named_lips(turned, named), named)
-    upright = lip_placement.place_lips_by_points(mesh, lip_placement.part_named_lips(mesh, named), named)
+    placement = lip_placement.place_lips_by_points(turned, lip_placement.separate_named_lips(turned, named), named)
+    upright = lip_placement.place_lips_by_points(mesh, lip_placement.separate_named_lips(mesh, named), named)
     assert placement.vertices.tolist() == upright.vertices.tolist()
     np.testing.assert_allclose(placement.axes, turn @ upright.axes, atol=1e-9)
     moved = placement.to_mesh(np.array([[0.0, -1, 0]]))

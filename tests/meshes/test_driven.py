@@ -20,7 +20,7 @@ from lipmotion.meshes.fitting.blendshape_motion import (
     with_mouth,
 )
 from lipmotion.meshes.model import face_shapes, rig_tables, shape_names, surface
-from lipmotion.meshes.model.mesh import ANGLES, HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merge_bones
+from lipmotion.meshes.model.mesh import ANGLES, HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, find_bone_kind, merge_bones
 from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit, delivery
 from lipmotion.types.delivery import parse_moods
 from lipmotion.types.motion import RADIAN
@@ -166,7 +166,7 @@ def test_any_names_are_understood_by_their_rows(file):
     halves.append(replace(next(each for each in halves if each.name == shapes["mouthFunnel"]), name="other half"))
     write_glb(file, replace(head(), shapes=tuple(halves)))
     rows = "".join(f"{own},{known},,\n" for known, own in shapes.items())
-    rig_tables.table_path(file).write_text(f"{COLUMNS}{rows}other half,mouthFunnel,,\n", encoding="utf-8")
+    rig_tables.find_table(file).write_text(f"{COLUMNS}{rows}other half,mouthFunnel,,\n", encoding="utf-8")
     character = load_character(file)
     weights = character.weights(motion(), units())
     for name in plain.names:
@@ -182,14 +182,14 @@ def test_the_table_of_what_was_found_changes_nothing_and_weights_that_are_given_
     after = load_character(file)
     assert after.table_rows() == before.table_rows()
     np.testing.assert_array_equal(after.weights(motion(), units()).values, before.weights(motion(), units()).values)
-    rig_tables.table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,0.03\nmouthPucker,mouthPucker,1.2,\n")
+    rig_tables.find_table(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,0.03\nmouthPucker,mouthPucker,1.2,\n")
     character = load_character(file)
     weights = character.weights(motion(), units())
     np.testing.assert_allclose(character.weights(weights, units()).values, weights.values, atol=0.03)
 
 
 def test_gains_weaken_the_mouth_and_lips_still_touch(file):
-    rig_tables.table_path(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,\nmouthPressLeft,mouthPressLeft,1,0.2\n")
+    rig_tables.find_table(file).write_text(f"{COLUMNS}jawOpen,jawOpen,0.5,\nmouthPressLeft,mouthPressLeft,1,0.2\n")
     character = load_character(file)
     weights = character.weights(motion(), units())
     whole = load_character(file.rename(file.with_name("other.glb"))).weights(motion(), units())
@@ -208,7 +208,7 @@ def test_gains_weaken_the_mouth_and_lips_still_touch(file):
      ("jawOpen,jawOpen,,\nmouthPucker,ou,,\n", "has jawOpen and ou; leave the sources of one kind empty")],
 )  # fmt: skip
 def test_damaged_tables_are_refused(file, rows, message):
-    rig_tables.table_path(file).write_text(COLUMNS + rows)
+    rig_tables.find_table(file).write_text(COLUMNS + rows)
     with pytest.raises(InputError, match=message):
         load_character(file)
 
@@ -220,7 +220,7 @@ def test_a_head_in_metres_parts_its_lips_as_far_as_in_centimetres(file):
         write_glb(file, replace(mesh, vertices=unit * mesh.vertices, shapes=shapes))
         found.append(load_character(file))
     centimetres, metres = found
-    assert face_shapes.life_scale(centimetres.mesh, centimetres.placement) == pytest.approx(9.0)
+    assert face_shapes.find_life_scale(centimetres.mesh, centimetres.placement) == pytest.approx(9.0)
     np.testing.assert_allclose(metres.shapes.gap, centimetres.shapes.gap, rtol=1e-3, atol=1e-6)
 
 
@@ -235,7 +235,7 @@ def test_bones_are_known_by_their_names():
     kinds = {"Head": HEAD, "mixamorig:Neck1": NECK, "J_Bip_C_Head": HEAD, "JawBone": JAW, "jaw_01": JAW}
     kinds |= {"LeftEye": LEFT_EYE, "eye_r": RIGHT_EYE, "HeadTop_End": None, "Hips": None, "": None}
     kinds |= {"mixamorigHead": HEAD, "headphones": None, "CC_Base_JawRoot": JAW, "Head_nub": None}
-    assert {name: bone_kind(name) for name in kinds} == kinds
+    assert {name: find_bone_kind(name) for name in kinds} == kinds
 
 
 def test_a_jaw_bone_opens_the_mouth():

@@ -156,15 +156,15 @@ def test_names_as_files_spell_them():
         "JAW_OPEN": "jawOpen", "A25_Jaw_Open": "jawOpen", "Head|jawOpen_12": "jawOpen",
         "mouthSmile": None, "Fcl_MTH_A": None, "": None, "001": None,
     }  # fmt: skip
-    assert {spelled: shape_names.arkit_name(spelled) for spelled in arkit} == arkit
+    assert {spelled: shape_names.to_arkit(spelled) for spelled in arkit} == arkit
     assert len({*shape_names.ARKIT_MOUTH, *shape_names.ARKIT_OTHERS}) == 52
     visemes = {"viseme_PP": "PP", "viseme_I": "ih", "vrc.v_oh": "oh", "Viseme_aa": "aa", "viseme_ZZ": None}
     visemes |= {"viseme_PP.001": "PP", "aa": None}
     assert len(set(shape_names.VISEMES_15)) == 15
-    assert {spelled: shape_names.viseme_name(spelled) for spelled in visemes} == visemes
+    assert {spelled: shape_names.find_viseme(spelled) for spelled in visemes} == visemes
     vowels = {"Fcl_MTH_A": "aa", "Fcl_MTH_O.003": "oh", "aa": "aa", "う": "ou", "oh": "oh"}
     vowels |= {"Fcl_MTH_Angry": None, "Alpha": None}
-    assert {spelled: shape_names.vowel_name(spelled) for spelled in vowels} == vowels
+    assert {spelled: shape_names.find_vowel(spelled) for spelled in vowels} == vowels
 
 
 SOURCES = {"jawOpen": np.array([0.0, 0.5, 1.0]), "mouthPucker": np.array([0.0, 1.0, 0.0])}

@@ -20,10 +20,10 @@ from lipmotion.pipeline.generate.explain import (
     TITLE_PX,
     StateRun,
     draw_posteriors,
-    explanation_document,
-    explanation_text,
+    list_runs,
     run_lines,
-    runs_of,
+    write_document,
+    write_explanation,
 )
 from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
@@ -52,7 +52,7 @@ def test_a_model_file_and_any_engine(toy_model_file, toy_speech):
 
 def test_the_text_names_everything(coupled_model, toy_sentence):
     (found,) = lipmotion.explain(toy_sentence.audio, at=0.8, model=coupled_model, transcript=WORDS)
-    text = explanation_text(found)
+    text = write_explanation(found)
     lines = text.splitlines()
     assert lines[0] == "0.80 s (frame 80)"
     for start in ("phone", "state", "chain 1: sVis", "chain 2: 2vis", "together", "asynchrony", "Gaussian of speech"):
@@ -69,7 +69,7 @@ def test_the_text_names_everything(coupled_model, toy_sentence):
 
 def test_the_document_is_json_with_all_channels(coupled_model, toy_sentence):
     (found,) = lipmotion.explain(toy_sentence.audio, at=0.8, model=coupled_model)
-    document = json.loads(json.dumps(explanation_document(found), allow_nan=False))
+    document = json.loads(json.dumps(write_document(found), allow_nan=False))
     assert document["frame"] == 80
     assert list(document["motion"]) == list(found.motion)
     lead = document["chains"][1]["lead"]
@@ -97,20 +97,20 @@ def generation(states: tuple[str, ...], frames: list[int]) -> Generation:
 
 
 def test_runs_of_frames_with_one_state():
-    assert runs_of(generation(("x", "y"), [0, 0, 0, 1, 1, 0, 0])) == (
+    assert list_runs(generation(("x", "y"), [0, 0, 0, 1, 1, 0, 0])) == (
         StateRun(0.0, 0.03, "sil", "", "x"),
         StateRun(0.03, 0.05, "p", "papa", "y"),
         StateRun(0.05, 0.07, "aa", "", "x"),
     )
-    assert runs_of(generation(("x",), [])) == ()
+    assert list_runs(generation(("x",), [])) == ()
 
 
 def test_the_phone_is_the_one_that_takes_most_of_the_run():
-    (run,) = runs_of(generation(("x",), [0] * 20))
+    (run,) = list_runs(generation(("x",), [0] * 20))
     assert (run.phone, run.end_s) == ("aa", 0.2)
-    first, second = runs_of(generation(("x", "y"), [0, 0, 0, 0, 1]))
+    first, second = list_runs(generation(("x", "y"), [0, 0, 0, 0, 1]))
     assert (first.phone, second.phone) == ("sil", "p")
-    (beyond,) = runs_of(replace(generation(("x",), [0]), units=Timeline(())))
+    (beyond,) = list_runs(replace(generation(("x",), [0]), units=Timeline(())))
     assert (beyond.phone, beyond.word) == ("", "")
 
 

@@ -15,8 +15,8 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.model import hmm_to_arrays
 from lipmotion.motion.eigenlips import eigenlips_to_arrays
 from lipmotion.pipeline.analysis.speech_analysis import analyse
-from lipmotion.pipeline.model import VERSION, read_header, shipped_path
-from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
+from lipmotion.pipeline.model import VERSION, find_shipped, read_header
+from lipmotion.speech.recognition.adaptation import adaptation_to_arrays, create_adaptation
 from lipmotion.storage.archive import HEADER
 from lipmotion.types import Audio, Generation
 from pipeline.damage import DAMAGES, LARGEST_DIFFERENCE, QUICK, UNREADABLE, animated, damaged, distance, refused
@@ -101,12 +101,12 @@ def welcome() -> Generation:
 
 
 def test_header_says_whose_recordings():
-    header = read_header(shipped_path())
+    header = read_header(find_shipped())
     assert header["licence"] == ["CC BY 4.0"]
     assert any("GRID" in line for line in header["attribution"])
     assert header["split"] == "all"
     assert header["utterances"] == 524
-    assert shipped_path().stat().st_size < 9_000_000
+    assert find_shipped().stat().st_size < 9_000_000
 
 
 def test_lips_meet_on_p_b_m(welcome):
@@ -219,7 +219,7 @@ def test_damaged_arrays_of_all_other_parts(pictured_model):
     parts = {
         "phones": hmm_to_arrays(model.phones),
         "eigenlips": eigenlips_to_arrays(model.eigenlips),
-        "adaptation": adaptation_arrays(identity_adaptation(1.0, 0.5)),
+        "adaptation": adaptation_to_arrays(create_adaptation(1.0, 0.5)),
     }
     read = [
         f"{part}/{name}: {what}"

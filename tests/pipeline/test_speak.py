@@ -9,7 +9,7 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate import speak as module
 from lipmotion.pipeline.generate.speak import REST_S, speak_from_corpus
-from lipmotion.speech.voices.installed import default_voice, installed_voices
+from lipmotion.speech.voices.installed import choose_voice, list_installed
 from lipmotion.types import Span, SpokenText, Unit
 from lipmotion.units import LIP_CLOSING, Lexicon, is_silent
 from pipeline.made import corpus_of
@@ -97,9 +97,9 @@ def test_neighbouring_silences_are_one_and_short_ones_are_pauses():
     ]  # fmt: skip
 
 
-@pytest.mark.skipif(not installed_voices(), reason="no synthesiser is installed")
+@pytest.mark.skipif(not list_installed(), reason="no synthesiser is installed")
 def test_a_real_voice_closes_the_lips_in_time():
-    spoken = speak("Please bring my mother the blue ball.", voice=default_voice(), model=load_model())
+    spoken = speak("Please bring my mother the blue ball.", voice=choose_voice(), model=load_model())
     opening = spoken.generation.motion["opening"]
     closing = [span for span in spoken.generation.units if span.label.phone in LIP_CLOSING]
     assert [span.label.word for span in closing] == ["please", "bring", "my", "mother", "blue", "ball"]

@@ -10,7 +10,7 @@ import pytest
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline import workers as module
-from lipmotion.pipeline.workers import map_in_processes, process_count, worker_pool
+from lipmotion.pipeline.workers import map_in_processes, open_workers, process_count
 
 
 def square(number: int) -> int:
@@ -35,7 +35,7 @@ def held(_: int) -> bool:
 
 def test_no_worker_and_one_are_this_process():
     for count in (0, 1):
-        with worker_pool(count) as team:
+        with open_workers(count) as team:
             assert list(team.ordered_map(square, range(20))) == [number * number for number in range(20)]
             assert sorted(team.unordered_map(square, range(20))) == [number * number for number in range(20)]
             assert list(team.ordered_map(square, [])) == []
@@ -63,7 +63,7 @@ def test_several_workers_are_other_processes():
             taken.append(number)
             yield number
 
-    with worker_pool(2) as team:
+    with open_workers(2) as team:
         assert list(team.ordered_map(square, range(20))) == [number * number for number in range(20)]
         assert list(team.ordered_map(square, [])) == []
         assert os.getpid() not in set(team.ordered_map(whose, range(3)))
@@ -80,7 +80,7 @@ def test_several_workers_are_other_processes():
 
 
 def test_a_worker_that_dies_is_a_clear_error():
-    with pytest.raises(CorpusError, match="a worker process died"), worker_pool(2) as team:
+    with pytest.raises(CorpusError, match="a worker process died"), open_workers(2) as team:
         list(team.ordered_map(die, [0, 1, 0]))
 
 
@@ -94,7 +94,7 @@ def test_a_worker_that_is_ended_while_it_sends_does_not_block():
     before = set(multiprocessing.active_children())
 
     def interrupted() -> None:
-        with worker_pool(2) as team:
+        with open_workers(2) as team:
             next(team.unordered_map(large, range(10)))
             raise KeyboardInterrupt
 
@@ -110,7 +110,7 @@ def killed_while_sending(_: int) -> bytes:
 
 @pytest.mark.long
 def test_a_worker_that_dies_while_it_sends_is_a_clear_error():
-    with pytest.raises(CorpusError, match="a worker process died"), worker_pool(2) as team:
+    with pytest.raises(CorpusError, match="a worker process died"), open_workers(2) as team:
         list(team.ordered_map(killed_while_sending, range(2)))
 
 
@@ -127,7 +127,7 @@ def test_a_signal_that_another_thread_takes_waits_until_a_process_has_started(nu
     signal.set_wakeup_fd(theirs.fileno())
     other.start()
     try:
-        with module._signals_delayed():
+        with module._delay_signals():
             os.kill(os.getpid(), number)
             assert ours.recv(1) == bytes([number])  # it has arrived: were it not held back, it would be answered now
             seen.append("started")

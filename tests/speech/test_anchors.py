@@ -22,7 +22,7 @@ def transcript(*lines: TranscriptLine) -> TimedTranscript:
 
 def test_words_have_the_times_of_their_line_or_their_own():
     timed = TranscriptLine((TimedWord("c"), TimedWord("d", 4.5, 4.75), TimedWord("e")), 4.0, 5.0)
-    found = anchors.anchors_of(transcript(line("a b", 1.0, 2.0), timed, line("f")))
+    found = anchors.find_anchors(transcript(line("a b", 1.0, 2.0), timed, line("f")))
     nan = np.nan
     np.testing.assert_allclose(found.start_s, [1.0, 1.0, 4.0, 4.5, nan, nan])
     np.testing.assert_allclose(found.end_s, [2.0, 2.0, nan, 4.75, 5.0, nan])
@@ -48,7 +48,7 @@ def test_words_have_the_times_of_their_line_or_their_own():
     ],
 )
 def test_windows_are_the_times_and_the_tolerance(lines: list[TranscriptLine], first: list[int], end: list[int]):
-    found = anchors.anchors_of(transcript(*lines))
+    found = anchors.find_anchors(transcript(*lines))
     windows = anchors.make_windows(found, found.tolerance_s, 3000)
     assert (windows.first.tolist(), windows.end.tolist()) == (first, end)
 
@@ -59,9 +59,9 @@ times = st.one_of(st.none(), st.floats(-5, 40))
 @given(spans=st.lists(st.tuples(times, times), min_size=1, max_size=12), frames=st.integers(10, 3000))
 @settings(max_examples=50)
 def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames):
-    found = anchors.anchors_of(transcript(*(line("a b", start_s, end_s) for start_s, end_s in spans)))
+    found = anchors.find_anchors(transcript(*(line("a b", start_s, end_s) for start_s, end_s in spans)))
     least = np.full(len(found.start_s), 3, np.intp)
-    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, least, 3, frames)
+    windows, tolerance_s = anchors.find_windows(found, found.tolerance_s, least, 3, frames)
     assert np.all(np.diff(windows.first) >= 0)
     assert np.all(np.diff(windows.end) >= 0)
     assert np.all(tolerance_s >= found.tolerance_s)
@@ -76,9 +76,9 @@ def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames)
 
 def test_windows_without_room_are_widened_where_it_lacks():
     crowded = [line("a", 1.0, 2.0), line(" ".join("b" * 100), 20.0, 20.5), line("c", 60.0, 61.0)]
-    found = anchors.anchors_of(transcript(*crowded))
+    found = anchors.find_anchors(transcript(*crowded))
     least = np.full(102, 9, np.intp)
-    windows, tolerance_s = anchors.feasible_windows(found, found.tolerance_s, least, 3, 10_000)
+    windows, tolerance_s = anchors.find_windows(found, found.tolerance_s, least, 3, 10_000)
     assert tolerance_s[50] > 4
     assert tolerance_s[0] <= tolerance_s[50]
     assert windows.end[100] - windows.first[1] >= 900
@@ -121,7 +121,7 @@ def many_lines(count: int) -> TimedTranscript:
 def aligned(search: Search, frames: int = 12_000) -> list[int]:
     count = len(search.starts)
     placed, _ = anchors.align_within(
-        anchors.anchors_of(many_lines(count)), np.full(count, 3, np.intp), 3, frames, search
+        anchors.find_anchors(many_lines(count)), np.full(count, 3, np.intp), 3, frames, search
     )
     return [item.start for item in placed[1:]]
 
@@ -194,7 +194,7 @@ def test_a_shift_of_all_times_is_found(late_s, caplog):
     loud = loud_at(spans, duration_s)
     shifted = transcript(*(line("a", start_s + late_s, end_s + late_s) for start_s, end_s in spans))
     assert anchors.measure_lateness(shifted, loud) == pytest.approx(late_s, abs=0.05)
-    corrected = anchors.fitted(shifted, loud, duration_s)
+    corrected = anchors.fit_transcript(shifted, loud, duration_s)
     assert [each.start_s for each in corrected.lines] == pytest.approx([start_s for start_s, _ in spans], abs=0.05)
     (record,) = caplog.records
     which = "late" if late_s > 0 else "early"
@@ -217,11 +217,11 @@ def test_no_shift_is_found_where_there_is_none():
 
 def test_lines_after_the_end_are_left_out(caplog):
     loud = np.ones(1000, bool)
-    kept = anchors.fitted(
+    kept = anchors.fit_transcript(
         transcript(line("a", 1.0, 2.0), line("b"), line("c", 10.5, 12.0), line("d", 11.5, 12.0)), loud, 10.0
     )
     assert kept.words == ("a", "b", "c")
     (record,) = caplog.records
     assert "goes on after the recording ends at 10.00 s; its last 1 lines are left out" in record.getMessage()
     with pytest.raises(InputError, match=r"begins at 20\.00 s, the recording ends at 10\.00 s; give the transcript"):
-        anchors.fitted(transcript(line("a", 20.0, 22.0)), loud, 10.0)
+        anchors.fit_transcript(transcript(line("a", 20.0, 22.0)), loud, 10.0)

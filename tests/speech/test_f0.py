@@ -17,12 +17,12 @@ from lipmotion import Model
 from lipmotion.speech.features import f0
 from lipmotion.speech.features.speaker_similarity import (
     WARPS,
-    mean_speaker_vector,
+    average_speaker,
+    embed_speaker,
+    rate_knowledge,
     speaker_similarity,
-    speaker_vector,
-    voice_knowledge,
 )
-from lipmotion.speech.sound.acoustic_conditions import noisy_audio
+from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.types import Audio
 from pipeline.made import read_sound
 from speech.mfcc_oracle import sample
@@ -171,7 +171,7 @@ def test_level_and_pitch_of_a_tone_that_rises_and_gets_louder():
     hz, gain = np.where(time_s < 1, 120.0, 180.0), np.where(time_s < 1, 0.1, 0.4)
     phase = 2 * np.pi * np.cumsum(hz) / 16_000
     samples = gain * sum(np.sin(k * phase) / k for k in range(1, 6))
-    voice = f0.prosody_of(Audio(samples.astype(np.float32), 16_000))
+    voice = f0.find_prosody(Audio(samples.astype(np.float32), 16_000))
     assert len(voice.level_db) == len(voice.log_f0) == 201
     assert voice.level_db[120:180].mean() - voice.level_db[20:80].mean() == pytest.approx(20 * np.log10(4), abs=0.3)
     assert np.exp(np.nanmedian(voice.log_f0[20:80])) == pytest.approx(120, rel=0.03)
@@ -179,11 +179,11 @@ def test_level_and_pitch_of_a_tone_that_rises_and_gets_louder():
 
 
 def test_silence_is_quiet_and_without_pitch_and_a_level_is_the_mean_power_of_10_ms_before_and_after():
-    silent = f0.prosody_of(Audio(np.zeros(16_000, np.float32), 16_000))
+    silent = f0.find_prosody(Audio(np.zeros(16_000, np.float32), 16_000))
     assert silent.level_db.max() < -80
     assert not np.isfinite(silent.log_f0).any()
     samples = np.random.default_rng(4).normal(0, 0.1, 1_650).astype(np.float32)
-    levels = f0.prosody_of(Audio(samples, 16_000)).level_db
+    levels = f0.find_prosody(Audio(samples, 16_000)).level_db
     around = [samples[max(160 * n - 160, 0) : 160 * n + 160].astype(float) for n in range(11)]
     assert levels == pytest.approx([10 * np.log10(np.mean(part**2) + 1e-9) for part in around])
 
@@ -274,27 +274,27 @@ def test_voices_are_known_by_their_similarity(toy_model: Model) -> None:
     audio, phones = read_sound(toy_sentences(3)[1].audio), replace(toy_model.phones, speaker=None)
     score = speaker_similarity(phones, audio).score
     shifted = [replace(phones, typical_fit=phones.typical_fit + score - other) for other in (-20, -9, -6, -3, 2)]
-    assert [voice_knowledge(hmm, audio) for hmm in shifted] == pytest.approx([0, 0, 0.5, 1, 1])
+    assert [rate_knowledge(hmm, audio) for hmm in shifted] == pytest.approx([0, 0, 0.5, 1, 1])
 
 
 def test_a_known_voice_in_noise_is_not_a_stranger(toy_model: Model) -> None:
     """Noise makes it dissimilar to its training; its speaker vector says more, and never less."""
     sounds = [read_sound(sentence.audio) for sentence in toy_sentences(6)]
-    mean = mean_speaker_vector(sounds[:5])
+    mean = average_speaker(sounds[:5])
     old, known, opposite = (replace(toy_model.phones, speaker=speaker) for speaker in (None, mean, -mean))
-    noisy = read_sound(noisy_audio(sounds[5], "white", 15))
-    assert voice_knowledge(old, sounds[5]) == voice_knowledge(known, sounds[5]) > 0.9
-    assert voice_knowledge(known, noisy) > voice_knowledge(old, noisy) + 0.3
-    assert voice_knowledge(opposite, noisy) == voice_knowledge(old, noisy)
+    noisy = read_sound(mix_noise(sounds[5], "white", 15))
+    assert rate_knowledge(old, sounds[5]) == rate_knowledge(known, sounds[5]) > 0.9
+    assert rate_knowledge(known, noisy) > rate_knowledge(old, noisy) + 0.3
+    assert rate_knowledge(opposite, noisy) == rate_knowledge(old, noisy)
 
 
 def test_a_speaker_vector_is_that_of_sound_alone() -> None:
     sound = toy_sentences(3)[0].audio.samples
     line = sound[: len(sound) // 320 * 320]
     alone, longer, louder = (
-        speaker_vector(read_sound(Audio(samples.astype(np.float32), 16_000)))
+        embed_speaker(read_sound(Audio(samples.astype(np.float32), 16_000)))
         for samples in (line, np.pad(line, 32_000), line / 8)
     )
     assert longer == pytest.approx(alone, abs=0.2)
     assert louder == pytest.approx(alone, abs=0.05)
-    assert not speaker_vector(read_sound(Audio(np.zeros(16_000, np.float32), 16_000))).any()
+    assert not embed_speaker(read_sound(Audio(np.zeros(16_000, np.float32), 16_000))).any()

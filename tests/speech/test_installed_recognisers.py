@@ -20,8 +20,8 @@ AUDIO = types.Audio(np.linspace(-1, 1, 20_000, dtype=np.float32), 16_000)
 @pytest.fixture(autouse=True)
 def no_cache() -> Iterator[None]:
     yield
-    installed_recognisers._whisper_model.cache_clear()
-    installed_recognisers._vosk_model.cache_clear()
+    installed_recognisers._load_whisper.cache_clear()
+    installed_recognisers._load_vosk.cache_clear()
 
 
 class WhisperModel:

@@ -20,11 +20,11 @@ from lipmotion.speech.features.encoding import (
     LEVEL,
     WindowedEncoding,
     encode_window,
+    load_encoder,
     log_mel_spectrum,
-    shipped_encoder,
 )
 from lipmotion.speech.features.f0 import log_f0
-from lipmotion.speech.features.mfcc import HOP, ROUNDING_SHARE, WINDOW, mfcc, normalised, regression_delta
+from lipmotion.speech.features.mfcc import HOP, ROUNDING_SHARE, WINDOW, compute_delta, mfcc, normalise_rows
 from lipmotion.testing import example
 from lipmotion_faces.corpus import sound_offset
 from pipeline.made import read_sound, read_welcome
@@ -109,14 +109,14 @@ def test_digital_silence_is_nothing_at_all_and_finite_inside_a_recording() -> No
 def test_a_constant_column_becomes_0() -> None:
     for value in (0.1, -69.07755, 1e4):
         for count in (1, 2, 12_345):
-            assert not normalised(np.full((count, 2), value, np.float32), ROUNDING_SHARE * abs(value)).any()
+            assert not normalise_rows(np.full((count, 2), value, np.float32), ROUNDING_SHARE * abs(value)).any()
 
 
 @settings(max_examples=50)
 @given(st.integers(5, 60), st.floats(-3, 3), st.floats(-10, 10))
 def test_the_delta_of_a_ramp_is_its_slope(frames: int, slope: float, start: float) -> None:
     ramp = (start + slope * np.arange(frames)).astype(np.float32)[:, None]
-    assert regression_delta(ramp)[2:-2] == pytest.approx(slope, abs=1e-4)
+    assert compute_delta(ramp)[2:-2] == pytest.approx(slope, abs=1e-4)
 
 
 @pytest.mark.parametrize("measure", [mfcc, log_f0])
@@ -197,7 +197,7 @@ def test_the_forward_pass_is_that_of_the_network() -> None:
     """
     samples = read_welcome().samples
     padded = np.pad(samples, (0, 8 * RATE_HZ + WINDOW - HOP - len(samples)))
-    rows = encode_window(log_mel_spectrum(padded.astype(np.float32))[:800], shipped_encoder())
+    rows = encode_window(log_mel_spectrum(padded.astype(np.float32))[:800], load_encoder())
     expected = np.loadtxt(Path(__file__).with_name("encoder_reference.csv"), delimiter=",")
     assert rows[5:285:20, :8] == pytest.approx(expected, abs=0.04)
     assert expected.std() > 0.4

@@ -33,40 +33,40 @@ def test_the_ratio_is_as_asked() -> None:
     for kind in acoustic_conditions.NOISE_KINDS:
         clean, talkers = talker(0, 0.3), [talker(1), talker(2), talker(3)]
         for snr_db in (-10.0, 12.5):
-            dirty = acoustic_conditions.noisy_audio(clean, kind, snr_db, talkers, seed=4)
+            dirty = acoustic_conditions.mix_noise(clean, kind, snr_db, talkers, seed=4)
             assert ratio_db(clean.samples, added(clean, dirty)) == pytest.approx(snr_db, abs=0.02)
 
 
 def test_neither_the_level_of_the_noise_given_nor_pauses_matter() -> None:
-    clean, hiss = talker(0), acoustic_conditions.white_noise(len(talker(0).samples), 1)
+    clean, hiss = talker(0), acoustic_conditions.make_hiss(len(talker(0).samples), 1)
     same, other = (
         acoustic_conditions.add_noise(clean, hiss, 10),
         acoustic_conditions.add_noise(clean, np.float32(20) * hiss, 10),
     )
     np.testing.assert_allclose(other.samples, same.samples, atol=1e-6)
     paused = (talker(0, pause_s=pause_s) for pause_s in (0.2, 0.7))
-    short, long = (added(clean, acoustic_conditions.noisy_audio(clean, "white", 10)).std() for clean in paused)
+    short, long = (added(clean, acoustic_conditions.mix_noise(clean, "white", 10)).std() for clean in paused)
     assert long == pytest.approx(short, rel=0.06)
 
 
 def test_speech_is_found_between_the_pauses() -> None:
     phones = [("sil", 0.5), ("aa", 0.5), ("sil", 0.5)]
-    spoken = np.flatnonzero(acoustic_conditions.spoken_samples(synthesise(phones)[0])) / RATE_HZ
+    spoken = np.flatnonzero(acoustic_conditions.mark_spoken(synthesise(phones)[0])) / RATE_HZ
     assert spoken[[0, -1]] == pytest.approx([0.5, 1.0], abs=0.06)
 
 
 def test_talkers_are_as_loud_begin_again_and_start_by_chance_of_the_seed() -> None:
     one, two = talker(1), talker(2)
-    alone = [acoustic_conditions.babble_noise([one, types.Audio(one.samples, RATE_HZ)], 16_000, seed=0)]
-    alone += [acoustic_conditions.babble_noise([talker(1, 0.02), talker(1, 3.0)], 16_000, seed=0)]
+    alone = [acoustic_conditions.make_babble([one, types.Audio(one.samples, RATE_HZ)], 16_000, seed=0)]
+    alone += [acoustic_conditions.make_babble([talker(1, 0.02), talker(1, 3.0)], 16_000, seed=0)]
     np.testing.assert_allclose(alone[0], alone[1], atol=1e-4)
     length = len(one.samples)
-    twice = acoustic_conditions.babble_noise([one, one], 3 * length, seed=2)
+    twice = acoustic_conditions.make_babble([one, one], 3 * length, seed=2)
     np.testing.assert_allclose(twice[:length], twice[length : 2 * length], atol=1e-6)
-    first, again, other = (acoustic_conditions.babble_noise([one, two], 20_000, seed) for seed in (1, 1, 2))
+    first, again, other = (acoustic_conditions.make_babble([one, two], 20_000, seed) for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
-    assert not np.array_equal(acoustic_conditions.white_noise(100, 1), acoustic_conditions.white_noise(100, 2))
+    assert not np.array_equal(acoustic_conditions.make_hiss(100, 1), acoustic_conditions.make_hiss(100, 2))
 
 
 SILENT = types.Audio(np.zeros(16_000, np.float32), RATE_HZ)
@@ -88,12 +88,12 @@ def test_it_says_what_is_wrong() -> None:
         ("babble", 10, one, [two, one], "own babble"),
     ):
         with pytest.raises(errors.InputError, match=message):
-            acoustic_conditions.noisy_audio(audio, kind, snr_db, talkers)
+            acoustic_conditions.mix_noise(audio, kind, snr_db, talkers)
     for noise, message in ((np.ones(3), "shape"), (np.zeros(16_000), "mean power"), (np.full(16_000, np.nan), "nan")):
         with pytest.raises(errors.InputError, match=message):
             acoustic_conditions.add_noise(tone, noise, 0)
     with pytest.raises(errors.InputError, match="0 samples"):
-        acoustic_conditions.white_noise(0)
+        acoustic_conditions.make_hiss(0)
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def voices() -> list[types.Audio]:
 
 def test_the_same_seed_gives_the_same_spectra_and_another_does_not(voices: list[types.Audio]) -> None:
     one, same, other = (
-        [each.values for each in acoustic_conditions.condition_spectra(voices[0], voices, 4, [seed])]
+        [each.values for each in acoustic_conditions.list_conditions(voices[0], voices, 4, [seed])]
         for seed in (7, 7, 8)
     )
     for a, b in zip(one, same, strict=True):
@@ -114,12 +114,12 @@ def test_the_same_seed_gives_the_same_spectra_and_another_does_not(voices: list[
 
 def test_the_length_follows_the_tempo(voices: list[types.Audio]) -> None:
     frames = len(spectrum(voices[0]))
-    for version in acoustic_conditions.condition_spectra(voices[0], voices, 8, [1]):
+    for version in acoustic_conditions.list_conditions(voices[0], voices, 8, [1]):
         assert len(version.values) == pytest.approx(frames / version.tempo, abs=2)
 
 
 def test_conditions_leave_speech_recognisable_and_finite(voices: list[types.Audio]) -> None:
-    found = [acoustic_conditions.in_condition(voices[0], voices, np.random.default_rng(seed)) for seed in range(20)]
+    found = [acoustic_conditions.apply_condition(voices[0], voices, np.random.default_rng(seed)) for seed in range(20)]
     assert all(np.isfinite(audio.samples).all() and len(audio.samples) == len(voices[0].samples) for audio, _ in found)
     distortions = np.array([distortion for _, distortion in found])
     assert distortions.min() == 0
@@ -132,7 +132,7 @@ def test_conditions_leave_speech_recognisable_and_finite(voices: list[types.Audi
 def test_silence_stays_as_it_is(voices: list[types.Audio]) -> None:
     silence = types.Audio(np.zeros(16_000, np.float32), 16_000)
     for seed in range(5):
-        audio, distortion = acoustic_conditions.in_condition(silence, voices, np.random.default_rng(seed))
+        audio, distortion = acoustic_conditions.apply_condition(silence, voices, np.random.default_rng(seed))
         assert not audio.samples.any()
         assert distortion == 0
 
@@ -154,14 +154,14 @@ def tone(hertz: float, seconds: float, phase: float = 0.0) -> np.ndarray:
 def test_successive_pieces_of_one_recording_join_without_a_trace(edges_s: tuple[float, ...]) -> None:
     sound = np.random.default_rng(1).standard_normal(16_000).astype(np.float32)
     pieces = list(pairwise(edges_s))
-    joined = resampling.overlapped([sound] * len(pieces), pieces, RATE_HZ)
+    joined = resampling.overlap_pieces([sound] * len(pieces), pieces, RATE_HZ)
     np.testing.assert_allclose(joined.samples, sound[1600 : round(edges_s[-1] * RATE_HZ)], atol=1e-5)
     assert joined.starts == [round((start_s - 0.1) * RATE_HZ) for start_s, _ in pieces]
 
 
 def test_a_tone_goes_on_in_phase() -> None:
     for phase in (1.0, 4.5):
-        joined = resampling.overlapped([tone(140, 0.5), tone(140, 0.5, phase)], [(0.0, 0.25), (0.25, 0.5)], RATE_HZ)
+        joined = resampling.overlap_pieces([tone(140, 0.5), tone(140, 0.5, phase)], [(0.0, 0.25), (0.25, 0.5)], RATE_HZ)
         spectrum = np.abs(np.fft.rfft(joined.samples[:7000] * np.hanning(7000)))
         frequencies = np.fft.rfftfreq(7000, 1 / RATE_HZ)
         assert spectrum[np.abs(frequencies - 140) > 30].max() < 0.02 * spectrum.max()
@@ -170,7 +170,7 @@ def test_a_tone_goes_on_in_phase() -> None:
 
 def test_a_shifted_piece_says_so() -> None:
     marked = tone(100, 0.5, np.pi / 2)
-    joined = resampling.overlapped([tone(100, 0.5), marked], [(0.0, 0.2), (0.25, 0.5)], RATE_HZ)
+    joined = resampling.overlap_pieces([tone(100, 0.5), marked], [(0.0, 0.2), (0.25, 0.5)], RATE_HZ)
     begins = 0.25 + joined.shifts[1] / RATE_HZ
     place = joined.starts[1] + round((0.4 - begins) * RATE_HZ)
     np.testing.assert_allclose(joined.samples[place : place + 200], marked[6400:6600], atol=1e-5)
@@ -178,16 +178,16 @@ def test_a_shifted_piece_says_so() -> None:
 
 
 def test_a_short_first_piece_makes_no_click() -> None:
-    joined = resampling.overlapped([np.ones(8000, np.float32)] * 2, [(0.1, 0.101), (0.2, 0.4)], RATE_HZ)
+    joined = resampling.overlap_pieces([np.ones(8000, np.float32)] * 2, [(0.1, 0.101), (0.2, 0.4)], RATE_HZ)
     np.testing.assert_allclose(joined.samples, 1, atol=1e-6)
 
 
 def test_fewer_samples_are_what_scipy_computes_and_a_sound_at_the_same_rate_stays():
     for factor, length in ((2, 1), (3, 5), (6, 100), (3, 2401), (3, 4 * resampling.KEPT_BLOCK)):
         sound = np.random.default_rng(length).normal(0, 0.1, length).astype(np.float32)
-        found, expected = resampling.decimated(sound, factor), resample_poly(sound, 1, factor)
+        found, expected = resampling.decimate(sound, factor), resample_poly(sound, 1, factor)
         assert found.dtype == np.float32
         assert found.shape == expected.shape
         assert found == pytest.approx(expected, abs=1e-6)
-        assert np.array_equal(resampling.decimated(sound, 1), sound)
-    assert not len(resampling.decimated(sound[:0], 3))
+        assert np.array_equal(resampling.decimate(sound, 1), sound)
+    assert not len(resampling.decimate(sound[:0], 3))

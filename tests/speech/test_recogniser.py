@@ -12,15 +12,15 @@ from scipy.signal import butter, lfilter
 from lipmotion import Model, errors, load_model, types
 from lipmotion.speech.recognition import adaptation, recogniser
 from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
-from lipmotion.speech.recognition.general import NOISES, combine_phones, combined_log_likelihoods, general_model
+from lipmotion.speech.recognition.general import NOISES, combine_likelihoods, combine_phones, load_general
 from lipmotion.speech.recognition.recognised_speech import (
     SLIVER_FRAMES,
     AlignedWords,
     LabelledFrames,
     RecognisedWord,
-    labels_of_words,
-    recognition_of,
-    spliced,
+    build_recognition,
+    label_words,
+    splice,
 )
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.stats.constrained_mllr import log_determinant
@@ -206,8 +206,8 @@ def test_all_phones_are_there_and_the_own_ones_are_as_they_were(toy_model: Model
 def test_evidence_is_the_sum_of_both(toy_model: Model, trust: float) -> None:
     own, general = np.random.default_rng(0).normal(size=(2, 9, 39)).astype(np.float32)
     combined = combine_phones(toy_model.phones)
-    log_likelihoods = combined_log_likelihoods(combined, own, trust, general)
-    wanted = general_model().log_density(general)[:, combined.columns] + trust * combined.hmm.mixtures.log_likelihood(
+    log_likelihoods = combine_likelihoods(combined, own, trust, general)
+    wanted = load_general().log_density(general)[:, combined.columns] + trust * combined.hmm.mixtures.log_likelihood(
         own
     )
     assert log_likelihoods.frames == 9
@@ -228,24 +228,24 @@ ALIGNED = AlignedWords(
 
 def test_a_stretch_nothing_or_all_is_replaced() -> None:
     part = (Stretch(30, 60), [LabelledFrames(30, "b", 0), LabelledFrames(45, "iy", 0)])
-    assert spliced(BASE, [part], 100) == [*BASE[:2], *part[1], LabelledFrames(60, "t"), BASE[3]]
-    assert spliced(BASE, [], 100) == BASE
+    assert splice(BASE, [part], 100) == [*BASE[:2], *part[1], LabelledFrames(60, "t"), BASE[3]]
+    assert splice(BASE, [], 100) == BASE
     whole = [LabelledFrames(0, "b", 0)]
-    assert spliced(BASE, [(Stretch(0, 100), whole)], 100) == whole
+    assert splice(BASE, [(Stretch(0, 100), whole)], 100) == whole
     sliver = (Stretch(22, 69), [LabelledFrames(22, "b", 0)])
     assert SLIVER_FRAMES > 2
-    assert [label.phone for label in spliced(BASE, [sliver], 100)] == ["sil", "b", "sil"]
+    assert [label.phone for label in splice(BASE, [sliver], 100)] == ["sil", "b", "sil"]
 
 
 def test_labels_are_those_of_the_words_that_are_believed() -> None:
-    ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([True, True]), 5)
+    ((frames, labels),) = label_words(ALIGNED, Stretch(100, 180), np.array([True, True]), 5)
     assert frames == Stretch(100, 180)  # all
     assert [label.word for label in labels] == [-1, 5, -1, 6, 6, 6, -1]
     assert [label.first for label in labels] == [100, 110, 120, 122, 130, 150, 160]
-    ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, True]), 0)
+    ((frames, labels),) = label_words(ALIGNED, Stretch(100, 180), np.array([False, True]), 0)
     assert frames == Stretch(122, 160)
     assert [label.phone for label in labels] == ["b", "ow", "t"]
-    assert not list(labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, False]), 0))
+    assert not list(label_words(ALIGNED, Stretch(100, 180), np.array([False, False]), 0))
 
 
 def test_fits_are_means_over_the_frames_of_each_word() -> None:
@@ -261,17 +261,17 @@ def test_what_was_recognised() -> None:
     labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
     spans = ((0.0, 0.1, "sil", ""), (0.1, 0.2, "b", "bee"), (0.2, 0.4, "iy", "bee"), (0.4, 0.5, "z", ""))
     units = Timeline(tuple(Span(start, end, Unit(phone, word=word)) for start, end, phone, word in spans))
-    found = recognition_of(units, labels, [RecognisedWord("bee", 0.8)], -7.0)
+    found = build_recognition(units, labels, [RecognisedWord("bee", 0.8)], -7.0)
     (word,) = found.words
     assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
     assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.1))
     assert found.confidence == pytest.approx(0.8)
     assert found.reliability == pytest.approx(1)
-    doubtful = recognition_of(units, labels, [RecognisedWord("bee", 0.3)], -7.0)
+    doubtful = build_recognition(units, labels, [RecognisedWord("bee", 0.3)], -7.0)
     assert doubtful.reliability == pytest.approx(0)
     shares = [replace(found, posterior=posterior).reliability for posterior in (0.6, 0.8, 0.95)]
     assert shares == pytest.approx([0, 0.5, 1])
-    wordless = recognition_of(units, [LabelledFrames(0, "sil")], [], -7.0)
+    wordless = build_recognition(units, [LabelledFrames(0, "sil")], [], -7.0)
     assert replace(wordless, posterior=0.575).reliability == pytest.approx(0.5)
 
 
@@ -286,7 +286,7 @@ def some() -> adaptation.Adaptation:
 
 
 def test_own_features_are_warped_then_transformed_and_general_ones_stream_by_stream(audio: types.Audio) -> None:
-    sound, nothing, one = read_sound(audio), adaptation.identity_adaptation(1.0, 0.5), some()
+    sound, nothing, one = read_sound(audio), adaptation.create_adaptation(1.0, 0.5), some()
     plain = sound.general_features
     assert np.array_equal(nothing.own_features(sound), sound.mfcc().values)
     assert np.array_equal(nothing.general_features(sound), plain)
@@ -301,7 +301,7 @@ def test_own_features_are_warped_then_transformed_and_general_ones_stream_by_str
 
 def test_arrays_and_back_and_damaged_arrays() -> None:
     one, broken = some(), np.eye(39, 40)
-    again = adaptation.adaptation_from_arrays(adaptation.adaptation_arrays(one))
+    again = adaptation.adaptation_from_arrays(adaptation.adaptation_to_arrays(one))
     assert (again.warp, again.own_weight) == (one.warp, one.own_weight)
     assert np.array_equal(again.own, one.own)
     assert np.array_equal(again.general, one.general)
@@ -315,7 +315,7 @@ def test_arrays_and_back_and_damaged_arrays() -> None:
         ({"own": broken}, "own holds values that are not finite"),
     ):
         arrays = {
-            key: value for key, value in (adaptation.adaptation_arrays(one) | damage).items() if value is not None
+            key: value for key, value in (adaptation.adaptation_to_arrays(one) | damage).items() if value is not None
         }
         with pytest.raises(errors.ModelFormatError, match=f"{says}.*adapt the model again"):
             adaptation.adaptation_from_arrays(arrays)

@@ -14,8 +14,8 @@ from lipmotion.speech.recognition.transcript_evidence import (
     PHONE_COST,
     WORD_COST,
     _best_path,
+    find_evidence,
     label_evidence,
-    transcript_evidence,
 )
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
@@ -50,7 +50,7 @@ def transcript(words: list[str], end_s: float, word_s: float = 0.1) -> Timeline[
 
 
 def test_a_right_transcript_is_said() -> None:
-    found = transcript_evidence(heard([*SAID]), FRAME_S, transcript([*SAID], 1.0))
+    found = find_evidence(heard([*SAID]), FRAME_S, transcript([*SAID], 1.0))
     assert [word.word for word in found.words] == [*SAID]
     assert (found.unsaid, found.others, found.is_doubtful) == ((), (), False)
     assert found.words[0].start_s == pytest.approx(0.22)
@@ -59,7 +59,7 @@ def test_a_right_transcript_is_said() -> None:
 
 def test_another_transcript_is_doubtful() -> None:
     for words in ([*OTHER], [*SAID][::-1]):
-        found = transcript_evidence(heard([*SAID], sure=0.99999), FRAME_S, transcript(words, 1.0))
+        found = find_evidence(heard([*SAID], sure=0.99999), FRAME_S, transcript(words, 1.0))
         assert found.is_doubtful
         assert found.gaps
 
@@ -67,7 +67,7 @@ def test_another_transcript_is_doubtful() -> None:
 def test_the_word_that_is_not_said_is_left_out_where_another_is() -> None:
     words = ["papa", "sees", "meow", "fish"]
     said = heard(["papa", "sees", "away", "fish"], sure=0.99999)
-    found = transcript_evidence(said, FRAME_S, transcript(words, 1.0))
+    found = find_evidence(said, FRAME_S, transcript(words, 1.0))
     (wrong,) = found.unsaid
     assert wrong.word == "meow"
     assert (wrong.start_s, wrong.end_s) == pytest.approx((0.4, 0.5))  # where it was aligned
@@ -81,19 +81,19 @@ def test_the_word_that_is_not_said_is_left_out_where_another_is() -> None:
 @pytest.mark.parametrize("first", [False, True])
 def test_a_sentence_too_many_is_left_out_and_nothing_is_missing(first: bool) -> None:
     words = [*OTHER, *SAID] if first else [*SAID, *OTHER]
-    found = transcript_evidence(heard([*SAID], sure=0.99999), FRAME_S, transcript(words, 2.0, word_s=0.05))
+    found = find_evidence(heard([*SAID], sure=0.99999), FRAME_S, transcript(words, 2.0, word_s=0.05))
     assert [word.word for word in found.unsaid] == [*OTHER]
     assert found.gaps == ()
 
 
 def test_words_that_are_left_out_are_a_gap_in_their_place() -> None:
     whole, part = ["papa", "meow", "away", "fish"], ["papa", "fish"]
-    found = transcript_evidence(heard(whole, sure=0.999), FRAME_S, transcript(part, 1.0))
+    found = find_evidence(heard(whole, sure=0.999), FRAME_S, transcript(part, 1.0))
     first = 10 + 1 + 2 * 4  # pause, blank, papa
     (gap,) = found.gaps
     assert gap == pytest.approx((first * FRAME_S, (first + 11) * FRAME_S), abs=0.03)
     assert found.unsaid == ()
-    nothing = transcript_evidence(heard(whole, sure=0.999), FRAME_S, Timeline((Span(0.0, 1.0, Unit("sil")),)))
+    nothing = find_evidence(heard(whole, sure=0.999), FRAME_S, Timeline((Span(0.0, 1.0, Unit("sil")),)))
     assert len(nothing.gaps) == 1
     assert nothing.words == ()
 
@@ -101,8 +101,8 @@ def test_words_that_are_left_out_are_a_gap_in_their_place() -> None:
 def test_similar_phones_are_heard_for_one_another() -> None:
     """And an unsure network has no strong opinion."""
     spoken = Timeline(tuple(Span(n / 10, (n + 1) / 10, Unit(p, word="c")) for n, p in enumerate(["z", "ih", "s"])))
-    assert transcript_evidence(heard(["sees"]), FRAME_S, spoken).others == ()
-    wrong = [transcript_evidence(heard(["sees"], sure), FRAME_S, transcript(["book"], 1.0)) for sure in (0.9999, 0.2)]
+    assert find_evidence(heard(["sees"]), FRAME_S, spoken).others == ()
+    wrong = [find_evidence(heard(["sees"], sure), FRAME_S, transcript(["book"], 1.0)) for sure in (0.9999, 0.2)]
     assert [len(found.unsaid) for found in wrong] == [1, 0]
 
 
@@ -113,10 +113,10 @@ def test_a_long_recording_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
     spans = []
     for number in range(3):
         spans += list(transcript([*SAID] if number != 1 else [*OTHER], piece_s).shifted(number * piece_s))
-    whole = transcript_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
+    whole = find_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
     monkeypatch.setattr(module, "LARGEST_SEARCH", 0)
     monkeypatch.setattr(module, "LEAST_STRETCH_S", 0.3)
-    parts = transcript_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
+    parts = find_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
     assert [word.is_said for word in parts.words] == [True] * 4 + [False] * 3 + [True] * 4
     assert [word[:2] for word in parts.words] == [word[:2] for word in whole.words]
     (one,), (other,) = whole.others, parts.others
@@ -124,25 +124,25 @@ def test_a_long_recording_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_words_that_do_not_fit_into_the_frames_are_not_said() -> None:
-    found = transcript_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
+    found = find_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
     assert found.unsaid == found.words
     assert found.gaps == ()
 
 
 def test_posteriors_of_something_else_are_refused() -> None:
     with pytest.raises(ValueError, match="47 classes, required 48"):
-        transcript_evidence(np.zeros((20, 47)), FRAME_S, transcript(["a"], 0.1))
+        find_evidence(np.zeros((20, 47)), FRAME_S, transcript(["a"], 0.1))
     with pytest.raises(ValueError, match=r"posteriors of 0\.20 s, required 0\.60"):
-        transcript_evidence(np.zeros((10, 48)), FRAME_S, transcript([*SAID], 0.7))
+        find_evidence(np.zeros((10, 48)), FRAME_S, transcript([*SAID], 0.7))
 
 
 def best_by_trying(log_posteriors: NDArray[np.float64], words: list[list[int]]) -> tuple[float, list[bool]]:
     """Return the score of the best path, and which words it says: all of them are tried, one after another."""
     phones = [phone for word in words for phone in word]
     edges = list(np.cumsum([0, *map(len, words)]))
-    silent = np.logaddexp.reduce(log_posteriors[:, module._silent_columns()], axis=1)
+    silent = np.logaddexp.reduce(log_posteriors[:, module._find_silent()], axis=1)
     anything = np.maximum(log_posteriors.max(axis=1), silent)
-    spoken = np.log(np.exp(log_posteriors) @ module._taken_for())
+    spoken = np.log(np.exp(log_posteriors) @ module._count_taken())
 
     def best(t: int, n: int, how: str) -> tuple[float, list[bool]]:
         """Return the best way on from the frame t, where n phones are said, or left out."""
@@ -217,7 +217,7 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
 ) -> None:
     """Frame by frame, by name."""
     sentence = sentences[0]
-    density = general.general_model().log_density(general.general_features(sentence.audio))
+    density = general.load_general().log_density(general.general_features(sentence.audio))
     names = {"ax": "AH", "axr": "ER", "ix": "IH"}
     spoken = [
         (n, number, span.label.phone)
@@ -232,18 +232,18 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
             max(density[frame].reshape(len(general.PHONES), 3)[row].max(), agreement.WORST_SCORE)
         )
     mean = np.mean([np.mean(scores) for scores in wanted.values()])
-    assert agreement.agreement_score(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
+    assert agreement.score_agreement(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
 
 
 def test_loud_silence_is_missing_speech(sentences: list[ToySentence]) -> None:
     audio, units = sentences[0].audio, sentences[0].units
-    fit = agreement.transcript_fit(audio, Timeline((Span(0.0, audio.duration_s, Unit("sil")),)))
+    fit = agreement.measure_fit(audio, Timeline((Span(0.0, audio.duration_s, Unit("sil")),)))
     ((start_s, end_s),) = fit.missing
     spoken = [span for span in units if span.label.phone != "sil"]
     assert (start_s, end_s) == pytest.approx((spoken[0].start_s, spoken[-1].end_s), abs=0.2)
     assert fit.speech_s == pytest.approx(fit.missing_s)
     assert fit.share == pytest.approx(0)
-    assert agreement.transcript_fit(audio, units).missing == ()
+    assert agreement.measure_fit(audio, units).missing == ()
 
 
 def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> None:
@@ -264,7 +264,7 @@ def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> 
     def missing(phone: str, gain: float = 1.0) -> tuple[tuple[float, float], ...]:
         audio = Audio(np.concatenate([samples[:stop], gain * vowel, samples[stop:]]), rate_hz)
         units = Timeline((*spans[:place], replace(spans[place], end_s=end_s, label=Unit(phone)), *later))
-        fit = agreement.transcript_fit(audio, units)
+        fit = agreement.measure_fit(audio, units)
         assert (fit.share < 0.8) == bool(fit.missing)
         return fit.missing
 
@@ -293,7 +293,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
         assert words is not None
         for said, kept in ((words, True), (words[:3], False)):
             units = phones.align(audio, features_of(audio), said, Lexicon())
-            noticed = bool(agreement.transcript_fit(audio, units).missing)
+            noticed = bool(agreement.measure_fit(audio, units).missing)
             whole, half = whole + (kept and noticed), half + (noticed and not kept)
     assert whole == 0
     assert half > 0.7 * len(names)
@@ -311,6 +311,6 @@ def test_real_recordings(recordings: Path) -> None:
         for clip, found in ((name, right), (other, wrong)):
             words = spell_name(clip)
             assert words is not None
-            found.append(agreement.agreement_score(audio, phones.align(audio, features, words, Lexicon())))
+            found.append(agreement.score_agreement(audio, phones.align(audio, features, words, Lexicon())))
     assert min(right) > agreement.DOUBTFUL_SCORE
     assert np.mean(np.array(wrong) < agreement.DOUBTFUL_SCORE) > 0.6

@@ -25,22 +25,22 @@ def energy(frames: int, *sounds: tuple[int, int]) -> np.ndarray:
 
 
 def test_sound_has_its_stretch_with_a_margin_that_ends_with_the_recording() -> None:
-    (found,) = voice_activity.stretches_of_sound(energy(1000, (300, 500)))
+    (found,) = voice_activity.find_sound(energy(1000, (300, 500)))
     assert found == pytest.approx((300 - voice_activity.MARGIN_FRAMES, 500 + voice_activity.MARGIN_FRAMES), abs=5)
-    assert voice_activity.stretches_of_sound(energy(400, (10, 200), (230, 390))) == [voice_activity.Stretch(0, 400)]
+    assert voice_activity.find_sound(energy(400, (10, 200), (230, 390))) == [voice_activity.Stretch(0, 400)]
 
 
 def test_short_pauses_do_not_part_sound_and_clicks_and_constant_energy_are_none() -> None:
-    assert len(voice_activity.stretches_of_sound(energy(1000, (200, 300), (380, 500)))) == 1
-    assert len(voice_activity.stretches_of_sound(energy(1000, (200, 300), (600, 700)))) == 2
-    assert not voice_activity.stretches_of_sound(energy(1000, (300, 300 + LEAST_FRAMES // 3), (600, 602)))
-    assert not voice_activity.stretches_of_sound(np.full(500, -11.5, np.float32))
+    assert len(voice_activity.find_sound(energy(1000, (200, 300), (380, 500)))) == 1
+    assert len(voice_activity.find_sound(energy(1000, (200, 300), (600, 700)))) == 2
+    assert not voice_activity.find_sound(energy(1000, (300, 300 + LEAST_FRAMES // 3), (600, 602)))
+    assert not voice_activity.find_sound(np.full(500, -11.5, np.float32))
 
 
 def test_a_long_stretch_is_cut_where_it_is_quietest() -> None:
     values = energy(5000, (400, 4600))
     values[1000:1030] = QUIET_ENERGY
-    first, second, *_ = voice_activity.stretches_of_sound(values)
+    first, second, *_ = voice_activity.find_sound(values)
     assert 1000 <= first.end <= 1030
     assert second.first == first.end
 
@@ -52,7 +52,7 @@ def test_stretches_are_in_order_bounded_and_hold_all_sound() -> None:
         starts = np.sort(draw.integers(0, frames, draw.integers(1, 30)))
         sounds = [(int(start), int(start + draw.integers(1, 900))) for start in starts]
         values = energy(frames, *sounds) + draw.normal(0, 0.1, frames).astype(np.float32)
-        found = voice_activity.stretches_of_sound(values)
+        found = voice_activity.find_sound(values)
         assert all(0 <= stretch.first < stretch.end <= frames for stretch in found)
         assert all(stretch.end - stretch.first <= voice_activity.LONGEST_FRAMES for stretch in found)
         assert all(before.end <= after.first for before, after in pairwise(found))
@@ -183,7 +183,7 @@ def test_what_is_no_voice_is_no_passage(sound: NDArray[np.float64], units: float
 
 def level_passage(samples: Samples) -> Samples:
     """Return a passage at the level of all passages."""
-    gain = voice_activity.passage_gain(mfcc.log_energy(samples))
+    gain = voice_activity.find_passage_gain(mfcc.log_energy(samples))
     return voice_activity.apply_gain(samples, np.arange(len(gain)), gain)
 
 
@@ -270,37 +270,37 @@ SPANS = [(0.5, 1.5), (2.0, 3.2), (4.0, 4.6)]
 
 def test_levels_are_those_of_the_sound():
     sine = np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE).astype(np.float32)
-    levels = pauses.levels_db(Audio(0.1 * sine, RATE))
+    levels = pauses.measure_levels_db(Audio(0.1 * sine, RATE))
     assert levels.shape == (100,)
     assert levels[10:-10] == pytest.approx(-23.0, abs=0.3)  # 20 dB below full scale, 3 for a sine
-    assert pauses.levels_db(Audio(np.zeros(RATE, np.float32), RATE)).tolist() == [-100.0] * 100
+    assert pauses.measure_levels_db(Audio(np.zeros(RATE, np.float32), RATE)).tolist() == [-100.0] * 100
 
 
 def test_spans_between_pauses_are_not_divided_by_short_dips_and_clicks_are_none():
-    np.testing.assert_allclose(pauses.spoken_spans(pauses.levels_db(loud_in(SPANS, 5.0))), SPANS, atol=0.04)
-    found = pauses.spoken_spans(pauses.levels_db(loud_in([(0.5, 1.0), (1.12, 1.5), (2.5, 2.53)], 4.0)))
+    np.testing.assert_allclose(pauses.list_spans(pauses.measure_levels_db(loud_in(SPANS, 5.0))), SPANS, atol=0.04)
+    found = pauses.list_spans(pauses.measure_levels_db(loud_in([(0.5, 1.0), (1.12, 1.5), (2.5, 2.53)], 4.0)))
     np.testing.assert_allclose(found, [(0.5, 1.5)], atol=0.04)
 
 
 def test_loudness_may_change_in_an_hour():
     loud, soft = loud_in(SPANS * 1, 60.0, gain=0.2, noise=1e-2), loud_in(SPANS, 60.0, gain=0.004, noise=1e-4)
     both = Audio(np.concatenate([loud.samples, soft.samples]), RATE)
-    found = pauses.spoken_spans(pauses.levels_db(both))
+    found = pauses.list_spans(pauses.measure_levels_db(both))
     expected = [*SPANS, *((start_s + 60, end_s + 60) for start_s, end_s in SPANS)]
     np.testing.assert_allclose([span for span in found if span[0] % 60 < 5], expected, atol=0.05)
 
 
 def test_the_quietest_place():
-    levels = pauses.levels_db(loud_in([(0.0, 1.0), (1.1, 2.0)], 2.0))
-    assert pauses.quietest_s(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
-    assert pauses.quietest_s(levels, 1.0, 1.0) == pytest.approx(1.0)
+    levels = pauses.measure_levels_db(loud_in([(0.0, 1.0), (1.1, 2.0)], 2.0))
+    assert pauses.find_quietest(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
+    assert pauses.find_quietest(levels, 1.0, 1.0) == pytest.approx(1.0)
 
 
 def test_levels_at_any_time_also_of_less_than_a_step():
     sound = loud_in(SPANS, 5.0)
-    levels, times_s = pauses.levels_db(sound), np.array([-1.0, 0.005, 1.005, 1.01, 99.0])
-    found = pauses.levels_db_at(sound, times_s)
+    levels, times_s = pauses.measure_levels_db(sound), np.array([-1.0, 0.005, 1.005, 1.01, 99.0])
+    found = pauses.measure_levels_at(sound, times_s)
     assert found == pytest.approx([levels[0], levels[0], levels[100], levels[100:102].mean(), levels[-1]])
     for samples in (0, 159):
-        found = pauses.levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
+        found = pauses.measure_levels_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
         assert found == pytest.approx([pauses.QUIETEST_DB] * 3)

@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from lipmotion.speech.features.voice_events import risen_peaks, silence_phones, voice_events
+from lipmotion.speech.features.voice_events import find_risen_peaks, find_voice_events, silence_units
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from speech.made_voices import RATE_HZ, laugh, noise, pulses, recording, said, vowels
 
 
 def found(audio: Audio, units: Timeline[Unit]) -> list[tuple[str, float, float]]:
-    return [(event.kind, event.start_s, event.end_s) for event in voice_events(audio, units)]
+    return [(event.kind, event.start_s, event.end_s) for event in find_voice_events(audio, units)]
 
 
 PHRASE = (0.5, vowels(pulses(1.5, 120)))
@@ -19,7 +19,7 @@ PHRASE = (0.5, vowels(pulses(1.5, 120)))
 def test_laughter_is_heard_by_its_calls_and_phones_recognised_in_it_become_silence():
     audio = recording(PHRASE, (2.6, laugh()))
     units = said(4.7, (0.5, 2.0), (2.6, 4.1), confidence=0.1)
-    (event,) = voice_events(audio, units)
+    (event,) = find_voice_events(audio, units)
     assert event.kind == LAUGHTER
     assert event.strength > 0.7
     assert (event.start_s, event.end_s) == pytest.approx((2.6, 4.1), abs=0.12)
@@ -27,7 +27,7 @@ def test_laughter_is_heard_by_its_calls_and_phones_recognised_in_it_become_silen
     assert times_s == pytest.approx(2.64 + 0.2 * np.arange(8), abs=0.03)
     assert loud[0] == max(loud) == 1
     assert loud[-1] < 0.8
-    left = silence_phones(units, [(event.start_s, event.end_s)])
+    left = silence_units(units, [(event.start_s, event.end_s)])
     assert [span.label.phone for span in left if span.start_s < 2.3] == ["sil", *["aa"] * 6, "sil"]
     assert {span.label.phone for span in left if span.start_s > 2.3} == {"sil"}
 
@@ -40,7 +40,7 @@ def test_what_has_words_is_no_laughter(confidence: float | None):
 
 def test_a_phrase_without_a_voice_is_whispered_and_one_with_a_voice_is_not():
     audio = recording(PHRASE, (2.6, vowels(noise(1.5))))
-    (event,) = voice_events(audio, said(4.6, (0.5, 2.0), (2.6, 4.1)))
+    (event,) = find_voice_events(audio, said(4.6, (0.5, 2.0), (2.6, 4.1)))
     assert (event.kind, event.strength) == (WHISPER, 1)
     assert (event.start_s, event.end_s) == (2.6, 4.1)
 
@@ -85,4 +85,4 @@ def test_peaks_are_those_of_scipy(count: int, prominence: float) -> None:
     for seed in range(5):
         curve = np.cumsum(np.random.default_rng(seed).normal(size=count))
         found = find_peaks(curve, prominence=prominence)[0]
-        assert risen_peaks(curve, prominence).tolist() == found.tolist()
+        assert find_risen_peaks(curve, prominence).tolist() == found.tolist()

@@ -13,10 +13,10 @@ from lipmotion import errors, load_model, types, units
 from lipmotion.hmm.network import wrap_log_likelihoods
 from lipmotion.speech.recognition import recognised_speech, word_search
 from lipmotion.speech.recognition.network import beam_search, posteriors
-from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
-from lipmotion.speech.recognition.word_search import phones_without_words, spoken_items
-from lipmotion.speech.sound.acoustic_conditions import noisy_audio
-from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples
+from lipmotion.speech.recognition.network.posteriors import find_installed
+from lipmotion.speech.recognition.word_search import list_spoken, list_wordless
+from lipmotion.speech.sound.acoustic_conditions import mix_noise
+from lipmotion.speech.sound.voice_activity import Stretch, read_stretch
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent
 from lipmotion.units.phones import count_phone_edits
@@ -29,9 +29,9 @@ SAID = "please speak and my lips will move five big blue boats float by".split()
 def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Words are searched by pocketsphinx where no phone recogniser is installed."""
     monkeypatch.setitem(sys.modules, "hama", None)
-    installed_phone_recogniser.cache_clear()
+    find_installed.cache_clear()
     yield
-    installed_phone_recogniser.cache_clear()
+    find_installed.cache_clear()
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_confidences_grow_with_fit_and_posterior() -> None:
 
 
 def recognise_as(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
-    monkeypatch.setattr(word_search, "words_in", lambda _: tuple(word_search.FoundWord(word, 0.5) for word in words))
+    monkeypatch.setattr(word_search, "spot_words", lambda _: tuple(word_search.FoundWord(word, 0.5) for word in words))
 
 
 def test_words_that_do_not_fit_are_not_believed(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,7 +142,7 @@ def test_other_languages_have_no_confident_words(recordings: Path) -> None:
 
 def test_words_of_a_sentence() -> None:
     audio = read_welcome()
-    words = word_search.words_in(stretch_samples(audio, Stretch(0, len(audio.samples) // 160)))
+    words = word_search.spot_words(read_stretch(audio, Stretch(0, len(audio.samples) // 160)))
     found = [word.text for word in words]
     assert all(0 <= word.posterior <= 1 for word in words)
     assert sum(word.posterior for word in words) > len(words) / 2
@@ -152,9 +152,9 @@ def test_words_of_a_sentence() -> None:
 
 
 def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers() -> None:
-    assert [word_search.words_in(samples) for samples in (b"", bytes(2), bytes(320))] == [()] * 3
+    assert [word_search.spot_words(samples) for samples in (b"", bytes(2), bytes(320))] == [()] * 3
     audio = Audio(np.repeat(np.array([0.0, 0.5, -2.0], np.float32), 160), 16_000)
-    samples = np.frombuffer(stretch_samples(audio, Stretch(1, 3)), "<i2")
+    samples = np.frombuffer(read_stretch(audio, Stretch(1, 3)), "<i2")
     assert len(samples) == 320
     assert samples[0] == pytest.approx(16_383, abs=1)
     assert samples[-1] == -32_768
@@ -164,11 +164,11 @@ def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers
 
 def test_one_recording_does_not_change_the_next() -> None:
     audio = read_welcome()
-    samples = stretch_samples(audio, Stretch(0, 120))
+    samples = read_stretch(audio, Stretch(0, 120))
     noise = np.random.default_rng(0).normal(0, 9000, 8_000).astype("<i2").tobytes()
-    first = word_search.words_in(samples)
-    word_search.words_in(noise)
-    assert word_search.words_in(samples) == first
+    first = word_search.spot_words(samples)
+    word_search.spot_words(noise)
+    assert word_search.spot_words(samples) == first
 
 
 def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,7 +176,7 @@ def test_without_its_language_model_it_says_what_to_do(monkeypatch: pytest.Monke
     word_search._decoder.cache_clear()
     try:
         with pytest.raises(errors.MissingDependencyError, match="pip install pocketsphinx"):
-            word_search.words_in(b"")
+            word_search.spot_words(b"")
     finally:
         word_search._decoder.cache_clear()
 
@@ -204,7 +204,7 @@ class Unigram:
 def vocabulary(**words: str) -> beam_search.EnglishWords:
     spelt = [[bytes(beam_search.SOUNDS.index(phone) for phone in phones.split())] for phones in words.values()]
     language = beam_search.LanguageModel(tuple(words), Unigram(), 1.0)
-    return beam_search.EnglishWords(beam_search.word_tree(spelt, np.full(len(words), -2.0)), language)
+    return beam_search.EnglishWords(beam_search.build_word_tree(spelt, np.full(len(words), -2.0)), language)
 
 
 WORDS = vocabulary(be="b iy", blue="b l uw", bee="b iy", plea="p l iy", loop="l uw p")
@@ -219,28 +219,28 @@ def test_words_that_begin_alike_share_nodes() -> None:
 
 
 def test_words_are_found_in_their_order() -> None:
-    words = beam_search.decoded_words(
-        WORDS, beam_search.scored(said("b", "l", "uː", posteriors.WORD_BOUNDARY, "b", "iː"))
+    words = beam_search.decode_words(
+        WORDS, beam_search.score_stretch(said("b", "l", "uː", posteriors.WORD_BOUNDARY, "b", "iː"))
     )
     assert [word.text for word in words] in (["blue", "be"], ["blue", "bee"])
     assert words[0].first == 0 < words[0].end <= words[1].first < words[1].end
 
 
 def test_the_language_decides_where_posteriors_do_not() -> None:
-    likely = beam_search.decoded_words(WORDS, beam_search.scored(said("b", "l", "iː", sure=0.5)))
+    likely = beam_search.decode_words(WORDS, beam_search.score_stretch(said("b", "l", "iː", sure=0.5)))
     assert [word.text for word in likely] in (["blue"], ["be"], ["bee"])
 
 
 def test_what_is_no_word_is_phones() -> None:
     rows = said("ŋ", "p", "ŋ", "l", "ŋ", sure=0.99)
-    words = beam_search.decoded_words(WORDS, beam_search.scored(rows))
+    words = beam_search.decode_words(WORDS, beam_search.score_stretch(rows))
     assert "".join(word.text for word in words) == ""
     assert [phone for word in words for phone in rows.phones_between(word.first, word.end)] == "ng p ng l ng".split()
 
 
 def test_nothing_is_said_in_blanks() -> None:
-    assert beam_search.decoded_words(WORDS, beam_search.scored(said())) == []
-    assert spoken_items(said()) == []
+    assert beam_search.decode_words(WORDS, beam_search.score_stretch(said())) == []
+    assert list_spoken(said()) == []
     assert posteriors.mean_posterior([posteriors.PosteriorStretch(Stretch(0, 2), said())]) == 0
 
 
@@ -251,12 +251,12 @@ def test_posteriors_draw_phones_that_models_do_not_tell_apart(frames: int) -> No
     same = wrap_log_likelihoods(np.zeros((60, len(hmm.table.names)), np.float32))
     rows = said(*["b"] * 7, sure=0.99)
     found = [posteriors.PosteriorStretch(Stretch(10, 10 + frames), rows)]
-    (part,) = phones_without_words(hmm, recogniser._loop, same, found)
+    (part,) = list_wordless(hmm, recogniser._loop, same, found)
     stretch, labels = part
     assert stretch == found[0].stretch
     assert labels[0].first == 10
     assert "b" in {label.phone for label in labels}
-    assert phones_without_words(hmm, recogniser._loop, same, [posteriors.PosteriorStretch(Stretch(0, 2), said())]) == []
+    assert list_wordless(hmm, recogniser._loop, same, [posteriors.PosteriorStretch(Stretch(0, 2), said())]) == []
 
 
 def test_forms_of_a_phone_are_the_same() -> None:
@@ -312,20 +312,20 @@ def noise_after_silence(seconds: float) -> types.Audio:
 
 def test_a_recording_has_posteriors_throughout(loud: str) -> None:
     audio = read_sound(noise_after_silence(3.0))
-    stretches = posteriors.posterior_stretches(loud, audio)
-    whole = posteriors.recording_posteriors(loud, audio)
+    stretches = posteriors.find_stretches(loud, audio)
+    whole = posteriors.read_posteriors(loud, audio)
     assert len(whole.values) == -(-len(audio.log_energy) // 2)
     assert stretches[0].stretch.first > 0
-    assert {found.token for found in posteriors.recording_posteriors(loud, audio).best_tokens} == {"b"}
+    assert {found.token for found in posteriors.read_posteriors(loud, audio).best_tokens} == {"b"}
     assert whole.best_tokens[0].first == stretches[0].stretch.first // 2 + 10
-    assert posteriors.posterior_stretches(loud, audio) is stretches
-    found = posteriors.token_posteriors(loud, audio)
+    assert posteriors.find_stretches(loud, audio) is stretches
+    found = posteriors.infer_tokens(loud, audio)
     assert found.source == "loud 1 0"
     assert found.mean == pytest.approx(np.exp(-0.1), abs=1e-3)
 
 
 def test_a_long_recording_is_cut(loud: str) -> None:
-    found = posteriors.posterior_stretches(loud, read_sound(noise_after_silence(50.0)))
+    found = posteriors.find_stretches(loud, read_sound(noise_after_silence(50.0)))
     assert len(found) > 2
     assert max(each.stretch.end - each.stretch.first for each in found) <= 2000
 
@@ -340,14 +340,14 @@ def test_a_recogniser_that_is_not_installed_or_is_none_is_refused() -> None:
 
 @pytest.mark.skipif(not posteriors.Hama.is_installed(), reason="hama has no library here")
 def test_unsure_posteriors_leave_phones_to_the_models(monkeypatch: pytest.MonkeyPatch) -> None:
-    noisy = read_sound(noisy_audio(read_welcome(), "white", -5))
+    noisy = read_sound(mix_noise(read_welcome(), "white", -5))
     found = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
     monkeypatch.setitem(sys.modules, "hama", None)
-    posteriors.installed_phone_recogniser.cache_clear()
+    posteriors.find_installed.cache_clear()
     try:
         alone = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
     finally:
-        posteriors.installed_phone_recogniser.cache_clear()
+        posteriors.find_installed.cache_clear()
     assert found.units == alone.units
     assert found.posterior is None
 

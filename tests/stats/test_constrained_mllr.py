@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from lipmotion.stats.constrained_mllr import (
     collect_transform_statistics,
+    create_prior,
     identity,
     improve_transform,
     log_determinant,
-    prior_statistics,
     transformed,
 )
 from lipmotion.stats.mixture import Mixtures
@@ -82,7 +82,7 @@ def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
     draw = np.random.default_rng(seed)
     mixtures, transform = random_mixtures(draw), random_transform(draw)
     statistics, _ = collect_transform_statistics(mixtures, *spoken(draw, mixtures, frames), transform)
-    statistics += prior_statistics(mixtures, np.arange(4)).times(5)
+    statistics += create_prior(mixtures, np.arange(4)).times(5)
     values = [oracle.objective(statistics, transform)]
     for _ in range(4):
         transform = improve_transform(transform, statistics, ALL, sweeps=1)
@@ -96,7 +96,7 @@ def test_the_likelihood_never_falls() -> None:
     mixtures = random_mixtures(draw)
     features, densities = spoken(draw, mixtures, 60)
     features = transformed(features, random_transform(draw))
-    prior = prior_statistics(mixtures, np.arange(4)).times(30)
+    prior = create_prior(mixtures, np.arange(4)).times(30)
     transform, values = identity(SIZE), []
     for _ in range(12):
         statistics, log_likelihood = collect_transform_statistics(mixtures, features, densities, transform)
@@ -125,7 +125,7 @@ def test_a_known_distortion_is_undone() -> None:
 
 def test_the_models_own_data_ask_for_no_change() -> None:
     mixtures = random_mixtures(np.random.default_rng(4))
-    prior = prior_statistics(mixtures, np.array([0, 2]))
+    prior = create_prior(mixtures, np.array([0, 2]))
     assert prior.count == pytest.approx(1)
     assert np.abs(gradient(partial(oracle.objective, prior), identity(SIZE))).max() < 1e-6
     np.testing.assert_allclose(improve_transform(identity(SIZE), prior, ALL), identity(SIZE), atol=1e-8)
@@ -139,7 +139,7 @@ def test_a_prior_holds_a_transform_of_few_frames_back() -> None:
     mixtures = random_mixtures(draw)
     features, densities = spoken(draw, mixtures, 10)
     statistics, _ = collect_transform_statistics(mixtures, features + 2, densities, identity(SIZE))
-    prior = prior_statistics(mixtures, np.arange(4))
+    prior = create_prior(mixtures, np.arange(4))
     sums = [statistics + prior.times(frames) for frames in (1, 100, 1e6)]
     moved = [np.abs(improve_transform(identity(SIZE), each, ALL) - identity(SIZE)).max() for each in sums]
     assert moved[0] > moved[1] > moved[2]

@@ -5,9 +5,9 @@ import pytest
 
 from lipmotion.stats.trees import (
     Question,
-    gaussian_log_likelihood,
     grow_tree,
-    multispace_log_likelihood,
+    score_gaussian,
+    score_multispace,
     trees_from_arrays,
     trees_to_arrays,
 )
@@ -28,7 +28,7 @@ def sample(mean_of, frames=20, seed=0):
     return [draw.normal(mean_of(context), 0.1, (frames, 2)) for context in CONTEXTS]
 
 
-def grown(values, questions=QUESTIONS, contexts=CONTEXTS, sums=None, likelihood=gaussian_log_likelihood, **options):
+def grown(values, questions=QUESTIONS, contexts=CONTEXTS, sums=None, likelihood=score_gaussian, **options):
     statistics = (sums or statistics_of)(values)
     options = {"parameters": 4, "factor": 1.0, "least": 10.0} | options
     return grow_tree(contexts, statistics, questions, likelihood, **options)
@@ -38,7 +38,7 @@ def test_the_likelihood_is_that_of_the_gaussian_fitted_to_the_frames():
     x = np.random.default_rng(0).normal([1, -2], [0.5, 3], (50, 2))
     mean, variance = x.mean(axis=0), x.var(axis=0)
     expected = (-0.5 * (np.log(2 * np.pi * variance) + (x - mean) ** 2 / variance)).sum()
-    assert gaussian_log_likelihood(statistics_of([x]))[0] == pytest.approx(expected, rel=1e-9)
+    assert score_gaussian(statistics_of([x]))[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_question_that_matters_is_asked_first_and_the_tree_can_be_read():
@@ -124,12 +124,10 @@ def test_frames_without_a_value_are_as_likely_as_they_are_frequent():
     known = x[:3]
     gaussian = -0.5 * (np.log(2 * np.pi * known.var()) + (known - known.mean()) ** 2 / known.var())
     expected = 3 * np.log(0.6) + 2 * np.log(0.4) + gaussian.sum()
-    assert multispace_log_likelihood(spaces_of([x]))[0] == pytest.approx(expected)
-    assert multispace_log_likelihood(spaces_of([np.full(4, np.nan)]))[0] == pytest.approx(0)
-    assert multispace_log_likelihood(spaces_of([known])) == pytest.approx(
-        gaussian_log_likelihood(spaces_of([known])[:, 1:])
-    )
-    assert multispace_log_likelihood(np.zeros((1, 4)))[0] == pytest.approx(0)
+    assert score_multispace(spaces_of([x]))[0] == pytest.approx(expected)
+    assert score_multispace(spaces_of([np.full(4, np.nan)]))[0] == pytest.approx(0)
+    assert score_multispace(spaces_of([known])) == pytest.approx(score_gaussian(spaces_of([known])[:, 1:]))
+    assert score_multispace(np.zeros((1, 4)))[0] == pytest.approx(0)
 
 
 def test_voicing_alone_is_worth_a_question():
@@ -137,15 +135,15 @@ def test_voicing_alone_is_worth_a_question():
     for context in CONTEXTS:
         voiced = draw.random(30) < (0.9 if context[1] in "ab" else 0.1)
         values.append(np.where(voiced, draw.normal(0, 1, 30), np.nan))
-    tree = grown(values, sums=spaces_of, likelihood=multispace_log_likelihood, parameters=3)
+    tree = grown(values, sums=spaces_of, likelihood=score_multispace, parameters=3)
     assert tree.questions[tree.asked[0]] == Question(1, "early", frozenset("ab"))
 
 
 def test_frames_that_are_all_alike_gain_no_more_than_the_least_variance_allows():
     x = np.full((5, 1), 3.0)
-    assert gaussian_log_likelihood(statistics_of([x]), 0.5)[0] == pytest.approx(-2.5 * np.log(2 * np.pi * 0.5))
+    assert score_gaussian(statistics_of([x]), 0.5)[0] == pytest.approx(-2.5 * np.log(2 * np.pi * 0.5))
     spread = np.array([[0.0], [2.0]])  # a variance of 1 under a Gaussian of 4
-    assert gaussian_log_likelihood(statistics_of([spread]), 4.0)[0] == pytest.approx(-(np.log(2 * np.pi * 4) + 0.25))
+    assert score_gaussian(statistics_of([spread]), 4.0)[0] == pytest.approx(-(np.log(2 * np.pi * 4) + 0.25))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -157,7 +155,7 @@ def test_of_questions_that_split_alike_the_first_is_asked_however_sums_are_round
     rounding = np.random.default_rng(seed)
 
     def likelihood(statistics):
-        found = gaussian_log_likelihood(statistics)
+        found = score_gaussian(statistics)
         return found * (1 + 1e-14 * rounding.normal(size=found.shape))
 
     tree = grown(values, [*alike, *others], likelihood=likelihood)

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.storage import schema
-from lipmotion.storage.archive import Checkpoint, array_in, check_archive
-from lipmotion.storage.json_text import as_json, from_json, nan_as_null
+from lipmotion.storage.archive import Checkpoint, check_archive, take_array
+from lipmotion.storage.json_text import as_json, from_json, replace_nan
 from robustness.case import npy
 
 
 def test_an_array_comes_back() -> None:
     texts = np.array(["a", "näher 😀"]), np.array("one")
     for array in (np.arange(6.0).reshape(2, 3), np.zeros((0, 3)), *texts, np.eye(3).T):
-        found = array_in(npy(array))
+        found = take_array(npy(array))
         assert found.dtype == array.dtype
         np.testing.assert_array_equal(found, array)
 
@@ -27,9 +27,9 @@ def test_an_array_is_exactly_as_long_as_its_header_says_and_of_letters_that_exis
     whole = npy(np.arange(6.0))
     for content in (whole[:-1], whole + b"\0", b"", b"\x93NUMPY\x09\x00"):
         with pytest.raises(ValueError, match=r"required 48 bytes|not an array"):
-            array_in(content)
+            take_array(content)
     with pytest.raises(ValueError, match="characters that do not exist"):
-        array_in(npy(np.array(["ab"]))[:-4] + b"\0\0\x11\0")
+        take_array(npy(np.array(["ab"]))[:-4] + b"\0\0\x11\0")
 
 
 def test_a_zip_may_not_grow_without_end(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_numbers_that_json_does_not_have() -> None:
 
 def test_a_figure_that_nothing_defines_is_null() -> None:
     nested = {"a": [1.5, NAN, (INFINITE, "b", -INFINITE)], "c": 2, "d": "nan", "e": None, "f": True}
-    assert nan_as_null(nested) == {"a": [1.5, None, (None, "b", None)], "c": 2, "d": "nan", "e": None, "f": True}
+    assert replace_nan(nested) == {"a": [1.5, None, (None, "b", None)], "c": 2, "d": "nan", "e": None, "f": True}
 
 
 def test_what_is_refused() -> None:

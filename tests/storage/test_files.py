@@ -17,13 +17,13 @@ from lipmotion.storage import files, locks
 from lipmotion.storage.files import (
     TEMPORARY,
     atomic_file,
-    atomic_folder,
     check_distinct,
     check_target,
     confine,
-    portable_name,
+    make_portable,
+    replace_folder,
 )
-from lipmotion.storage.locks import LOCK, lock_folder, unfinished_work
+from lipmotion.storage.locks import LOCK, list_unfinished, lock_folder
 from lipmotion.storage.sources import Source, check_apart, check_kind
 
 Context = Callable[[Path], AbstractContextManager[Path]]
@@ -55,7 +55,7 @@ def fail(context: AbstractContextManager[Path], error: BaseException) -> None:
         raise error
 
 
-@pytest.mark.parametrize("context", [atomic_file, atomic_folder])
+@pytest.mark.parametrize("context", [atomic_file, replace_folder])
 def test_a_failure_leaves_nothing(tmp_path: Path, context: Context) -> None:
     for error in (RuntimeError(), KeyboardInterrupt()):
         with pytest.raises(type(error)):
@@ -68,7 +68,7 @@ def test_a_failure_leaves_nothing(tmp_path: Path, context: Context) -> None:
 
 
 def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
-    with atomic_folder(tmp_path / "one") as unfinished:
+    with replace_folder(tmp_path / "one") as unfinished:
         (unfinished / "entry.json").touch()
         assert not (tmp_path / "one").exists()
     assert names(tmp_path / "one") == ["entry.json"]
@@ -78,7 +78,7 @@ def test_a_folder_appears_when_it_is_whole(tmp_path: Path) -> None:
 def test_a_folder_does_not_replace_one_that_holds_something(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "one" / "precious").touch()
-    with pytest.raises(ExportError, match="one: cannot be written"), atomic_folder(tmp_path / "one"):
+    with pytest.raises(ExportError, match="one: cannot be written"), replace_folder(tmp_path / "one"):
         pass
     assert names(tmp_path) == ["one"]
     assert names(tmp_path / "one") == ["precious"]
@@ -143,20 +143,20 @@ def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_pat
 
 
 def test_finished_work_leaves_no_folder(tmp_path: Path) -> None:
-    with unfinished_work(tmp_path / "model") as folder:
+    with list_unfinished(tmp_path / "model") as folder:
         (folder / "stage").touch()
         assert names(tmp_path) == ["model.unfinished"]
     assert names(tmp_path) == []
-    with pytest.raises(RuntimeError), unfinished_work(tmp_path / "model"):  # nor does work without a result
+    with pytest.raises(RuntimeError), list_unfinished(tmp_path / "model"):  # nor does work without a result
         raise RuntimeError
     assert names(tmp_path) == []
-    with pytest.raises(ExportError, match="does not exist"), unfinished_work(tmp_path / "missing" / "model"):
+    with pytest.raises(ExportError, match="does not exist"), list_unfinished(tmp_path / "missing" / "model"):
         raise AssertionError
 
 
 def test_unfinished_work_is_found_again(tmp_path: Path) -> None:
     def interrupted() -> None:
-        with unfinished_work(tmp_path / "model") as folder:
+        with list_unfinished(tmp_path / "model") as folder:
             (folder / "stage").touch()
             (folder / f"{TEMPORARY}half").touch()
             raise KeyboardInterrupt
@@ -164,7 +164,7 @@ def test_unfinished_work_is_found_again(tmp_path: Path) -> None:
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
             interrupted()
-    with unfinished_work(tmp_path / "model") as folder:
+    with list_unfinished(tmp_path / "model") as folder:
         assert names(folder) == [LOCK, "stage"]
 
 
@@ -205,7 +205,7 @@ def test_a_link_that_leads_nowhere(tmp_path: Path) -> None:
 def test_unfinished_work_lies_beside_what_a_link_points_to(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "m").symlink_to("there/model")
-    with unfinished_work(tmp_path / "m") as folder:
+    with list_unfinished(tmp_path / "m") as folder:
         assert folder == (tmp_path / "there").resolve() / "model.unfinished"
     assert names(tmp_path / "there") == []
 
@@ -223,10 +223,10 @@ def test_two_outputs_that_are_one(tmp_path: Path) -> None:
 
 def test_only_names_that_windows_does_not_take_get_other_ones() -> None:
     for name in (*"CON nul Aux.wav prn.tar.gz com1 LPT9.csv COM\u00b2 conin$ a.".split(), "NUL .txt", "a "):
-        assert portable_name(name) != name
-        assert portable_name(portable_name(name)) == portable_name(name)
+        assert make_portable(name) != name
+        assert make_portable(make_portable(name)) == make_portable(name)
     for name in "icon.wav console com10 lpt nul_.wav a.b .hidden null".split():
-        assert portable_name(name) == name
+        assert make_portable(name) == name
 
 
 def interrupted(folder: Path, step: int) -> bool:

@@ -12,7 +12,7 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
 from lipmotion.storage import files
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.locks import LOCK, lock_folder, remove_unfinished, temporary_folder, unfinished_work
+from lipmotion.storage.locks import LOCK, list_unfinished, lock_folder, open_temporary, remove_unfinished
 from lipmotion_faces.corpus.sync import sync
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST
@@ -83,7 +83,7 @@ def answer_study(folder: Path) -> None:
 
 
 def train(folder: Path) -> None:
-    with unfinished_work(folder / "m") as work:
+    with list_unfinished(folder / "m") as work:
         Checkpoint(work, "of this").save("stage", {"a": np.zeros(1)})
         raise KeyboardInterrupt
 
@@ -125,7 +125,7 @@ def test_no_verb_follows_a_link_in_a_folder_of_a_stranger(tmp_path: Path, verb: 
         assert content_of(outside) == before, aim
 
 
-@pytest.mark.parametrize("write", [files.atomic_file, files.atomic_folder])
+@pytest.mark.parametrize("write", [files.atomic_file, files.replace_folder])
 def test_a_confined_folder_may_be_a_link_itself(
     tmp_path: Path, write: Callable[[Path], AbstractContextManager[Path]]
 ) -> None:
@@ -173,9 +173,9 @@ def test_folders_that_killed_runs_left_are_swept(tmp_path: Path, monkeypatch: py
     for name in (LOCK, "file"):
         (tmp_path / "precious" / name).touch()
     (tmp_path / "lipmotion-link").symlink_to("precious")
-    with temporary_folder() as used:
+    with open_temporary() as used:
         (used / "sound.wav").touch()
-        with temporary_folder() as other:
+        with open_temporary() as other:
             assert other != used
         assert (used / "sound.wav").exists()
         assert not (tmp_path / "lipmotion-killed").exists()

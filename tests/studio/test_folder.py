@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.files import portable_name
+from lipmotion.storage.files import make_portable
 from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, project_path
 from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, parse_project, project_document
 from lipmotion_studio.votes import Side, Vote, read_votes, tally, votes_text
@@ -111,13 +111,13 @@ def test_documents_that_are_refused(tmp_path, change):
 @pytest.mark.parametrize("name", ["CON.wav", "nul .wav", "Aux..wav", "com1.take.wav"])
 def test_what_is_called_as_a_device_gets_another_name(lines, tmp_path, name):
     sound = (lines / "a.wav").rename(tmp_path / name)
-    assert portable_name(project_path(sound).name) == project_path(sound).name
+    assert make_portable(project_path(sound).name) == project_path(sound).name
     with open_folder(sound, tmp_path / "own") as folder:
         (folder.path / "came").write_text("sound", encoding="utf-8")
         for number in (1, folder.drop(name, folder.path / "came", "")):
             line = folder.recording(number)
-            assert portable_name(line.name) == line.name
-            assert portable_name(folder.edits(line).name) == folder.edits(line).name
+            assert make_portable(line.name) == line.name
+            assert make_portable(folder.edits(line).name) == folder.edits(line).name
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")

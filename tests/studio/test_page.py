@@ -13,7 +13,7 @@ import pytest
 
 from children import LIPMOTION, child, wait_until
 from lipmotion import load_model, read_motion, save_model
-from lipmotion.pipeline.model import shipped_path
+from lipmotion.pipeline.model import find_shipped
 from studio.test_recorded_videos import shifted
 from study.browser import (
     CONTROL,
@@ -540,7 +540,7 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
     write_film(tmp_path / "in step.mp4", pictures, sound)
     shifted(tmp_path / "in step.mp4", sound.with_suffix(".mp4"), sound_s=0.2)
-    other = tmp_path / shipped_path().name  # another file, of the same name
+    other = tmp_path / find_shipped().name  # another file, of the same name
     model = load_model()
     save_model(replace(model, about={**model.about, "seed": "another"}), other)
     options = ("--against", other, "--face", filmed_face_file)
@@ -591,7 +591,7 @@ def test_the_real_video_beside_and_comparisons(opens, tmp_path, filmed_face_file
         wait_until(lambda: "A was" in window.text("#blind-told"), LIMIT_S)
         (vote,) = read_votes(tmp_path / "project" / "votes.json")
         assert vote.better == 0
-        assert {side.model for side in vote.shown} == {sha256_of(path) for path in (other, shipped_path())}
+        assert {side.model for side in vote.shown} == {sha256_of(path) for path in (other, find_shipped())}
         is_other, told = vote.shown[0].model == sha256_of(other), window.text("#blind-told")
         assert (f"{other.stem} ({sha256_of(other)[:8]})" in told.partition(", B was")[0]) == is_other
         window.click("#film")

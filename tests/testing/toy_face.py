@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion import mouth_region
-from lipmotion.speech.sound.pauses import STEP_S, levels_db
+from lipmotion.speech.sound.pauses import STEP_S, measure_levels_db
 from lipmotion.types import Audio, Motion
 from lipmotion_faces.appearance.lower_face import CORNER, HEIGHT, WIDTH, FaceShape
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
@@ -128,7 +128,7 @@ def _take(sentence: ToySentence) -> SpokenTake:
 
 
 def _levels(sentence: ToySentence, frames: int) -> Array:
-    levels = levels_db(sentence.audio)
+    levels = measure_levels_db(sentence.audio)
     return np.interp(np.arange(frames) / CAMERA_HZ, (np.arange(len(levels)) + 0.5) * STEP_S, levels)
 
 

@@ -178,7 +178,7 @@ def _ffmpeg() -> str:
 
 
 def _voices() -> str:
-    from lipmotion.speech.voices.installed import SYNTHESISERS, how_to_install, nothing_installed
+    from lipmotion.speech.voices.installed import SYNTHESISERS, explain_install, explain_missing
 
     found, others = [], []
     for each in SYNTHESISERS.values():
@@ -190,16 +190,16 @@ def _voices() -> str:
         if count:
             found.append(f"{each.name} {count}")
         else:
-            others.append(f"no {each.name} ({how_to_install(each)})")
+            others.append(f"no {each.name} ({explain_install(each)})")
     if not found:
-        raise _AbsentError(f"{EXTRAS['text']}; {nothing_installed()}")
+        raise _AbsentError(f"{EXTRAS['text']}; {explain_missing()}")
     return "; ".join([*found, *others])
 
 
 def _phone_recogniser() -> str:
-    from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, phone_recogniser
+    from lipmotion.speech.recognition.network.posteriors import find_installed, phone_recogniser
 
-    name = installed_phone_recogniser()
+    name = find_installed()
     if name is None:
         raise _AbsentError("none for this machine: voices that the model does not know are recognised less well")
     return phone_recogniser(name).source
@@ -224,15 +224,15 @@ def _face_tracking() -> str:
 
 
 def _model() -> str:
-    from lipmotion.pipeline.model import load_model, read_header, shipped_path
-    from lipmotion.storage.sources import sha256_of
+    from lipmotion.pipeline.model import find_shipped, load_model, read_header
+    from lipmotion.storage.sources import hash_file
 
-    path = shipped_path()
+    path = find_shipped()
     try:
         header, engine = read_header(path), load_model(path).engine.name
     except LipMotionError as error:
         raise ModelFormatError(f"{error}; or install lipmotion again: pip install --force-reinstall") from error
-    digest, size = sha256_of(path)[:12], path.stat().st_size / 1e6
+    digest, size = hash_file(path)[:12], path.stat().st_size / 1e6
     return f"{path.name}, {engine}, version {header['version']}, {size:.1f} MB, sha256 {digest}"
 
 
@@ -291,10 +291,10 @@ def _main_path() -> str:
     from lipmotion.formats.sound import write_sound
     from lipmotion.pipeline.job import Job
     from lipmotion.pipeline.request import Outputs, Request
-    from lipmotion.storage.locks import temporary_folder
+    from lipmotion.storage.locks import open_temporary
     from lipmotion.types.delivery import Staging
 
-    with temporary_folder() as folder:
+    with open_temporary() as folder:
         sound = folder / "mama.wav"
         write_sound(sound, _say_mama())
         files = tuple(str(folder / name) for name in ("mama.json", "mama.cues.tsv", "mama.mp4"))

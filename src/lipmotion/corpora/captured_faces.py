@@ -29,7 +29,7 @@ from lipmotion.corpora.source_recordings import (
 from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_files import find_labels
 from lipmotion.formats.markers import measure_markers, to_head_frame
-from lipmotion.storage.archive import array_in
+from lipmotion.storage.archive import take_array
 from lipmotion.storage.sources import check_regular
 from lipmotion.types import WEIGHT, Channel, Motion
 
@@ -234,6 +234,6 @@ def _load(path: Path) -> NDArray[Any]:
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Reading `.npy`", category=UserWarning)
-            return array_in(path.read_bytes())
+            return take_array(path.read_bytes())
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: not an array of numbers or texts ({error}); save it with numpy.save") from error

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.extensions import install_command
-from lipmotion.storage.files import TEMPORARY, atomic_file, atomic_folder, confine, make_folder, portable_name
+from lipmotion.storage.files import TEMPORARY, atomic_file, confine, make_folder, make_portable, replace_folder
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.storage.locks import remove_unfinished, temporary_folder
+from lipmotion.storage.locks import open_temporary, remove_unfinished
 from lipmotion.storage.schema import ArraySpec, check_sizes
 from lipmotion.storage.sources import check_regular, read_text_file
 from lipmotion.types import (
@@ -82,7 +82,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
     Raises InputError: the name cannot be a folder's, or the motion cannot be that of a face.
     Raises ExportError: it cannot be written.
     """
-    if not is_utterance_name(utterance.name) or portable_name(utterance.name) != utterance.name:
+    if not is_utterance_name(utterance.name) or make_portable(utterance.name) != utterance.name:
         raise InputError(
             f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder, on Windows, too"
         )
@@ -115,7 +115,7 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
     }
     if crops is not None:  # read only where they are used, without a checksum
         arrays["crops"] = crops.astype(np.uint8)
-    with atomic_folder(folder) as unfinished:
+    with replace_folder(folder) as unfinished:
         for name, array in arrays.items():
             np.save(unfinished / f"{name}.npy", array)
         text = as_json(description, indent=1, sort_keys=True, ensure_ascii=False)
@@ -455,7 +455,7 @@ def _open_remote(url: str) -> tuple[Path, Callable[[str], None]]:
     except Exception as error:  # every kind of file system has errors of its own
         raise CorpusError(f"{url}: cannot be opened ({error}); give a folder by URL, as s3://BUCKET/NAME") from error
     kept = ExitStack()
-    folder = kept.enter_context(temporary_folder()) / (Path(root).name or "corpus")
+    folder = kept.enter_context(open_temporary()) / (Path(root).name or "corpus")
     atexit.register(kept.close)
 
     def fetch(part: str) -> None:
@@ -468,7 +468,7 @@ def _open_remote(url: str) -> tuple[Path, Callable[[str], None]]:
                 with atomic_file(place) as file:
                     file.write_bytes(system.cat_file(source))
                 return
-            with atomic_folder(place) as unfinished:
+            with replace_folder(place) as unfinished:
                 for name in system.ls(source, detail=False):
                     (unfinished / Path(name).name).write_bytes(system.cat_file(name))
         except Exception as error:

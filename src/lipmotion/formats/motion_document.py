@@ -36,8 +36,8 @@ from lipmotion.formats.base import MotionFormat, read_members, write_json
 from lipmotion.formats.steady_rate import TIME_COLUMN, clean_column, convert_times, resample_rows, tabulate_frames
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
 from lipmotion.printable import is_line
-from lipmotion.storage.archive import UNREADABLE, array_in, check_archive
-from lipmotion.storage.json_text import as_json, json_errors
+from lipmotion.storage.archive import UNREADABLE, check_archive, take_array
+from lipmotion.storage.json_text import as_json, catch_errors
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.values import items, members, number, require, text, truth
 from lipmotion.units import RECOGNISED, RecognisedPhone, list_recognised_phones, restore_confidences
@@ -84,7 +84,7 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
     if version > VERSION:
         newer = f"the motion document has version {version}"
         raise InputError(f"{newer}, this lipmotion reads up to {VERSION}: upgrade lipmotion")
-    with json_errors("the motion document"):
+    with catch_errors("the motion document"):
         checked = _DOCUMENT(document)
         channels = tuple(Channel(**channel) for channel in checked["channels"])
         if isinstance(values, np.ndarray) and values.dtype.kind not in "fiu":
@@ -100,7 +100,7 @@ def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
     recognised : the member ``recognised``, where there is one: units that are in it, too, are not known
     Raises InputError: rows of another kind, without a time or a name, or with times that no recording has.
     """
-    with json_errors("the motion document"):
+    with catch_errors("the motion document"):
         confidences = [
             RecognisedPhone(_TIME(start_s), _TIME(end_s), _TEXT(name), number(0, 1)(confidence))
             for start_s, end_s, name, confidence in _ROWS(recognised or [])
@@ -145,7 +145,7 @@ def write_json_file(path: Path, generation: Generation, source: Mapping[str, str
 
 def read_json(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Return motion and units of a file. Raises InputError: not JSON, or not a motion document."""
-    with json_errors("the motion document"):
+    with catch_errors("the motion document"):
         text = path.read_text(encoding="utf-8-sig")
         if text.lstrip().startswith("["):
             raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
@@ -201,8 +201,8 @@ def read_npz(path: Path) -> tuple[Motion, Timeline[Unit]]:
     try:
         with zipfile.ZipFile(path) as file:
             check_archive(file)
-            values = array_in(file.read("values.npy"))
-            document = json.loads(str(array_in(file.read("document.npy"))))
+            values = take_array(file.read("values.npy"))
+            document = json.loads(str(take_array(file.read("document.npy"))))
     except OSError:
         raise
     except UNREADABLE as error:
@@ -246,7 +246,7 @@ def read_audio2face(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
     Raises InputError: not such a file, no rate, or rows that do not fit the names.
     """
-    with json_errors("the file of Audio2Face"):
+    with catch_errors("the file of Audio2Face"):
         document = read_members(path.read_text(encoding="utf-8-sig"), WEIGHTS)
         checked = _AUDIO2FACE(document)
         names, rows, rate_hz = checked[NAMES], document[WEIGHTS], checked[RATE]
@@ -272,7 +272,7 @@ def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
     Raises InputError: not JSON, none of these forms, frames without a time, or pieces that contradict one another.
     """
-    with json_errors("the file of frames of weights"):
+    with catch_errors("the file of frames of weights"):
         documents = list(_decode_documents(path.read_text(encoding="utf-8-sig")))
         objects = [_list_key_members(each) for each in _find_objects(documents, DEEPEST)]
         pieces = [each for each in objects if "frameindex" in each and each.get("blendshapes")]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.model.shape_names import arkit_name, is_known
+from lipmotion.meshes.model.shape_names import is_known, to_arkit
 from lipmotion.motion.frame_labels import find_runs
 from lipmotion.types import WEIGHT, Channel, Motion
 from lipmotion.types.motion import RADIAN
@@ -175,7 +175,7 @@ def resample_rows(
 def _channel(name: str, unit: str) -> Channel:
     if name.endswith(ANGLES):
         return Channel(name[:1].lower() + name[1:], RADIAN)
-    return Channel(arkit_name(name) or name, WEIGHT if is_known(name) else unit)
+    return Channel(to_arkit(name) or name, WEIGHT if is_known(name) else unit)
 
 
 def choose_columns(names: Sequence[str], values: Array) -> list[int]:

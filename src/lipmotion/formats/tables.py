@@ -32,8 +32,8 @@ from lipmotion.formats.steady_rate import (
     resample_rows,
     tabulate_frames,
 )
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, is_known
-from lipmotion.storage.text_table import LONGEST_LINE, numbers_in, open_table
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, is_known, to_arkit
+from lipmotion.storage.text_table import LONGEST_LINE, open_table, parse_numbers
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
@@ -113,9 +113,9 @@ def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
             for line, fields in table.rows:
                 if len(fields) != columns:
                     raise ValueError(f"line {line} has {len(fields)} fields, required {columns} numbers in each")
-                numbers.extend(numbers_in(fields, line))
+                numbers.extend(parse_numbers(fields, line))
             values = np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
-            channels = tuple(Channel(name, WEIGHT if arkit_name(name) else EYE_DISTANCE) for name in table.names[1:])
+            channels = tuple(Channel(name, WEIGHT if to_arkit(name) else EYE_DISTANCE) for name in table.names[1:])
     except ValueError as error:
         if isinstance(error, InputError):
             raise
@@ -212,7 +212,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
             if coded:
                 time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
             else:
-                time_s = convert_times(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
+                time_s = convert_times(np.array([parse_numbers([text], line)[0] for line, text in times]), keys[timed])
             return resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
     except (ValueError, OverflowError) as error:
         if isinstance(error, InputError):
@@ -253,7 +253,7 @@ def _read_rows(
                 LOG.warning("%d columns hold text, not numbers, and are left out: %s", len(texts), named)
                 curves = [fields[column] for column in used]
         faces.append(len(times) - 1)
-        numbers.extend(numbers_in(curves, line))
+        numbers.extend(parse_numbers(curves, line))
     if not times:
         raise ValueError("there are no rows")
     values = np.full((len(times), len(used)), np.nan)
@@ -264,7 +264,7 @@ def _read_rows(
 def _is_text(field: str, name: str) -> bool:
     """Return whether a field is no number, in a column whose name does not promise one."""
     try:
-        numbers_in([field], 0)
+        parse_numbers([field], 0)
     except ValueError:
         return not is_known(name)
     return False
@@ -282,7 +282,7 @@ def _read_single_scores(
             raise ValueError(f"line {line} has {len(fields)} fields, required {len(names)}")
         time = fields[timed].strip()
         lines.setdefault(time, line)
-        frames.setdefault(time, {})[fields[named].strip()] = numbers_in([fields[score]], line)[0]
+        frames.setdefault(time, {})[fields[named].strip()] = parse_numbers([fields[score]], line)[0]
     known, values = tabulate_frames(list(frames.values()))
     return [(line, time) for time, line in lines.items()], known, values
 

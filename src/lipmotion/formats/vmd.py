@@ -17,8 +17,8 @@ import numpy as np
 from lipmotion.errors import InputError
 from lipmotion.formats.base import MotionFormat, list_key_frames
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_to_weights, weights_to_gaze
-from lipmotion.meshes.model.mesh import ANGLES, head_angles, head_quaternions
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, CLOSED, VRM_VOWELS, arkit_name, vowel_name
+from lipmotion.meshes.model.mesh import ANGLES, find_head_angles, turn_head
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, CLOSED, VRM_VOWELS, find_vowel, to_arkit
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
 from lipmotion.types.motion import RADIAN
 
@@ -88,7 +88,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     if {*MOVED_BY["gaze"]} & {*curves}:
         still = dict.fromkeys(MOVED_BY["gaze"], np.zeros(len(motion.values)))
         angles[EYES] = np.pad(weights_to_gaze(still | curves), ((0, 0), (0, 1)))
-    turns = {bone: (head_quaternions(turned) * MIRRORED).tolist() for bone, turned in angles.items()}
+    turns = {bone: (turn_head(turned) * MIRRORED).tolist() for bone, turned in angles.items()}
     bones = [(frame, bone, turn[row]) for row, frame in enumerate(frames) for bone, turn in turns.items()]
     with path.open("wb") as file:
         file.write(MARK.ljust(MARK_BYTES, b"\0") + _encode_name("lipmotion", MODEL_BYTES) + COUNT.pack(len(bones)))
@@ -133,7 +133,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 def _find_channels(morph: str) -> tuple[str, ...]:
     """Return the channels that a morph moves: a standard one, or a vowel or blendshape by its name; none of others."""
-    known = vowel_name(morph) or arkit_name(morph)
+    known = find_vowel(morph) or to_arkit(morph)
     return MORPHS.get(morph, (known,) if known else ())
 
 
@@ -142,7 +142,7 @@ def _turn_bone(bone: str, keys: Turns, frames: np.ndarray) -> np.ndarray:
     at, turns = zip(*keys, strict=True)
     if not all(map(any, turns)):
         raise InputError(f"a rotation of the bone {bone} is none (0 0 0 0); save the motion again in MikuMikuDance")
-    angles = np.unwrap(head_angles(np.array(turns) * MIRRORED), axis=0)
+    angles = np.unwrap(find_head_angles(np.array(turns) * MIRRORED), axis=0)
     return np.stack([np.interp(frames, at, column) for column in angles.T], axis=1)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.motion.articulation import unseen_share
+from lipmotion.motion.articulation import count_unseen
 from lipmotion.motion.frame_labels import rate_clearness
 from lipmotion.motion.network_steps import (
     STEP,
@@ -116,7 +116,7 @@ class AcousticNetwork(Predictor):
             raise InputError("the speech has no spectrum; an engine that uses one says so by ``inputs``")
         spectrum = speech.spectrum
         motion, distortion = speech.cached(self, lambda: self._predict(spectrum))
-        network, posteriors, strange = self.posterior_network, speech.posteriors, unseen_share(speech.voice)
+        network, posteriors, strange = self.posterior_network, speech.posteriors, count_unseen(speech.voice)
         if network is not None and posteriors is not None:
             known, unknown = POSTERIOR_SHARES
             sure = _rate_sureness(speech)

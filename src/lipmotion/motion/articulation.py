@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, REACH_S
-from lipmotion.motion.frame_labels import frames_away, list_speech_intervals, with_neighbours
+from lipmotion.motion.frame_labels import list_speech_intervals, mark_distant, with_neighbours
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
@@ -23,7 +23,7 @@ from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, VOWELS, describe_unknown_phone, find_similar_phone, is_silent
 
 
-def unseen_share(voice: float) -> float:
+def count_unseen(voice: float) -> float:
     """Return how far the measures for unknown voices apply, 0 to 1; more than half for voices half known."""
     return float(np.sqrt(1 - voice))
 
@@ -90,10 +90,10 @@ class ArticulationPrior:
         for left, span, right in with_neighbours(units):
             at_end = is_silent(span.label.phone) and span in (units[0], units[-1])
             if span.label.phone and not at_end:
-                count = self.contexts.get((_merged(left), _merged(span.label.phone), _merged(right)), 0)
+                count = self.contexts.get((_merge_cells(left), _merge_cells(span.label.phone), _merge_cells(right)), 0)
                 first, stop = frames_of(span, frames)
                 steps[first:stop] = count / (count + HALF_FAMILIAR_COUNT)
-        steps[frames_away(units, frames, REST_S)] = 1
+        steps[mark_distant(units, frames, REST_S)] = 1
         return smooth_steps(steps)[:, 0]
 
     def blend(
@@ -108,7 +108,7 @@ class ArticulationPrior:
         """
         values = self.centre + GAIN * trace_articulators(units, frames) @ self.matrix
         unknown = 1 - self.familiarity(units, frames)
-        of_voice = self.known_voice_share + unseen_share(voice) * (1 - self.known_voice_share)
+        of_voice = self.known_voice_share + count_unseen(voice) * (1 - self.known_voice_share)
         weight = of_voice * self.weight * (np.asarray(reliability) * unknown) ** POWER
         share = (weight / (1 + weight))[:, None, None]
         return draw_towards(values, share, statistics)
@@ -170,7 +170,7 @@ def average_classes() -> dict[bool, Array]:
 
     Phones count as often as they occur.
     """
-    table, counts = read_articulation_table(), {row["phone"]: float(row["count"]) for row in _csv_rows()}
+    table, counts = read_articulation_table(), {row["phone"]: float(row["count"]) for row in _read_csv()}
     spoken = [phone for phone in table if not is_silent(phone)]
     return {
         vowels: np.average(
@@ -187,12 +187,12 @@ def read_articulation_table() -> dict[str, Array]:
     """Return the mean of every articulator in each third of every phone [each shape=(3, 8)]."""
     return {
         row["phone"]: np.array([[float(row[f"{name}_{third}"]) for name in ARTICULATORS] for third in THIRDS])
-        for row in _csv_rows()
+        for row in _read_csv()
     }
 
 
 @cache
-def _csv_rows() -> list[dict[str, str]]:
+def _read_csv() -> list[dict[str, str]]:
     text = resources.files("lipmotion.motion").joinpath("articulation.csv").read_text(encoding="ascii")
     return list(csv.DictReader(text.splitlines()))
 
@@ -245,7 +245,7 @@ def count_contexts(timelines: Iterable[Timeline[Unit]]) -> dict[Context, int]:
     counts: Counter[Context] = Counter()
     for units in timelines:
         counts.update(
-            (_merged(left), _merged(span.label.phone), _merged(right))
+            (_merge_cells(left), _merge_cells(span.label.phone), _merge_cells(right))
             for left, span, right in with_neighbours(units)
             if span.label.phone
         )
@@ -286,7 +286,7 @@ ARTICULATION = {
 }
 
 
-def _merged(phone: str) -> str:
+def _merge_cells(phone: str) -> str:
     return SILENCE if is_silent(phone) else phone
 
 
@@ -375,7 +375,7 @@ class UnseenSpeaker:
                 spoken[max(first - NEAR_FRAMES, 0) : stop + NEAR_FRAMES] = 1
         unsure, sure = SOUND_SHARES
         reliability = np.broadcast_to(self.reliability, self.frames)[:, None, None]
-        strange = unseen_share(self.voice)
+        strange = count_unseen(self.voice)
         share = strange * (unsure + reliability * (sure - unsure)) + (1 - strange) * NOISY_SHARE * (1 - reliability)
         share = share * smooth_steps(spoken)[:, :, None]
         heard = self.prior.centre + articulators @ self.prior.matrix
@@ -404,7 +404,7 @@ class UnseenSpeaker:
                 wider[inside] = -CONSONANT_CLOSING
         more_open = (average_classes()[True] - average_classes()[False]).mean(axis=0)
         more_open /= more_open[ARTICULATORS.index(OPENING)]
-        gain = unseen_share(self.voice) * np.broadcast_to(self.reliability, self.frames)[:, None]
+        gain = count_unseen(self.voice) * np.broadcast_to(self.reliability, self.frames)[:, None]
         change = gain * smooth_steps(wider) * more_open @ self.prior.matrix
 
         def predict(chosen: slice) -> Statistics:
@@ -424,7 +424,7 @@ class UnseenSpeaker:
         time_s = np.arange(self.frames) / FRAME_RATE_HZ
         before = ((time_s >= first_s - BREATH_S) & (time_s < first_s))[:, None].astype(float)
         sure = min(sum(self.prior.contexts.values()) / SURE_PHONES, 1)
-        strange = max(2 * np.sqrt(self.voice), 1.0) * unseen_share(self.voice) * sure
+        strange = max(2 * np.sqrt(self.voice), 1.0) * count_unseen(self.voice) * sure
         share = strange * np.broadcast_to(self.reliability, self.frames)[:, None] * smooth_steps(before)
         return draw_towards(np.tile(self.prior.centre, (self.frames, 1)), share[:, :, None], statistics)
 
@@ -434,7 +434,7 @@ def choose_closing_reach(voice: float) -> float:
 
     voice : how well training knows the voice, 0 to 1
     """
-    return REACH_S - unseen_share(voice) * (REACH_S + INSET_S)
+    return REACH_S - count_unseen(voice) * (REACH_S + INSET_S)
 
 
 def widen_range(prior: ArticulationPrior, space: MotionSpace, voice: float, reliability: float) -> float:

@@ -55,7 +55,7 @@ class Eigenlips:
         Raises InputError: pictures of another size.
         """
         _check(images, self.size)
-        flat = _by_colour(images)
+        flat = _sort_by_colour(images)
         return np.concatenate(
             [(flat[c] - self.mean[c]) @ self.basis[c].T for c in range(len(COLOURS))], axis=1, dtype=np.float32
         )
@@ -92,7 +92,7 @@ def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:
     if components < 1:
         raise InputError(f"{components} components asked for, required at least 1")
     _check(images)
-    flat = _by_colour(images)
+    flat = _sort_by_colour(images)
     spaces = [fit_pca(colour, components) for colour in flat]
     count = min(len(space.basis) for space in spaces)
     if len(images) < 2 or not count:
@@ -138,7 +138,7 @@ SPACES = {
 """The arrays of eigenlips."""
 
 
-def _by_colour(images: Images) -> NDArray[np.uint8]:
+def _sort_by_colour(images: Images) -> NDArray[np.uint8]:
     """Return pictures as rows of each colour [shape=(3, T, H·W)]."""
     return np.moveaxis(images, -1, 0).reshape(len(COLOURS), len(images), -1)
 

@@ -52,7 +52,7 @@ def list_speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
     return [(span.start_s, span.end_s) for span in units if not is_silent(span.label.phone)]
 
 
-def frames_away(units: Timeline[Unit], frames: int, margin_s: float) -> NDArray[np.bool_]:
+def mark_distant(units: Timeline[Unit], frames: int, margin_s: float) -> NDArray[np.bool_]:
     """Return which frames are further than ``margin_s`` seconds from all speech, before and after it [shape=(T,)]."""
     return is_away_from_speech(np.arange(frames) / FRAME_RATE_HZ, list_speech_intervals(units), margin_s)
 
@@ -68,7 +68,7 @@ def find_digital_silence(features: NDArray[np.floating], units: Timeline[Unit]) 
     silent = np.zeros(len(energy), bool)
     for first, stop in find_runs(at_floor):
         silent[first:stop] = stop - first >= MIN_SILENCE_S * FRAME_RATE_HZ
-    return silent & frames_away(units, len(energy), BEFORE_SPEECH_S)
+    return silent & mark_distant(units, len(energy), BEFORE_SPEECH_S)
 
 
 def rate_phones(speech: Speech, distortion: Array | None, frames: int) -> Array:
@@ -190,7 +190,7 @@ def label_full_context(units: Timeline[Unit], frames: int, layout: StateLayout) 
         if span.label.phone not in PHONES:
             raise InputError(describe_unknown_phone(span.label.phone, f" at {span.start_s} s"))
     result = [layout.rest] * frames
-    away = frames_away(units, frames, layout.rest_s)
+    away = mark_distant(units, frames, layout.rest_s)
     for left, span, right in with_neighbours(units):
         first, stop = frames_of(span, frames)
         time_s = np.arange(first, stop) / FRAME_RATE_HZ

@@ -33,11 +33,11 @@ def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:
     if speech.encoding is None or (speech.voice >= 1 and speech.units_known):
         return None
     steps = np.asarray(speech.encoding)[::STEP].astype(np.float32) * ENCODING_SCALE
-    return interpolate_steps(shipped_network()(steps).astype(float), len(speech.features.values))
+    return interpolate_steps(load_shipped()(steps).astype(float), len(speech.features.values))
 
 
 @cache
-def shipped_network() -> ConvolutionalNetwork:
+def load_shipped() -> ConvolutionalNetwork:
     """Return the network of the package."""
     path = resources.files("lipmotion") / "models" / WEIGHTS
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:

@@ -17,8 +17,8 @@ from lipmotion.motion.articulation import (
     Statistics,
     UnseenSpeaker,
     choose_closing_reach,
+    count_unseen,
     fit_articulation_prior,
-    unseen_share,
     widen_range,
 )
 from lipmotion.motion.closure import (
@@ -121,7 +121,7 @@ class LearnedMotion:
         """
         if self.modulation is None or voice == 1:
             return self
-        strength = np.full(self.space.dimensions, 1 - unseen_share(voice))
+        strength = np.full(self.space.dimensions, 1 - count_unseen(voice))
         if "width" in self.space.direct_names:
             strength[self.space.direct_names.index("width")] **= 2
         return replace(self, modulation=self.modulation.scale_to(strength))

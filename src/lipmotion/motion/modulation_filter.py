@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.frame_labels import find_runs, frames_away
+from lipmotion.motion.frame_labels import find_runs, mark_distant
 from lipmotion.stats.curves import measure_modulation_spectrum
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Rule
@@ -99,7 +99,7 @@ def select_resting_motion(examples: Sequence[Example], values: Sequence[Array]) 
     """
     resting = []
     for example, x in zip(examples, values, strict=True):
-        far = example.valid & frames_away(example.speech.units, len(x), RESTING_MARGIN_S)
+        far = example.valid & mark_distant(example.speech.units, len(x), RESTING_MARGIN_S)
         resting += [x[start:stop] for start, stop in find_runs(far)]
     return resting
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
-from lipmotion.motion.articulation import unseen_share
+from lipmotion.motion.articulation import count_unseen
 from lipmotion.motion.network_steps import (
     MIN_DEVIATION,
     STEP,
@@ -148,7 +148,7 @@ class PosteriorNetwork(Predictor):
         Raises InputError: speech without posteriors, or with those of another phone recogniser than in training.
         """
         posteriors, frames = self._check(speech.posteriors), len(speech.features.values)
-        share = 0.0 if speech.spectrum is None else 1 - unseen_share(speech.voice)
+        share = 0.0 if speech.spectrum is None else 1 - count_unseen(speech.voice)
         motion = np.zeros((frames, len(self.centre)))
         for spectrum, weight in ((None, 1 - share), (speech.spectrum, share)):
             if weight > 0:

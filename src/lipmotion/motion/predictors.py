@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ModelFormatError
 from lipmotion.extensions import Registry
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, refuse_undeclared, select_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, silent_monitor
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ class Predictor(ABC):
 
     @classmethod
     def conditions(cls, motion_s: float, most: int) -> int:  # noqa: ARG003
-        """Return in how many acoustic conditions training takes each example (``Example.condition_spectra``).
+        """Return in how many acoustic conditions training takes each example (``Example.list_conditions``).
 
         motion_s : seconds of measured motion
         most     : as many as the configuration allows
@@ -214,8 +214,8 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
     Raises KeyError, ValueError: an array is missing or undeclared, or has a wrong shape, type or range; or there are
     several predictors. ModelFormatError: the predictor is of a package that is not installed.
     """
-    names = {name.rpartition(".")[0] for name in arrays_under(arrays, ADDED)}
-    added = {name: arrays_under(arrays, f"{ADDED}{name}.") for name in sorted(names)}
+    names = {name.rpartition(".")[0] for name in select_arrays(arrays, ADDED)}
+    added = {name: select_arrays(arrays, f"{ADDED}{name}.") for name in sorted(names)}
     found = [name for name in PREDICTORS.built_in if arrays.keys() & PREDICTORS.load(name).ARRAYS]
     inside = {part for name in found for part in PREDICTORS.load(name).CONTAINS}
     stored = {name: arrays for name in found if name not in inside} | added

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING, estimate_closed_opening, find_closable_ranges
-from lipmotion.motion.frame_labels import frames_away, list_speech_intervals
+from lipmotion.motion.frame_labels import list_speech_intervals, mark_distant
 from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion, Timeline, Unit
 from lipmotion.units import VISEME_OF, VISEMES
@@ -282,10 +282,10 @@ def measure_person(examples: Sequence[Example], column: int | None) -> PersonSta
     silent, silence, spoken, measured, smallest = [], [], [], [], []
     for example in examples:
         values, valid, units = np.asarray(example.motion.values, float), example.valid, example.speech.units
-        silent.append(values[valid & frames_away(units, len(values), FAR_FROM_SPEECH_S)])
-        silence.append(values[valid & frames_away(units, len(values), NEAR_SPEECH_S)])
+        silent.append(values[valid & mark_distant(units, len(values), FAR_FROM_SPEECH_S)])
+        silence.append(values[valid & mark_distant(units, len(values), NEAR_SPEECH_S)])
         measured.append(values[valid])
-        spoken.append(values[valid & ~frames_away(units, len(values), 0.0)])
+        spoken.append(values[valid & ~mark_distant(units, len(values), 0.0)])
         if column is not None:
             ranges = find_closable_ranges(example.speech.units, len(values))
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
@@ -422,5 +422,5 @@ def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> 
 
 def count_speech_s(examples: Sequence[Example]) -> float:
     """Return the seconds of speech in which the motion of some examples was measured."""
-    spoken = (each.valid & ~frames_away(each.speech.units, len(each.valid), 0.0) for each in examples)
+    spoken = (each.valid & ~mark_distant(each.speech.units, len(each.valid), 0.0) for each in examples)
     return sum(int(frames.sum()) for frames in spoken) / FRAME_RATE_HZ

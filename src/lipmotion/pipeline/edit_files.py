@@ -18,7 +18,7 @@ from lipmotion.pipeline.request import Request, locate_paths
 from lipmotion.pipeline.session import Session
 from lipmotion.storage.files import atomic_file, sound_reference
 from lipmotion.storage.json_text import as_json_rows, from_json, read_toml
-from lipmotion.storage.sources import LARGEST_TEXT_BYTES, check_source, read_text_file, sha256_of
+from lipmotion.storage.sources import LARGEST_TEXT_BYTES, check_source, hash_file, read_text_file
 from lipmotion.types import Generation, Outlook, Timeline, Unit
 from lipmotion.types.values import as_tuple, describe_value, items, number, optional, require, text, value_of
 
@@ -105,14 +105,14 @@ def create_edit_file(request: Request, session: Session | None = None) -> tuple[
         raise InputError("a file of edits names its recording and lexicon, required paths of files, not values")
     generation = session.generate()
     moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not stored
-    digest = sha256_of(named.recording) if named.recording else ""
+    digest = hash_file(named.recording) if named.recording else ""
     return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook, sha256=digest), generation
 
 
 def check_sound(recording: Path, sha256: str) -> None:
     """Raise InputError unless a recording is the one of a digest, whose phones were found, or it cannot be read."""
     check_source(recording, "recording")
-    if (digest := sha256_of(recording)) != sha256:
+    if (digest := hash_file(recording)) != sha256:
         raise InputError(
             f"{recording}: is another recording than when its phones were found (SHA-256 {digest[:12]}, required "
             f"{sha256[:12]}); put the old one back, or begin anew with this one, under another name"
@@ -198,9 +198,9 @@ def write_edits(file: EditFile, path: str | Path) -> None:
     if suffix == TOML:  # a line each, and lists with a line for each of their members
         content = ""
         for name, value in members.items():
-            rows = "".join(f"  {_toml_value(row)},\n" for row in value) if isinstance(value, list | tuple) else ""
+            rows = "".join(f"  {_format_toml(row)},\n" for row in value) if isinstance(value, list | tuple) else ""
             content += (
-                f"{name} = [\n{rows}]\n" if isinstance(value, list | tuple) else f"{name} = {_toml_value(value)}\n"
+                f"{name} = [\n{rows}]\n" if isinstance(value, list | tuple) else f"{name} = {_format_toml(value)}\n"
             )
     else:
         content = as_json_rows(members)
@@ -208,9 +208,9 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         temporary.write_text(content, encoding="utf-8")
 
 
-def _toml_value(value: Any) -> str:
+def _format_toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{name} = {_toml_value(each)}" for name, each in value.items()) + "}"
+        return "{" + ", ".join(f"{name} = {_format_toml(each)}" for name, each in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml_value, value)) + "]"
+        return "[" + ", ".join(map(_format_toml, value)) + "]"
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -84,7 +84,7 @@ class PhoneStep(Step):
         return number - 1
 
 
-def _unit_of(phone: str, word: str = "") -> Unit:
+def _read_unit(phone: str, word: str = "") -> Unit:
     """Return the label of a phone that a user gives. Raises InputError: there is no such phone."""
     if phone not in PHONES:
         raise InputError(describe_unknown_phone(phone))
@@ -101,7 +101,7 @@ class PhoneIs(PhoneStep):
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
         place = self._index(units, self.number)
         spans = list(units)
-        spans[place] = replace(spans[place], label=_unit_of(self.phone, spans[place].label.word))
+        spans[place] = replace(spans[place], label=_read_unit(self.phone, spans[place].label.word))
         return Timeline(tuple(spans))
 
 
@@ -173,7 +173,7 @@ class PhoneInserted(PhoneStep):
         last_s = units[-1].end_s if len(units) else 0.0
         if not (self.start_s >= 0 and self.start_s + MIN_PHONE_S - 1e-9 <= self.end_s <= last_s + 1e-9):
             raise InputError(f"{str(self)!r}: required at least {MIN_PHONE_S} s within 0 to {last_s:.3f} s")
-        return with_span(units, [Span(self.start_s, min(self.end_s, last_s), _unit_of(self.phone))])
+        return with_span(units, [Span(self.start_s, min(self.end_s, last_s), _read_unit(self.phone))])
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ class WordSaid(Step):
 def _check_said(step: Step, phones: Sequence[str]) -> None:
     """Raise InputError unless phones are those of a word that an edit says."""
     for phone in phones:
-        if _unit_of(phone) and is_silent(phone):
+        if _read_unit(phone) and is_silent(phone):
             raise InputError(f"{str(step)!r}: a word has no silence in it; say two words")
 
 

@@ -26,8 +26,8 @@ from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
-from lipmotion.speech.recognition.recognised_speech import NOISY_DB, joined_units, placed_units
-from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
+from lipmotion.speech.recognition.recognised_speech import NOISY_DB, join_units, place_units
+from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, weigh_own_model
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChannelValue,
@@ -107,7 +107,7 @@ def generate_motion(
     )
 
 
-def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
+def find_speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
     """Return the map of a speaker; None: of the mean person (no name), or the only one. Raises InputError: unknown."""
     if not speaker:
         return None
@@ -122,9 +122,9 @@ def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
 def find_person(model: Model, request: Request) -> SpeakerMap | None:
     """Return the map of the motion that a model generates to that of the person of a request; None: it is not mapped.
 
-    Raises as ``speaker_map`` and ``map_onto``.
+    Raises as ``find_speaker_map`` and ``map_onto``.
     """
-    person = speaker_map(model.speakers, request.speaker)
+    person = find_speaker_map(model.speakers, request.speaker)
     if request.onto is None:
         if request.onto_speaker:
             raise InputError(
@@ -150,7 +150,7 @@ def generate_for(
 ) -> Generation:
     """Return the motion of one person; pins hold exactly, and closed lips stay closed.
 
-    person      : from ``speaker_map``
+    person      : from ``find_speaker_map``
     learned     : the engine's model of motion: the mean person's
     constraints : values that the motion must take, in this person's units
     finish      : what else is done with the motion of each passage, whose time in the recording (s) is given
@@ -248,7 +248,7 @@ def predict_outlook(request: Request, analysis: SpeechAnalysis) -> Outlook:
         return Outlook("no speech", 0.0, None, analysis.range_db, ())
     if recognition is not None:
         words = "words" if recognition.word_s > recognition.phone_s else "phones"
-        voice = own_model_weight(similarity) if similarity is not None else None
+        voice = weigh_own_model(similarity) if similarity is not None else None
         return Outlook(words, weigh_words(recognition), voice, analysis.range_db, advice)
     is_used = speech.units_known if fit is None else not fit.is_doubtful
     words = "given units" if request.units is not None else "transcript" if is_used else "own model"
@@ -380,8 +380,8 @@ def _join_units(
 ) -> Timeline[Unit]:
     """Return the phones of all passages, as the engine names them and places them in time, and silence between."""
     end_s = speech.units[-1].end_s if len(speech.units) else speech.features.duration_s
-    placed = (placed_units(each.units, part.first, part.own) for part, each in zip(parts, made, strict=True))
-    units = joined_units(placed, silence, end_s)
+    placed = (place_units(each.units, part.first, part.own) for part, each in zip(parts, made, strict=True))
+    units = join_units(placed, silence, end_s)
     pairs = [(part.speech.units, each.units) for part, each in zip(parts, made, strict=True)]
     if any([span.start_s for span in given] != [span.start_s for span in moved] for given, moved in pairs):
         return units

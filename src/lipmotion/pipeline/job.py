@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import load_provided
 from lipmotion.pipeline.request import Outputs, Request, locate_paths
-from lipmotion.storage.files import portable_name
+from lipmotion.storage.files import make_portable
 from lipmotion.storage.json_text import read_toml
 from lipmotion.storage.sources import check_listable
 from lipmotion.types.configuration import Configuration, option
@@ -111,7 +111,7 @@ def run(  # noqa: PLR0913
     from lipmotion.pipeline.edit_files import edit_file
     from lipmotion.pipeline.generate.explain import chain_posteriors, check_picture, write_posteriors
     from lipmotion.pipeline.model import load_model
-    from lipmotion.pipeline.outputs.curve_sets import curve_names
+    from lipmotion.pipeline.outputs.curve_sets import list_curve_names
 
     # What cannot be written is refused before the long work.
     edits, recording, picture = edit_file(job.request.edits), job.request.recording, job.outputs.posteriors
@@ -133,7 +133,7 @@ def run(  # noqa: PLR0913
         workers=workers,
         monitor=sub_monitor(monitor, 0.0, RECOGNITION if draws else 1.0),
         background=face.load if draws else None,
-        curves=curve_names(curves) if curves else (),
+        curves=list_curve_names(curves) if curves else (),
     )
     if picture:
         write_posteriors(picture, *chain_posteriors(session, edits.edits))
@@ -179,7 +179,7 @@ def choose_curves(outputs: Outputs, face: ShownFace) -> str | DrivenCharacter | 
     return outputs.curves or (character if character is not None and character.shapes is not None else None)
 
 
-def output_settings(job: Job, face: ShownFace, speech: str | Path | Audio | None) -> OutputSettings:
+def to_output_settings(job: Job, face: ShownFace, speech: str | Path | Audio | None) -> OutputSettings:
     """Return what the outputs of a job hold, and how they show it.
 
     speech : the recording, or the sound; None: there will be a sound that is in no file
@@ -197,11 +197,11 @@ def output_settings(job: Job, face: ShownFace, speech: str | Path | Audio | None
 def check_outputs(job: Job, face: ShownFace, speech: str | Path | Audio | None = None) -> list[Output]:
     """Return the outputs of a job's files. Raises ExportError or InputError: one cannot be written.
 
-    speech : as of ``output_settings``
+    speech : as of ``to_output_settings``
     """
     from lipmotion.pipeline.outputs.output import create_outputs
 
-    return create_outputs(job.outputs.files, output_settings(job, face, speech))
+    return create_outputs(job.outputs.files, to_output_settings(job, face, speech))
 
 
 def write_outputs(
@@ -224,7 +224,7 @@ def write_outputs(
 
     if job.outputs.articulation:
         generation = with_articulation(generation)
-    settings = replace(output_settings(job, face, speech), sounded=isinstance(speech, Audio))
+    settings = replace(to_output_settings(job, face, speech), sounded=isinstance(speech, Audio))
     sound = speech if isinstance(speech, Audio) else None
     performance = Performance(generation, settings, sound, settings.recording, model, monitor)
     write_planned(performance, create_outputs(job.outputs.files, settings), temporary=temporary)
@@ -284,7 +284,7 @@ def plan_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: Sequ
     named = [part for template in templates for part in Path(template).parts if NAME in part]
     for recording in recordings:
         for name in (part.replace(NAME, recording.stem) for part in named):
-            if portable_name(name) != name:
+            if make_portable(name) != name:
                 raise ExportError(f"{name}: no name of a file on Windows; rename {recording}, or name the output")
     seen: dict[str, Path] = {}
     for recording, files in zip(recordings, planned, strict=True):

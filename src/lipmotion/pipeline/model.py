@@ -20,9 +20,9 @@ from lipmotion.motion.eigenlips import Eigenlips, eigenlips_from_arrays, eigenli
 from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, speakers_from_arrays, speakers_to_arrays
 from lipmotion.speech.features.mfcc import FEATURES
-from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
+from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_from_arrays, adaptation_to_arrays
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive
-from lipmotion.storage.schema import arrays_under, refuse_undeclared
+from lipmotion.storage.schema import refuse_undeclared, select_arrays
 from lipmotion.types import PriorOutput, Speech
 
 FORMAT = "lipmotion.model"
@@ -86,20 +86,20 @@ def save_model(model: Model, path: str | Path) -> None:
     parts: dict[str, Mapping[str, NDArray[Any]]] = {
         "phones": hmm_to_arrays(model.phones),
         "engine": model.engine.to_arrays(model.learned),
-        "adaptation": adaptation_arrays(model.adaptation) if model.adaptation is not None else {},
+        "adaptation": adaptation_to_arrays(model.adaptation) if model.adaptation is not None else {},
         "eigenlips": eigenlips_to_arrays(model.eigenlips) if model.eigenlips is not None else {},
         "speakers": speakers_to_arrays(model.speakers) if model.speakers is not None else {},
         "prior": model.prior.engine.to_arrays(model.prior.learned) if model.prior is not None else {},
     }
     config = model.phones.config.as_mapping()
-    header = {"format": FORMAT, "version": VERSION, **_engine_header(model), "recogniser": config}
+    header = {"format": FORMAT, "version": VERSION, **_describe_engine(model), "recogniser": config}
     if model.prior is not None:
-        header["prior"] = _engine_header(model.prior)
+        header["prior"] = _describe_engine(model.prior)
     arrays = {f"{part}/{key}": array for part, inner in parts.items() for key, array in inner.items()}
     write_archive(Path(path), header, arrays)
 
 
-def _engine_header(model: Model) -> dict[str, Any]:
+def _describe_engine(model: Model) -> dict[str, Any]:
     return {"engine": model.engine.name, "configuration": model.engine.config.as_mapping(), **model.about}
 
 
@@ -114,7 +114,7 @@ def load_model(path: str | Path | None = None) -> Model:
     >>> lipmotion.load_model().about["licence"]
     ['CC BY 4.0']
     """
-    if path is None and not shipped_path().is_file():
+    if path is None and not find_shipped().is_file():
         raise ModelFormatError("the package holds no model; install it again, or give one with --model")
     if path is None:
         return _read_shipped()
@@ -134,14 +134,14 @@ def read_header(path: Path) -> dict[str, Any]:
     return read_header_of(path, FORMAT, VERSION, "lipmotion model", "give a file that `lipmotion train` wrote")
 
 
-def shipped_path() -> Path:
+def find_shipped() -> Path:
     """Return the path of the model that ships with the package."""
     return Path(str(resources.files("lipmotion") / "models" / SHIPPED))
 
 
 @cache
 def _read_shipped() -> Model:
-    return _read(shipped_path())
+    return _read(find_shipped())
 
 
 def _read(path: Path) -> Model:
@@ -155,7 +155,7 @@ def _read(path: Path) -> Model:
     try:
         stored = read_archive(path)
         for folder in _FOLDERS:
-            arrays[folder] = arrays_under(stored, f"{folder}/")
+            arrays[folder] = select_arrays(stored, f"{folder}/")
         refuse_undeclared(stored, (f"{folder}/{key}" for folder, inner in arrays.items() for key in inner))
         engine = engine_named(header["engine"], _options(header, "configuration"), stored=True)
         config = HmmConfig.parsed(_options(header, "recogniser"))

@@ -45,9 +45,9 @@ def _file(reads: str, metavar: str, help: str, **more: Any) -> Any:
 
 
 def _shipped() -> Path:
-    from lipmotion.pipeline.model import shipped_path
+    from lipmotion.pipeline.model import find_shipped
 
-    return shipped_path()
+    return find_shipped()
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ class Workers:
 
 
 @contextmanager
-def worker_pool(count: int) -> Iterator[Workers]:
+def open_workers(count: int) -> Iterator[Workers]:
     """Provide ``count`` workers; their processes end when the block is left, immediately if by an exception.
 
     Matrix products use one thread inside the block and in every worker, so that results do not depend on ``count``.
@@ -118,7 +118,7 @@ def worker_pool(count: int) -> Iterator[Workers]:
         here, there = context.Pipe()
         process = context.Process(target=_work, args=(there,), daemon=True)
         try:
-            with _signals_delayed():
+            with _delay_signals():
                 process.start()
             there.close()  # the process alone has it: when it ends, so does the pipe
             yield here
@@ -146,7 +146,7 @@ def map_in_processes(count: int, background: Callable[[], None] | None = None) -
 
     def start(processes: int, function: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
         """Yield None when the processes have begun with the first items, then the results."""
-        with worker_pool(processes) as team:
+        with open_workers(processes) as team:
             results = team.ordered_map(function, items)
             yield None
             if background is not None and processes > 1:
@@ -175,7 +175,7 @@ def start_process(
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
     process = context.Process(target=_apart, args=(there, function, item))
-    with _signals_delayed():
+    with _delay_signals():
         process.start()
     there.close()
     return process, here
@@ -193,7 +193,7 @@ DIED = (
 
 
 @contextmanager
-def _signals_delayed() -> Iterator[None]:
+def _delay_signals() -> Iterator[None]:
     """Delay Ctrl-C and ``kill`` inside the block, and block them forever in processes that are started inside it.
 
     The terminal sends Ctrl-C to all processes, but only the first one, which ends the others, should act on it. A mask
@@ -254,7 +254,7 @@ def _begin_below() -> None:
 
 
 @contextmanager
-def training_pool(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
+def open_training(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
     """Give the map that distributes a training, whose results are in the order of the items.
 
     workers    : number of processes on this machine, or the address of a Dask scheduler
@@ -262,7 +262,7 @@ def training_pool(workers: int | str, utterances: int) -> Iterator[ParallelMap]:
     Raises as ``cluster_pool``. The map raises CorpusError: a process died; Dask lets others finish its work, thrice.
     """
     if isinstance(workers, int):
-        with worker_pool(min(process_count(workers), utterances // UTTERANCES_PER_WORKER)) as team:
+        with open_workers(min(process_count(workers), utterances // UTTERANCES_PER_WORKER)) as team:
             yield team.ordered_map
         return
     with cluster_pool(workers) as pool:

@@ -85,7 +85,7 @@ def collect_transform_statistics(
     return TransformStatistics(AffineStatistics(float(len(features)), quadratic, target.T @ extended), log_likelihood)
 
 
-def prior_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineStatistics:
+def create_prior(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineStatistics:
     """Return the expected statistics of one frame drawn from densities, each equally often.
 
     densities : their numbers [shape=(N,)]

@@ -37,7 +37,7 @@ def mark_known_dynamics(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return inner
 
 
-def window_frames(rate_hz: float) -> int:
+def count_window(rate_hz: float) -> int:
     """Return the number of frames of a window, an even number, at least 4."""
     return max(2 * round(WINDOW_S * rate_hz / 2), 4)
 
@@ -51,7 +51,7 @@ def measure_modulation_spectrum(clips: Sequence[Array], rate_hz: float) -> tuple
     Source: Takamichi, Toda, Black, Neubig, Sakti & Nakamura 2016, who compute it over whole utterances.  Deviation: the
     mean over windows, so that clips of different lengths have one spectrum.
     """
-    size = window_frames(rate_hz)
+    size = count_window(rate_hz)
     powers: list[Array] = []
     for clip in clips:
         length = min(size, len(clip))

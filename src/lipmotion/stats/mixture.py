@@ -189,7 +189,7 @@ class QuadraticForm:
         return result
 
 
-def normalised_components(components: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+def normalise_components(components: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
     """Return the log density of mixtures [shape=(T, G)], and posteriors of their components [shape=(T, M, G)].
 
     components : log weight + log density of each [shape=(T, M, G)], overwritten by the posteriors

@@ -93,9 +93,9 @@ class RecurrentNetwork(SequenceNetwork):
     def forward(  # noqa: D102
         self, inputs: Array, inside: NDArray[np.bool_], dropout: Dropout | None
     ) -> tuple[Array, list[_CellPass]]:
-        states, passes, counts = inputs, [], _both_directions(inside[:, :, None].astype(np.float32))
+        states, passes, counts = inputs, [], _run_both(inside[:, :, None].astype(np.float32))
         for layer in self.layers:
-            passed = _run_layer(layer, _both_directions(states), counts)
+            passed = _run_layer(layer, _run_both(states), counts)
             forth, back = passed.outputs[0], passed.outputs[1, ::-1]
             states = np.ascontiguousarray(np.concatenate([forth, back], axis=2).transpose(1, 0, 2))
             if dropout is not None:
@@ -130,7 +130,7 @@ def make_recurrent_network(inputs: int, cells: int, outputs: int, layers: int, s
     return RecurrentNetwork(tuple(made), LinearMap(uniform(2 * cells, outputs), np.zeros(outputs, np.float32)))
 
 
-def _both_directions(values: Array) -> Array:
+def _run_both(values: Array) -> Array:
     """Return the values of a batch [shape=(B, T, C)] forward and backward in time [shape=(2, T, B, C)]."""
     forward = values.transpose(1, 0, 2)
     return np.stack([forward, forward[::-1]])
@@ -164,7 +164,7 @@ def _run_layer(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPass
 def _differentiate_layer(layer: RecurrentLayer, passed: _CellPass, slope: Array) -> tuple[list[Array], Array]:
     """Return the gradients of a layer's parameters and inputs [shape=(B, T, I)], from that of its outputs."""
     _, length, batch, cells = passed.cells.shape
-    forth, back = _both_directions(slope)
+    forth, back = _run_both(slope)
     of_outputs = np.stack([forth[:, :, :cells], back[:, :, cells:]])
     gates, bent = passed.gates, np.tanh(passed.cells)
     before = _shift(passed.cells)

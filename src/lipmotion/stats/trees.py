@@ -110,7 +110,7 @@ POSITIONS = ("left", "unit", "right")
 _STORED_POSITIONS = [str(position) for position in range(len(POSITIONS))]
 
 
-def gaussian_log_likelihood(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
+def score_gaussian(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
     """Return the log likelihood of frames under their maximum-likelihood diagonal Gaussian [shape=(N,)].
 
     statistics     : [shape=(N, 1 + 2·D)]: number of frames, sums, sums of squares
@@ -123,11 +123,11 @@ def gaussian_log_likelihood(statistics: Array, least_variance: float = MIN_VARIA
     return -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + spread / variance).sum(axis=1)
 
 
-def multispace_log_likelihood(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
+def score_multispace(statistics: Array, least_variance: float = MIN_VARIANCE) -> Array:
     """Return the log likelihood of frames, some without a value, under their maximum-likelihood density [shape=(N,)].
 
     statistics : [shape=(N, 2 + 2·D)]: number of frames, of frames with a value, and their sums and sums of squares
-    least_variance : as in ``gaussian_log_likelihood``
+    least_variance : as in ``score_gaussian``
     The density is a Gaussian for frames with a value and a point mass for those without one.
     """
     count, voiced = statistics[:, 0], statistics[:, 1]
@@ -135,7 +135,7 @@ def multispace_log_likelihood(statistics: Array, least_variance: float = MIN_VAR
     likelihood = np.zeros(len(count))
     for part in (np.maximum(voiced, 0.0), np.maximum(count - voiced, 0.0)):
         likelihood += part * np.log(np.where(part > 0, part, total) / total)
-    return likelihood + np.where(voiced > 0, gaussian_log_likelihood(statistics[:, 1:], least_variance), 0.0)
+    return likelihood + np.where(voiced > 0, score_gaussian(statistics[:, 1:], least_variance), 0.0)
 
 
 def grow_tree(
@@ -270,7 +270,7 @@ class RegressionStatistics:
         return RegressionStatistics(self.products + other.products, self.targets + other.targets)
 
 
-def zero_statistics(inputs: int, outputs: int) -> RegressionStatistics:
+def create_statistics(inputs: int, outputs: int) -> RegressionStatistics:
     """Return the statistics of no frames."""
     return RegressionStatistics(np.zeros((inputs, inputs)), np.zeros((inputs, outputs)))
 

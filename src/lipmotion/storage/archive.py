@@ -83,7 +83,7 @@ def read_archive(path: Path) -> dict[str, NDArray[Any]]:
     unknown = next((name for name in members if not name.endswith(ARRAY)), None)
     if unknown is not None:
         raise ValueError(f"undeclared {unknown!r}, which is no array")
-    return {name.removesuffix(ARRAY): array_in(content) for name, content in members.items()}
+    return {name.removesuffix(ARRAY): take_array(content) for name, content in members.items()}
 
 
 def check_archive(file: zipfile.ZipFile) -> None:
@@ -99,7 +99,7 @@ def check_archive(file: zipfile.ZipFile) -> None:
         raise ValueError("its parts are compressed in an unknown way, required: deflated or stored")
 
 
-def array_in(content: bytes) -> NDArray[Any]:
+def take_array(content: bytes) -> NDArray[Any]:
     """Return the array of a ``.npy`` file's content.
 
     Raises ValueError: no array, pickled objects, or more or fewer bytes than the header declares; sizes are compared

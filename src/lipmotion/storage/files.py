@@ -31,7 +31,7 @@ def check_target(target: Path, source: str | Path | None = None) -> None:
     """Raise ExportError unless a file can be written at ``target``; called before the work that leads to it."""
     try:
         is_folder = target.is_dir()
-        _check_parent(output_place(target))
+        _check_parent(find_place(target))
     except OSError as error:  # a name too long, a folder that may not be looked into
         raise ExportError(f"{target}: cannot be written: {error.strerror or error}") from error
     if is_folder:
@@ -51,10 +51,10 @@ def check_distinct(targets: Sequence[Path]) -> None:
 _DEVICE = re.compile(r"con|prn|aux|nul|conin\$|conout\$|(?:com|lpt)[0-9\u00b9\u00b2\u00b3]", re.IGNORECASE)
 
 
-def portable_name(name: str) -> str:
+def make_portable(name: str) -> str:
     """Return a name of a file or a folder that Windows takes as one, too; as it is, where it does.
 
-    >>> portable_name("nul.wav"), portable_name("Con ."), portable_name("icon.wav")
+    >>> make_portable("nul.wav"), make_portable("Con ."), make_portable("icon.wav")
     ('nul_.wav', 'Con_', 'icon.wav')
     """
     stem, dot, rest = name.rstrip(" .").partition(".")
@@ -92,7 +92,7 @@ def confine(folder: Path) -> Iterator[None]:
         _CONFINED.pop(other, None)
 
 
-def _confined_names(path: Path) -> tuple[str, tuple[str, ...]] | None:
+def _split_confined(path: Path) -> tuple[str, tuple[str, ...]] | None:
     """Return the outermost confined folder that holds a path, and the names from there to it; None: there is none."""
     place = Path(os.path.abspath(path))  # noqa: PTH100 # links are not followed
     for root in sorted(set(_CONFINED.copy().values()), key=len):
@@ -114,7 +114,7 @@ def is_link(path: Path) -> bool:
 @contextmanager
 def _reached(folder: Path, *, create: bool = False) -> Iterator[int | None]:
     """Give a handle of a folder in a confined one; None: it is in none, or the system has no handles of folders."""
-    inside = _confined_names(folder / "name")
+    inside = _split_confined(folder / "name")
     if inside is None:
         if create:
             folder.mkdir(parents=True, exist_ok=True)
@@ -250,9 +250,9 @@ def remove_left_files(target: Path) -> None:
                 continue
 
 
-def output_place(target: Path) -> Path:
+def find_place(target: Path) -> Path:
     """Return the path that an output is written to; for a link, that of its target, so that the link remains."""
-    if _confined_names(target):
+    if _split_confined(target):
         return target
     try:
         place = Path(os.path.realpath(target)) if target.is_symlink() else target
@@ -271,7 +271,7 @@ def atomic_file(target: Path) -> Iterator[Path]:
     Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
     Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
     """
-    place = output_place(target)
+    place = find_place(target)
     temporary = _temporary(place, target.suffix)
     try:
         with _reached(place.parent):
@@ -286,7 +286,7 @@ def atomic_file(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_folder(target: Path) -> Iterator[Path]:
+def replace_folder(target: Path) -> Iterator[Path]:
     """Give a temporary folder to fill; rename it to ``target``, which must not exist, on success.
 
     Raises ExportError: the parent does not exist, or something cannot be written.

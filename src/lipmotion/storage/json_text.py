@@ -27,7 +27,7 @@ def as_json(content: Any, **options: Any) -> str:
     """Return content as JSON text that can be encoded as UTF-8.
 
     options : of ``json.dumps``; surrogates, which UTF-8 cannot encode, are escaped in any case
-    Raises ExportError: a number that is not finite; JSON has none (``nan_as_null`` removes them from reports); or it is
+    Raises ExportError: a number that is not finite; JSON has none (``replace_nan`` removes them from reports); or it is
     nested too deeply.
     """
     try:
@@ -81,12 +81,12 @@ def _rows(rows: Sequence[Any], *, ensure_ascii: bool) -> str:
     return ",\n  ".join(as_json(row, ensure_ascii=ensure_ascii) for row in rows)
 
 
-def nan_as_null(content: Any) -> Any:
+def replace_nan(content: Any) -> Any:
     """Return content with None (null in JSON) for every number that is not finite: such figures are undefined."""
     if isinstance(content, dict):
-        return {key: nan_as_null(value) for key, value in content.items()}
+        return {key: replace_nan(value) for key, value in content.items()}
     if isinstance(content, list | tuple):
-        return type(content)(map(nan_as_null, content))
+        return type(content)(map(replace_nan, content))
     return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
@@ -97,13 +97,13 @@ def from_json(text: str | bytes) -> Any:
     """
     try:
         numbers: Any = {"parse_constant": _refuse, "parse_float": finite, "parse_int": _whole}
-        return json.loads(text, object_pairs_hook=_distinct_keys, **numbers)
+        return json.loads(text, object_pairs_hook=_check_keys, **numbers)
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
 
 
 @contextmanager
-def json_errors(what: str) -> Iterator[None]:
+def catch_errors(what: str) -> Iterator[None]:
     """Turn the errors of reading JSON that are raised inside into an InputError; ``what`` is read."""
     try:
         yield
@@ -115,7 +115,7 @@ def json_errors(what: str) -> Iterator[None]:
         raise InputError(f"{what} is damaged ({error}); export it again") from error
 
 
-def _distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _check_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(pairs)
     if len(content) < len(pairs):
         counts = Counter(key for key, _ in pairs)

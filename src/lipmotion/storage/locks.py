@@ -16,10 +16,10 @@ from lipmotion.storage.files import (
     TEMPORARY,
     check_target,
     confine,
+    find_place,
     is_link,
     make_folder,
     open_own,
-    output_place,
     remove,
     remove_left_files,
     write_error,
@@ -126,7 +126,7 @@ else:
 
 
 @contextmanager
-def temporary_folder() -> Iterator[Path]:
+def open_temporary() -> Iterator[Path]:
     """Give a folder in the system's place for temporary files, which is removed at the end.
 
     Those that killed runs have left there are removed first: nobody holds their locks.
@@ -153,7 +153,7 @@ def temporary_folder() -> Iterator[Path]:
 
 
 @contextmanager
-def unfinished_work(target: Path) -> Iterator[Path]:
+def list_unfinished(target: Path) -> Iterator[Path]:
     """Give a locked folder beside ``target`` for the finished parts of the work on it.
 
     The folder is deleted when the block ends without an error; after an error, or when the process is killed, a later
@@ -161,8 +161,8 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     Raises ExportError: the target could not be written, or another process is at work on it.
     """
     check_target(target)
-    target = output_place(target)
-    folder = work_folder(target)
+    target = find_place(target)
+    folder = name_work_folder(target)
     if is_link(folder):
         raise ExportError(f"{folder}: is a link, required a folder of unfinished work; remove it")
     try:
@@ -181,9 +181,9 @@ def unfinished_work(target: Path) -> Iterator[Path]:
             folder.rmdir()
 
 
-def work_folder(target: Path) -> Path:
-    """Return the path of the folder that ``unfinished_work`` gives."""
-    target = output_place(target)
+def name_work_folder(target: Path) -> Path:
+    """Return the path of the folder that ``list_unfinished`` gives."""
+    target = find_place(target)
     return target.with_name(target.name + UNFINISHED)
 
 

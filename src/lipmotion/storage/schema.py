@@ -137,6 +137,6 @@ def check_index(name: str, numbers: NDArray[Any], count: int) -> None:
         raise ValueError(f"{name} is {numbers.min()} to {numbers.max()}, required 0 to {count - 1}")
 
 
-def arrays_under(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
+def select_arrays(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
     """Return the arrays whose names begin with a prefix, by their names without it."""
     return {name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)}

@@ -153,7 +153,7 @@ def check_source(path: Path, kind: str) -> None:
     check_kind(path, kind)
 
 
-def sha256_of(path: Path) -> str:
+def hash_file(path: Path) -> str:
     """Return the SHA-256 digest of a file's content, in hexadecimal. Raises InputError: it is no file."""
     check_regular(path, "file")
     digest = hashlib.sha256()
@@ -310,7 +310,7 @@ MAX_PIXELS = 4096 * 2304
 
 
 @cache
-def x264_instructions() -> str:
+def read_x264() -> str:
     """Return the parameter of x264 that limits its instructions, after a colon; empty on processors without AVX-512.
 
     With AVX-512 it writes other bytes now and then for pictures under 100 px (3 videos of 100), with AVX2 it does not,
@@ -356,7 +356,7 @@ def bound_allocations() -> None:
         ctypes.CDLL(av._core.__file__).av_max_alloc(ctypes.c_size_t(LARGEST_BLOCK_BYTES))
 
 
-def video_streams(container: Any) -> list[Any]:
+def list_video(container: Any) -> list[Any]:
     """Return the video streams of an open container, without album covers."""
     import av
 
@@ -370,12 +370,12 @@ def has_video(path: Path) -> bool:
 
     try:
         with open_media(path) as container:
-            return bool(video_streams(container))
+            return bool(list_video(container))
     except (av.FFmpegError, ValueError, OSError):
         return False
 
 
-def stated_duration_s(container: Any, stream: Any) -> float:
+def read_duration(container: Any, stream: Any) -> float:
     """Return the duration of a stream that an open container states, in seconds; 0 if it states none.
 
     A stream without a duration of its own has that of the container; but as subtitles may last longer than sound and

@@ -97,7 +97,7 @@ def _rows(reader: Iterator[list[str]], above: int) -> Iterator[tuple[int, list[s
         raise ValueError(str(error)) from error
 
 
-def numbers_in(fields: Sequence[str], line: int) -> list[float]:
+def parse_numbers(fields: Sequence[str], line: int) -> list[float]:
     """Return fields as numbers; those that are missing are NaN. Raises ValueError: another text, with its line."""
     written = "".join(fields)
     if "_" in written or not written.isascii():  # as 1_0, or digits of other scripts, which Python reads

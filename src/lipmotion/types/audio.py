@@ -160,8 +160,8 @@ def frames_of(span: Span[Any], frames: int) -> tuple[int, int]:
 
     frames : length of the recording; both are cut to it
     """
-    return _frame_after(span.start_s, frames), _frame_after(span.end_s, frames)
+    return _find_next_frame(span.start_s, frames), _find_next_frame(span.end_s, frames)
 
 
-def _frame_after(time_s: float, frames: int) -> int:
+def _find_next_frame(time_s: float, frames: int) -> int:
     return ceil(min(max(time_s * FRAME_RATE_HZ - 1e-6, 0), frames))

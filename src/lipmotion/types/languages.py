@@ -30,14 +30,14 @@ LANGUAGES: dict[str, Language] = {
 """By their code of ISO 639-1. Not in it: languages whose script espeak-ng was not tried on."""
 
 
-def script_of(letter: str) -> str:
+def find_script(letter: str) -> str:
     """Return the script of a letter, as Unicode's names begin: ``LATIN``, ``CJK``; empty: it is no letter."""
     if not unicodedata.category(letter).startswith("L"):
         return ""
     return unicodedata.name(letter, "").partition(" ")[0].partition("-")[0]
 
 
-def foreign_letters(word: str, language: str) -> str:
+def find_foreign(word: str, language: str) -> str:
     """Return the letters of a word that its language is not written in. Latin letters are read in every language."""
     known = ("", "LATIN", *LANGUAGES[language].scripts)
-    return "".join(dict.fromkeys(letter for letter in word if script_of(letter) not in known))
+    return "".join(dict.fromkeys(letter for letter in word if find_script(letter) not in known))

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import cache
 
-from lipmotion.types.languages import ENGLISH, LANGUAGES, script_of
+from lipmotion.types.languages import ENGLISH, LANGUAGES, find_script
 from lipmotion.units.lexicon import Lexicon, Pronunciation, find_english_data
 
 COMMON_WORDS = {
@@ -37,7 +37,7 @@ def detect_language(words: Sequence[str]) -> str:
     >>> detect_language("der hund und die katze und das".split()), detect_language(["밥을"]), detect_language(["ok"])
     ('de', 'ko', '')
     """
-    scripts = Counter(script_of(letter) for word in words for letter in word) - Counter([""])
+    scripts = Counter(find_script(letter) for word in words for letter in word) - Counter([""])
     for code in ("ja", "ko", "zh", "el"):  # a Japanese text has Chinese characters, too
         if any(scripts[script] for script in LANGUAGES[code].scripts):
             return code

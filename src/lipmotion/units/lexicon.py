@@ -117,9 +117,9 @@ class Lexicon:
             if not labels:
                 raise InputError(f"{where}: a word without phones; write the word, then its phones")
             word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
-            phones = tuple([phone for phone in map(_spoken_phone, labels) if phone])
+            phones = tuple([phone for phone in map(_find_phone, labels) if phone])
             if len(phones) < len(labels):
-                wrong = shorten(next(label for label in labels if not _spoken_phone(label)))
+                wrong = shorten(next(label for label in labels if not _find_phone(label)))
                 raise InputError(f"{where}: unknown phone {wrong!r}; the phones are: {' '.join(PHONES)}")
             variants = user.setdefault(word, [])
             if len(variants) == MAX_VARIANTS:
@@ -131,7 +131,7 @@ class Lexicon:
 
     def known(self, word: str) -> bool:
         """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
-        said = (each in self.user or in_dictionary(each) for each in list_readings(word)[0])
+        said = (each in self.user or is_in_dictionary(each) for each in list_readings(word)[0])
         return word in self.user or all(said) or bool(expand_lengthened(word) or SOUNDED.fullmatch(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
@@ -166,7 +166,7 @@ class Lexicon:
     def _pronounce(self, word: str) -> tuple[Pronunciation, ...]:
         if word in self.user:
             return self.user[word]
-        entries = _dictionary_entries(word) or _dictionary_entries(remove_accents(word))
+        entries = _list_entries(word) or _list_entries(remove_accents(word))
         variants = [reduce_vowels(word, entry) for entry in entries]
         if variants:
             return tuple(dict.fromkeys(variants))
@@ -176,9 +176,9 @@ class Lexicon:
         return (reduce_vowels(word, pronounce_by_network(remove_accents(word)) or by_rules),)
 
 
-def in_dictionary(word: str) -> bool:
+def is_in_dictionary(word: str) -> bool:
     """Return whether the dictionary has a word, perhaps without accents."""
-    return bool(_dictionary_entries(word) or _dictionary_entries(remove_accents(word)))
+    return bool(_list_entries(word) or _list_entries(remove_accents(word)))
 
 
 @cache
@@ -189,7 +189,7 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     part that is repeated: ``hahaha``.
     """
     plain = remove_accents(word)
-    if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or in_dictionary(word):
+    if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or is_in_dictionary(word):
         return ()
     runs = [found[0] for found in re.finditer(r"(.)\1*", plain)]
     choices = [
@@ -198,10 +198,10 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     ]
     if max(map(len, runs)) > 2 and sum(len(each) > 1 for each in choices) <= MAX_LENGTHENED:
         shortest = 3 if SOUNDED.fullmatch(plain) else 1  # "sss" is no name of a letter
-        known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and in_dictionary(each)]
+        known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and is_in_dictionary(each)]
         return tuple((each,) for each in sorted(known, key=lambda each: each not in OFTEN_LENGTHENED))
     found = REPEATED.fullmatch(plain)
-    return ((found[1],) * found[0].count(found[1]),) if found and in_dictionary(found[1]) else ()
+    return ((found[1],) * found[0].count(found[1]),) if found and is_in_dictionary(found[1]) else ()
 
 
 def _lines(path: Path) -> Iterator[str]:
@@ -218,7 +218,7 @@ def _lines(path: Path) -> Iterator[str]:
 
 
 @lru_cache(maxsize=4096)
-def _spoken_phone(label: str) -> str | None:
+def _find_phone(label: str) -> str | None:
     name = find_phone(label)
     return None if name is None or is_silent(name) else name
 
@@ -240,7 +240,7 @@ def _dictionary() -> bytes:
 
 
 @cache
-def _dictionary_entries(word: str) -> tuple[Pronunciation, ...]:
+def _list_entries(word: str) -> tuple[Pronunciation, ...]:
     """Return the pronunciations of a word in the dictionary, by binary search in its text; none if it is not in it."""
     text, wanted, entries = _dictionary(), word.encode(), []
     low, high = 0, len(text) - 1  # each at the line break before a line

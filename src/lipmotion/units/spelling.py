@@ -41,7 +41,7 @@ PLAIN = str.maketrans({"ß": "ss", "æ": "ae", "œ": "oe", "ø": "o", "đ": "d",
 """Letters of Latin alphabets that Unicode does not divide into a letter and an accent."""
 
 
-def plain_text(text: str) -> str:
+def convert_to_plain(text: str) -> str:
     """Return a text in NFKC form (``2½``: ``2 1⁄2``), with straight apostrophes, without invisible characters."""
     if not text.isascii():
         marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
@@ -55,8 +55,8 @@ def plain_text(text: str) -> str:
 
 
 def normalise_text(text: str) -> str:
-    """Return a text as ``plain_text`` does, in lower case."""
-    return plain_text(text).lower()
+    """Return a text as ``convert_to_plain`` does, in lower case."""
+    return convert_to_plain(text).lower()
 
 
 def remove_accents(word: str) -> str:

@@ -81,7 +81,7 @@ def find_stress(units: Timeline[Unit], lexicon: Lexicon | None = None) -> tuple[
             if repeated and tuple(phones[:size]) in lexicon.pronunciations(word):
                 length = size
                 break
-        stresses[first:stop] = _stress_phones(word, phones[:length]) * (count // length)
+        stresses[first:stop] = _mark_stress(word, phones[:length]) * (count // length)
     return tuple(stresses)
 
 
@@ -110,7 +110,7 @@ def find_stressed_vowel(word: str, vowels: Sequence[str]) -> int | None:
     return PATTERNS.get(pattern, full[len(full) // 2] if full else 0)
 
 
-def _stress_phones(word: str, phones: Sequence[str]) -> list[int | None]:
+def _mark_stress(word: str, phones: Sequence[str]) -> list[int | None]:
     """Return the stress of each phone; syllables begin with two consonants at most (Kahn 1976), not s and a stop."""
     nuclei = [place for place, phone in enumerate(phones) if phone in NUCLEI]
     if not nuclei:

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from lipmotion.errors import AlignmentError, InputError, shorten
-from lipmotion.units.lexicon import SOUNDED, expand_lengthened, in_dictionary
-from lipmotion.units.spelling import normalise_text, plain_text
+from lipmotion.units.lexicon import SOUNDED, expand_lengthened, is_in_dictionary
+from lipmotion.units.spelling import convert_to_plain, normalise_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
@@ -66,14 +66,14 @@ def tokenise(text: str) -> tuple[str, ...]:
     """
     text = SMILEY.sub(" ", REFERENCE.sub(lambda found: html.unescape(found[0]), text))
     text = re.sub(r"\bWW(?=II?\b)", "World War ", re.sub("№ ?", "No. ", text))
-    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", plain_text(text)))
+    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", convert_to_plain(text)))
     plain = CURRENCY.sub(lambda found: {"U": "$", "E": "€", "G": "£"}[found[0].strip()[0]], plain)
     plain = GROUPED.sub(lambda found: re.sub(r"\D", ",", found[0]), plain)
     shouted = not any(letter.islower() for letter in plain)
     tokens = []
     for token in (found[0] for found in _scanner().finditer(plain)):
         is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
-        is_short = not shouted and INITIALS.fullmatch(token) and not in_dictionary(token.lower())
+        is_short = not shouted and INITIALS.fullmatch(token) and not is_in_dictionary(token.lower())
         is_short = is_short and not (expand_lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))
         tokens.append(token.lower() if is_word and not is_short else token)
     return tuple(tokens)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.trees import ridge, zero_statistics
+from lipmotion.stats.trees import create_statistics, ridge
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance.candidates import choose_candidates, squared_distances
@@ -107,7 +107,7 @@ def fit_motion_map(values: Array, channels: tuple[Channel, ...], targets: NDArra
     centres = near[choose_candidates(near, min(CENTRES, len(near) // FRAMES_PER_CENTRE))]
     unfitted = MotionMap(names, mean, scale, basis, limits, centres, np.zeros((0, 0), np.float32))
     regressors = unfitted._regressors(values[:, used]).astype(np.float64)
-    moments = zero_statistics(regressors.shape[1], targets.shape[1])
+    moments = create_statistics(regressors.shape[1], targets.shape[1])
     moments.add(regressors, targets.astype(np.float64))
     prior = np.zeros((regressors.shape[1], targets.shape[1]))
     prior[0] = targets.mean(axis=0)

@@ -26,7 +26,7 @@ from lipmotion.motion.frame_labels import find_runs
 from lipmotion.motion.mouth_region import HEIGHT as MOUTH_HEIGHT
 from lipmotion.motion.mouth_region import WIDTH as MOUTH_WIDTH
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays, format_errors, refuse_undeclared
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared, select_arrays
 from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance import candidates, lower_face, motion_map
 from lipmotion_faces.appearance.camera_noise import (
@@ -349,7 +349,7 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
 
 def appearance_from_arrays(arrays: Arrays) -> Appearance:
     """Deserialise the appearance of a person. Raises ModelFormatError: arrays are missing, unknown or do not fit."""
-    inner = {part: arrays_under(arrays, f"{part}/") for part in PARTS}
+    inner = {part: select_arrays(arrays, f"{part}/") for part in PARTS}
     named = {name: array for name, array in arrays.items() if name.partition("/")[0] not in PARTS or "/" not in name}
     with format_errors("the appearance of the person", REMEDY):
         refuse_undeclared(named, APPEARANCE)

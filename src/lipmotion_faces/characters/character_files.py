@@ -16,9 +16,9 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.lip_placement import (
     find_opening_shape,
-    part_named_lips,
     place_lips_by_points,
     place_lips_by_shape,
+    separate_named_lips,
 )
 from lipmotion.meshes.model.binding import bind, paint_weights
 from lipmotion.meshes.model.face_shapes import find_face_shapes
@@ -357,7 +357,7 @@ def load_character(
             return DrivenCharacter(mesh, stored.placement, None, stored, path, table)
         if points is not None:
             named = read_points(points)
-            surface = part_named_lips(mesh, named)
+            surface = separate_named_lips(mesh, named)
             placement = place_lips_by_points(mesh, surface, named)
         else:
             surface = build_surface(mesh)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.model.mesh import bone_kind
+from lipmotion.meshes.model.mesh import find_bone_kind
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import (
@@ -449,7 +449,7 @@ def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
         matrix = parent.matrix @ local
         if not np.abs(matrix).max() <= LARGEST_NUMBER:
             raise InputError(f"node {number} is beyond ±{LARGEST_NUMBER:g}, with those that it hangs on; scale it down")
-        kind = bone_kind(node.get("name", ""))
+        kind = find_bone_kind(node.get("name", ""))
         kinds = parent.kinds if kind is None else {kind: number, **parent.kinds}
         placed[number] = PlacedNode(matrix, kinds)
         waiting += [(child, placed[number], depth + 1) for child in node.get("children", [])]

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
 from lipmotion.formats.steady_rate import choose_columns, exact_rate
-from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, bone_kind, head_angles
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
+from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, find_bone_kind, find_head_angles
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, find_spoken_name, to_arkit
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.types.motion import RADIAN
@@ -110,7 +110,7 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
     def moves_mouth(track: _Track) -> bool:
         keys = track.keys[:, 1] if track.kind == CUBIC else track.keys
-        mouth = [spoken_name(name) is not None or arkit_name(name) in ARKIT_MOUTH for name in track.names]
+        mouth = [find_spoken_name(name) is not None or to_arkit(name) in ARKIT_MOUTH for name in track.names]
         return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
 
     animation, tracks = next((each for each in animations if any(map(moves_mouth, each[1]))), animations[0])
@@ -121,7 +121,7 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
         LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(named), listed, named[which])
     turns: dict[str, tuple[int, _Track]] = {}  # of the first neck and the first head, with the numbers of their nodes
     for number, target, sampler in _targets(document, animation):
-        kind = bone_kind(document.items("nodes")[number].get("name", ""))
+        kind = find_bone_kind(document.items("nodes")[number].get("name", ""))
         if target == "rotation" and kind in TURNING and kind not in turns:
             turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
     ordered = dict(turns[kind] for kind in TURNING if kind in turns)
@@ -137,11 +137,11 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
         for name, curve in zip(track.names, track.at(time_s).T, strict=True)
         for known in KNOWN_AS.get(name, (name,))
     ]
-    columns = choose_columns([arkit_name(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
+    columns = choose_columns([to_arkit(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
     curves = dict(every[column] for column in columns)
     channels = [Channel(name, WEIGHT) for name in curves]
     if ordered:
-        angles = np.unwrap(head_angles(_turn_head(document, ordered, time_s)), axis=0)
+        angles = np.unwrap(find_head_angles(_turn_head(document, ordered, time_s)), axis=0)
         curves |= dict(zip(ANGLES, angles.T, strict=True))
         channels += [Channel(name, RADIAN) for name in ANGLES]
     return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels)), Timeline(())

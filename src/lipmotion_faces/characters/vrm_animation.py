@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError
 from lipmotion.formats.base import MotionFormat
 from lipmotion.formats.keys import with_jumps
-from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
+from lipmotion.meshes.model.mesh import ANGLES, turn_head
 from lipmotion.meshes.model.shape_names import VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.types import Generation, Motion
 from lipmotion_faces.characters.gltf_document import write_container
@@ -68,7 +68,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     if all(name in motion.names for name in ANGLES):
         angles = np.stack([motion[name] for name in ANGLES], axis=1).astype(np.float64)
         frames = shared if len(time_s) == len(angles) else buffer.add(motion.time_s, "SCALAR", limits=True)
-        add(frames, head_quaternions(angles), "VEC4", list(BONES).index("head"), "rotation")
+        add(frames, turn_head(angles), "VEC4", list(BONES).index("head"), "rotation")
     bones = {name: {"node": number} for number, name in enumerate(BONES)}
     scene: dict[str, Any] = {"nodes": [0, *range(len(BONES), len(nodes))]}
     if source.get("path"):

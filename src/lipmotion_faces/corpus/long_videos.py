@@ -18,8 +18,8 @@ from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRe
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
-from lipmotion.storage.sources import open_media, stated_duration_s, video_streams
+from lipmotion.speech.sound.pauses import find_quietest, list_spans, measure_levels_db
+from lipmotion.storage.sources import list_video, open_media, read_duration
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript
 from lipmotion.units.written_forms import list_readings
 from lipmotion_faces.corpus.supplied import align_sound, separate_sound
@@ -270,8 +270,8 @@ def _is_long_video(recording: SourceRecording) -> bool:
         return False
     try:
         with open_media(recording.file) as container:
-            stream = next(iter(video_streams(container)), None)
-            return stream is not None and stated_duration_s(container, stream) > LONG_S
+            stream = next(iter(list_video(container)), None)
+            return stream is not None and read_duration(container, stream) > LONG_S
     except (av.FFmpegError, ValueError, OSError):
         return False
 
@@ -293,7 +293,7 @@ def divide_video(
     if separate is not None:
         LOG.info("%s: %s", recording.file, separate.note)
         audio = align_sound(separate, audio.duration_s)
-    levels = levels_db(audio)
+    levels = measure_levels_db(audio)
     transcript = find_transcript(recording.file)
     lines = [] if transcript is None else spoken_lines(transcript)
     if transcript is not None and not lines:
@@ -302,10 +302,10 @@ def divide_video(
             "transcript. Give one with times: subtitles, labels, or what a recogniser writes",
             recording.file,
         )
-    parts = lines or [SpokenPart(*span) for span in spoken_spans(levels)]
+    parts = lines or [SpokenPart(*span) for span in list_spans(levels)]
     end_s = min(audio.duration_s, scan.end_s)
     parts = [replace(part, end_s=min(part.end_s, end_s)) for part in parts if part.start_s < end_s]
-    spans = utterance_spans(parts, scan.cuts_s.tolist(), end_s, partial(quietest_s, levels))
+    spans = utterance_spans(parts, scan.cuts_s.tolist(), end_s, partial(find_quietest, levels))
     spans = [span for longer in spans if (span := _fit_to_pictures(longer, scan, end_s)).duration_s > 0]
     held_out = 0
     if splits_by_time and len(spans) >= LEAST_SPLIT_UTTERANCES:

@@ -20,12 +20,12 @@ from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder,
 from lipmotion.corpora.store import UTTERANCES, Corpus, quantise, read_entry, write_utterance
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.extensions import find_version
-from lipmotion.pipeline.workers import process_count, worker_pool
+from lipmotion.pipeline.workers import open_workers, process_count
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import confine, portable_name
+from lipmotion.storage.files import confine, make_portable
 from lipmotion.storage.locks import lock_folder, remove_unfinished
-from lipmotion.storage.sources import Source, check_apart, is_folder, sha256_of
+from lipmotion.storage.sources import Source, check_apart, hash_file, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
 from lipmotion_faces.corpus import supplied
@@ -149,7 +149,7 @@ def prepare(
             _make_job(item, collection, corpus, tracker, packages, crops, parts.get(item.name))
             for item in folder.recordings
         ]
-        with _refresh_at_end(corpus), worker_pool(min(processes, len(jobs))) as team:
+        with _refresh_at_end(corpus), open_workers(min(processes, len(jobs))) as team:
             results = team.unordered_map(_process, jobs)
             outcomes = _collect(folder, results, len(jobs), monitor, DIVIDING_SHARE if parts else 0.0)
         outcomes = _leave_out_damaged(corpus, outcomes, monitor)
@@ -189,7 +189,7 @@ def _make_job(
     crops: bool,
     part: VideoPart | None,
 ) -> _Job:
-    name = portable_name(recording.name)
+    name = make_portable(recording.name)
     stored = _stored_source(corpus.folder(name))
     if (  # speakers of GRID share file names
         stored is not None
@@ -270,7 +270,7 @@ def _digest(path: Path) -> str:
 
 @lru_cache(maxsize=16)
 def _digest_of_content(path: Path, _size: int, _changed_ns: int) -> str:
-    return sha256_of(path)
+    return hash_file(path)
 
 
 def _read_if_current(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.features.mfcc import regression_delta
-from lipmotion.speech.sound.pauses import STEP_S, mean_powers
+from lipmotion.speech.features.mfcc import compute_delta
+from lipmotion.speech.sound.pauses import STEP_S, average_powers
 from lipmotion.types import Audio, Features
 
 CLAP, BEEP = "clap", "beep"
@@ -67,7 +67,7 @@ def _claps(audio: Audio) -> list[SoundMark]:
     from scipy.ndimage import maximum_filter1d
 
     sharp = np.diff(audio.samples, prepend=audio.samples[:1])  # claps are brighter than speech
-    power = mean_powers(sharp, round(CLAP_STEP_S * audio.rate_hz))
+    power = average_powers(sharp, round(CLAP_STEP_S * audio.rate_hz))
     before, rise = round(BEFORE_S / CLAP_STEP_S), round(RISE_S / CLAP_STEP_S)
     early, late = (round(time_s / CLAP_STEP_S) for time_s in DECAY_S)
     if len(power) < before + late + 1:
@@ -243,7 +243,7 @@ class _Likeness:
 
 def _levels(audio: Audio) -> Array:
     """Return the level of every 10 ms, without what is quieter than the quiet tenth [shape=(N,)]."""
-    power = mean_powers(audio.samples, round(STEP_S * audio.rate_hz))
+    power = average_powers(audio.samples, round(STEP_S * audio.rate_hz))
     if not len(power):
         raise InputError(f"{audio.duration_s * 1000:.0f} ms of sound, required more than {STEP_S * 1000:.0f}")
     levels = np.log10(power + 1e-10)
@@ -353,7 +353,7 @@ def measured_opening_speed(opening: Array) -> Array:
 
     opening : of the lips, frame by frame [shape=(T,)]
     """
-    return regression_delta(opening.astype(np.float32)[:, None])[:, 0].astype(float)
+    return compute_delta(opening.astype(np.float32)[:, None])[:, 0].astype(float)
 
 
 def context_features(features: Features) -> Array:

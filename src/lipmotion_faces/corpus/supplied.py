@@ -17,7 +17,7 @@ from lipmotion.formats.tables import is_live_link_file, read_curve_table, read_s
 from lipmotion.pipeline.outputs.motion_files import correct_rate
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.sources import sha256_of
+from lipmotion.storage.sources import hash_file
 from lipmotion.types import Audio, Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
@@ -39,13 +39,13 @@ def source_digests(recording: SourceRecording) -> dict[str, str]:
         file = recording.motion_file.file
         digests["motion_file"] = file.name
         if file.suffix == MESH:  # a sequence of meshes
-            meshes = "\n".join(map(sha256_of, list_mesh_files(file)))
+            meshes = "\n".join(map(hash_file, list_mesh_files(file)))
             digests["motion_sha256"] = hashlib.sha256(meshes.encode()).hexdigest()
         else:
-            digests["motion_sha256"] = sha256_of(file)
+            digests["motion_sha256"] = hash_file(file)
     if recording.recorder is not None:
         digests["recorder_file"] = recording.recorder.name
-        digests["recorder_sha256"] = sha256_of(recording.recorder)
+        digests["recorder_sha256"] = hash_file(recording.recorder)
     if recording.phones is not None:
         text = "\n".join(f"{span.start_s!r} {span.end_s!r} {span.label.phone}" for span in recording.phones)
         digests["phones_sha256"] = hashlib.sha256(text.encode()).hexdigest()

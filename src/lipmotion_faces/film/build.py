@@ -17,11 +17,11 @@ from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
 from lipmotion.corpora.store import MANIFEST, Corpus, read_entry
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import limit_threads
-from lipmotion.pipeline.workers import process_count, worker_pool
+from lipmotion.pipeline.workers import open_workers, process_count
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
+from lipmotion.speech.sound.pauses import QUIETEST_DB, measure_levels_at
 from lipmotion.stats.pca import choose_evenly
-from lipmotion.storage.sources import check_source, open_media, sha256_of, stated_duration_s, video_streams
+from lipmotion.storage.sources import check_source, hash_file, list_video, open_media, read_duration
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
@@ -126,7 +126,7 @@ def _list_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[
         size, known = stated.get("bytes"), files.get(str(stated.get("file", "")), [])
         same = [file for file in known if size is None or str(file.stat().st_size) == str(size)]
         if len(same) > 1 and "sha256" in stated:  # people of a corpus may share names of files
-            same = [file for file in same if sha256_of(file) == stated["sha256"]]
+            same = [file for file in same if hash_file(file) == stated["sha256"]]
         if not same:
             continue
         rights = {key: str(stated[key]) for key in RIGHTS if key in stated}
@@ -158,8 +158,8 @@ def _duration_s(take: Take) -> float:
         return take.span.end_s - take.span.start_s
     try:
         with open_media(take.file) as container:
-            streams = video_streams(container)
-            return (stated_duration_s(container, streams[0]) if streams else 0.0) or LONG_S
+            streams = list_video(container)
+            return (read_duration(container, streams[0]) if streams else 0.0) or LONG_S
     except (av.FFmpegError, ValueError, OSError):
         return LONG_S
 
@@ -255,7 +255,7 @@ def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Fi
     """Return all takes that show the person whom most takes show; others are reported. Raises InputError: none."""
     filmed: list[_Filmed] = []
     problems: list[str] = []
-    with worker_pool(min(workers, len(takes))) as team:
+    with open_workers(min(workers, len(takes))) as team:
         for number, result in enumerate(team.ordered_map(_film, takes)):
             monitor(Progress("tracking the face", number + 1, len(takes), 0.6 * (number + 1) / len(takes)))
             if isinstance(result, str):
@@ -366,7 +366,7 @@ def _gather_pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
     levels = [
         np.full(len(take.used), QUIETEST_DB)
         if take.sound is None
-        else levels_db_at(take.sound, take.used / take.footage.rate_hz)
+        else measure_levels_at(take.sound, take.used / take.footage.rate_hz)
         for take in filmed
     ]
 

@@ -17,7 +17,7 @@ from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.eigenlips import Eigenlips
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Mark, Outputs
-from lipmotion.speech.sound.pauses import levels_db_at
+from lipmotion.speech.sound.pauses import measure_levels_at
 from lipmotion.storage.sources import check_source, has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
 from lipmotion.types.progress import with_reports
@@ -167,7 +167,7 @@ def _make_codes(
     if options.jaw == "energy":
         if sound is None:
             raise InputError("a jaw that follows the energy needs the sound; give the recording")
-        levels = levels_db_at(sound, np.arange(count) / rate_hz)
+        levels = measure_levels_at(sound, np.arange(count) / rate_hz)
         codes = face.appearance.with_jaw_of_sound(codes, levels)
     return codes
 

@@ -137,7 +137,7 @@ def load_face(path: str | Path) -> FilmedFace:
             if not 0 <= count <= MOST_TAKES:
                 raise ValueError(f"{count} takes, required 0 to {MOST_TAKES}")
             folders = ("appearance", "background", *(f"take{number}" for number in range(count)))
-            inner = {folder: schema.arrays_under(arrays, f"{folder}/") for folder in folders}
+            inner = {folder: schema.select_arrays(arrays, f"{folder}/") for folder in folders}
             schema.refuse_undeclared(arrays, (f"{folder}/{key}" for folder, part in inner.items() for key in part))
             channels = tuple(Channel(str(item["name"]), str(item["unit"])) for item in header["channels"])
             takes = tuple(_take(inner[f"take{number}"], channels) for number in range(count))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import UpperFace
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_BROW_RISE, FULL_LOOK_RAD
-from lipmotion.meshes.fitting.shape_weights import CurveCosts, fit_bounded_curves, part_opposed, with_gap
+from lipmotion.meshes.fitting.shape_weights import CurveCosts, fit_bounded_curves, separate_opposed, with_gap
 from lipmotion.meshes.model.face_shapes import FaceShapes
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
 from lipmotion_faces.characters.textures import encode_srgb
@@ -185,7 +185,7 @@ class _MouthFit:
         for name, curve in fixed.items():
             targets -= np.outer(curve, self._fixed[name])
         weights = fit_bounded_curves(self._triangle.T, targets, COSTS)
-        weights = part_opposed(weights, self._triangle.T, names, COSTS, (0.0, 1.0))
+        weights = separate_opposed(weights, self._triangle.T, names, COSTS, (0.0, 1.0))
         jaw, close = names.index("jawOpen"), names.index("mouthClose")
         weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
         others = [name for name in names if not name.startswith(PARTING)]

@@ -20,8 +20,8 @@ from lipmotion.formats.keys import Thinning
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves, eye_and_brow_weights
-from lipmotion.meshes.model.mesh import Blendshape, head_quaternions
-from lipmotion.pipeline.outputs.curve_sets import edit_weights
+from lipmotion.meshes.model.mesh import Blendshape, turn_head
+from lipmotion.pipeline.outputs.curve_sets import apply_weight_edits
 from lipmotion.pipeline.outputs.deliver import deliver, hold_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_recorded_prosody
 from lipmotion.storage.files import sound_reference
@@ -147,11 +147,11 @@ def head_scene(
     names = [name for name in mesh.shape_names if name in curves]
     table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
     table[around] = np.stack([curves[name] for name in names], axis=1)
-    weights = edit_weights(Motion(table, hertz, channels), units, generation.curve_edits)
+    weights = apply_weight_edits(Motion(table, hertz, channels), units, generation.curve_edits)
     weights = replace(weights, values=weights.values[around][wanted])
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
-    turns = head_quaternions(np.stack([pose.turn for pose in poses]))[wanted]
+    turns = turn_head(np.stack([pose.turn for pose in poses]))[wanted]
     return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.turning(), turns), split=False)
 
 
@@ -186,7 +186,7 @@ def character_scene(
     solved, mouth = character.weights(part, phones), find_mouth(with_mouth(part), phones)
     table = np.zeros((len(motion.values), len(solved.names)))
     table[around] = solved.values[there]
-    weights = edit_weights(replace(solved, values=table), units, generation.curve_edits, character)
+    weights = apply_weight_edits(replace(solved, values=table), units, generation.curve_edits, character)
     living = compute_living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
     extra = character.weigh_others(others, len(living.values))

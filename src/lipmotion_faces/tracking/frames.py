@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.sources import MAX_PIXELS, check_source, open_media, stated_duration_s, video_streams
+from lipmotion.storage.sources import MAX_PIXELS, check_source, list_video, open_media, read_duration
 from lipmotion_faces.tracking.packages import import_opencv
 
 
@@ -79,7 +79,7 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable video ({reason}); give a video file") from error
     with container:
-        stream = next(iter(video_streams(container)), None)
+        stream = next(iter(list_video(container)), None)
         if stream is None:
             raise InputError(f"{path}: has no video stream; give a video that shows the speaker's face")
         if stream.codec_context is None:
@@ -88,7 +88,7 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
         stream.codec_context.options = {"max_pixels": str(MAX_PIXELS)}
         rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
         damage: list[str] = []
-        stated_s = stated_duration_s(container, stream)
+        stated_s = read_duration(container, stream)
         if span != WHOLE:
             stated_s = max(min(stated_s, span.end_s) - span.start_s, 0.0)
         if longest_px is not None:

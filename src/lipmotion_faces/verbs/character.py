@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
     from lipmotion.extensions import load_provided
     from lipmotion.meshes.fitting.driven import list_rows
-    from lipmotion.meshes.model.rig_tables import read_rig_table, table_path, write_rig_table
+    from lipmotion.meshes.model.rig_tables import find_table, read_rig_table, write_rig_table
     from lipmotion.pipeline.job import open_character
     from lipmotion.storage.sources import is_file
     from lipmotion_faces.characters.binding_files import save_binding, write_points, write_weights
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> None:
     try:
         character = open_character(pick_part(options, Outputs(), control_points=by_points))
     except InputError:
-        table = table_path(path)
+        table = find_table(path)
         if options.write_table and not is_file(table):  # the mouth was not found: the table is to be filled in
             write_rig_table(table, list_rows(read_character(path), None, {}))
             print_line(table)

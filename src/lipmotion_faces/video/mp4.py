@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.storage.files import as_text, atomic_file
-from lipmotion.storage.sources import x264_instructions
+from lipmotion.storage.sources import read_x264
 from lipmotion.types import Audio
 
 XMP_UUID = bytes.fromhex("be7acfcb97a942e89c71999491e3afac")
@@ -144,7 +144,7 @@ def _encode(
     first = next(frames)
     with open_output(temporary, path, format="mp4", options={"movflags": "+faststart"}) as container:
         container.metadata.update(tags)
-        options = _ENCODER | {"x264-params": _ENCODER["x264-params"] + x264_instructions()}
+        options = _ENCODER | {"x264-params": _ENCODER["x264-params"] + read_x264()}
         video = container.add_stream("libx264", rate=rate, options=options)
         video.height, video.width = first.shape[:2]
         video.pix_fmt = "yuv420p"

@@ -16,9 +16,9 @@ from lipmotion.measures.closures import clip_closure_counts, measure_closures, m
 from lipmotion.measures.curves import Clips, compute_interval
 from lipmotion.motion.frame_labels import is_away_from_speech
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.stats.curves import varies
-from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import Monitor, Utterance, silent_monitor
 from lipmotion.units import VISEMES, Lexicon
 from lipmotion_lab.evaluation import held_out
@@ -155,7 +155,7 @@ def evaluate(
     >>> sorted(figures["conditions"])
     ['audio only', 'with transcript']
     """
-    phones = cached_recogniser(model.phones, recogniser, model.adaptation)
+    phones = open_recogniser(model.phones, recogniser, model.adaptation)
     modelled = getattr(model.engine.config, "channels", "").split()  # some alone: what else moves is not compared
     recordings = held_out.load_held_out(
         corpus,
@@ -191,7 +191,7 @@ def evaluate(
         figures["seen_in_training"] = True
     if model.speakers is not None:
         figures["strangers"] = list(recordings.strangers)
-    return nan_as_null(figures)
+    return replace_nan(figures)
 
 
 def _was_trained_on(model: Model, utterances: Sequence[Utterance], folder: str) -> bool:

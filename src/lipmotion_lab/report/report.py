@@ -281,7 +281,7 @@ class _Writer:
     def _run(self, name: str, settings: ExperimentSettings) -> None:
         part, target = PARTS[name], self.folder / name
         models = self.folder / "models" / self.key("models")[:KEY_DIGITS]  # of other recordings, other models
-        with locks.unfinished_work(self.folder / f"{name}.json") as work:
+        with locks.list_unfinished(self.folder / f"{name}.json") as work:
             stamp = Stamp()
             keeper = ClipKeeper(work / MOTION, self.key(name))
             running = replace(settings.part(0, 0.95), receive=keeper)
@@ -290,7 +290,7 @@ class _Writer:
             section, motion = part.section(figures), keeper.content()
             made_with = stamp.content(self._command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
-            with files.atomic_folder(target) as made:
+            with files.replace_folder(target) as made:
                 videos = []
                 if motion:
                     drawing = sub_monitor(settings.monitor, 0.95, 1)

@@ -71,7 +71,7 @@ def run_experiment(
     ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
-    from lipmotion.storage.locks import unfinished_work
+    from lipmotion.storage.locks import list_unfinished
     from lipmotion_lab.folds import in_blocks
     from lipmotion_lab.report.report import PARTS
     from lipmotion_lab.report.sections import blocks_section
@@ -88,7 +88,7 @@ def run_experiment(
         corpus = Corpus.open(options.corpus)
         if getattr(options, "quick", False):
             corpus = take_quick_part(corpus, settings.seed)
-        with unfinished_work(options.output) if options.output and has_parts else nullcontext() as work:
+        with list_unfinished(options.output) if options.output and has_parts else nullcontext() as work:
             figures = experiment(corpus, work=work, settings=settings)
         return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
 
@@ -190,7 +190,7 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 def _run_xieliu2007(options: argparse.Namespace) -> None:
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
-    from lipmotion.pipeline.training.other_speakers import other_voices
+    from lipmotion.pipeline.training.other_speakers import synthesise_others
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
     from lipmotion_lab.xie_liu2007.systems import BLSTM, REFERENCE_SYSTEM
 
@@ -206,7 +206,7 @@ def _run_xieliu2007(options: argparse.Namespace) -> None:
             systems=options.systems or usual.systems,
             visual=options.visual,
             transcripts=options.transcripts,
-            voices=tuple(other_voices(synthetic=options.voices, recordings=options.recordings)),
+            voices=tuple(synthesise_others(synthetic=options.voices, recordings=options.recordings)),
         )
         order = read_names(options.order) if options.order else None
         split, sizes, plots = list_or_all(options.split), options.sizes, options.plots

@@ -22,11 +22,11 @@ from lipmotion.measures import curves
 from lipmotion.pipeline.model import EIGENLIPS, GEOMETRY
 from lipmotion.pipeline.training.channels import check_visual, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
-from lipmotion.pipeline.training.train import examples_without_motion
+from lipmotion.pipeline.training.train import list_motionless
 from lipmotion.stats.curves import varies
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.files import atomic_file, make_folder
-from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.json_text import replace_nan
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import GREY, Example, Monitor, Speech, Timeline, sub_monitor
 from lipmotion_lab import runner
@@ -211,7 +211,7 @@ def xieliu2007(  # noqa: PLR0913
     about = {"split": split or "all", "clips": len(held_out), "seed": seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "visual": options.visual}
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
-    return nan_as_null(about | {"validation": len(validation), "rows": rows})
+    return replace_nan(about | {"validation": len(validation), "rows": rows})
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +236,7 @@ class _TrainingSetup:
         """Return systems, trained on the same phones of the utterances ``names``."""
         examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
         kept, trained = self.checkpoint(names), dict[str, TrainedSystem]()
-        others = [*examples_without_motion(engine_named("coupled"), self.options.voices)]
+        others = [*list_motionless(engine_named("coupled"), self.options.voices)]
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
             part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here

@@ -23,7 +23,7 @@ from lipmotion.live.consumers import Consumer, LiveSound, read_address
 from lipmotion.live.face import LiveFrame
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.storage.files import atomic_file
-from lipmotion.storage.json_text import from_json, json_errors
+from lipmotion.storage.json_text import catch_errors, from_json
 from lipmotion_studio.live.servers import CLOSE_S, check_installed, in_background
 
 PORT = 8001
@@ -139,7 +139,7 @@ class VTubeStudio:
         """Return the parameters that can be set; those of ``MADE`` are made where they are not there."""
         reply = await self._ask(connection, "InputParameterListRequest")
         kinds = ("defaultParameters", "customParameters")
-        with json_errors(REPLY):
+        with catch_errors(REPLY):
             names = {str(dict(each)["name"]) for kind in kinds for each in list(reply.get(kind, ()))}
         for name, (low, high) in MADE.items():
             if name not in names:
@@ -163,7 +163,7 @@ class VTubeStudio:
         number = str(next(self._numbers))
         about = {"apiName": "VTubeStudioPublicAPI", "apiVersion": "1.0", "requestID": number, "messageType": kind}
         await connection.send(json.dumps({**about, "data": data}))
-        with json_errors(REPLY):
+        with catch_errors(REPLY):
             while True:
                 reply = dict(from_json(await connection.recv()))
                 if reply.get("requestID") == number:

@@ -25,7 +25,7 @@ import numpy as np
 from lipmotion.cli.terminal.progress import print_error
 from lipmotion.live.consumers import Consumer, LiveSound, json_line
 from lipmotion.live.face import LiveFrame
-from lipmotion.meshes.model.mesh import ANGLES, head_quaternions
+from lipmotion.meshes.model.mesh import ANGLES, turn_head
 from lipmotion_studio.live.servers import Server, open_server, pcm_16
 from lipmotion_studio.web.listening import read_page
 
@@ -69,7 +69,7 @@ class LiveWindow:
 
     def __call__(self, frame: LiveFrame) -> None:
         """Take a frame."""
-        (turn,) = head_quaternions(np.array([[frame.weights.get(name, 0.0) for name in ANGLES]])).tolist()
+        (turn,) = turn_head(np.array([[frame.weights.get(name, 0.0) for name in ANGLES]])).tolist()
         turned = frame.weights | dict(zip(TURN, turn, strict=True))
         self._server.send(json_line(replace(frame, weights=turned)))
 

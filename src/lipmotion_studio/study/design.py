@@ -16,13 +16,13 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import find_version
 from lipmotion.formats.base import list_read_suffixes
 from lipmotion.pipeline.job import Job, list_recordings, run
-from lipmotion.pipeline.model import Model, load_model, shipped_path
+from lipmotion.pipeline.model import Model, find_shipped, load_model
 from lipmotion.pipeline.outputs.motion_files import match_duration, read_generation
 from lipmotion.pipeline.outputs.output import write
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import atomic_folder
-from lipmotion.storage.sources import has_video, open_media, read_text_file, sha256_of
+from lipmotion.storage.files import replace_folder
+from lipmotion.storage.sources import has_video, hash_file, open_media, read_text_file
 from lipmotion.types import Audio, Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
 from lipmotion_faces.tracking.track import read_video_frames
@@ -112,7 +112,7 @@ def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) 
         raise InputError(f"{source}: no such model, job file or folder; give one, or {SHIPPED!r}: the model that ships")
     if path.suffix.lower() == JOB_SUFFIX:
         job = Job.from_file(path)
-        return _animated(job, {"job": str(path), "job_sha256": sha256_of(path)})
+        return _animated(job, {"job": str(path), "job_sha256": hash_file(path)})
     if source != SHIPPED and path.suffix.lower() != MODEL_SUFFIX:
         raise InputError(f"{source}: required a model ({MODEL_SUFFIX}), a job file ({JOB_SUFFIX}) or a folder")
     model = None if source == SHIPPED else path
@@ -137,7 +137,7 @@ def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> C
 
     def condition(sentence: StudySentence, target: Path) -> MadeVideo:
         path, outputs = files[sentence.name], drawn.outputs
-        made = {"file": path.name, "file_sha256": sha256_of(path)}
+        made = {"file": path.name, "file_sha256": hash_file(path)}
         if path.suffix.lower() in VIDEO_SUFFIXES:
             return MadeVideo(path, made | {"made": "finished"})
         generation = match_duration(read_generation(path), read_audio(sentence.recording, warn=False).duration_s)
@@ -149,8 +149,8 @@ def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> C
 
 def _animated(job: Job, made: dict[str, str]) -> Condition:
     """Return a condition whose videos are animated from the sound of the sentences."""
-    model_path = job.request.model or shipped_path()
-    made = made | {"made": "animated", "model": model_path.name, "model_sha256": sha256_of(model_path)}
+    model_path = job.request.model or find_shipped()
+    made = made | {"made": "animated", "model": model_path.name, "model_sha256": hash_file(model_path)}
     made |= {"face": job.outputs.face}
 
     @cache
@@ -229,7 +229,7 @@ def design_study(
         path = getattr(settings, name)
         if path:
             texts[name] = read_text_file(path, name, MAX_TEXT_BYTES).strip()
-    with atomic_folder(output) as folder:
+    with replace_folder(output) as folder:
         (folder / manifest.VIDEOS).mkdir()
         videos: list[manifest.StudyVideo] = []
         wanted = [(sentence, name) for sentence in spoken for name in makers]
@@ -253,7 +253,7 @@ def design_study(
             seed=seed,
             conditions=sources | ({ANCHOR: f"{base}, sound {settings.anchor_ms:g} ms late"} if late else {}),
             sentences={
-                each.name: {"file": each.recording.name, "sha256": sha256_of(each.recording)} for each in spoken
+                each.name: {"file": each.recording.name, "sha256": hash_file(each.recording)} for each in spoken
             },
             videos=tuple(videos),
             trials=(*practice, *trials, *anchored, *checks),
@@ -274,7 +274,7 @@ def _encode(
     late_ms = settings.anchor_ms if name == ANCHOR else 0.0
     file = folder / manifest.VIDEOS / "encoded.mp4"
     seconds = encode_video(video.file, file, sentence.recording, settings.shown_region, late_ms)
-    digest = sha256_of(file)
+    digest = hash_file(file)
     file.replace(file.with_name(f"{digest[:32]}.mp4"))
     made = video.made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})
     return manifest.StudyVideo(f"{digest[:32]}.mp4", sentence.name, name, round(seconds, 3), digest, made)

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json, from_json
-from lipmotion.storage.sources import read_text_file, sha256_of
+from lipmotion.storage.sources import hash_file, read_text_file
 from lipmotion.types.values import any_members, as_tuple, items, number, text, truth, value_of, whole
 from lipmotion_studio.study.answers import ANCHOR, FIRST, HIGHEST_RANK, KINDS, MOS, PAIRED, RANKING, SECOND, is_possible
 from lipmotion_studio.study.settings import MATCH, PREFERENCE, SCALES
@@ -136,7 +136,7 @@ def check_videos(study: Study, folder: Path) -> dict[str, Path]:
     for video in study.videos:
         if not paths[video.file].is_file():
             raise InputError(f"{paths[video.file]}: this video of the study is missing; copy the whole folder")
-        if sha256_of(paths[video.file]) != video.sha256:
+        if hash_file(paths[video.file]) != video.sha256:
             raise InputError(f"{paths[video.file]}: has changed since the study was designed; design it again")
     return paths
 

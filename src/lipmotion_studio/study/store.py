@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.storage.files import check_own
-from lipmotion.storage.sources import sha256_of
+from lipmotion.storage.sources import hash_file
 from lipmotion_studio.study.manifest import MANIFEST
 
 ResultT = TypeVar("ResultT")
@@ -76,7 +76,7 @@ class StudyStore:
         self.path = folder / ANSWERS
         if not create and not self.path.is_file():
             raise InputError(f"{folder}: nobody has answered yet; let raters in: lipmotion study serve {folder}")
-        digest = sha256_of(folder / MANIFEST)
+        digest = hash_file(folder / MANIFEST)
         for suffix in ("", "-wal", "-shm", "-journal"):  # which SQLite opens through links
             check_own(self.path.with_name(f"{ANSWERS}{suffix}"))
         try:

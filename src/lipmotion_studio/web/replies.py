@@ -17,7 +17,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from lipmotion.errors import ExportError, LipMotionError
-from lipmotion.storage.json_text import as_json, from_json, nan_as_null
+from lipmotion.storage.json_text import as_json, from_json, replace_nan
 
 LOG = logging.getLogger("lipmotion")
 HEADERS = {
@@ -40,7 +40,7 @@ class JSONResponse(responses.JSONResponse):
         try:
             return as_json(content, ensure_ascii=False).encode()
         except ExportError:
-            return as_json(nan_as_null(content), ensure_ascii=False).encode()
+            return as_json(replace_nan(content), ensure_ascii=False).encode()
 
 
 class SecurityHeaders:

@@ -10,7 +10,7 @@ from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, fit
 from lipmotion.motion import closure, fit_acoustic_context, frame_labels
 from lipmotion.motion.context_window import OFFSETS, SCALE
 from lipmotion.motion.frame_labels import FullContextState, label_full_context
-from lipmotion.stats.trees import Question, Tree, fit_regression_node, fit_tree_regressions, ridge, zero_statistics
+from lipmotion.stats.trees import Question, Tree, create_statistics, fit_regression_node, fit_tree_regressions, ridge
 from lipmotion.testing import CHANNELS, examples, speech, timeline
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin, silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, load_unit_set
@@ -202,7 +202,7 @@ REGRESSION = engines.engine_named(
 
 
 def moments_of(z, r):
-    moments = zero_statistics(z.shape[1], r.shape[1])
+    moments = create_statistics(z.shape[1], r.shape[1])
     moments.add(z.astype(np.float32), r.astype(np.float32))
     return moments
 

@@ -77,7 +77,7 @@ def _parsed(content: bytes) -> Any:
 
 def _array(content: bytes) -> Any:
     try:
-        array = archive.array_in(content)
+        array = archive.take_array(content)
     except ValueError as error:
         raise errors.InputError(str(error)) from error
     return array if array.size < 1e6 else array.ravel()[:1_000_000]

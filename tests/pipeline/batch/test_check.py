@@ -14,7 +14,7 @@ from lipmotion.pipeline.batch.check import (
     _find_problems,
     check_line,
     count_letters,
-    expected_s,
+    estimate_time,
 )
 
 RATE_HZ = 16_000
@@ -78,8 +78,8 @@ def test_the_measure_of_length_is_the_usual_rate():
     """What is too long among quick talkers is not among slow ones."""
 
     def lines(share: float) -> list[CheckedLine]:
-        usual = [CheckedLine(f"{n}", spoken_s=share * expected_s(60), letters=60) for n in range(FEWEST_LINES)]
-        return [*usual, CheckedLine("x", spoken_s=2.6 * expected_s(60), letters=60)]
+        usual = [CheckedLine(f"{n}", spoken_s=share * estimate_time(60), letters=60) for n in range(FEWEST_LINES)]
+        return [*usual, CheckedLine("x", spoken_s=2.6 * estimate_time(60), letters=60)]
 
     assert [each.name for each in _find_problems(lines(0.8), [])] == ["x"]
     assert list(_find_problems(lines(1.3), [])) == []

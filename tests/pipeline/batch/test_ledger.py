@@ -24,7 +24,7 @@ from lipmotion.pipeline.batch.ledger import (
     check_kinds,
     fingerprint_job,
     fingerprint_line,
-    input_files,
+    list_input_files,
     open_ledger,
     read_receipt,
     write_receipt,
@@ -38,7 +38,7 @@ DIGEST = hashlib.sha256(CONTENT).hexdigest()
 
 
 def record_of(line: BatchLine, run: str = "old") -> Record:
-    inputs = [vars(each) for each in input_files(line)]
+    inputs = [vars(each) for each in list_input_files(line)]
     return {
         "name": line.name, "recording": line.recording, "run": run, "fingerprint": fingerprint_line(line, "settings"),
         "outcome": DONE, "inputs": inputs, "outputs": {f"{line.name}.json": DIGEST},
@@ -472,7 +472,7 @@ def test_names_that_are_only_alike():
 def test_another_file_of_the_same_size_and_time_is_noticed(tmp_path):
     path, other = tmp_path / "a.wav", tmp_path / "b.wav"
     path.write_bytes(b"a")
-    (file,) = input_files(BatchLine("a", str(path)))
+    (file,) = list_input_files(BatchLine("a", str(path)))
     path.touch()
     assert file.is_unchanged()
     other.write_bytes(b"b")

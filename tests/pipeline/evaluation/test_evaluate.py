@@ -17,8 +17,8 @@ from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.measures import curves
 from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.pipeline.generation import generate_for
-from lipmotion.speech.features.speaker_similarity import voice_knowledge
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.speech.features.speaker_similarity import rate_knowledge
+from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Speech, StateTrace, Track, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
@@ -85,11 +85,11 @@ def test_a_voice_is_as_well_known_as_in_animation(toy_model, toy_corpus):
     heard = []
     for less_similar in (0.0, 3.0, 20.0):
         own = replace(toy_model.phones, typical_fit=toy_model.phones.typical_fit + less_similar, speaker=None)
-        recogniser = cached_recogniser(own, "own")
+        recogniser = open_recogniser(own, "own")
         recordings = load_held_out(toy_corpus, recogniser, selection=Selection(split="val"), lexicon=Lexicon())
         speeches = make_speech(recordings, AUDIO_ONLY, Medium(None), {})
         heard.append([speech.voice for speech in speeches])
-        known = [voice_knowledge(own, made.read_sound(each.audio)) for each in recordings.utterances]
+        known = [rate_knowledge(own, made.read_sound(each.audio)) for each in recordings.utterances]
         assert heard[-1] == pytest.approx(known)
     similar, less, least = np.array(heard)
     assert similar.max() == 1 > less.max() > least.max() == 0

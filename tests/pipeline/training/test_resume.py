@@ -18,8 +18,8 @@ from lipmotion.formats.label_files import write_labels
 from lipmotion.pipeline import workers
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training.other_speakers import align_recordings, is_held_out_speaker, synthesise_sentences
-from lipmotion.speech.sound.acoustic_conditions import spoken_samples
-from lipmotion.speech.voices.installed import installed_voices
+from lipmotion.speech.sound.acoustic_conditions import mark_spoken
+from lipmotion.speech.voices.installed import list_installed
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import Audio, Item, Monitor, Progress, Timeline, Unit, silent_monitor
 from lipmotion.units import Lexicon, split_words
@@ -227,7 +227,7 @@ def test_sentences_stand_between_pauses_over_a_faint_noise():
         assert last.end_s == pytest.approx(sentence.audio.duration_s)
         assert last.duration_s == pytest.approx(0.25)
         assert all(a.end_s == b.start_s for a, b in pairwise(sentence.phones))
-        loud = sentence.audio.samples[spoken_samples(sentence.audio)].std()
+        loud = sentence.audio.samples[mark_spoken(sentence.audio)].std()
         for part in (sentence.audio.samples[:4000], sentence.audio.samples[-4000:]):
             assert 20 * np.log10(loud / part.std()) == pytest.approx(50, abs=0.6)
 
@@ -358,7 +358,7 @@ def test_a_folder_without_transcripts(tmp_path, own, toy_sentence, name):
 
 @pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
 def test_real_voices():
-    voices = installed_voices()[-1:]
+    voices = list_installed()[-1:]
     if not voices:
         pytest.skip("the synthesisers have no voices")
     (sentence,) = synthesise_sentences(["My baby may be home."], voices)

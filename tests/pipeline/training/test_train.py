@@ -21,7 +21,7 @@ from lipmotion.pipeline.training.labels import (
 )
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.pipeline.training.train import describe_training, label_phones
-from lipmotion.speech.recognition.general import general_model
+from lipmotion.speech.recognition.general import load_general
 from lipmotion.types import Span, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
@@ -250,7 +250,7 @@ def test_labelled_phones_are_believed(right_transcripts, caplog):
 
 def test_without_general_models_nothing_is_measured(right_transcripts, caplog, monkeypatch):
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
-    general_model.cache_clear()
+    load_general.cache_clear()
     warn_of_doubtful_transcripts([(right_transcripts[0][0], right_transcripts[1][1])])
     assert not caplog.records
 

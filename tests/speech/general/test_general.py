@@ -10,10 +10,10 @@ from lipmotion.speech.recognition.general import (
     PHONES,
     STATES,
     STREAMS,
-    density_column,
-    english_bigram,
+    find_density,
     general_features,
-    general_model,
+    load_bigram,
+    load_general,
 )
 from lipmotion.units import PHONES as OURS
 from testing.formant_synthesiser import synthesise
@@ -26,18 +26,18 @@ def vowels() -> types.Audio:
 
 def test_blocks_change_nothing() -> None:
     features = general_features(vowels())
-    wanted = general_model().log_density(features)
+    wanted = load_general().log_density(features)
     assert len(features) > acoustic.BLOCK
     for first in (1, 100):
-        assert general_model().log_density(features[first:]) == pytest.approx(wanted[first:], abs=2e-3)
+        assert load_general().log_density(features[first:]) == pytest.approx(wanted[first:], abs=2e-3)
 
 
 def test_vowels_are_told_apart() -> None:
-    density = general_model().log_density(general_features(vowels()))
+    density = load_general().log_density(general_features(vowels()))
 
     def best(start_s: float, end_s: float, phones: tuple[str, ...]) -> str:
         frames = density[round(start_s * 100) : round(end_s * 100)]
-        return max(phones, key=lambda phone: frames[:, density_column(phone, 1, 3)].sum())
+        return max(phones, key=lambda phone: frames[:, find_density(phone, 1, 3)].sum())
 
     assert best(0.4, 0.6, ("iy", "aa", "uw", "s", "sil")) == "iy"
     assert best(0.75, 0.95, ("iy", "aa", "uw", "s", "sil")) == "s"
@@ -46,11 +46,11 @@ def test_vowels_are_told_apart() -> None:
 
 
 def test_every_phone_has_a_column() -> None:
-    columns = [density_column(phone, state, 3) for phone in OURS for state in range(3)]
+    columns = [find_density(phone, state, 3) for phone in OURS for state in range(3)]
     assert min(columns) >= 2 * STATES  # the noises are nobody's
     assert {PHONES[c // STATES] for c in columns} == set(PHONES[2:])
-    assert [density_column("b", state, 5) % 3 for state in range(5)] == [0, 0, 1, 2, 2]
-    assert density_column("sp", 0, 1) == density_column("sil", 1, 3)
+    assert [find_density("b", state, 5) % 3 for state in range(5)] == [0, 0, 1, 2, 2]
+    assert find_density("sp", 0, 1) == find_density("sil", 1, 3)
 
 
 def test_features_are_those_of_the_recognised_sound_at_any_level() -> None:
@@ -65,7 +65,7 @@ def test_features_are_those_of_the_recognised_sound_at_any_level() -> None:
 
 def test_the_bigram_is_that_of_the_phone_model() -> None:
     units = (*OURS, "+nsn+")
-    bigram = english_bigram(units)
+    bigram = load_bigram(units)
     assert bigram.sum(axis=1) == pytest.approx(1)
     s, t, ng = units.index("s"), units.index("t"), units.index("ng")
     assert bigram[s, t] > 0.1 > bigram[t, s] * 0.5
@@ -77,22 +77,22 @@ def test_another_pocketsphinx_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path
     data = tmp_path / "pocketsphinx" / "model" / "en-us" / "en-us"
     data.mkdir(parents=True)
     (tmp_path / "pocketsphinx" / "__init__.py").touch()
-    general_model.cache_clear()
+    load_general.cache_clear()
     monkeypatch.delitem(sys.modules, "pocketsphinx")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(errors.MissingDependencyError, match="not those of its version 5"):
-        general_model()
+        load_general()
     for name in ("means", "variances", "sendump"):
         (data / name).write_bytes(b"s3\nendhdr\n" + bytes(64))
     with pytest.raises(errors.MissingDependencyError, match="unexpected header"):
-        general_model()
+        load_general()
 
 
 def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
     """Its decoder, with its own features and search, puts the phones of a sentence where our densities do."""
     from lipmotion import load_model
     from lipmotion.hmm.align import align_units
-    from lipmotion.speech.recognition.general import combine_phones, combined_log_likelihoods
+    from lipmotion.speech.recognition.general import combine_likelihoods, combine_phones
 
     sample = (toy_sentence.audio.samples * 32767).astype("<i2").tobytes()
     decoder = Decoder(lm=None, loglevel="FATAL", beam=1e-80, wbeam=1e-60, pbeam=1e-80)
@@ -107,12 +107,12 @@ def test_pocketsphinx_s_own_alignment_agrees(toy_sentence: ToySentence) -> None:
     joint = combine_phones(load_model().phones)
     general = general_features(toy_sentence.audio)
     units = ["sil", *(name for name, _ in theirs), "sil"]
-    bounds = align_units(joint.hmm, combined_log_likelihoods(joint, general, 0.0, general), units)[1:-2] / 100
+    bounds = align_units(joint.hmm, combine_likelihoods(joint, general, 0.0, general), units)[1:-2] / 100
     assert np.median(np.abs(bounds - [start_s for _, start_s in theirs])) <= 0.03
 
 
 def test_the_densities_of_its_streams_are_mixtures() -> None:
-    model, x = general_model(), np.random.default_rng(0).normal(0, 2, (5, 39)).astype(np.float32)
+    model, x = load_general(), np.random.default_rng(0).normal(0, 2, (5, 39)).astype(np.float32)
     total = sum(model.mixtures(n).log_likelihood(x[:, stream]) for n, stream in enumerate(STREAMS))
     expected = total - total.max(axis=1, keepdims=True)
     near = expected > -60  # beyond, products of tiny shares are floored

@@ -30,6 +30,6 @@ def faked(bare: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     if os.name != "posix":
         pytest.skip("the fakes are scripts")
     fakes.install(bare)
-    espeak._system_data.cache_clear()
+    espeak._find_system_data.cache_clear()
     monkeypatch.setattr(espeak, "PROGRAM", [str(bare / "espeak-events")])
     return bare.parent / "temporary"

@@ -14,8 +14,8 @@ from lipmotion import errors, types
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech.voices import espeak
 from lipmotion.speech.voices import inventory_phones as module
-from lipmotion.speech.voices.installed import speak_sentences, voice_named
-from lipmotion.speech.voices.inventory_phones import inventory_timeline, matches, with_words
+from lipmotion.speech.voices.installed import find_voice, speak_sentences
+from lipmotion.speech.voices.inventory_phones import convert_phones, matches, with_words
 from lipmotion.speech.voices.synthesiser import ARPABET_PHONES, ESPEAK_PHONES, complete_map
 from lipmotion.types import Audio, Span, Timeline, languages
 from lipmotion.units import PHONES, Lexicon, is_silent
@@ -23,7 +23,7 @@ from oracles.edits import least_cost
 
 from . import fakes
 
-INSTALLED = espeak.wheel_folder() is not None
+INSTALLED = espeak.find_wheel() is not None
 SENTENCES = {
     "de": ("Die schöne Köchin möchte fünf süße Äpfel.", "die schöne köchin möchte fünf süße äpfel"),
     "fr": ("Une belle huître, bon vin blanc.", "une belle huître bon vin blanc"),
@@ -43,12 +43,12 @@ def wheel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_package_comes_before_the_system(wheel: Path) -> None:
-    assert espeak.wheel_folder() == wheel
+    assert espeak.find_wheel() == wheel
     assert espeak._library() == {"library": str(wheel / "libespeak-ng.so"), "data": str(wheel)}
     assert [voice.name for voice in espeak.ESPEAK_NG.voices()] == ["en-us+f2"]
     assert [voice.name for voice in espeak.ESPEAK_NG.others()] == ["de", "en", "en-gb", "en-us"]
     shutil.rmtree(wheel / "espeak-ng-data")
-    assert espeak.wheel_folder() is None
+    assert espeak.find_wheel() is None
 
 
 @pytest.mark.usefixtures("faked")
@@ -64,7 +64,7 @@ def test_a_library_without_data_has_no_voices(faked: Path) -> None:
 
 @pytest.mark.usefixtures("faked")
 def test_another_language_keeps_its_words_and_takes_the_nearest_phones(caplog: pytest.LogCaptureFixture) -> None:
-    _, units = next(speak_sentences(["«Hällo!»"], voice_named("espeak-ng:de+f2")))
+    _, units = next(speak_sentences(["«Hällo!»"], find_voice("espeak-ng:de+f2")))
     assert [(span.label.phone, span.label.word) for span in units] == [
         ("sil", ""), ("hh", "hällo"), ("ax", "hällo"), ("l", "hällo"), ("ow", "hällo"), ("sil", ""),
     ]  # fmt: skip
@@ -73,14 +73,14 @@ def test_another_language_keeps_its_words_and_takes_the_nearest_phones(caplog: p
 
 @pytest.mark.usefixtures("faked")
 def test_phones_that_no_table_has_are_reported(caplog: pytest.LogCaptureFixture) -> None:
-    _, units = next(speak_sentences(["strange"], voice_named("de")))
+    _, units = next(speak_sentences(["strange"], find_voice("de")))
     assert units[4].label.phone == "ax"
     assert "no table has, shown as the nearest or as ax: ꙮ" in caplog.text
 
 
 def written(*places: int, text: str) -> list[str]:
     phones = Timeline(tuple(Span(n / 10, (n + 1) / 10, "a") for n in range(len(places))))
-    return [f"{span.start_s} {span.label}" for span in espeak._written_words(phones, places, text)]
+    return [f"{span.start_s} {span.label}" for span in espeak._spell_words(phones, places, text)]
 
 
 def test_words_are_found_by_their_places() -> None:
@@ -111,19 +111,19 @@ class TestPackage:
     @pytest.mark.parametrize("language", ["de", *(pytest.param(each, marks=pytest.mark.long) for each in ("fr", "pt"))])
     def test_other_languages(self, language: str, caplog: pytest.LogCaptureFixture) -> None:
         text, words = SENTENCES[language]
-        audio, units = next(speak_sentences([text], voice_named(language)))
+        audio, units = next(speak_sentences([text], find_voice(language)))
         said = [span.label.word for span in units if not is_silent(span.label.phone)]
         assert list(dict.fromkeys(said)) == words.split()
         assert units[-1].end_s == pytest.approx(audio.duration_s)
         assert caplog.text == ""
 
     def test_numbers_and_signs_have_the_words_that_are_said(self) -> None:
-        _, units = next(speak_sentences(["It cost 42 euros, mother-in-law."], voice_named("espeak-ng:en-us+f2")))
+        _, units = next(speak_sentences(["It cost 42 euros, mother-in-law."], find_voice("espeak-ng:en-us+f2")))
         said = dict.fromkeys(span.label.word for span in units if span.label.word)
         assert list(said) == "it cost forty two euros mother in law".split()
 
     def test_letters_of_other_scripts_are_said_somehow(self) -> None:
-        _, units = next(speak_sentences(["שלום 12345678901234567890"], voice_named("espeak-ng:en-us+f2")))
+        _, units = next(speak_sentences(["שלום 12345678901234567890"], find_voice("espeak-ng:en-us+f2")))
         assert len(units) > 40
 
 
@@ -140,7 +140,7 @@ def sound(*silences: tuple[float, float], duration_s: float = 1.0) -> Audio:
 
 
 def starts(labels: list[tuple[str, float]], audio: Audio) -> list[float]:
-    return [round(span.start_s, 4) for span in espeak.corrected_phone_times(labels, audio)]
+    return [round(span.start_s, 4) for span in espeak.correct_times(labels, audio)]
 
 
 def test_a_stop_begins_with_its_closure() -> None:
@@ -163,7 +163,7 @@ def test_an_l_that_is_late_gets_its_share_of_the_vowel() -> None:
 
 
 def test_the_last_lasts_to_the_end() -> None:
-    phones = espeak.corrected_phone_times([("a", 0.1), ("s", 0.5)], sound())
+    phones = espeak.correct_times([("a", 0.1), ("s", 0.5)], sound())
     assert [(span.label, span.end_s) for span in phones] == [("a", 0.5), ("s", 1.0)]
 
 
@@ -249,7 +249,7 @@ def test_pauses_are_named_by_place_and_length() -> None:
     said = timeline(
         ("pau", 0.0, 0.1), ("ih", 0.1, 0.2), ("pau", 0.2, 0.35), ("t", 0.35, 0.4), ("pau", 0.4, 0.65), ("ih", 0.65, 1.0)
     )
-    units = inventory_timeline(said, ARPABET_PHONES, ["it"], LEXICON, 1.1)
+    units = convert_phones(said, ARPABET_PHONES, ["it"], LEXICON, 1.1)
     assert [span.label.phone for span in units] == ["sil", "ih", "sp", "t", "sil", "ih", "sil"]
     assert [span.start_s for span in units] == pytest.approx([0, 0.1, 0.2, 0.35, 0.4, 0.65, 1.0])
     assert units[-1].end_s == pytest.approx(1.1)
@@ -257,14 +257,14 @@ def test_pauses_are_named_by_place_and_length() -> None:
 
 def test_what_is_not_covered_is_silent_and_what_is_too_late_is_cut() -> None:
     said = timeline(("ih", 0.1, 0.2), ("t", 0.3, 0.6), ("t", 0.7, 0.8))
-    units = inventory_timeline(said, ARPABET_PHONES, ["it"], LEXICON, 0.5)
+    units = convert_phones(said, ARPABET_PHONES, ["it"], LEXICON, 0.5)
     found = [(span.label.phone, span.start_s, span.end_s) for span in units]
     assert found == [("sil", 0.0, 0.1), ("ih", 0.1, 0.2), ("sp", 0.2, 0.3), ("t", 0.3, 0.5)]
 
 
 def test_several_phones_share_a_label_and_parts_join() -> None:
     said = timeline(("A@", 0.0, 0.2), (";", 0.2, 0.3), ("t", 0.3, 0.3), ("z", 0.3, 0.4))
-    units = inventory_timeline(said, ESPEAK_PHONES, ["is"], LEXICON, 0.4)
+    units = convert_phones(said, ESPEAK_PHONES, ["is"], LEXICON, 0.4)
     found = [(span.label.phone, span.start_s, span.end_s) for span in units]
     assert found == [("aa", 0.0, 0.1), ("r", 0.1, pytest.approx(0.3)), ("z", 0.3, 0.4)]
 
@@ -272,7 +272,7 @@ def test_several_phones_share_a_label_and_parts_join() -> None:
 def test_it_says_what_is_wrong() -> None:
     for label, message in (("xx", "'xx', which is no phone"), ("pau", "no phone; give")):
         with pytest.raises(errors.InputError, match=message):
-            inventory_timeline(timeline((label, 0.0, 0.1)), ARPABET_PHONES, ["it"], LEXICON, 0.2)
+            convert_phones(timeline((label, 0.0, 0.1)), ARPABET_PHONES, ["it"], LEXICON, 0.2)
 
 
 def test_tables_lead_to_the_inventory() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lipmotion import Model, errors
-from lipmotion.speech.sound.acoustic_conditions import noisy_audio
+from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.voices import installed, synthesiser
 from lipmotion.units import PHONES, Lexicon, is_silent, split_words
 from pipeline.made import features_of, recogniser_of
@@ -28,8 +28,8 @@ HARD = ['"Hello" \\ (sil) %s', "Hello; `ls` $HOME", "Helló"]
 
 @pytest.mark.usefixtures("faked")
 def test_voices_are_listed() -> None:
-    assert installed.installed_voices() == installed.all_voices()[: len(FAKED)] == tuple(FAKED)
-    assert [voice.language for voice in installed.all_voices()[len(FAKED) :]] == ["de", "en", "en-gb", "en-us"]
+    assert installed.list_installed() == installed.list_voices()[: len(FAKED)] == tuple(FAKED)
+    assert [voice.language for voice in installed.list_voices()[len(FAKED) :]] == ["de", "en", "en-gb", "en-us"]
 
 
 @pytest.mark.usefixtures("faked")
@@ -90,7 +90,7 @@ def test_voices_by_name() -> None:
         ("en-us+f2", "espeak-ng:en-us+f2"),
         ("de+f2", "espeak-ng:de+f2"),
     ):
-        assert installed.voice_named(name).full_name == full_name
+        assert installed.find_voice(name).full_name == full_name
     for name, message in (
         ("dectalk:paul", "unknown synthesiser 'dectalk'; required one of: flite, festival, espeak-ng"),
         ("paul", "no voice 'paul' is installed; lipmotion speak --voices lists"),
@@ -98,44 +98,44 @@ def test_voices_by_name() -> None:
         ("de+robosoft", "no voice 'de.robosoft' is installed"),
     ):
         with pytest.raises(errors.InputError, match=message):
-            installed.voice_named(name)
+            installed.find_voice(name)
     with pytest.raises(errors.InputError, match="no voice 'rms' here; it has: kal16, slt"):
         next(installed.speak_sentences(["Hello"], synthesiser.SyntheticVoice("rms", "flite", "rms")))
 
 
 @pytest.mark.usefixtures("bare")
 def test_without_synthesisers_it_says_what_to_install() -> None:
-    assert installed.installed_voices() == ()
+    assert installed.list_installed() == ()
     for voice in EACH:
         with pytest.raises(errors.MissingDependencyError, match=f"apt install {voice.synthesiser}"):
             next(installed.speak_sentences(["Hello"], voice))
-    for find in (installed.default_voice, lambda: installed.voice_named("slt")):
+    for find in (installed.choose_voice, lambda: installed.find_voice("slt")):
         with pytest.raises(errors.MissingDependencyError, match=r'pip install ".*\[text\]", or: apt install flite'):
             find()
     with pytest.raises(errors.MissingDependencyError, match="flite is not installed: apt install flite"):
-        installed.voice_named("flite:slt")
+        installed.find_voice("flite:slt")
 
 
 def test_the_default_voice_is_the_first_that_there_is(faked: Path) -> None:
-    assert installed.default_voice().full_name == "espeak-ng:en-us+f2"
+    assert installed.choose_voice().full_name == "espeak-ng:en-us+f2"
     (faked.parent / "programs" / "espeak-ng").unlink()
-    assert installed.default_voice().full_name == "flite:slt"
+    assert installed.choose_voice().full_name == "flite:slt"
     (faked.parent / "programs" / "flite").unlink()
-    assert installed.default_voice().full_name == "festival:cmu_us_slt_arctic_hts"
+    assert installed.choose_voice().full_name == "festival:cmu_us_slt_arctic_hts"
 
 
 def test_a_synthesiser_that_does_not_work_is_left_out(faked: Path, caplog: pytest.LogCaptureFixture) -> None:
     (faked.parent / "programs" / "festival").write_text("#!/bin/sh\nexit 3\n")
-    assert [voice.synthesiser for voice in installed.all_voices()] == ["flite", "flite", *["espeak-ng"] * 5]
-    assert installed.voice_named("slt").full_name == "flite:slt"
+    assert [voice.synthesiser for voice in installed.list_voices()] == ["flite", "flite", *["espeak-ng"] * 5]
+    assert installed.find_voice("slt").full_name == "flite:slt"
     assert "festival is left out: festival failed with 3" in caplog.text
     with pytest.raises(errors.InputError, match="festival failed with 3"):
-        installed.voice_named("festival:kal_diphone")
+        installed.find_voice("festival:kal_diphone")
 
 
 @pytest.mark.usefixtures("faked")
 def test_a_sound_is_there_until_the_next() -> None:
-    with closing(installed.voiced_sentences(["hello", "hello"], FAKED[0])) as said:
+    with closing(installed.voice_sentences(["hello", "hello"], FAKED[0])) as said:
         first = next(said)
         assert first.own_sound().rate_hz == 16_000
         list(said)
@@ -182,7 +182,7 @@ def test_real_voices_say_what_the_dictionary_says(real: synthesiser.SyntheticVoi
 def test_the_times_of_real_voices_are_those_of_the_aligner(real: synthesiser.SyntheticVoice, toy_model: Model) -> None:
     recogniser, late_s = recogniser_of(toy_model, "general"), []
     for audio, units in installed.speak_sentences(TEXTS, real):
-        room = noisy_audio(audio, "white", 50)
+        room = mix_noise(audio, "white", 50)
         placed = recogniser.align_phones(room, features_of(room), units)
         said, aligned = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
         late_s += [a.start_s - b.start_s for a, b in zip(said, aligned, strict=True)]
@@ -219,12 +219,12 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_program_is_stopped(script: str, message: str, tmp_path: Path) -> None:
     program = _program(tmp_path, script)
     with pytest.raises(errors.InputError, match=message):
-        synthesiser.program_output([str(program)], "a-package", folder=tmp_path / "say.d")
+        synthesiser.run_program([str(program)], "a-package", folder=tmp_path / "say.d")
 
 
 @needs_scripts
 def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
-    child = int(synthesiser.program_output([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
+    child = int(synthesiser.run_program([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
     for _ in range(100):
         if not _is_running(child):
             return
@@ -235,7 +235,7 @@ def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
 
 @needs_scripts
 def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
-    assert synthesiser.program_output([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
+    assert synthesiser.run_program([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
 
 
 def _program(folder: Path, script: str) -> Path:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.storage.json_text import as_json, nan_as_null
+from lipmotion.storage.json_text import as_json, replace_nan
 from lipmotion_studio.study.analysis.analyse import RULES, analyse_study, analysis_table, counts, screen
 from lipmotion_studio.study.answers import Answer, write_answers
 from study.simulated import Effects, comparisons, pair_answer, paired_answers, rated_answers, rating, ratings
@@ -30,7 +30,7 @@ def test_figures_come_with_and_without_screening(tmp_path):
     assert [(part["kind"], part["raters"]) for part in figures["all"]] == [("mos", 12), ("paired", 12)]
     assert [(part["kind"], part["raters"]) for part in figures["screened"]] == [("mos", 11), ("paired", 11)]
     assert figures["screened"] == analyse_study([each for each in study() if each.rater != "r3"])["all"]
-    as_json(nan_as_null(figures))
+    as_json(replace_nan(figures))
 
 
 def test_the_table_has_all_figures():
@@ -99,7 +99,7 @@ def test_degenerate_studies_have_figures_without_numbers_that_are_none(name):
     figures = analyse_study(DEGENERATE[name])
     text = analysis_table(figures)
     assert not re.search(r"\b(nan|inf)\b", text)
-    as_json(nan_as_null(figures))
+    as_json(replace_nan(figures))
 
 
 Change = Callable[[Answer], Answer]

@@ -44,7 +44,7 @@ class OutputArgument:
 
     name       : of the option in the namespace
     is_folder  : whether it is a folder
-    keeps_work : whether finished stages are kept in a folder beside it (``locks.unfinished_work``)
+    keeps_work : whether finished stages are kept in a folder beside it (``locks.list_unfinished``)
     """
 
     name: str
@@ -90,14 +90,14 @@ def add_output(
 
 def check_paths(options: argparse.Namespace) -> None:
     """Raise ExportError if an output of a command is one of its inputs."""
-    from lipmotion.storage.locks import work_folder
+    from lipmotion.storage.locks import name_work_folder
 
     declared: tuple[OutputArgument, ...] = getattr(options, "writes", ())
     written = [(output, path) for output in declared for path in _paths(getattr(options, output.name))]
     if not written:
         return
     folders = [path for output, path in written if output.is_folder]
-    folders += [work_folder(path) for output, path in written if output.keeps_work]
+    folders += [name_work_folder(path) for output, path in written if output.keeps_work]
     files, sources = [path for output, path in written if not output.is_folder], list[Source]()
     for argument in getattr(options, "reads", ()):
         paths = _paths(getattr(options, argument.name))
@@ -157,9 +157,9 @@ def read_pipe(path: Path) -> Iterator[Path]:
         yield path
         return
     from lipmotion.errors import InputError
-    from lipmotion.storage.locks import temporary_folder
+    from lipmotion.storage.locks import open_temporary
 
-    with temporary_folder() as folder:
+    with open_temporary() as folder:
         stored = folder / "standard-input"
         with stored.open("wb") as file:
             if str(path) == PIPE and sys.stdin is None:
@@ -182,9 +182,9 @@ def write_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], b
     if PIPE not in outputs:
         yield outputs, False
         return
-    from lipmotion.storage.locks import temporary_folder
+    from lipmotion.storage.locks import open_temporary
 
-    with temporary_folder() as folder:
+    with open_temporary() as folder:
         motion = folder / f"motion.{options.format}"
         yield tuple(str(motion) if output == PIPE else output for output in outputs), True
         write_bytes(motion)

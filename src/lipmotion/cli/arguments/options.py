@@ -85,7 +85,7 @@ def report_figures(
     """Call ``compute(lexicon, monitor)``, write its figures, and print their table."""
     from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.storage.files import atomic_file, check_target
-    from lipmotion.storage.json_text import as_json, nan_as_null
+    from lipmotion.storage.json_text import as_json, replace_nan
     from lipmotion.units import Lexicon
 
     with report_progress(options) as report:
@@ -95,7 +95,7 @@ def report_figures(
         figures = compute(Lexicon.from_file(file) if file else None, report.receive)
         if options.output:
             with atomic_file(options.output) as unfinished:
-                unfinished.write_text(as_json(nan_as_null(figures), indent=1) + "\n", encoding="utf-8")
+                unfinished.write_text(as_json(replace_nan(figures), indent=1) + "\n", encoding="utf-8")
         report.finish(table(figures), figures=figures)
 
 

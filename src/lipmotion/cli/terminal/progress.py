@@ -22,7 +22,7 @@ from lipmotion.errors import ExportError, InputError, LipMotionError
 from lipmotion.extensions import describe_failed_extension
 from lipmotion.printable import printable
 from lipmotion.storage.files import as_text
-from lipmotion.storage.json_text import as_json, nan_as_null
+from lipmotion.storage.json_text import as_json, replace_nan
 from lipmotion.types.progress import Item, Progress, warnings_to
 
 LINE_START = "\r\x1b[K"
@@ -75,7 +75,7 @@ def with_program_name(text: object) -> str:
 def print_json(document: Any) -> None:
     """Print a JSON document as one line of ASCII on standard output. Raises ExportError: it cannot be written."""
     with _catch_failure():
-        print(as_json(nan_as_null(document)), flush=True)
+        print(as_json(replace_nan(document)), flush=True)
 
 
 def print_error_json(document: Any, *, spaced: bool = False) -> None:
@@ -86,7 +86,7 @@ def print_error_json(document: Any, *, spaced: bool = False) -> None:
     if sys.stderr is None:
         raise ExportError("standard error is closed; open it, or leave out what asks for messages there")
     try:
-        print(_spaced(document) if spaced else as_json(nan_as_null(document)), file=sys.stderr, flush=True)
+        print(_spaced(document) if spaced else as_json(replace_nan(document)), file=sys.stderr, flush=True)
     except OSError as error:
         _discard_pending(sys.stderr)
         raise ExportError(f"standard error cannot be written: {error.strerror or error}") from error

@@ -47,9 +47,9 @@ def _run_cite(options: argparse.Namespace) -> None:
     """Print the entries. Raises InputError: nothing has that name.  Raises ModelFormatError: the file is no model."""
     from lipmotion.citations import bibliography, list_engine_citations, list_model_citations
     from lipmotion.engines import ENGINES
-    from lipmotion.pipeline.model import read_header, shipped_path
+    from lipmotion.pipeline.model import find_shipped, read_header
 
-    name = options.name or str(shipped_path())
+    name = options.name or str(find_shipped())
     if name in ENGINES.names:
         print_lines(list_engine_citations(name))
     elif name in bibliography():
@@ -125,9 +125,9 @@ def add_info(verbs: Verbs) -> None:
 
 def run_info(options: argparse.Namespace) -> None:
     """Print the header of the model, or its structure."""
-    from lipmotion.pipeline.model import load_model, read_header, shipped_path
+    from lipmotion.pipeline.model import find_shipped, load_model, read_header
 
-    path = options.model or shipped_path()
+    path = options.model or find_shipped()
     if options.structure:
         model = load_model(path)
         text = model.engine.describe(model.learned)

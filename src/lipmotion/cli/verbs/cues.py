@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.edit_files import edit_file
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model
-    from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
+    from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cues, format_cues, write_cues
 
     piped = is_pipe(options.speech)
     placed = place_outputs(options.speech, options.output, options.format or "tsv")
@@ -126,5 +126,5 @@ def run(options: argparse.Namespace) -> None:
         for path in options.output:
             print_line(path)
         if not options.output:
-            print_lines(cue_text(sheet, speech=speech_path, form=options.format or "tsv").removesuffix("\n"))
+            print_lines(format_cues(sheet, speech=speech_path, form=options.format or "tsv").removesuffix("\n"))
         flush_output()

@@ -29,10 +29,10 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.analysis.read_request import read_request
     from lipmotion.pipeline.generate.explain import (
         explain,
-        explanation_document,
-        explanation_text,
         run_lines,
         state_runs,
+        write_document,
+        write_explanation,
     )
     from lipmotion.pipeline.model import load_model
 
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> None:
     request, model = read_request(asked), load_model(asked.model)
     if options.at is not None:
         explanations = explain(request, at=options.at, model=model)
-        documents, text = map(explanation_document, explanations), "\n\n".join(map(explanation_text, explanations))
+        documents, text = map(write_document, explanations), "\n\n".join(map(write_explanation, explanations))
     else:
         runs = state_runs(request, model=model)
         documents, text = map(asdict, runs), "\n".join(run_lines(runs, options.count))

@@ -47,9 +47,9 @@ def run(options: argparse.Namespace) -> None:
         if not options.voices:
             _speak(options, report)
             return
-        from lipmotion.speech.voices.installed import all_voices
+        from lipmotion.speech.voices.installed import list_voices
 
-        voices = all_voices()
+        voices = list_voices()
         report.finish(
             "\n".join(f"{voice.full_name:28} {voice.language}" for voice in voices) or "no voice is installed",
             voices=[{"name": voice.full_name, "language": voice.language} for voice in voices],

@@ -80,9 +80,9 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import create_engine, find_visual
     from lipmotion.pipeline.model import GEOMETRY, save_model
-    from lipmotion.pipeline.training.other_speakers import other_voices
+    from lipmotion.pipeline.training.other_speakers import synthesise_others
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.storage.locks import unfinished_work
+    from lipmotion.storage.locks import list_unfinished
     from lipmotion.units import Lexicon
 
     workers = options.workers if isinstance(options.workers, str) else count_workers(options)
@@ -90,10 +90,10 @@ def run(options: argparse.Namespace) -> None:
     with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         engine = create_engine(options.engine, preset=preset, units=options.units, settings=options.set)
-        voices = other_voices(
+        voices = synthesise_others(
             synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
         )
-        with unfinished_work(options.output) as work:
+        with list_unfinished(options.output) as work:
             model, result = train(
                 Corpus.open(options.corpus),
                 selection=Selection(list_or_all(options.split), tuple(options.speaker)),

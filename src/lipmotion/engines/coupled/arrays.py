@@ -30,10 +30,10 @@ from lipmotion.storage.schema import (
     POSITIVE,
     Arrays,
     ArraySpec,
-    arrays_under,
     check_arrays,
     check_index,
     refuse_undeclared,
+    select_arrays,
 )
 from lipmotion.units import UnitSet
 
@@ -103,7 +103,7 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
         sets = []
         for place, unit_set in enumerate(config.chains.split()):
-            pairs = check_arrays(arrays_under(arrays, f"chain_{place}/"), UNITS)["units"]
+            pairs = check_arrays(select_arrays(arrays, f"chain_{place}/"), UNITS)["units"]
             sets.append(UnitSet(unit_set, dict(pairs.tolist())))
         structure = config.structure_with(tuple(sets))
         poses = check_arrays(arrays, POSES, Q=space.dimensions)
@@ -115,7 +115,7 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
             )
         transitions = _transitions(arrays, structure)
         visual = tuple(
-            _visual(arrays_under(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
+            _visual(select_arrays(arrays, f"visual_{number}/"), name, space.dimensions, config.dynamic)
             for number, name in enumerate(streams[1:])
         )
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
@@ -191,7 +191,7 @@ def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
 
 
 def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:
-    of_chains = [arrays_under(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
+    of_chains = [select_arrays(arrays, f"chain_{number}/") for number in range(len(structure.chains))]
     chains = [check_arrays(own, CHAIN, U=len(units)) for own, units in zip(of_chains, structure.units, strict=True)]
     for chain in chains:
         check_sums_to_one("first", chain["first"].sum(keepdims=True))
@@ -230,7 +230,7 @@ def _visual(arrays: Arrays, name: str, dimensions: int, dynamic: bool) -> Visual
 def _groups(arrays: Arrays, joint_states: int, visual: tuple[VisualStream, ...]) -> tuple[StreamGroup, ...]:
     groups, widths = [], [FEATURES, *(len(stream.mean) for stream in visual)]
     for number in range(sum(key.endswith("/tie") for key in arrays)):
-        of_group = arrays_under(arrays, f"group_{number}/")
+        of_group = select_arrays(arrays, f"group_{number}/")
         streams = tuple(check_arrays(of_group, {"streams": GROUP["streams"]})["streams"].tolist())
         check_index(f"group_{number}/streams", np.array(streams), len(widths))
         edges = np.cumsum([0, *(widths[stream] for stream in streams)]).tolist()
@@ -246,7 +246,7 @@ def _groups(arrays: Arrays, joint_states: int, visual: tuple[VisualStream, ...])
 def _regression(
     arrays: Arrays, structure: Structure, visual: tuple[VisualStream, ...]
 ) -> tuple[RegressionInputs, tuple[VisualRegression, ...]]:
-    of_inputs = arrays_under(arrays, "around/")
+    of_inputs = select_arrays(arrays, "around/")
     check_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0])
     size = of_inputs["window_basis"].shape[1] + of_inputs["belief"].shape[1] * len(OFFSETS)
     checked = check_arrays(of_inputs, REGRESSION_INPUTS, N=structure.state_counts[0], I=size)
@@ -257,7 +257,7 @@ def _regression(
     for number, stream in enumerate(visual):
         count = structure.state_counts[structure.chain_of(number + 1)]
         sizes = {"N": count, "F": checked.sizes["F"] + 1, "D": len(stream.mean)}
-        own = check_arrays(arrays_under(arrays, f"following_{number}/"), VISUAL_REGRESSION, **sizes)
+        own = check_arrays(select_arrays(arrays, f"following_{number}/"), VISUAL_REGRESSION, **sizes)
         check_index(f"following_{number}/kind", own["kind"], own.sizes["E"])
         regressions.append(VisualRegression(own["kind"], own["coefficients"], own["variances"]))
     return inputs, tuple(regressions)

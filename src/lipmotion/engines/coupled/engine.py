@@ -24,7 +24,7 @@ from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, Cou
 from lipmotion.engines.coupled.training.alignment import mark_allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.articulation import Statistics, slice_dynamics, unseen_share
+from lipmotion.motion.articulation import Statistics, count_unseen, slice_dynamics
 from lipmotion.motion.generation import split_into_blocks
 from lipmotion.printable import printable
 from lipmotion.storage.archive import Checkpoint
@@ -357,7 +357,7 @@ class CoupledEngine(Engine[CoupledModel]):
             streams = convert(chains, inference.observations, inference.lattice, self.config.em, inference).streams[1:]
             return model.frame_statistics(streams), inference.posteriors.most_probable
         means, precisions = model.motion_statistics(inference)
-        share = ENCODING_SHARE * min(2 * unseen_share(speech.voice), 1.0)
+        share = ENCODING_SHARE * min(2 * count_unseen(speech.voice), 1.0)
         if share and model.encoding is not None and speech.encoding is not None:
             means += share * (slice_dynamics(model.encoding.predict(speech)[0], frames) - means)
             precisions += share * (1 / model.encoding.variances - precisions)

@@ -43,7 +43,7 @@ from lipmotion.motion.modulation_filter import (
 )
 from lipmotion.motion.space import MotionLimits, MotionSpace, check_poses, fit_reduced_motion, measure_limits
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.storage.schema import arrays_under, format_errors, refuse_undeclared
+from lipmotion.storage.schema import format_errors, refuse_undeclared, select_arrays
 from lipmotion.types import (
     FRAME_RATE_HZ,
     Configuration,
@@ -334,7 +334,7 @@ class JointEngine(Engine[JointModel]):
             joint = (name for name in arrays if name.startswith(PREFIX))
             refuse_undeclared(arrays, MOTION_ARRAYS, SCALING, MODULATION, joint)
             units, space, closure, prior = motion_from_arrays(arrays, self.config.units)
-            hmm = joint_from_arrays(arrays_under(arrays, PREFIX), self.config.hmm)
+            hmm = joint_from_arrays(select_arrays(arrays, PREFIX), self.config.hmm)
             if set(hmm.inventory.names) != set(units.units):
                 raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
             if MOTION not in hmm.models or len(hmm.models[MOTION].scale.mean) != 3 * space.dimensions:

@@ -18,7 +18,7 @@ from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.windows import PROTECTED_PHONES
 from lipmotion.motion.articulation import Statistics
-from lipmotion.motion.frame_labels import find_digital_silence, find_runs, frames_away
+from lipmotion.motion.frame_labels import find_digital_silence, find_runs, mark_distant
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.types import FRAME_RATE_HZ, Constraints, Motion, ReducedVariance, Speech, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent
@@ -234,7 +234,7 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
     silent = np.ones(len(features), bool) if always else find_digital_silence(features, units)
     if not silent.any():
         return np.zeros(len(features))
-    away = frames_away(units, len(features), SETTLED_S)
+    away = mark_distant(units, len(features), SETTLED_S)
     resting = np.zeros(len(features))
     for first, stop in find_runs(away):
         resting[first:stop] = float(silent[first:stop].any())

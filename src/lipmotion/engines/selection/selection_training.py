@@ -17,7 +17,7 @@ from lipmotion.engines.selection.windows import covering, list_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
-from lipmotion.motion.frame_labels import find_runs, frames_away, rate_phones
+from lipmotion.motion.frame_labels import find_runs, mark_distant, rate_phones
 from lipmotion.motion.generation import fit_motion
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import PREDICTORS, PredictorTraining, choose_predictor
@@ -157,7 +157,7 @@ def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int
     """Return the ranges of rows that are stored: not the middle of long silences, nor what was not measured."""
     ranges = list[list[int]]()
     for example, begin in zip(examples, first[:-1].tolist(), strict=True):
-        near = example.valid & ~frames_away(example.speech.units, len(example.valid), KEPT_SILENCE_S)
+        near = example.valid & ~mark_distant(example.speech.units, len(example.valid), KEPT_SILENCE_S)
         ranges += (find_runs(near) + begin).tolist()
     return ranges
 
@@ -166,7 +166,7 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
     """Return the mean pose in silence away from speech, or that of the least open frames [shape=(Q,)]."""
     poses = np.concatenate(
         [
-            x[example.valid & frames_away(example.speech.units, len(x), REST_AWAY_S)]
+            x[example.valid & mark_distant(example.speech.units, len(x), REST_AWAY_S)]
             for example, x in zip(examples, values, strict=True)
         ]
     )

@@ -22,8 +22,8 @@ from lipmotion.motion.articulation import (
     TABLE_WEIGHT_WITH_PREDICTOR,
     ArticulationPrior,
     Statistics,
+    count_unseen,
     slice_dynamics,
-    unseen_share,
 )
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.context_window import (
@@ -256,7 +256,7 @@ class Experts:
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
         own = self.network is not None and self.network.uses_prior  # states of a person, not of a distant speaker
-        strange = unseen_share(self.speech.voice)
+        strange = count_unseen(self.speech.voice)
         known = 1.0 if own else 1 - STRANGER_LOSS * strange
         states = (1 - self.network_share) * self.reliability * familiarity * known
         at_rest = np.maximum(1 - self.reliability, 0.0 if own else RESTING_SHARE * (1 - strange))

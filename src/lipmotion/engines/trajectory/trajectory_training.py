@@ -33,12 +33,12 @@ from lipmotion.stats.trees import (
     Question,
     RegressionStatistics,
     Tree,
+    create_statistics,
     fit_regression_node,
     fit_tree_regressions,
-    gaussian_log_likelihood,
     grow_tree,
     ridge,
-    zero_statistics,
+    score_gaussian,
 )
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Example, Monitor, Progress, Speech, sub_monitor
@@ -98,7 +98,7 @@ def fit_acoustic_regression(
         nodes += [(name, fit_regression_node(tree, tree.path_to(int(leaf)), least)) for leaf in tree.leaves]
     owners = [*nodes, None]
     components, outputs = context.basis.shape[1], emission.means[0].size
-    statistics = {node: zero_statistics(components, outputs) for node in dict.fromkeys(owners) if node is not None}
+    statistics = {node: create_statistics(components, outputs) for node in dict.fromkeys(owners) if node is not None}
     for node, z, error in _frames(emission, clips, layout, context, owners):
         statistics[node].add(z, error)
     coefficients, index = _coefficients(emission, statistics, options)
@@ -315,7 +315,7 @@ def _grow_tree(contexts: _Contexts, parameters: int, options: TrajectoryConfig, 
         list(contexts or empty),
         np.array(list((contexts or empty).values())),
         [Question(place, *unit_class) for place in range(3) for unit_class in layout.units.classes().items()],
-        gaussian_log_likelihood,
+        score_gaussian,
         parameters=parameters,
         factor=options.tree_factor,
         least=options.least_frames,

@@ -32,9 +32,9 @@ from lipmotion.stats.trees import (
     Context,
     Question,
     Tree,
-    gaussian_log_likelihood,
     grow_tree,
-    multispace_log_likelihood,
+    score_gaussian,
+    score_multispace,
     trees_from_arrays,
     trees_to_arrays,
 )
@@ -44,10 +44,10 @@ from lipmotion.storage.schema import (
     POSITIVE,
     Arrays,
     ArraySpec,
-    arrays_under,
     check_arrays,
     format_errors,
     refuse_undeclared,
+    select_arrays,
 )
 
 
@@ -204,7 +204,7 @@ def grow_forest(
     values = statistics.moments[:, 0]
     if has_spaces:
         values = np.concatenate([statistics.frames[:, None], values], axis=1)
-    likelihood = multispace_log_likelihood if has_spaces else gaussian_log_likelihood
+    likelihood = score_multispace if has_spaces else score_gaussian
     names = np.array([inventory.tree(context[1], state) for context, state in triphones])
     trees = {}
     for name, (unit, state) in inventory.trees.items():
@@ -413,7 +413,7 @@ def joint_from_arrays(arrays: Arrays, config: JointConfig) -> JointHmm:
         if SPEECH not in streams or not set(streams) <= set(STREAMS) or len(set(streams)) < len(streams):
             raise ValueError(f"streams {streams}")
         stored = check_arrays(arrays, TIMES, U=len(units), R=len(inventory.monophones))
-        models = {name: _restore_stream(name, arrays_under(arrays, f"{name}/"), inventory) for name in streams}
+        models = {name: _restore_stream(name, select_arrays(arrays, f"{name}/"), inventory) for name in streams}
         bigram = bigram_from_array(units, stored["bigram"])
         return JointHmm(config, inventory, models, stored["log_stay"], stored["durations"], spoken, bigram)
 

@@ -15,7 +15,7 @@ from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_ar
 from lipmotion.hmm.multistream.recognise import build_recogniser
 from lipmotion.hmm.multistream.unit_states import Inventory, frames_to_units, units_to_frames
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, check_arrays
+from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, select_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit
 from lipmotion.units import UNIT_SETS, is_silent
 
@@ -100,7 +100,7 @@ def recogniser_to_arrays(recogniser: OwnPhoneRecogniser) -> dict[str, NDArray[An
 
 def recogniser_from_arrays(arrays: Arrays) -> OwnPhoneRecogniser | None:
     """Deserialise a recogniser; None: there is none. Raises ModelFormatError, KeyError, ValueError: a wrong array."""
-    own = arrays_under(arrays, JOINT_PREFIX)
+    own = select_arrays(arrays, JOINT_PREFIX)
     if not own:
         return None
     (score,) = check_arrays(own, SCORE)["typical"].tolist()

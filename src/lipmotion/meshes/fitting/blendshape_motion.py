@@ -30,7 +30,7 @@ from lipmotion.articulation.mouth import LEAST_CHIN_DROP_SHARE, SpokenMouth, dro
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.face_shapes import FaceShapes
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, OPENS, VOWELS, VRM_VOWELS, arkit_name, convert_to_arkit
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, OPENS, VOWELS, VRM_VOWELS, convert_to_arkit, to_arkit
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
@@ -207,7 +207,7 @@ def arkit_weights(motion: Motion) -> dict[str, Array]:
     """
     weights: dict[str, Array] = {}
     for name in motion.names:
-        known = arkit_name(name)
+        known = to_arkit(name)
         if known is not None:
             weights.setdefault(known, np.clip(motion[name].astype(np.float64), 0, 1))
     if OPENS not in weights:
@@ -288,13 +288,13 @@ def move_points(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     moved[:, lips, 0] += np.outer(wider / 2, across[lips])
     forward = np.maximum(MIN_PROTRUSION * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
     moved[:, lips, 2] += forward[:, None]
-    moved[:, :, 1] += _part_lips(moved[:, :, 1], across, mouth.gap)
+    moved[:, :, 1] += _separate_lips(moved[:, :, 1], across, mouth.gap)
     higher = moved[:, template.row(CHIN), 1] + LEAST_CHIN_DROP_SHARE * drop_jaw(mouth.gap) * (1 - mouth.tuck)
     moved[:, template.jaw, 1] -= np.maximum(higher, 0)[:, None]
     return PointMotion(moved, mouth)
 
 
-def _part_lips(heights: Array, across: Array, gap: Array) -> Array:
+def _separate_lips(heights: Array, across: Array, gap: Array) -> Array:
     """Return how the points of both lips move up or down for a gap between their middles [shape=(T, 52)]."""
     template = build_mouth()
     pairs = np.array([(template.row(upper), template.row(lower)) for upper, lower in FACING])

@@ -20,12 +20,12 @@ from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.meshes.fitting.lip_placement import (
     LipPlacement,
 )
-from lipmotion.meshes.fitting.shape_weights import expression_weights, solve_shape_weights, with_gap
+from lipmotion.meshes.fitting.shape_weights import solve_shape_weights, weigh_expressions, with_gap
 from lipmotion.meshes.model.binding import ControlBinding
-from lipmotion.meshes.model.face_shapes import FaceShapes, measure_lip_parting, numbers_by_name
+from lipmotion.meshes.model.face_shapes import FaceShapes, group_by_name, measure_lip_parting
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
-from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, table_path
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name, spoken_name
+from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, find_table
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, find_spoken_name, to_arkit
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def _find_solved_name(shape: Blendshape, shapes: FaceShapes) -> str | None:
     """Return the name of the solved shape that a blendshape belongs to; None: it is not of the mouth."""
     if shape.name in shapes.names:
         return shape.name
-    known = {arkit_name(shape.called), spoken_name(shape.called)} - {None} if shape.source else set()
+    known = {to_arkit(shape.called), find_spoken_name(shape.called)} - {None} if shape.source else set()
     return next((name for name, each in zip(shapes.names, shapes.known, strict=True) if each in known), None)
 
 
@@ -157,7 +157,7 @@ class DrivenCharacter:
 
     def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
         """Return weights of VRM's expressions for moods, by the mesh's names [each shape=(T,)]; none parts p b m."""
-        moods = expression_weights(read_moods(motion)) if self._expressions else {}
+        moods = weigh_expressions(read_moods(motion)) if self._expressions else {}
         upper, lower = (self.placement.vertices[self.placement.row(point)] for point in (UPPER_MIDDLE, LOWER_MIDDLE))
         curves = {}
         for name, shape in self._expressions.items():
@@ -228,7 +228,7 @@ class DrivenCharacter:
         """Where the table of the character is. Raises InputError: it is from no file."""
         if self.file is None:
             raise InputError("the character was read from no file, so no table is beside it; read it from one")
-        return table_path(self.file)
+        return find_table(self.file)
 
     @cached_property
     def _mouth_rows(self) -> tuple[tuple[RigRow, ...], Array]:
@@ -250,7 +250,7 @@ class DrivenCharacter:
     @cached_property
     def _other_rows(self) -> tuple[RigRow, ...]:
         """What moves ARKit's blendshapes of eyes and brows, in ARKit's order."""
-        numbers = numbers_by_name(self.mesh, arkit_name)
+        numbers = group_by_name(self.mesh, to_arkit)
         pairs = [(known, self.mesh.shapes[number]) for known in ARKIT_OTHERS for number in numbers.get(known, ())]
         return tuple(
             replace(self.table.get(shape.name, make_plain_row(shape.name, known)), source=known)

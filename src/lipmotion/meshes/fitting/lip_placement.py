@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE, build_mouth
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
-from lipmotion.meshes.model.shape_names import arkit_name, viseme_name, vowel_name
+from lipmotion.meshes.model.shape_names import find_viseme, find_vowel, to_arkit
 from lipmotion.meshes.model.surface import MeshSurface, build_surface
 
 Rows = NDArray[np.int64]
@@ -144,7 +144,7 @@ def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, i
     return LipPlacement(template.points, vertices, scale, axes)
 
 
-def part_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
+def separate_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
     """Return how a mesh hangs together, its named lips apart even where they touch. Raises InputError: as
     ``place_lips_by_points``.
     """
@@ -167,9 +167,9 @@ def part_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
 def find_opening_shape(mesh: Mesh) -> Blendshape:
     """Return the blendshape that opens the mouth most: ``jawOpen``, ``aa`` or by name. Raises InputError: none."""
     tests: tuple[Callable[[str], bool], ...] = (
-        lambda name: arkit_name(name) == "jawOpen",
-        lambda name: viseme_name(name) == "aa",
-        lambda name: vowel_name(name) == "aa",
+        lambda name: to_arkit(name) == "jawOpen",
+        lambda name: find_viseme(name) == "aa",
+        lambda name: find_vowel(name) == "aa",
         lambda name: "open" in name.lower() and ("mouth" in name.lower() or "jaw" in name.lower()),
     )
     for test in tests:
@@ -210,10 +210,10 @@ def _find_slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArr
         far[here] = along[number[here] - first, pairs[here, 1]] > longest[here]
     pairs = pairs[far]
     middle = (vertices[pairs[:, 0]] + vertices[pairs[:, 1]]) / 2
-    return middle[middle[:, 2] > _max_depths(middle, reach / 4) - FRONT_SHARE * reach / SLIT_REACH]
+    return middle[middle[:, 2] > _limit_depths(middle, reach / 4) - FRONT_SHARE * reach / SLIT_REACH]
 
 
-def _max_depths(places: Places, reach: float) -> Places:
+def _limit_depths(places: Places, reach: float) -> Places:
     """Return the largest z of all places whose x is within a reach of that of each [shape=(N,)]."""
     order = np.argsort(places[:, 0], kind="stable")
     across = places[order, 0]

@@ -202,7 +202,7 @@ def solve_shape_weights(
     costs = costs or CurveCosts()
     points = move_points(motion, units)
     mouth, channels = points.mouth, tuple(Channel(name, WEIGHT) for name in shapes.names)
-    own_weights, mood = find_own_weights(motion, shapes), mood_weights(mouth, shapes)
+    own_weights, mood = find_own_weights(motion, shapes), weigh_moods(mouth, shapes)
     if own_weights is not None:
         weights = _close_own_weights(own_weights.values.astype(np.float64), with_mouth(motion), mouth, shapes, mood)
         return Motion(weights, motion.rate_hz, channels)
@@ -328,13 +328,13 @@ def _solve_free_weights(
     weights[:, free] += fit_bounded_curves(matrix[free], targets - fixed @ matrix, costs, ties[:, free])
     weights = round_lips(np.clip(weights, 0.0, 1.0), shapes, mouth.protrusion)
     limits = (fixed, np.where(free, 1.0, fixed))
-    weights = part_opposed(weights, matrix, shapes.known, costs, limits, ties)
+    weights = separate_opposed(weights, matrix, shapes.known, costs, limits, ties)
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
     return np.clip(weights, 0.0, 1.0)
 
 
-def part_opposed(
+def separate_opposed(
     weights: Array, matrix: Array, known: Sequence[str], costs: CurveCosts, limits: Limits, ties: Array | None = None
 ) -> Array:
     """Return weights that look as others do, without shapes at once that undo each other [shape=(T, S)].
@@ -349,7 +349,7 @@ def part_opposed(
 
 def cancel_opposed(weights: Array, known: Sequence[str]) -> Array:
     """Return the weights of one frame, of shapes that undo each other only the larger side, as far as it is larger
-    [shape=(S,)]. ``part_opposed`` keeps the look better, but needs many frames and some time.
+    [shape=(S,)]. ``separate_opposed`` keeps the look better, but needs many frames and some time.
     """
     left = weights.copy()
     for one, other in (tuple(np.isin(known, names) for names in pair) for pair in OPPOSED):
@@ -374,7 +374,7 @@ def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
     return result
 
 
-def mood_weights(mouth: SpokenMouth, shapes: FaceShapes) -> Array | None:
+def weigh_moods(mouth: SpokenMouth, shapes: FaceShapes) -> Array | None:
     """Return the weights of ARKit's blendshapes of the mouth in a mood, 0 to 1 [shape=(T, S)]; None: in none.
 
     They leave the lips as free as the phones need (``articulation.mouth``); the distance between the lips is set
@@ -393,7 +393,7 @@ def _add_mood(weights: Array, mood: Array | None) -> Array:
     return weights if mood is None else np.clip(weights + mood * (1 - weights), 0.0, 1.0)
 
 
-def expression_weights(moods: Mapping[str, Array]) -> dict[str, Array]:
+def weigh_expressions(moods: Mapping[str, Array]) -> dict[str, Array]:
     """Return the weights of VRM's expressions for moods, 0 to 1, both by name [each shape=(T,)]."""
     weights: dict[str, Array] = {}
     for mood, strength in moods.items():

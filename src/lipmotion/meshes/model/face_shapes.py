@@ -12,7 +12,7 @@ from lipmotion.articulation.lip_points import CHIN, FACING
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, spoken_name
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, find_spoken_name, to_arkit
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class FaceShapes:
         return np.array(rows).reshape(-1, len(self.known))
 
 
-def life_scale(mesh: Mesh, placement: LipPlacement) -> float:
+def find_life_scale(mesh: Mesh, placement: LipPlacement) -> float:
     """Return the length of an eye distance in units of a mesh: of a head as high as people's, theirs.
 
     The unit is the metre, the decimetre, the centimetre or another power of ten: the one in which the head is as high.
@@ -109,10 +109,10 @@ def measure_lip_parting(mesh: Mesh, placement: LipPlacement) -> Array:
     rows = [[placement.vertices[placement.row(point)] for point in pair] for pair in FACING[:3]]
     moved = placement.to_motion(mesh.displacements(np.ravel(rows))).reshape(len(mesh.shapes), -1, 2, 3)
     gap = (moved[:, :, 0, 1] - moved[:, :, 1, 1]).mean(axis=1)
-    return np.asarray(gap * placement.scale / life_scale(mesh, placement))
+    return np.asarray(gap * placement.scale / find_life_scale(mesh, placement))
 
 
-def numbers_by_name(mesh: Mesh, named: Callable[[str], str | None]) -> dict[str, list[int]]:
+def group_by_name(mesh: Mesh, named: Callable[[str], str | None]) -> dict[str, list[int]]:
     """Return the numbers of blendshapes by the names they are understood as: a table's, or the first that moves
     something.
     """
@@ -128,10 +128,10 @@ def numbers_by_name(mesh: Mesh, named: Callable[[str], str | None]) -> dict[str,
 
 def _choose_mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str, list[int]]], str]:
     """Return the known names of the shapes of the mouth with their blendshapes, and their style."""
-    spoken = numbers_by_name(mesh, spoken_name)
+    spoken = group_by_name(mesh, find_spoken_name)
     arkit = {
         known: numbers
-        for known, numbers in numbers_by_name(mesh, arkit_name).items()
+        for known, numbers in group_by_name(mesh, to_arkit).items()
         if known in ARKIT_MOUTH and len(mesh.shapes[numbers[0]].rows)
     }
     jaw = arkit.get("jawOpen", [])

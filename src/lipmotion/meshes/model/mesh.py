@@ -32,10 +32,10 @@ class Bone:
     shares: NDArray[np.float64]
 
 
-def bone_kind(name: str) -> str | None:
+def find_bone_kind(name: str) -> str | None:
     """Return which bone of the head a name stands for, or None: ``mixamorig:Head``, ``J_Bip_C_Neck``, ``JawBone``.
 
-    >>> bone_kind("J_Adj_L_FaceEye"), bone_kind("CC_Base_JawRoot"), bone_kind("HeadTop_End")
+    >>> find_bone_kind("J_Adj_L_FaceEye"), find_bone_kind("CC_Base_JawRoot"), find_bone_kind("HeadTop_End")
     ('leftEye', 'jaw', None)
     """
     words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)]
@@ -70,7 +70,7 @@ SIGNS = np.array([1.0, -1.0, -1.0])
 ORDER = "YXZ"
 
 
-def head_quaternions(angles: Array) -> Array:
+def turn_head(angles: Array) -> Array:
     """Return rotations of a head as quaternions x, y, z, w [shape=(T, 4)], near their neighbours, from ``ANGLES``
     [shape=(T, 3)].
     """
@@ -81,8 +81,8 @@ def head_quaternions(angles: Array) -> Array:
     return np.asarray(turned * np.concatenate([[1.0], np.cumprod(np.where(same, 1.0, -1.0))])[:, None])
 
 
-def head_angles(quaternions: Array) -> Array:
-    """Return the angles of a head from rotations, as of ``head_quaternions`` [shape=(T, 3)]."""
+def find_head_angles(quaternions: Array) -> Array:
+    """Return the angles of a head from rotations, as of ``turn_head`` [shape=(T, 3)]."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_quat(quaternions).as_euler(ORDER) * SIGNS)

@@ -129,7 +129,7 @@ def _number(text: str, default: float) -> float:
     return value
 
 
-def table_path(character: Path) -> Path:
+def find_table(character: Path) -> Path:
     """Return where the table of a character is: ``head.glb`` has ``head.glb.character.csv`` in the same folder."""
     named = character.resolve() if character.name in {"", ".."} else character
     return named.parent / f"{named.name}.character.csv"
@@ -139,7 +139,7 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
     """Return the rows of the table beside a character by its blendshapes, None without one. Raises InputError: a
     damaged table.
     """
-    path = table_path(character)
+    path = find_table(character)
     if not is_file(path):
         return {}
     table: dict[str, RigRow] = {}

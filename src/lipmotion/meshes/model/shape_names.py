@@ -48,7 +48,7 @@ _COPY = re.compile(r"[._ ]\d{1,4}$")
 """What programs add to a name that is there already: ``jawOpen.001``."""
 
 
-def arkit_name(name: str) -> str | None:
+def to_arkit(name: str) -> str | None:
     """Return ARKit's name of a blendshape as files spell it, or None.
 
     ``head.mouthSmile_L``, ``Face_mouthSmileL`` and ``mouth_smile_left.001`` are ``mouthSmileLeft``.
@@ -63,23 +63,23 @@ def arkit_name(name: str) -> str | None:
     return None
 
 
-def viseme_name(name: str) -> str | None:
+def find_viseme(name: str) -> str | None:
     """Return the Oculus name of a viseme as files spell it, or None: ``viseme_I`` and ``vrc.v_ih`` are ``ih``."""
     match = re.search(r"(?:viseme|vrc\.v|v)[_.\-](\w+?)$", _COPY.sub("", name), re.IGNORECASE)
     return _VISEME_SPELLINGS.get(match[1].lower()) if match else None
 
 
-def vowel_name(name: str) -> str | None:
+def find_vowel(name: str) -> str | None:
     """Return the VRM name of a vowel as files spell it, or None: ``Fcl_MTH_A``, ``あ`` and ``aa`` are ``aa``."""
     match = re.search(r"(?:^|mth_|mouth_)(aa|ih|ou|ee|oh|[aiueoあいうえお])$", _COPY.sub("", name), re.IGNORECASE)
     return _VOWEL_SPELLINGS[match[1].lower()] if match else None
 
 
-def spoken_name(name: str) -> str | None:
+def find_spoken_name(name: str) -> str | None:
     """Return the viseme or vowel (``viseme_ih``, ``vowel_aa``) of a blendshape as files spell it, or None; silence is
     none.
     """
-    viseme, vowel = viseme_name(name), vowel_name(name)
+    viseme, vowel = find_viseme(name), find_vowel(name)
     if viseme is not None:
         return None if viseme == "sil" else f"viseme_{viseme}"
     return None if vowel is None else f"vowel_{vowel}"
@@ -87,7 +87,7 @@ def spoken_name(name: str) -> str | None:
 
 def is_known(name: str) -> bool:
     """Return whether a blendshape has a name that is understood."""
-    return arkit_name(name) is not None or viseme_name(name) is not None or vowel_name(name) is not None
+    return to_arkit(name) is not None or find_viseme(name) is not None or find_vowel(name) is not None
 
 
 Array = NDArray[np.float64]
@@ -200,7 +200,7 @@ def convert_to_arkit(motion: Motion) -> dict[str, Array]:
     """
     named = {name: name for name in motion.names}
     for name in motion.names:
-        viseme, vowel = viseme_name(name), vowel_name(name)
+        viseme, vowel = find_viseme(name), find_vowel(name)
         if viseme in VISEMES_15:
             named.setdefault(f"viseme_{viseme}", name)
         if vowel in VRM_VOWELS:

@@ -18,11 +18,11 @@ from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.network.posteriors import (
     WORD_BOUNDARY,
-    installed_phone_recogniser,
-    posterior_stretches,
+    find_installed,
+    find_stretches,
 )
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
-from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, cached_recogniser
+from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, open_recogniser
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Audio, Span, TimedTranscript, TimedWord, Timeline, TranscriptLine
@@ -98,13 +98,13 @@ def detect_english(audio: Audio) -> bool | None:
     audio : at 16 kHz
     The network writes every language with the phones of English: it cannot say which other one it is.
     """
-    name = installed_phone_recogniser()
+    name = find_installed()
     if name is None:
         return None
     part = analysed(Audio(audio.samples[: int(PART_S * audio.rate_hz)], audio.rate_hz))
     tokens = [
         token
-        for _, posteriors in posterior_stretches(name, part)
+        for _, posteriors in find_stretches(name, part)
         for token in (*(each.token for each in posteriors.best_tokens), WORD_BOUNDARY)
     ]
     words = (list(group) for ends, group in groupby(tokens, WORD_BOUNDARY.__eq__) if not ends)
@@ -156,7 +156,7 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
             f"{', '.join(USING_WORDS)}"
         )
     audio = analysed(read_recording(request))
-    recogniser = cached_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
+    recogniser = open_recogniser(chosen.phones, request.recogniser, chosen.adaptation)
     return recogniser.recognition(audio, audio.mfcc(), map_in_processes(workers))
 
 

@@ -33,7 +33,7 @@ def read_request(request: Request, *, words_beside: bool = False, is_typed: bool
     if request.recording is None:
         raise InputError("the job names no recording; required: [request] recording = 'FILE'")
     transcript, units = request.transcript, request.units
-    spoken_by = _speaker_of_labels(request, is_typed=is_typed)
+    spoken_by = _find_label_speaker(request, is_typed=is_typed)
     if is_typed and isinstance(transcript, str):
         transcript = read_text_or_file(transcript, request.tier, spoken_by)
     elif isinstance(transcript, Path) or (isinstance(transcript, str) and ":" in transcript):  # perhaps subtitles
@@ -75,11 +75,11 @@ def read_recording(request: Request) -> Audio:
     return read_audio(Path(recording))
 
 
-def _speaker_of_labels(request: Request, *, is_typed: bool) -> str:
+def _find_label_speaker(request: Request, *, is_typed: bool) -> str:
     """Return the speaker of a request if its labels have one of that name: it then is whose words are read."""
     sources = (request.transcript, request.units) if request.speaker else ()
     kinds = (str, Path) if is_typed else Path
-    files = [Path(name) for name in sources if isinstance(name, kinds) and _file_exists(Path(name))]
+    files = [Path(name) for name in sources if isinstance(name, kinds) and _is_file(Path(name))]
     if not files:
         return ""
     from lipmotion.formats.label_files import list_speakers
@@ -95,7 +95,7 @@ def read_text_or_file(argument: str, tier: str = "", speaker: str = "") -> str |
     Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
     """
     path = Path(argument)
-    if not _file_exists(path):
+    if not _is_file(path):
         parts = argument.encode("utf-8", "surrogatepass").split(b"/")
         may_be_name = " " not in argument and "\0" not in argument and len(argument) < LONGEST_PATH
         if not may_be_name or max(map(len, parts)) > LONGEST_NAME:
@@ -115,7 +115,7 @@ def _read_words(words: Path | str, tier: str, speaker: str) -> str | TimedTransc
     return read_transcript(words, tier, speaker)
 
 
-def _file_exists(path: Path) -> bool:
+def _is_file(path: Path) -> bool:
     """Return whether a file, a pipe or a device of that name exists; a folder does not count."""
     try:
         return path.exists() and not path.is_dir()

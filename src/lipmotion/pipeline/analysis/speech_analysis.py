@@ -23,24 +23,24 @@ from lipmotion.pipeline.request import DETECTED, Request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
-from lipmotion.speech.features.speaker_similarity import voice_knowledge
-from lipmotion.speech.features.voice_events import silence_phones, voice_events
+from lipmotion.speech.features.speaker_similarity import rate_knowledge
+from lipmotion.speech.features.voice_events import find_voice_events, silence_units
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
-from lipmotion.speech.recognition.network.beam_search import english_words
-from lipmotion.speech.recognition.network.posteriors import token_posteriors
+from lipmotion.speech.recognition.network.beam_search import load_english
+from lipmotion.speech.recognition.network.posteriors import infer_tokens
 from lipmotion.speech.recognition.recognised_speech import (
     WORD_POSTERIORS,
     Recognition,
-    joined_units,
-    level_range_db,
-    placed_units,
-    relied_on,
+    join_units,
+    measure_level_range,
+    place_units,
+    select_reliable,
 )
 from lipmotion.speech.recognition.recogniser import (
     RECOGNISER_KINDS,
     Recogniser,
-    cached_recogniser,
-    network_of,
+    find_network,
+    open_recogniser,
 )
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.sources import is_file
@@ -147,8 +147,8 @@ def analyse_speech(
     analysis = _find_phones(model, request, audio, _report_progress(each, audio.duration_s, monitor))
     speech, recognition = analysis.speech, analysis.recognition
     tones = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
-    events = voice_events(audio, speech.units) if request.manner == DETECTED else ()
-    units = silence_phones(speech.units, [*tones, *((e.start_s, e.end_s) for e in events if e.kind == LAUGHTER)])
+    events = find_voice_events(audio, speech.units) if request.manner == DETECTED else ()
+    units = silence_units(speech.units, [*tones, *((e.start_s, e.end_s) for e in events if e.kind == LAUGHTER)])
     speech = with_units(speech, units) if units != speech.units else speech
     analysis = replace(analysis, speech=speech, events=events)
     if analysis.is_without_speech and not analysis.events:
@@ -176,7 +176,7 @@ def with_voice(
     """
 
     def knowledge_of(sound: Audio) -> float:
-        return voice_knowledge(phones, analysed(sound))
+        return rate_knowledge(phones, analysed(sound))
 
     by_engine, parts = recognition is None and not given and not speech.units_known, speech.parts
     voice = 1.0 if by_engine or not speech.features.values.any() else knowledge_of(audio)
@@ -195,9 +195,9 @@ def with_voice(
 def prepare_search(request: Request) -> None:
     """Load the words that are searched where a phone recogniser decides; they are then there when it is done."""
     is_searched = request.transcript is None and request.units is None and request.language == ENGLISH
-    if is_searched and network_of(request.recogniser) is not None:
+    if is_searched and find_network(request.recogniser) is not None:
         with suppress(MissingDependencyError):  # whoever needs them says so
-            english_words()
+            load_english()
 
 
 def align_between(
@@ -234,7 +234,7 @@ def align_between(
 
 def _recogniser(model: Model, request: Request) -> Recogniser:
     kind = "auto" if request.recogniser in INSTALLED_RECOGNISERS else request.recogniser
-    return cached_recogniser(model.phones, kind, model.adaptation)
+    return open_recogniser(model.phones, kind, model.adaptation)
 
 
 def _report_progress(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
@@ -262,7 +262,7 @@ def _find_phones(model: Model, request: Request, audio: AnalysedAudio, each: Par
     kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
     if request.recogniser not in kinds:
         raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
-    range_db = level_range_db(audio.log_energy)
+    range_db = measure_level_range(audio.log_energy)
     phones, features, fit = _recogniser(model, request), audio.joined_mfcc(), None
     results: list[Recognition] = []
 
@@ -315,8 +315,8 @@ def build_speech(
     f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
     spectrum = rows(lambda sound: sound.spectrum) if inputs.conditions else None
     encoding = rows(lambda sound: sound.encoding) if inputs.encoding else None
-    network = network_of(kind) if inputs.posteriors else None
-    posteriors = token_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
+    network = find_network(kind) if inputs.posteriors else None
+    posteriors = infer_tokens(network, audio, each, dense=audio.is_passage) if network is not None else None
     parts = None
     if not audio.is_passage:
         parts = tuple(
@@ -367,7 +367,7 @@ def _place_in_parts(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tup
                 label = replace(within[place].label, confidence=said[place].confidence)
                 within[place] = replace(within[place], label=label)
         silent = Unit(SILENCE, confidence=said[0].confidence if said else None)
-        joined = joined_units([Timeline(tuple(within))], silent, part.speech.features.duration_s)
+        joined = join_units([Timeline(tuple(within))], silent, part.speech.features.duration_s)
         spoken.append(part._replace(speech=with_units(part.speech, joined)))
     return tuple(spoken)
 
@@ -397,21 +397,21 @@ def recognise_speech(
             within = engine.recognise(learned, part.speech)
         if within is not None:
             try:
-                within = relied_on(phones.align_phones(sound, sound.mfcc(), within), 0.0)
+                within = select_reliable(phones.align_phones(sound, sound.mfcc(), within), 0.0)
             except AlignmentError:
                 within = None
         knows_voice = within is not None
         if within is None:
             found = found or recognise()
-            within = part.between(relied_on(found.units, found.reliability))
+            within = part.between(select_reliable(found.units, found.reliability))
         if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < MIN_SPEECH_S:
             continue  # a click, a knock
         spoken.append(part._replace(speech=replace(part.speech, voice=float(knows_voice))))  # else ``with_voice`` says
-        units.append(placed_units(within, part.first, part.own))
+        units.append(place_units(within, part.first, part.own))
     if speech.parts is not None:
         speech = replace(speech, parts=tuple(spoken))
     confidence = found.reliability if found is not None else 0.0
-    return with_units(speech, joined_units(units, Unit(SILENCE, confidence=confidence), features.duration_s))
+    return with_units(speech, join_units(units, Unit(SILENCE, confidence=confidence), features.duration_s))
 
 
 def _read_words(text: str | TimedTranscript | None, duration_s: float) -> tuple[str, ...] | TimedTranscript | None:
@@ -463,7 +463,7 @@ def _follow_units(
     units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
     if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
         return units, None
-    name = network_of(kind) if request.language == ENGLISH else None
+    name = find_network(kind) if request.language == ENGLISH else None
     posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
     is_sure = sure >= WORD_POSTERIORS[0]
     fit = label_fit(audio, units, posteriors if is_sure else None)

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError, shorten
 from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
-from lipmotion.speech.recognition.anchors import anchors_of, fitted
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, measure_fit
+from lipmotion.speech.recognition.anchors import find_anchors, fit_transcript
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     WORD_BOUNDARY,
+    find_stretches,
     mean_posterior,
-    posterior_stretches,
-    recording_posteriors,
+    read_posteriors,
 )
 from lipmotion.speech.recognition.recognised_speech import PHONE_POSTERIORS, WORD_POSTERIORS
-from lipmotion.speech.recognition.recogniser import Recogniser, network_of
+from lipmotion.speech.recognition.recogniser import Recogniser, find_network
 from lipmotion.speech.recognition.transcript_evidence import (
     LEAST_GAP_S,
     SURE_COSTS,
@@ -34,7 +34,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
     OtherSpeech,
     TranscriptEvidence,
     WordEvidence,
-    transcript_evidence,
+    find_evidence,
 )
 from lipmotion.speech.voices.espeak import LanguageLexicon
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
@@ -88,7 +88,7 @@ def transcribe(
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
-        words = fitted(words, find_loud_frames(analysed(audio, features).log_energy), audio.duration_s)
+        words = fit_transcript(words, find_loud_frames(analysed(audio, features).log_energy), audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
     if is_other_language(spoken, lexicon):
         LOG.warning(
@@ -97,7 +97,7 @@ def transcribe(
         )
     else:
         warn_of_guesses(spoken, lexicon)
-    name = None if isinstance(lexicon, LanguageLexicon) else network_of(phones.kind)
+    name = None if isinstance(lexicon, LanguageLexicon) else find_network(phones.kind)
     refused: AlignmentError | None = None
     try:
         units = align_or_recognise(phones, audio, features, words, lexicon)
@@ -115,13 +115,13 @@ def transcribe(
         units = Timeline(tuple(map(Span, edges_s[:-1], edges_s[1:], labels)))
     if words is None or phones.kind == "own":
         return Transcription(units, None)
-    fit = transcript_fit(audio, units)
+    fit = measure_fit(audio, units)
     if name is None:
         warn_of_misfit(fit)
         return Transcription(units, fit)
     posteriors, sure = compute_phone_posteriors(name, analysed(audio))
     costs = SURE_COSTS if sure >= WORD_POSTERIORS[0] else WORD_COSTS
-    evidence = transcript_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
+    evidence = find_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units, costs)
     if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
         fit = replace(fit, missing=evidence.gaps, evidence=evidence)
         warn_of_misfit(fit)
@@ -141,9 +141,9 @@ def transcribe(
 
 def compute_phone_posteriors(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
     """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
-    posteriors = recording_posteriors(name, audio)
+    posteriors = read_posteriors(name, audio)
     hears = any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
-    sure = mean_posterior(posterior_stretches(name, audio)) if hears else 1.0
+    sure = mean_posterior(find_stretches(name, audio)) if hears else 1.0
     return posteriors.of_phones.astype(float), sure
 
 
@@ -280,7 +280,7 @@ def align_or_recognise(
         return phones.recognise(audio, features)
     anchors = None
     if isinstance(words, TimedTranscript):
-        anchors, words = anchors_of(words) if words.has_times else None, words.words
+        anchors, words = find_anchors(words) if words.has_times else None, words.words
     check_words(words, audio.duration_s)
     return phones.align(audio, features, words, lexicon, anchors)
 

@@ -16,15 +16,15 @@ from lipmotion.pipeline.analysis.language import detect_english
 from lipmotion.pipeline.analysis.read_request import read_request
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
-from lipmotion.pipeline.batch.run import local_pool
+from lipmotion.pipeline.batch.run import open_local_pool
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.request import Request
 from lipmotion.pipeline.workers import WorkerDiedError, process_count
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.pauses import levels_db, spoken_spans
+from lipmotion.speech.sound.pauses import list_spans, measure_levels_db
 from lipmotion.types import Monitor, Progress, TimedTranscript, silent_monitor
 from lipmotion.types.audio import to_sixteen_bits
-from lipmotion.types.languages import AUTO, ENGLISH, script_of
+from lipmotion.types.languages import AUTO, ENGLISH, find_script
 from lipmotion.units.language_detection import COMMON_WORDS, detect_language
 from lipmotion.units.mood_tags import parse_tagged_text
 from lipmotion.units.text_normalisation import find_words, split_written_words
@@ -70,11 +70,11 @@ def check_line(line: BatchLine, request: Request) -> CheckedLine:
         words = _read_words(line, request)
     except (LipMotionError, OSError) as error:
         return CheckedLine(line.name, "unreadable", str(error))
-    levels = levels_db(audio)
+    levels = measure_levels_db(audio)
     loudest_db = float(levels.max())
     if loudest_db < SILENT_DB:
         return CheckedLine(line.name, "silent", f"nowhere louder than {loudest_db:.0f} dB of full scale")
-    spoken_s = sum(end_s - start_s for start_s, end_s in spoken_spans(levels))
+    spoken_s = sum(end_s - start_s for start_s, end_s in list_spans(levels))
     if spoken_s < MIN_SPOKEN_S:
         return CheckedLine(line.name, "silent", "no sound longer than a click")
     detected = detect_language(words) if len(words) >= FEWEST_TOLD_WORDS else ""
@@ -95,7 +95,7 @@ def count_letters(words: Sequence[str]) -> float:
     >>> count_letters(["ab", "c"]), count_letters(["你"])
     (3.0, 4.0)
     """
-    return sum((LETTERS_OF.get(script_of(letter), 1.0) for word in words for letter in word), 0.0)
+    return sum((LETTERS_OF.get(find_script(letter), 1.0) for word in words for letter in word), 0.0)
 
 
 def _read_words(line: BatchLine, request: Request) -> tuple[str, ...]:
@@ -176,7 +176,7 @@ def check(
     lines = read_lines(Path(source), job.outputs.kinds)
     checked: dict[str, CheckedLine] = {}
     try:
-        with local_pool(processes) as pool:
+        with open_local_pool(processes) as pool:
             for each in pool(partial(check_line, request=job.request), lines):
                 checked[each.name] = each
                 monitor(Progress(STAGE, len(checked), len(lines), len(checked) / len(lines)))
@@ -188,7 +188,7 @@ def check(
 
 def _find_problems(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> Iterator[Finding]:
     """Yield what is wrong, line after line, and then what is there twice, and the recordings of no line."""
-    rates = [each.spoken_s / expected_s(each.letters) for each in checked if each.letters]
+    rates = [each.spoken_s / estimate_time(each.letters) for each in checked if each.letters]
     usual = min(max(median(rates), 1 / SLOWEST), SLOWEST) if len(rates) >= FEWEST_LINES else 1.0
     for each in checked:
         if each.problem:
@@ -196,7 +196,7 @@ def _find_problems(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> It
             continue
         if each.reason:
             yield Finding("language", each.name, each.reason)
-        wanted_s = usual * expected_s(each.letters)
+        wanted_s = usual * estimate_time(each.letters)
         text = f"{each.spoken_s:.1f} s of speech, about {wanted_s:.1f} s for its {len(each.words)} words"
         if each.letters and each.spoken_s < SHORT * wanted_s:
             yield Finding("too short", each.name, text)
@@ -209,10 +209,10 @@ def _find_problems(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> It
     yield from (Finding("orphaned", path, "no line has this recording") for path in orphans)
 
 
-def expected_s(letters: float) -> float:
+def estimate_time(letters: float) -> float:
     """Return how long words of a number of letters usually take, without pauses, s.
 
-    >>> expected_s(15)
+    >>> estimate_time(15)
     1.3
     """
     return PAUSE_S + letters / LETTERS_PER_S

@@ -23,16 +23,16 @@ from lipmotion.extensions import find_version, load_provided
 from lipmotion.formats.base import list_suffixes
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.formats.label_files import LABEL_SUFFIXES, find_label_files
-from lipmotion.meshes.model.rig_tables import table_path
+from lipmotion.meshes.model.rig_tables import find_table
 from lipmotion.pipeline.batch.lines import CONTROL, OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.job import Job
-from lipmotion.pipeline.model import shipped_path
+from lipmotion.pipeline.model import find_shipped
 from lipmotion.pipeline.outputs.cues import SHEET
-from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
+from lipmotion.speech.recognition.network.posteriors import find_installed
 from lipmotion.storage.files import TEMPORARY, atomic_file, check_own, confine, make_folder, open_own, remove
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.locks import lock_folder
-from lipmotion.storage.sources import check_source, is_file, sha256_of
+from lipmotion.storage.sources import check_source, hash_file, is_file
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, whole
 
 CUES = SHEET.removeprefix(".")
@@ -74,18 +74,18 @@ def fingerprint_job(job: Job) -> str:
 
     def describe(value: Any) -> Any:
         if isinstance(value, str | Path) and is_file(Path(value)):
-            return sha256_of(Path(value))
+            return hash_file(Path(value))
         return str(value) if isinstance(value, Path) else value
 
-    request = replace(job.request, model=job.request.model or shipped_path())
+    request = replace(job.request, model=job.request.model or find_shipped())
     parts = [{name: describe(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
     parts += [job.delivery.as_mapping(), job.staging.as_mapping()]
     if load_provided("is_drawings")(job.outputs.face):
-        parts.append({path.name: sha256_of(path) for path in load_provided("picture_files")(Path(job.outputs.face))})
-    table = table_path(job.outputs.character) if job.outputs.character else None
+        parts.append({path.name: hash_file(path) for path in load_provided("picture_files")(Path(job.outputs.face))})
+    table = find_table(job.outputs.character) if job.outputs.character else None
     if table and is_file(table):
-        parts.append({"table": sha256_of(table)})
-    return _digest(as_json([*parts, find_version(), installed_phone_recogniser()]))
+        parts.append({"table": hash_file(table)})
+    return _digest(as_json([*parts, find_version(), find_installed()]))
 
 
 def fingerprint_line(line: BatchLine, of_settings: str) -> str:
@@ -110,32 +110,32 @@ class InputFile:
         """Return whether the file has the same content: by size and time of change, else by its digest."""
         try:
             status = Path(self.path).stat()
-            if (status.st_size, _changed_ns(status)) == (self.size, self.changed_ns):
+            if (status.st_size, _read_change_time(status)) == (self.size, self.changed_ns):
                 return True
-            return status.st_size == self.size and sha256_of(Path(self.path)) == self.sha256
+            return status.st_size == self.size and hash_file(Path(self.path)) == self.sha256
         except (OSError, InputError):
             return False
 
 
-def _changed_ns(status: os.stat_result) -> int:
+def _read_change_time(status: os.stat_result) -> int:
     """Return when a file was changed: copying another file to its place may keep the time of its content."""
     return max(status.st_mtime_ns, status.st_ctime_ns)
 
 
-def input_paths(line: BatchLine) -> list[Path]:
+def list_input_paths(line: BatchLine) -> list[Path]:
     """Return the files that are read for a line: its recording and, if the row has no words, its label files."""
     recording = Path(line.recording)
     return [recording] + ([] if line.transcript else find_label_files(recording))
 
 
-def input_files(line: BatchLine) -> list[InputFile]:
-    """Return the files of ``input_paths`` as they are now.
+def list_input_files(line: BatchLine) -> list[InputFile]:
+    """Return the files of ``list_input_paths`` as they are now.
 
     Raises InputError: the recording is missing, empty, a folder, a pipe or a device. OSError: one cannot be read.
     """
     check_source(Path(line.recording), "recording")
-    status = [(path, path.stat()) for path in input_paths(line)]
-    return [InputFile(str(path), each.st_size, _changed_ns(each), sha256_of(path)) for path, each in status]
+    status = [(path, path.stat()) for path in list_input_paths(line)]
+    return [InputFile(str(path), each.st_size, _read_change_time(each), hash_file(path)) for path, each in status]
 
 
 Record = dict[str, Any]
@@ -250,7 +250,7 @@ def write_receipt(path: Path, record: Mapping[str, Any]) -> None:
 def is_in_place(path: Path, digest: str) -> bool:
     """Return whether a file exists and has a digest."""
     try:
-        return sha256_of(path) == digest
+        return hash_file(path) == digest
     except (OSError, InputError):  # there is none, or a folder or a pipe in its place
         return False
 
@@ -339,7 +339,7 @@ class Ledger:
 def are_same_inputs(line: BatchLine, record: Record) -> bool:
     """Return whether the files of a line are those of its record, with the same content."""
     inputs = [InputFile(**each) for each in record["inputs"]]
-    same = [each.path for each in inputs] == list(map(str, input_paths(line)))
+    same = [each.path for each in inputs] == list(map(str, list_input_paths(line)))
     return same and all(each.is_unchanged() for each in inputs)
 
 

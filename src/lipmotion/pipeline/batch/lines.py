@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import list_suffixes
-from lipmotion.storage.files import portable_name
+from lipmotion.storage.files import make_portable
 from lipmotion.storage.sources import check_listable, read_text_file
 from lipmotion.storage.text_table import read_table
 
@@ -102,7 +102,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
                 f"{line.recording}: the output {line.name!r} lies outside the folder of the outputs, or is hidden; "
                 "give a relative name without '..' and '//' and without names that begin with a dot"
             )
-        device = next((part for part in (*path.parts[:-1], f"{path.name}.x") if portable_name(part) != part), None)
+        device = next((part for part in (*path.parts[:-1], f"{path.name}.x") if make_portable(part) != part), None)
         if device is not None:
             raise ExportError(
                 f"{line.recording}: the output {line.name!r} has a name that Windows keeps for a device, or that ends "

@@ -131,7 +131,7 @@ def write_reports(
             record |= {"doubt": rate_doubt(record), "outputs": outputs, "mark": mark.kind if mark else None}
             values = [record.get(name) for name in COLUMNS]
             rows.writerow([_field(value) for value in values])
-            page_file.write(f"{',' if place else ''}\n{_for_page(record, values, out, mark)}")
+            page_file.write(f"{',' if place else ''}\n{_show_on_page(record, values, out, mark)}")
         page_file.write(after)
     return table, page
 
@@ -164,7 +164,7 @@ def _field(value: Any) -> str:
     return as_field(BETWEEN.join(value) if isinstance(value, list) else value)
 
 
-def _for_page(record: Record, values: Sequence[Any], out: Path, mark: Mark | None) -> str:
+def _show_on_page(record: Record, values: Sequence[Any], out: Path, mark: Mark | None) -> str:
     """Return a row of the page: its values, the addresses of outputs and recording, and when it was marked."""
     links = [quote(as_text(name)) for name in record["outputs"]]
     sound = _address(record["recording"], out) if "recording" in record else None

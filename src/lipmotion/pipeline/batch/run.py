@@ -39,8 +39,8 @@ from lipmotion.pipeline.batch.ledger import (
     check_job,
     fingerprint_job,
     fingerprint_line,
-    input_files,
     is_in_place,
+    list_input_files,
     open_ledger,
     read_receipt,
     write_receipt,
@@ -62,11 +62,11 @@ from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_out
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.output import ShownFace
 from lipmotion.pipeline.request import Request
-from lipmotion.pipeline.workers import ItemT, Pool, ResultT, WorkerDiedError, cluster_pool, process_count, worker_pool
+from lipmotion.pipeline.workers import ItemT, Pool, ResultT, WorkerDiedError, cluster_pool, open_workers, process_count
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import check_target, confine, make_folder, put_in_place, remove
-from lipmotion.storage.locks import temporary_folder
-from lipmotion.storage.sources import Source, check_apart, sha256_of
+from lipmotion.storage.locks import open_temporary
+from lipmotion.storage.sources import Source, check_apart, hash_file
 from lipmotion.types import Audio, Generation, Item, Monitor, Progress, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import Lexicon
 from lipmotion.units.phone_timelines import group_words
@@ -129,10 +129,10 @@ def _animate_line(work: LineWork) -> Record:
     }
     with _capture_warnings() as warnings:
         try:
-            record["inputs"] = [asdict(each) for each in input_files(line)]
+            record["inputs"] = [asdict(each) for each in list_input_files(line)]
             record |= _describe_motion(_write_line(work))
             staged = {f"{line.name}.{kind}": place.staged(line.name, kind) for kind in kinds}
-            record["outputs"] = {name: sha256_of(path) for name, path in staged.items()}
+            record["outputs"] = {name: hash_file(path) for name, path in staged.items()}
             record |= _describe_work(start_s, warnings)
             if not place.is_current():
                 raise RunReplacedError(f"{place.out}: another run of this batch has begun; this one ends")
@@ -266,18 +266,18 @@ def check_line_job(job: Job, of_run: str) -> None:
     silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)
     units = Timeline((Span(0.0, SILENCE_S, Unit("sil")),))
     request = Request(silence, units=units, speaker=job.request.speaker)
-    with temporary_folder() as folder:
+    with open_temporary() as folder:
         files = tuple(str(folder / f"line.{kind}") for kind in kinds)
         early = replace(job, delivery=replace(job.delivery, offset_ms=0.0), outputs=replace(job.outputs, files=files))
         write_outputs(early, face, animate(request, model=model), silence)
 
 
 @contextmanager
-def local_pool(jobs: int) -> Iterator[Pool]:
+def open_local_pool(jobs: int) -> Iterator[Pool]:
     """Give a pool of processes on this machine; with one job, this process itself."""
 
     def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
-        with worker_pool(jobs) as workers:
+        with open_workers(jobs) as workers:
             yield from workers.unordered_map(function, items)
 
     yield each
@@ -381,7 +381,7 @@ def batch(
         for line in lines:
             if line.name in finished:
                 count(line.name, "kept")
-        pool = cluster_pool(cluster, Path(place.out)) if cluster else local_pool(processes)
+        pool = cluster_pool(cluster, Path(place.out)) if cluster else open_local_pool(processes)
         if waiting:
             with pool as each, closing(_finish_lines(each, waiting)) as records:
                 for record in records:

@@ -110,7 +110,7 @@ def explain_session(session: Session, edits: Edits, times: Sequence[float]) -> t
     return tuple(explanations)
 
 
-def explanation_document(explanation: Explanation) -> dict[str, Any]:
+def write_document(explanation: Explanation) -> dict[str, Any]:
     """Return an explanation as an object of JSON (docs/explain.md)."""
     document = asdict(explanation)
     for written, chain in zip(document["chains"], explanation.chains, strict=True):
@@ -119,7 +119,7 @@ def explanation_document(explanation: Explanation) -> dict[str, Any]:
     return document
 
 
-def explanation_text(explanation: Explanation) -> str:
+def write_explanation(explanation: Explanation) -> str:
     """Return an explanation as lines of text for people to read."""
     rows = list(_rows(explanation))
     width = max(len(name) for name, _ in rows) + 2
@@ -229,10 +229,10 @@ def state_runs(
     >>> runs[0].start_s, runs[0].state, runs[0].end_s == runs[1].start_s
     (0.0, 'rest', True)
     """
-    return runs_of(animate(speech, model=model, transcript=transcript))
+    return list_runs(animate(speech, model=model, transcript=transcript))
 
 
-def runs_of(generation: Generation) -> tuple[StateRun, ...]:
+def list_runs(generation: Generation) -> tuple[StateRun, ...]:
     """Return the runs of frames with one state of generated motion."""
     frames, rate_hz = generation.trace.frames, generation.motion.rate_hz
     firsts = [0, *(np.flatnonzero(np.diff(frames)) + 1).tolist()] if len(frames) else []

@@ -18,12 +18,12 @@ from lipmotion.formats.subtitles import is_subtitles, strip_markup
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.analysis.read_request import read_lexicon
 from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generation import speaker_map
+from lipmotion.pipeline.generation import find_speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import ASKED, Onto, Pauses, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.speech.sound.resampling import JoinedPieces, at_speech_rate, overlapped
-from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
+from lipmotion.speech.sound.resampling import JoinedPieces, overlap_pieces, resample_speech
+from lipmotion.speech.voices.installed import choose_voice, find_voice, voice_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
@@ -90,7 +90,7 @@ def speak_from_corpus(
     pieces, units = engine.source_pieces(model.learned, target, recorded_features)
     sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]
     rate_hz = utterances[names[0]].audio.rate_hz
-    joined = overlapped(sounds, [(piece.start_s, piece.end_s) for piece in pieces], rate_hz)
+    joined = overlap_pieces(sounds, [(piece.start_s, piece.end_s) for piece in pieces], rate_hz)
     begin_s = _find_starts(len(units), pieces, joined, rate_hz)
     first, last = (round(begin_s[number] * rate_hz) for number in (0, -1))
     audio = Audio(joined.samples[first:last], rate_hz)
@@ -205,12 +205,12 @@ def speak(  # noqa: PLR0913
         spoken = speak_from_corpus(text, corpus, loaded, replace(request, onto_speaker=""), constraints)
         return spoken._replace(generation=_with_moods(spoken.generation, tags))
     sentences = split_sentences(text)
-    chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
+    chosen = find_voice(voice) if isinstance(voice, str) else voice or choose_voice()
     loaded = model if isinstance(model, Model) else load_model(model)
-    speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
+    find_speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
     sound, units = _speak_sentences(sentences, chosen, lexicon)
     sound = quantise(sound)
-    spoken_so = {"recording": at_speech_rate(sound), "units": units, "manner": ASKED, "spoken_so": True}
+    spoken_so = {"recording": resample_speech(sound), "units": units, "manner": ASKED, "spoken_so": True}
     request = replace(request, lexicon=None, **spoken_so)
     return SpokenText(sound, _with_moods(animate(request, model=loaded, constraints=constraints), tags))
 
@@ -232,17 +232,17 @@ def _speak_sentences(
     spans: list[Span[Unit]] = []
     rate_hz, at = SPEECH_RATE_HZ, 0
     for start in range(0, len(sentences), SENTENCES_PER_RUN):
-        with closing(voiced_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as voiced:
+        with closing(voice_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as voiced:
             for sentence in voiced:
                 sound = sentence.own_sound()
                 sound = sentence.audio if sound.rate_hz < SPEECH_RATE_HZ else sound
                 if not spans:
                     rate_hz = sound.rate_hz
-                    at = _rest_samples(sentence.units[0], rate_hz)
+                    at = _count_rest(sentence.units[0], rate_hz)
                 sounds.append((at, sound.samples))
                 spans += sentence.units.shifted(at / rate_hz)
                 at += len(sound.samples)
-    count = at + _rest_samples(spans[-1], rate_hz)
+    count = at + _count_rest(spans[-1], rate_hz)
     samples = np.zeros(count, np.float32)
     while sounds:  # each is freed at once
         first, part = sounds.pop()
@@ -259,7 +259,7 @@ def _speak_sentences(
     return Audio(samples, rate_hz), units
 
 
-def _rest_samples(edge: Span[Unit], rate_hz: int) -> int:
+def _count_rest(edge: Span[Unit], rate_hz: int) -> int:
     """Return how many samples a first or last span lacks to ``REST_S`` of silence."""
     rest_s = REST_S - (edge.duration_s if is_silent(edge.label.phone) else 0.0)
     return max(round(rest_s * rate_hz), 0)

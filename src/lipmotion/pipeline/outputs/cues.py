@@ -90,7 +90,7 @@ def write_cues(
         write_cue_file(path, sheet, as_text(speech), form or format_of(path))
 
 
-def cue_text(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> str:
+def format_cues(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> str:
     """Return the text of the file that ``write_cues`` would write.
 
     speech : the recording that was animated;  form : as of ``write_cues``

@@ -23,13 +23,13 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import GROUPS, compute_living_curves
 from lipmotion.meshes.fitting.shape_weights import (
     VISEME_CHANNELS,
-    expression_weights,
     solve_shape_weights,
+    weigh_expressions,
     weigh_visemes,
 )
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, read_rig_table
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, CLOSED, VRM_VOWELS, to_arkit
 from lipmotion.motion.generation import find_pinned_frame
 from lipmotion.pipeline.analysis.speech_analysis import LATE_S
 from lipmotion.types import (
@@ -77,10 +77,10 @@ def check_curve_set(curves: str | Path) -> None:
         raise InputError(f"no set of curves {str(curves)!r}, required one of {', '.join(SHAPE_SETS)}, or a FILE.csv")
 
 
-def curve_names(curves: str | Path | DrivenCharacter) -> tuple[str, ...]:
+def list_curve_names(curves: str | Path | DrivenCharacter) -> tuple[str, ...]:
     """Return the names that a character or a rig has for its curves; none, for the sets of ``SHAPE_SETS``."""
     if isinstance(curves, DrivenCharacter):
-        return (*curves.mesh.shape_names, *known_names(curves.mesh))
+        return (*curves.mesh.shape_names, *list_known_names(curves.mesh))
     return () if curves in SHAPE_SETS else tuple(row.control for row in read_rig_table(Path(curves)))
 
 
@@ -102,10 +102,10 @@ def make_curves(
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
     if isinstance(curves, DrivenCharacter):
-        return edit_weights(curves.weights(motion, units), units, edits, curves)
+        return apply_weight_edits(curves.weights(motion, units), units, edits, curves)
     check_curve_set(curves)
     if curves in SHAPE_SETS:
-        return edit_curves(_make_set(motion, units, str(curves), staging, prosody), units, edits)
+        return edit_face_curves(_make_set(motion, units, str(curves), staging, prosody), units, edits)
     rows = read_rig_table(Path(curves))
     sources = make_rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
     own = [edit for edit in edits if edit.channel not in sources]
@@ -128,7 +128,7 @@ def make_rig_sources(
     """
 
     def plain(name: str) -> Motion:
-        return edit_curves(_make_set(motion, units, name, staging, prosody), units, edits)
+        return edit_face_curves(_make_set(motion, units, name, staging, prosody), units, edits)
 
     sets = [with_mouth(motion), plain(ARKIT), plain(VISEMES)]
     if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
@@ -137,14 +137,14 @@ def make_rig_sources(
     return {name: np.zeros(len(motion.values)) for name in ARKIT_OTHERS} | sources
 
 
-def edit_weights(
+def apply_weight_edits(
     weights: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit], character: DrivenCharacter | None = None
 ) -> Motion:
     """Return weights of a character with pins and gains, which name its blendshapes as it does or as others do.
 
     character : whose weights of the mouth these are, which stay where it is held; None: of the 3D head
     """
-    known = known_names(character.mesh) if character else {}
+    known = list_known_names(character.mesh) if character else {}
     named = {other: name for other, name in known.items() if name in weights.names}
     named |= {name: name for name in weights.names}
     return apply_curve_edits(weights, units, rename_edits(edits, named), held=weights.names if character else ())
@@ -189,14 +189,14 @@ def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) ->
         check_drawn(edit, is_weight=edit.channel in WEIGHTS)
 
 
-def edit_curves(curves: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
+def edit_face_curves(curves: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
     """Return curves of one of ``SHAPE_SETS`` with edits; those that phones make stay where the mouth is held."""
     return apply_curve_edits(curves, units, rename_edits(edits, FAPS), held=PHONETIC)
 
 
-def known_names(mesh: Mesh) -> dict[str, str]:
+def list_known_names(mesh: Mesh) -> dict[str, str]:
     """Return the blendshapes of a mesh by the names of the curves that they follow, or by ARKit's."""
-    return {arkit_name(shape.called) or shape.called: shape.name for shape in reversed(mesh.shapes) if shape.called}
+    return {to_arkit(shape.called) or shape.called: shape.name for shape in reversed(mesh.shapes) if shape.called}
 
 
 def _make_set(
@@ -209,7 +209,7 @@ def _make_set(
         mouth = solve_shape_weights(motion, units, arkit_mouth())
         return join_channels(mouth, compute_living_curves(motion, units, staging, prosody))
     if name == VOWELS:  # with how far the lips are pressed together, and VRM's expressions of moods
-        lips, moods = find_mouth(motion, units), expression_weights(read_moods(motion))
+        lips, moods = find_mouth(motion, units), weigh_expressions(read_moods(motion))
         curves = {CLOSED: lips.closing if CLOSED not in motion.names else motion[CLOSED]}
         curves |= {
             mood: curve * lips.free for mood, curve in moods.items()
@@ -243,7 +243,7 @@ def show_edited_curves(
         if not names & {*SETS_OF[name]}:
             continue
         plain = _make_set(calm, generation.units, name, staging, prosody)
-        edited = edit_curves(plain, generation.units, edits)
+        edited = edit_face_curves(plain, generation.units, edits)
         if mouth and names & {*SETS_OF[name]} - {*ARKIT_OTHERS}:
             motion = _move_mouth(motion, calm, generation.units, (plain, edited), edits)
         given = [each for group in GROUPS if names & {*group} for each in group if each in edited.names]

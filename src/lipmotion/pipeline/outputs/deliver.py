@@ -22,7 +22,7 @@ from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, to_arkit
 from lipmotion.pipeline.outputs.curve_sets import show_edited_curves, with_curves
 from lipmotion.types import Generation, Prosody, VoiceEvent
 from lipmotion.types.audio import LAUGHTER, SHOUT, WHISPER
@@ -133,7 +133,7 @@ def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     names = tuple(
         channel.name
         for channel in motion.channels
-        if channel.unit != RADIAN and arkit_name(channel.name) not in ARKIT_OTHERS and not is_mood(channel.name)
+        if channel.unit != RADIAN and to_arkit(channel.name) not in ARKIT_OTHERS and not is_mood(channel.name)
     )
     if not frames or not names:
         return generation

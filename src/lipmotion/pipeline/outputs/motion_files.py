@@ -32,13 +32,13 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import compute_living_curves
 from lipmotion.meshes.model.rig_tables import CONTROL
-from lipmotion.meshes.model.shape_names import arkit_name, is_known
+from lipmotion.meshes.model.shape_names import is_known, to_arkit
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.outputs.curve_sets import (
     ARKIT,
     LIVING_SETS,
     WHOLE_FACE,
-    edit_curves,
+    edit_face_curves,
     join_channels,
     make_curves,
     with_curves,
@@ -191,7 +191,7 @@ def fit_to_format(
     others = form.other_curves and not is_all and all(channel.unit in CURVES for channel in held.motion.channels)
     if form.curves and not others:
         curves = _make_curves(generation, form.curves, staging, prosody)
-        curves = edit_curves(curves, generation.units, generation.curve_edits)
+        curves = edit_face_curves(curves, generation.units, generation.curve_edits)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
         named = [name for name in channels or () if name in curves.names]
         held = held.selected(named) if named else held
@@ -253,7 +253,7 @@ def _make_curves(generation: Generation, name: str, staging: Staging | None, pro
 def _blendshapes(motion: Motion) -> Motion | None:
     """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names, and angles of head and eyes."""
     angles = {channel.name: channel.name for channel in motion.channels if channel.unit == RADIAN}
-    known = {angles.get(name) or arkit_name(name): n for n, name in reversed(list(enumerate(motion.names)))}
+    known = {angles.get(name) or to_arkit(name): n for n, name in reversed(list(enumerate(motion.names)))}
     columns = [(name, column) for name, column in sorted(known.items(), key=lambda each: each[1]) if name]
     if "jawOpen" not in known:
         return None

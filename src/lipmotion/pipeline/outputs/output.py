@@ -25,10 +25,10 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Outputs
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
-from lipmotion.speech.features.f0 import prosody_of
+from lipmotion.speech.features.f0 import find_prosody
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
-from lipmotion.speech.sound.resampling import decimated
+from lipmotion.speech.sound.resampling import decimate
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
 from lipmotion.types.delivery import Staging
@@ -191,11 +191,11 @@ def plan(path: str | Path, settings: OutputSettings) -> Output:
     taking = [kind for kind in map(OUTPUTS.load, OUTPUTS.names) if kind.takes(Path(path), settings)]
     if taking:
         return max(taking, key=length)(Path(path), settings)
-    suffixes = " ".join(output_suffixes(settings))
+    suffixes = " ".join(list_outputs(settings))
     raise ExportError(f"{path}: unknown format {Path(path).suffix!r}; required one of: {suffixes}")
 
 
-def output_suffixes(settings: OutputSettings) -> tuple[str, ...]:
+def list_outputs(settings: OutputSettings) -> tuple[str, ...]:
     """Return the ends of names of all outputs, as messages list them."""
     return tuple(suffix for kind in map(OUTPUTS.load, OUTPUTS.names) for suffix in kind.suffixes(settings))
 
@@ -227,13 +227,13 @@ def _prosody(sound: Audio) -> Prosody:
     ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
     samples = sound.samples.astype(np.float32)
     if ratio.numerator == 1:
-        samples = decimated(samples, ratio.denominator)
+        samples = decimate(samples, ratio.denominator)
     else:
         from scipy.signal import resample_poly
 
         samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)
     missing = max(WINDOW - len(samples), 0)
-    return prosody_of(Audio(np.pad(samples, (0, missing)), SPEECH_RATE_HZ))
+    return find_prosody(Audio(np.pad(samples, (0, missing)), SPEECH_RATE_HZ))
 
 
 def shift_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:

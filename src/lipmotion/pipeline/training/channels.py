@@ -17,8 +17,8 @@ from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import BOTH, GEOMETRY, VISUALS
 from lipmotion.printable import printable
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, token_posteriors
-from lipmotion.speech.sound.acoustic_conditions import condition_spectra
+from lipmotion.speech.recognition.network.posteriors import find_installed, infer_tokens
+from lipmotion.speech.sound.acoustic_conditions import list_conditions
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -146,16 +146,16 @@ def with_sound_inputs(
     """Return examples with what the engine's training takes from their sound (``Inputs``).
 
     These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, the encoding of the
-    sound, and spectra in many acoustic conditions (``Example.condition_spectra``). The noise of babble is made of the
+    sound, and spectra in many acoustic conditions (``Example.list_conditions``). The noise of babble is made of the
     recordings themselves; all is drawn from the number of the recording.
     """
     inputs = engine.inputs(sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ)
     recordings, count = [sound[example.name] for example in examples], len(examples)
     result = list(examples)
-    name = installed_phone_recogniser() if inputs.posteriors else None
+    name = find_installed() if inputs.posteriors else None
     if name is not None:
         report = sub_monitor(monitor, 0, 0.5)
-        for number, posteriors in enumerate(each(partial(token_posteriors, name), recordings)):
+        for number, posteriors in enumerate(each(partial(infer_tokens, name), recordings)):
             result[number] = replace(result[number], speech=replace(result[number].speech, posteriors=posteriors))
             if (number + 1) % BLOCK == 0:
                 report(Progress("posteriors of phones", number + 1, count, (number + 1) / count))
@@ -181,7 +181,7 @@ def with_sound_inputs(
 def _vary_block(
     recordings: Sequence[tuple[int, Audio]], voices: Sequence[Audio], count: int
 ) -> list[list[ConditionSpectrum]]:
-    return [condition_spectra(audio, voices, count, [number]) for number, audio in recordings]
+    return [list_conditions(audio, voices, count, [number]) for number, audio in recordings]
 
 
 def _encode(audio: Audio) -> NDArray[np.float16]:

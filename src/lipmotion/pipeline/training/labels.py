@@ -24,10 +24,10 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.compiler import list_blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.printable import printable
-from lipmotion.speech.recognition.agreement import transcript_fit
-from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
+from lipmotion.speech.recognition.agreement import measure_fit
+from lipmotion.speech.recognition.network.posteriors import find_installed
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.sources import sha256_of
+from lipmotion.storage.sources import hash_file
 from lipmotion.types import Item, Monitor, Progress, Span, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 
@@ -50,10 +50,10 @@ def warn_of_doubtful_transcripts(
     try:
         for utterance, units in labelled:
             if utterance.phones is None and utterance.words:
-                fit, count = transcript_fit(utterance.audio, units), count + 1
+                fit, count = measure_fit(utterance.audio, units), count + 1
                 if realigned is not None and fit.is_partial:
                     with suppress(AlignmentError):
-                        other = transcript_fit(utterance.audio, realigned(utterance))
+                        other = measure_fit(utterance.audio, realigned(utterance))
                         fit = max(fit, other, key=lambda each: (not each.is_doubtful, each.share))
                 if fit.is_doubtful:
                     wrong.append(utterance.name)
@@ -183,7 +183,7 @@ def fingerprint_training(
         "words": lexicon.user,
         "visual": visual,
         "versions": [find_version(), *map(metadata.version, ("numpy", "scipy", "pocketsphinx"))],
-        "phone recogniser": installed_phone_recogniser(),
+        "phone recogniser": find_installed(),
         "machine": [platform.machine(), list_blas_kernels()],
     }
     if prior is not None:
@@ -208,4 +208,4 @@ def _add_utterances(digest: hashlib._Hash, corpus: Corpus, names: Sequence[str],
         for path in sorted(corpus.folder(name).iterdir()):
             if path.name != PICTURES or visual != GEOMETRY:
                 digest.update(f"{path.name}\n".encode())
-                digest.update(bytes.fromhex(sha256_of(path)))
+                digest.update(bytes.fromhex(hash_file(path)))

@@ -19,11 +19,11 @@ from lipmotion.pipeline.analysis.transcribe import align_or_recognise
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, agreement_score
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, score_agreement
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.sound.acoustic_conditions import noisy_audio
+from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentences
+from lipmotion.speech.voices.installed import SYNTHESISERS, list_installed, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.sources import check_listable
 from lipmotion.types import Audio, Item, Monitor, Span, Timeline, Unit, silent_monitor
@@ -76,7 +76,7 @@ def synthesise_sentences(
     arguments give the same samples.
     Raises MissingDependencyError: no synthesiser is installed. Raises InputError: as ``speech.voices.speak_sentences``.
     """
-    chosen = installed_voices() if voices is None else tuple(voices)
+    chosen = list_installed() if voices is None else tuple(voices)
     if not chosen:
         packages = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
         raise MissingDependencyError(f"no speech synthesiser is installed; install one or more: apt install {packages}")
@@ -127,7 +127,7 @@ def align_recordings(
                 units = align_or_recognise(phones, audio, analysed(audio).mfcc(), words, lexicon)
             else:
                 units = labels.phones.between(0, audio.duration_s)
-            score = agreement_score(audio, units)
+            score = score_agreement(audio, units)
             if score < DOUBTFUL_SCORE:
                 raise InputError(
                     f"its transcript seems not to be what is said (its phones agree with the sound at {score:.1f}, "
@@ -140,7 +140,7 @@ def align_recordings(
         raise CorpusError(f"{root}: no recording with a transcript; put what is said in x.wav into x.txt beside it")
 
 
-def other_voices(
+def synthesise_others(
     *,
     synthetic: bool = False,
     recordings: str | Path | None = None,
@@ -157,7 +157,7 @@ def other_voices(
         general = Recogniser(load_model().phones, "general")
         yield from align_recordings(recordings, general, lexicon=lexicon, monitor=monitor)
     if synthetic:
-        chosen = [voice for voice in installed_voices() if not is_held_out_speaker(voice.speaker)]
+        chosen = [voice for voice in list_installed() if not is_held_out_speaker(voice.speaker)]
         yield from synthesise_sentences(voices=chosen, lexicon=lexicon)
 
 
@@ -173,6 +173,6 @@ def _synthesise_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexi
             del spoken[-1]
         before = Span(0.0, spoken[0].start_s, Unit(SILENCE))
         after = Span(spoken[-1].end_s, longer.duration_s, Unit(SILENCE))
-        noisy = noisy_audio(longer, "white", FLOOR_DB, seed=number)
+        noisy = mix_noise(longer, "white", FLOOR_DB, seed=number)
         name = f"{voice.synthesiser}-{voice.name}-{number:03d}"
         yield SpokenSentence(name, voice.speaker, noisy, Timeline((before, *spoken, after)))

@@ -39,11 +39,11 @@ from lipmotion.pipeline.training.labels import (
     warn_of_missing_transcripts,
 )
 from lipmotion.pipeline.training.other_speakers import SpokenSentence
-from lipmotion.pipeline.workers import training_pool
+from lipmotion.pipeline.workers import open_training
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import LOG_ENERGY
-from lipmotion.speech.features.speaker_similarity import JUDGED_RECORDINGS, mean_speaker_vector
+from lipmotion.speech.features.speaker_similarity import JUDGED_RECORDINGS, average_speaker
 from lipmotion.speech.recognition.adaptation_estimation import estimate_adaptation
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
@@ -118,7 +118,7 @@ class Run:
 
     monitor : called with reports of progress, and with the utterances that are not used
     work    : a folder for checkpoints, from which the same call continues after it was stopped
-              (``storage.locks.unfinished_work`` creates one); the model is the same to the byte. None: no checkpoints
+              (``storage.locks.list_unfinished`` creates one); the model is the same to the byte. None: no checkpoints
     workers : number of processes, fewer if the corpus is small. With more than one, a script must be guarded by
               ``if __name__ == "__main__":``. Or the address of a Dask scheduler, as ``tcp://HOST:8786``
 
@@ -188,15 +188,15 @@ def train(  # noqa: PLR0913
     engine = engine or engine_named("trajectory", {})
     chosen = corpus.selected(selection)
     recogniser = recogniser or HmmConfig()
-    speech_examples = list(examples_without_motion(engine, voices, run.monitor))
+    speech_examples = list(list_motionless(engine, voices, run.monitor))
     utterances = [corpus.utterance(name) for name in chosen]
     eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
     utterances = with_common_channels([with_visual_channels(each, visual, eigenlips) for each in utterances])
     job = fingerprint_training(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
-    with training_pool(run.workers, len(chosen)) as each:
+    with open_training(run.workers, len(chosen)) as each:
         checkpoint = Checkpoint(run.work, job, each)
         monitor = sub_monitor(run.monitor, 0, 0.5)
-        phones, examples, skipped = phones_and_examples(utterances, recogniser, lexicon, monitor, checkpoint)
+        phones, examples, skipped = fit_phones(utterances, recogniser, lexicon, monitor, checkpoint)
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
         people, speakers = [speaker_of[example.name] for example in examples], None
         if len(set(filter(None, people))) > 1:
@@ -227,7 +227,7 @@ def train(  # noqa: PLR0913
     )
 
 
-def phones_and_examples(
+def fit_phones(
     utterances: Sequence[Utterance],
     recogniser: HmmConfig,
     lexicon: Lexicon,
@@ -241,7 +241,7 @@ def phones_and_examples(
     learning, labelling = sub_monitor(monitor, 0, 0.78, "learning phones: "), sub_monitor(monitor, 0.78, 1)
     phones = _train_phone_models(utterances, lexicon, recogniser, learning, checkpoint)
     judged = utterances[:: -(-len(utterances) // JUDGED_RECORDINGS)]
-    phones = replace(phones, speaker=mean_speaker_vector(analysed(utterance.audio) for utterance in judged))
+    phones = replace(phones, speaker=average_speaker(analysed(utterance.audio) for utterance in judged))
     examples: list[Example] = []
     skipped: dict[str, str] = {}
     labelled: list[tuple[Utterance, Timeline[Unit]]] = []
@@ -264,7 +264,7 @@ def phones_and_examples(
     return phones, examples, skipped
 
 
-def examples_without_motion(
+def list_motionless(
     engine: Engine[Any], voices: Iterable[SpokenSentence], monitor: Monitor = silent_monitor
 ) -> Iterator[Example]:
     """Yield speech without motion as examples without valid frames; their names are those of the speakers.

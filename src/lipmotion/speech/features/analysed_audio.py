@@ -16,7 +16,7 @@ from lipmotion.speech.features.encoding import WindowedEncoding
 from lipmotion.speech.features.mfcc import (
     HOP,
     WINDOW,
-    checked_samples,
+    check_samples,
     frame_count,
     log_energy,
     mfcc_of_warps,
@@ -29,9 +29,9 @@ from lipmotion.speech.sound.voice_activity import (
     Stretch,
     apply_gain,
     fill_gaps,
+    find_passage_gain,
     find_passages,
     find_tones,
-    passage_gain,
 )
 from lipmotion.types import Audio, Features, JoinedRows
 
@@ -78,7 +78,7 @@ class AnalysedAudio(Audio):
         encodings = {id(piece): WindowedEncoding(sounds[id(piece)].read, len(piece.samples)) for piece, _ in found}
         for number, (piece, (first, end)) in enumerate(found):
             level, samples = piece.energy[first:end], piece.samples[first * HOP : end * HOP]
-            gain = passage_gain(level)
+            gain = find_passage_gain(level)
             samples = apply_gain(fill_gaps(samples, level), np.arange(len(gain)), gain)
             sound = find_spoken_frames(level)
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
@@ -110,7 +110,7 @@ class AnalysedAudio(Audio):
     @cached_property
     def _pieces(self) -> list[_Piece]:
         """What lies between digital silences, in order: each is a recording of its own, with frames of its own."""
-        pieces, waiting = [], [(0, checked_samples(self))]
+        pieces, waiting = [], [(0, check_samples(self))]
         while waiting:
             start, samples = waiting.pop()
             heard = _heard(samples)
@@ -120,7 +120,7 @@ class AnalysedAudio(Audio):
             energy = log_energy(samples)
             tones = find_tones(samples, energy)
             passages = [] if tones else find_passages(energy)
-            cuts = _silences_beside(passages, samples)
+            cuts = _find_silences(passages, samples)
             if tones:
                 waiting.append((start, samples.copy()))
             for tone in tones:
@@ -180,7 +180,7 @@ class AnalysedAudio(Audio):
 
     def joined_mfcc(self) -> Features:
         """Return ``mfcc`` with values that are ``JoinedRows``."""
-        values: Any = self.joined_rows(partial(_mfcc_values, warp=1.0))
+        values: Any = self.joined_rows(partial(_compute_mfcc, warp=1.0))
         return Features(values, self.duration_s)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
@@ -196,7 +196,7 @@ class AnalysedAudio(Audio):
             del self._mfcc[warp]
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        return [Features(self.joined(partial(_mfcc_values, warp=warp)), self.duration_s) for warp in warps]
+        return [Features(self.joined(partial(_compute_mfcc, warp=warp)), self.duration_s) for warp in warps]
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
@@ -223,7 +223,7 @@ class AnalysedAudio(Audio):
         return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, whole=self, first=first)
 
 
-def _mfcc_values(audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
+def _compute_mfcc(audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
     return audio.mfcc(warp).values
 
 
@@ -286,7 +286,7 @@ def _heard(samples: NDArray[np.float32]) -> slice:
     return slice(int(sound.argmax()), len(sound) - int(sound[::-1].argmax())) if sound.any() else slice(0, 0)
 
 
-def _silences_beside(passages: Sequence[Stretch], samples: NDArray[np.float32]) -> list[int]:
+def _find_silences(passages: Sequence[Stretch], samples: NDArray[np.float32]) -> list[int]:
     """Return a sample of each digital silence before, after and between passages that is long enough to part them."""
     silent = np.asarray(~samples[: len(samples) // HOP * HOP].reshape(-1, HOP).any(axis=1))
     for first, end in passages:
@@ -323,7 +323,7 @@ class _PassageAudio(AnalysedAudio):
 
     @cached_property
     def _energy(self) -> NDArray[np.float32]:
-        return log_energy(checked_samples(self.sound))
+        return log_energy(check_samples(self.sound))
 
     def _with_silence(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Return the rows of the sound, and before and after them their mean where it is the most silent."""

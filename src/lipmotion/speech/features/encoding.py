@@ -45,7 +45,7 @@ class WindowedEncoding:
     """
 
     def __init__(self, read: Callable[[int, int], Array], samples: int, encoder: Encoder | None = None) -> None:
-        self._read, self._samples, self._encoder = read, samples, encoder or shipped_encoder()
+        self._read, self._samples, self._encoder = read, samples, encoder or load_encoder()
         self._windows: dict[int, Array] = {}
 
     def rows(self, first: int, stop: int) -> NDArray[np.float16]:
@@ -162,29 +162,29 @@ class Encoder(NamedTuple):
 
 
 @cache
-def shipped_encoder() -> Encoder:
+def load_encoder() -> Encoder:
     """Return the network of the package."""
-    return encoder_of(_shipped_arrays())
+    return find_encoder(_read_arrays())
 
 
 @cache
-def speaker_background() -> tuple[Array, Array]:
+def read_background() -> tuple[Array, Array]:
     """Return mean and deviation of the features of many voices [shape=(128,)], and what whitens them.
 
     The whitening is a matrix, of the covariance of recordings of one speaker in many conditions [shape=(128, 128)].
     """
-    arrays = _shipped_arrays()
+    arrays = _read_arrays()
     return arrays["speaker_centre"], arrays["speaker_whitening"].astype(np.float32)
 
 
 @cache
-def _shipped_arrays() -> dict[str, NDArray[Any]]:
+def _read_arrays() -> dict[str, NDArray[Any]]:
     path = resources.files("lipmotion") / "models" / WEIGHTS
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
         return dict(stored)
 
 
-def encoder_of(arrays: Mapping[str, NDArray[Any]]) -> Encoder:
+def find_encoder(arrays: Mapping[str, NDArray[Any]]) -> Encoder:
     """Return the network of stored arrays: matrices in eight bits, with a scale for each row and each column."""
 
     def linear(name: str) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.kernels.paths import find_cheapest, trace_back
-from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count
+from lipmotion.speech.features.mfcc import HOP, check_samples, frame_count
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import Audio, Prosody
 
@@ -63,7 +63,7 @@ def log_f0(audio: Audio) -> Floats:
     Memory: under 5 MB, and 55 bytes a frame: 20 MB for an hour.
     Raises InputError: as ``speech.features.mfcc`` says.
     """
-    samples = checked_samples(audio)
+    samples = check_samples(audio)
     silence = SILENCE_POWER * _loudness(samples) + ROUNDING_POWER * float(max(samples.max(), -samples.min())) ** 2
     frames = frame_count(samples)
     pitch = np.empty((CANDIDATES + 1, frames), np.float32)
@@ -85,7 +85,7 @@ def correlations(samples: Floats, block: slice, silence: float) -> Floats:
     Σ w(t) x(t) w(t+k) x(t+k) / (√(Σ w(t) w(t+k) x²(t) · Σ w(t) w(t+k) x²(t+k)) + s · Σ w(t) w(t+k)), at most 1.
     """
     tables = _tables()
-    low = _low_passed(samples, block.start * HOP - _REACH, block.stop - block.start + _WINDOW // _HOP)
+    low = _filter_low(samples, block.start * HOP - _REACH, block.stop - block.start + _WINDOW // _HOP)
     x = sliding_window_view(low, _WINDOW)[: len(low) - _WINDOW : _HOP].copy()
     spectrum = x @ tables.fourier
     bins = spectrum.shape[1] // 2
@@ -106,7 +106,7 @@ def candidates(correlation: Floats) -> tuple[Floats, Floats]:
     """
     middle = correlation[:, 1:-1]
     is_maximum = (middle > correlation[:, :-2]) & (middle >= correlation[:, 2:]) & (middle > 0)
-    weighted = np.where(is_maximum, middle * _lag_weight(lags()[1:-1]), 0).astype(np.float32)
+    weighted = np.where(is_maximum, middle * _weigh_lag(lags()[1:-1]), 0).astype(np.float32)
     rows = np.arange(len(weighted))
     peaks = np.empty((CANDIDATES, len(weighted)), np.intp)
     is_peak = np.empty((CANDIDATES, len(weighted)), bool)
@@ -124,11 +124,11 @@ def _refine(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.bo
     bend = np.where(is_peak, 2 * top - left - right, 1)
     offset = np.where(is_peak, (right - left) / (2 * bend), 0)
     lag = np.clip(lags()[peaks] + 0.5 * offset, _RATE_HZ / HIGHEST_HZ, _RATE_HZ / LOWEST_HZ)
-    height = (top + (right - left) * offset / 4) * _lag_weight(lag)
+    height = (top + (right - left) * offset / 4) * _weigh_lag(lag)
     return np.log(_RATE_HZ / lag).astype(np.float32), np.where(is_peak, 1 - height, np.inf).astype(np.float32)
 
 
-def _lag_weight(lag: NDArray[np.float64]) -> NDArray[np.float64]:
+def _weigh_lag(lag: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the weight of the correlation at a lag (``LONG_LAG_SHARE``)."""
     return 1 - LONG_LAG_SHARE * lag * LOWEST_HZ / _RATE_HZ
 
@@ -156,13 +156,13 @@ def _loudness(samples: Floats) -> float:
     """Return the mean power of frames, each weighted by its power: pauses count little, a click does not count much."""
     power, square = 0.0, 0.0
     for start in range(0, len(samples) // HOP + 1, BLOCK):
-        low = _low_passed(samples, start * HOP, min(BLOCK, len(samples) // HOP + 1 - start))
+        low = _filter_low(samples, start * HOP, min(BLOCK, len(samples) // HOP + 1 - start))
         frames = np.square(low).reshape(-1, _HOP).mean(axis=1).astype(np.float64)
         power, square = power + frames.sum(), square + np.square(frames).sum()
     return square / power if power else 0.0
 
 
-def _low_passed(samples: Floats, first: int, hops: int) -> Floats:
+def _filter_low(samples: Floats, first: int, hops: int) -> Floats:
     """Return ``hops`` · 10 ms at 4 kHz, the first sample centred ``_TAPS // 2`` after sample ``first``."""
     low_pass = _tables().low_pass
     parts = low_pass.shape[1] // _HOP
@@ -236,9 +236,9 @@ LEAST_POWER = 1e-9
 """Power that is added to every frame's: digital silence is at -90 dB."""
 
 
-def prosody_of(audio: Audio) -> Prosody:
+def find_prosody(audio: Audio) -> Prosody:
     """Return loudness and pitch of a sound at 16 kHz. Raises InputError: as ``speech.features.mfcc`` says."""
-    samples = checked_samples(audio)
+    samples = check_samples(audio)
     frames = frame_count(samples)
     hops = samples[: (frames - 1) * HOP].reshape(-1, HOP)
     rest = samples[hops.size :].astype(np.float64)

@@ -48,7 +48,7 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     finite samples.
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
     """
-    (features,) = mfcc_of_warps(audio, (warp,), log_energy(checked_samples(audio)))
+    (features,) = mfcc_of_warps(audio, (warp,), log_energy(check_samples(audio)))
     return features
 
 
@@ -58,7 +58,7 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
     energy : ``log_energy`` of the recording [shape=(T,)]
     Raises InputError: as ``mfcc``.
     """
-    log_powers = log_mels(checked_samples(audio), [mel_filters(warp) for warp in warps])
+    log_powers = log_mels(check_samples(audio), [mel_filters(warp) for warp in warps])
     features = []
     while log_powers:
         cepstra, rounding = _cepstra(log_powers.pop(0))  # the log powers of a long recording are freed here
@@ -67,18 +67,18 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
         values = np.empty((len(static), 3 * width), np.float32)
         values[:, :width] = static
         for first in (width, 2 * width):
-            values[:, first : first + width] = regression_delta(values[:, first - width : first])
-        features.append(Features(normalised(values, rounding), audio.duration_s))
+            values[:, first : first + width] = compute_delta(values[:, first - width : first])
+        features.append(Features(normalise_rows(values, rounding), audio.duration_s))
     return features
 
 
 def _cepstra(log_powers: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
     """Return c1–c12 [shape=(T, 12)] and the standard deviation up to which a feature is constant but for rounding."""
     rounding = ROUNDING_SHARE * max(float(log_powers.max()), -float(log_powers.min()))
-    return log_powers @ liftered_cosine(FILTERS, 1, CEPSTRA + 1), rounding
+    return log_powers @ build_cosine(FILTERS, 1, CEPSTRA + 1), rounding
 
 
-def checked_samples(audio: Audio) -> NDArray[np.float32]:
+def check_samples(audio: Audio) -> NDArray[np.float32]:
     """Return the samples of a recording [shape=(N,)]. Raises InputError: as ``mfcc`` says."""
     if audio.rate_hz != SPEECH_RATE_HZ:
         raise InputError(f"speech features need {SPEECH_RATE_HZ} Hz, found {audio.rate_hz} Hz; resample first")
@@ -90,7 +90,7 @@ def checked_samples(audio: Audio) -> NDArray[np.float32]:
     return audio.samples.astype(np.float32, copy=False)
 
 
-def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:
+def compute_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:
     """Return the slope of the regression line through ±``reach`` frames around every frame [shape=(T, D)].
 
     values : [shape=(T, D)]; the first and the last frame are repeated beyond the ends
@@ -106,7 +106,7 @@ def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.
     return slope
 
 
-def normalised(values: NDArray[np.float32], rounding: float) -> NDArray[np.float32]:
+def normalise_rows(values: NDArray[np.float32], rounding: float) -> NDArray[np.float32]:
     """Return the columns with mean 0 and standard deviation 1 [shape=(T, D)]; a constant column becomes exactly 0."""
     scaled = values - values.mean(axis=0, dtype=np.float64).astype(np.float32)
     deviation = np.sqrt(np.square(scaled).mean(axis=0, dtype=np.float64))  # single precision loses count in an hour
@@ -208,7 +208,7 @@ def mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @cache
-def liftered_cosine(filters: int, first: int, end: int) -> NDArray[np.float32]:
+def build_cosine(filters: int, first: int, end: int) -> NDArray[np.float32]:
     """Return the orthonormal DCT-II to cepstra ``first``..``end`` - 1, liftered [shape=(filters, end - first)]."""
     order = np.arange(first, end)
     basis = np.cos(np.pi * (np.arange(filters)[:, None] + 0.5) * order / filters) * np.sqrt(2 / filters)
@@ -231,7 +231,7 @@ def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
     whole spectrum, so that bands without speech stay small.
     Raises InputError: as ``mfcc``.
     """
-    powers = log_bands(checked_samples(audio), warp)
+    powers = log_bands(check_samples(audio), warp)
     powers = np.maximum(powers, powers.max() - np.float32(DYNAMIC_RANGE_DB / 10 * np.log(10)))
     powers -= powers.mean(axis=0, dtype=float).astype(np.float32)
     squares = np.square(powers).mean(axis=0, dtype=float)
@@ -245,7 +245,7 @@ def log_bands(samples: NDArray[np.float32], warp: float = 1.0) -> NDArray[np.flo
 
 
 @cache
-def band_centres() -> NDArray[np.float64]:
+def find_centres() -> NDArray[np.float64]:
     """Return the frequencies in Hz at which the bands of ``log_bands`` are most sensitive [shape=(40,)]."""
     hertz = np.arange(SPEECH_RATE_HZ / 2 + 1)
     return np.interp(_edges(*BANDS)[1:-1], mel(hertz), hertz)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
-from lipmotion.speech.features.encoding import COMPONENTS, speaker_background
+from lipmotion.speech.features.encoding import COMPONENTS, read_background
 from lipmotion.stats.mixture import QuadraticForm
 
 WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)
@@ -50,20 +50,20 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
     Source: Lee & Rose 1996 (vocal tract length normalisation); the best density of each frame stands for the
     state path, so that the warp is chosen before anything is recognised.
     """
-    stretch = _longest_passage(audio)
+    stretch = _find_passage(audio)
 
     def judge() -> SpeakerSimilarity:
-        part = _judged_part(stretch)
+        part = _select_judged(stretch)
         form, warped = _densities(hmm), zip(WARPS, part.mfcc_of_warps(WARPS), strict=True)
         fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in warped}
-        warp = best_warp(fits)
+        warp = find_warp(fits)
         stretch.keep_warps(1.0, warp)
         return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
 
     return stretch.cached(("similarity to", hmm), judge)
 
 
-def voice_knowledge(hmm: UnitHmm, audio: AnalysedAudio) -> float:
+def rate_knowledge(hmm: UnitHmm, audio: AnalysedAudio) -> float:
     """Return how well a model knows the voice of a recording, 0 (as little as any) to 1 (its own).
 
     By the speaker similarity or the likeness of speaker vectors, whichever says more: noise makes every voice
@@ -72,39 +72,39 @@ def voice_knowledge(hmm: UnitHmm, audio: AnalysedAudio) -> float:
     by_score = float(np.interp(speaker_similarity(hmm, audio).score, (STRANGER_SCORE, OWN_SCORE), (0, 1)))
     if hmm.speaker is None or by_score >= 1:
         return by_score
-    stretch = _longest_passage(audio)
-    vector, own = stretch.cached("speaker vector", lambda: speaker_vector(stretch)), hmm.speaker.astype(float)
+    stretch = _find_passage(audio)
+    vector, own = stretch.cached("speaker vector", lambda: embed_speaker(stretch)), hmm.speaker.astype(float)
     likeness = float(vector @ own) / float(own @ own)
     limits = [np.interp(by_score, (0.0, 0.5), pair) for pair in (STRANGER_LIKENESS, OWN_LIKENESS)]
     return max(by_score, float(np.interp(likeness, limits, (0, 1))))
 
 
-def speaker_vector(audio: AnalysedAudio) -> NDArray[np.float64]:
+def embed_speaker(audio: AnalysedAudio) -> NDArray[np.float64]:
     """Return a vector of the speaker and the room, in units of what differs within them [shape=(2 · 64,)].
 
     It is the mean and the deviation of the encoding over the louder frames of the longest passage, from those of many
-    voices (``speaker_background``). In digital silence it is 0.
+    voices (``read_background``). In digital silence it is 0.
     Source: Fisher 1936 (linear discriminant analysis): differences from the mean voice, whitened by the covariance of
     recordings of one speaker in quiet, in noise and in rooms.
     """
-    part = _judged_part(_longest_passage(audio))
-    centre, whitening = speaker_background()
+    part = _select_judged(_find_passage(audio))
+    centre, whitening = read_background()
     if not part.samples.any():
         return np.zeros(2 * COMPONENTS)
     rows = part.encoding[part.log_energy >= np.quantile(part.log_energy, QUIET_SHARE)].astype(float)
     return np.asarray((np.concatenate([rows.mean(axis=0), rows.std(axis=0)]) - centre) @ whitening, np.float64)
 
 
-def mean_speaker_vector(recordings: Iterable[AnalysedAudio]) -> NDArray[np.float32]:
+def average_speaker(recordings: Iterable[AnalysedAudio]) -> NDArray[np.float32]:
     """Return the mean speaker vector of recordings, for ``UnitHmm.speaker`` [shape=(2 · 64,)]."""
-    return np.mean([speaker_vector(audio) for audio in recordings], axis=0).astype(np.float32)
+    return np.mean([embed_speaker(audio) for audio in recordings], axis=0).astype(np.float32)
 
 
-def _longest_passage(audio: AnalysedAudio) -> AnalysedAudio:
+def _find_passage(audio: AnalysedAudio) -> AnalysedAudio:
     return max((passage.audio for passage in audio.passages), key=lambda part: part.frames, default=audio)
 
 
-def _judged_part(stretch: AnalysedAudio) -> AnalysedAudio:
+def _select_judged(stretch: AnalysedAudio) -> AnalysedAudio:
     """Return what is recorded of a passage, ``JUDGED_FRAMES`` at most: silence that was added is like every voice's."""
     recorded = stretch.recorded
     return stretch.stretch(recorded.start, min(recorded.stop, recorded.start + JUDGED_FRAMES))
@@ -116,6 +116,6 @@ def _densities(hmm: UnitHmm) -> QuadraticForm:
     return hmm.mixtures.quadratic(np.arange(len(hmm.log_stay), dtype=np.intp))
 
 
-def best_warp(fits: dict[float, float]) -> float:
+def find_warp(fits: dict[float, float]) -> float:
     """Return the warp with the highest fit; of equal ones, that which changes the frequencies least."""
     return max(fits, key=lambda warp: (fits[warp], -abs(warp - 1)))

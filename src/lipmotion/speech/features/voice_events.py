@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
-from lipmotion.speech.features.mfcc import HOP, band_centres, log_bands
+from lipmotion.speech.features.mfcc import HOP, find_centres, log_bands
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
 from lipmotion.units import VOWELS, is_silent
@@ -66,7 +66,7 @@ def laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.b
     level_db : smoothed level of every frame of 10 ms [shape=(T,)]
     voiced   : whether it is voiced [shape=(T,)]
     """
-    for calls in runs_of_calls(level_db):
+    for calls in find_calls(level_db):
         figures = figures_of(samples, level_db, voiced, calls)
         if figures is None:
             continue
@@ -76,9 +76,9 @@ def laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.b
             yield Bout(first, end, calls, tuple(level_db[[*calls]].tolist()), probability)
 
 
-def runs_of_calls(level_db: Curve) -> Iterator[tuple[int, ...]]:
+def find_calls(level_db: Curve) -> Iterator[tuple[int, ...]]:
     """Yield the loudest frames of successive calls that are near enough to be of one bout."""
-    peaks = risen_peaks(level_db, RISE_DB)
+    peaks = find_risen_peaks(level_db, RISE_DB)
     peaks = peaks[level_db[peaks] >= level_db.max() + LOWEST_DB]
     gaps = np.diff(peaks)
     breaks = np.flatnonzero((gaps < APART_FRAMES[0]) | (gaps > APART_FRAMES[1])) + 1
@@ -87,7 +87,7 @@ def runs_of_calls(level_db: Curve) -> Iterator[tuple[int, ...]]:
             yield tuple(run.tolist())
 
 
-def risen_peaks(curve: Curve, prominence: float) -> NDArray[np.intp]:
+def find_risen_peaks(curve: Curve, prominence: float) -> NDArray[np.intp]:
     """Return the frames of peaks that are at least so far above the higher of the two levels beside them, ascending.
 
     Beside a peak the curve falls to its lowest value before the next higher peak, or the end. Equal neighbours are no
@@ -97,12 +97,12 @@ def risen_peaks(curve: Curve, prominence: float) -> NDArray[np.intp]:
     if not len(peaks):
         return peaks
     lowest, heights = np.minimum.reduceat(curve, [0, *peaks]), curve[peaks]
-    before = _fallen_to(heights, lowest[:-1])
-    after = _fallen_to(heights[::-1], lowest[:0:-1])[::-1]
+    before = _find_fall(heights, lowest[:-1])
+    after = _find_fall(heights[::-1], lowest[:0:-1])[::-1]
     return peaks[heights - np.maximum(before, after) >= prominence]
 
 
-def _fallen_to(heights: Curve, lowest: Curve) -> Curve:
+def _find_fall(heights: Curve, lowest: Curve) -> Curve:
     """Return how low the curve falls before each peak, back to the one before it that is higher [shape=(P,)]."""
     found, higher = [], list[tuple[float, float]]()
     for height, least in zip(heights.tolist(), lowest.tolist(), strict=True):
@@ -184,7 +184,7 @@ BLOCK_FRAMES = 2000
 """Frames whose surroundings are in memory at once."""
 
 
-def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
+def find_voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     """Return what is detected in a recording beside words, in the order of time; events of a kind do not overlap.
 
     audio : at 16 kHz
@@ -201,7 +201,7 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
         phrases = [
             phrase
             for phrase in _phrases(said)
-            if not any(_overlap_s(phrase, (laugh.start_s, laugh.end_s)) > 0 for laugh in laughs)
+            if not any(_find_overlap(phrase, (laugh.start_s, laugh.end_s)) > 0 for laugh in laughs)
         ]
         events = *laughs, *_breaths(sound, level_db, voiced, said), *_whispers(level_db, voiced, phrases)
         found += [event.shifted(at_s) for event in events]
@@ -210,14 +210,14 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     return tuple(sorted([*found, *_shouts(judged)], key=lambda event: event.start_s))
 
 
-def silence_phones(units: Timeline[Unit], others: Sequence[tuple[float, float]]) -> Timeline[Unit]:
+def silence_units(units: Timeline[Unit], others: Sequence[tuple[float, float]]) -> Timeline[Unit]:
     """Return recognised phones in time which are silence where something else is heard; known phones stay.
 
     others : from when to when, in seconds
     """
     spans = []
     for span in units:
-        inside_s = sum(_overlap_s((span.start_s, span.end_s), other) for other in others)
+        inside_s = sum(_find_overlap((span.start_s, span.end_s), other) for other in others)
         is_word = span.label.confidence is None or inside_s < span.duration_s / 2
         spans.append(span if is_word else replace(span, label=Unit("sil", confidence=span.label.confidence)))
     return Timeline(tuple(spans))
@@ -239,7 +239,7 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
     words = [span for span in sure if not is_silent(span.label.phone)]
     for bout in laughter(audio.samples, level_db, voiced):
         start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
-        said_s = sum(_overlap_s((span.start_s, span.end_s), (start_s, end_s)) for span in words)
+        said_s = sum(_find_overlap((span.start_s, span.end_s), (start_s, end_s)) for span in words)
         if said_s <= MOST_WORD_SHARE * (end_s - start_s):
             loudness = 2 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 10)
             calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
@@ -278,8 +278,8 @@ def _efforts(
     audio: AnalysedAudio, level_db: Curve, pitch: Curve, phrases: Sequence[tuple[float, float]]
 ) -> Iterator[tuple[tuple[float, float], tuple[float, float, float]]]:
     """Yield the phrases with a voice, and how high (semitones), bright and loud (decibels) it is there."""
-    high = (band_centres() >= 1000) & (band_centres() < 4500)
-    low = band_centres() < 1000
+    high = (find_centres() >= 1000) & (find_centres() < 4500)
+    low = find_centres() < 1000
     for phrase in phrases:
         frames = _frames(*phrase)
         voiced = np.flatnonzero(np.isfinite(pitch[frames]))
@@ -332,7 +332,7 @@ def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timel
 
 def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:
     """Yield first frame, the one after the last, and rise in decibels of noise that is as a breath's."""
-    centres, starts = band_centres(), range(0, len(bands), BLOCK_FRAMES)
+    centres, starts = find_centres(), range(0, len(bands), BLOCK_FRAMES)
     low, middle, high, bright = (
         np.concatenate([np.exp(bands[n : n + BLOCK_FRAMES, inside].astype(np.float64)).mean(axis=1) for n in starts])
         for least, most in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
@@ -377,5 +377,5 @@ def _risen(value: float, limits: tuple[float, float]) -> float:
     return float(np.clip((value - limits[0]) / (limits[1] - limits[0]), 0, 1))
 
 
-def _overlap_s(one: tuple[float, float], other: tuple[float, float]) -> float:
+def _find_overlap(one: tuple[float, float], other: tuple[float, float]) -> float:
     return max(min(one[1], other[1]) - max(one[0], other[0]), 0.0)

@@ -45,13 +45,13 @@ class Adaptation:
         return np.concatenate(streams, axis=1)
 
 
-def identity_adaptation(warp: float, own_weight: float) -> Adaptation:
+def create_adaptation(warp: float, own_weight: float) -> Adaptation:
     """Return an adaptation whose affine transforms are the identity."""
     streams, size, _ = _GENERAL
     return Adaptation(warp, own_weight, identity(FEATURES), np.stack([identity(size)] * streams))
 
 
-def adaptation_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:
+def adaptation_to_arrays(adaptation: Adaptation) -> dict[str, NDArray[Any]]:
     """Return an adaptation serialised as arrays (``ADAPTATION_ARRAYS``)."""
     numbers = np.array([adaptation.warp, adaptation.own_weight])
     return {"numbers": numbers, "own": adaptation.own, "general": adaptation.general}

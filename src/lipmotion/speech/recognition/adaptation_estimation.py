@@ -13,16 +13,16 @@ from lipmotion.errors import InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import FEATURES
-from lipmotion.speech.features.speaker_similarity import WARPS, SpeakerSimilarity, best_warp
-from lipmotion.speech.recognition.adaptation import Adaptation, identity_adaptation
-from lipmotion.speech.recognition.general import NOISES, STREAMS, general_model
-from lipmotion.speech.recognition.recogniser import Recogniser, own_model_weight
+from lipmotion.speech.features.speaker_similarity import WARPS, SpeakerSimilarity, find_warp
+from lipmotion.speech.recognition.adaptation import Adaptation, create_adaptation
+from lipmotion.speech.recognition.general import NOISES, STREAMS, load_general
+from lipmotion.speech.recognition.recogniser import Recogniser, weigh_own_model
 from lipmotion.stats.constrained_mllr import (
     AffineStatistics,
     Array,
     collect_transform_statistics,
+    create_prior,
     improve_transform,
-    prior_statistics,
 )
 from lipmotion.stats.em import run_em
 from lipmotion.stats.mixture import Mixtures
@@ -60,11 +60,11 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
     scores = {
         warp: own.fit(np.concatenate([audio.mfcc(warp).values for audio in audios])) - own.typical_fit for warp in WARPS
     }
-    warp = best_warp(scores)
+    warp = find_warp(scores)
     similarity = SpeakerSimilarity(warp, scores[warp])
     own_features = np.concatenate([audio.mfcc(similarity.warp).values for audio in audios])
     general_features = np.concatenate([audio.general_features for audio in audios])
-    adaptation, speech_s = identity_adaptation(similarity.warp, own_model_weight(similarity.score)), 0.0
+    adaptation, speech_s = create_adaptation(similarity.warp, weigh_own_model(similarity.score)), 0.0
     for _ in range(PASSES):
         recogniser = Recogniser(own, adaptation=adaptation)
         densities = np.concatenate([recogniser.best_path_densities(audio, audio.mfcc()) for audio in audios])
@@ -82,19 +82,19 @@ def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedA
         group = np.arange(FEATURES + 1) // (FEATURES // 3 if short else FEATURES)
         free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)
         plain = np.arange(len(own.log_stay), dtype=np.intp)
-        prior = prior_statistics(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE)
+        prior = create_prior(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE)
         matrix = _improved(combined.hmm.mixtures, prior, own_features, densities, adaptation.own, free)
-        streams = _general_improved(general_features, combined.columns[densities], adaptation.general)
+        streams = _improve_general(general_features, combined.columns[densities], adaptation.general)
         adaptation = replace(adaptation, own=matrix, general=streams)
     return EstimatedAdaptation(adaptation, speech_s)
 
 
-def _general_improved(features: NDArray[np.float32], densities: NDArray[np.intp], transforms: Array) -> Array:
+def _improve_general(features: NDArray[np.float32], densities: NDArray[np.intp], transforms: Array) -> Array:
     """Return the transform of each stream of the general models [shape=(3, 13, 14)], improved."""
     streams = []
     for number, (stream, transform) in enumerate(zip(STREAMS, transforms, strict=True)):
-        mixtures = general_model().mixtures(number)
-        prior = prior_statistics(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
+        mixtures = load_general().mixtures(number)
+        prior = create_prior(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
         free = np.ones(transform.shape, bool)
         streams.append(_improved(mixtures, prior, features[:, stream], densities, transform, free))
     return np.stack(streams)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import find_loud_frames, find_quiet_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition.general import STATES, density_column, general_model
+from lipmotion.speech.recognition.general import STATES, find_density, load_general
 from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP
 from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordEvidence, label_evidence
 from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
@@ -39,7 +39,7 @@ JOINED_S = 0.5
 class TranscriptFit:
     """How well a transcript fits a recording.
 
-    score    : the agreement score (``agreement_score``)
+    score    : the agreement score (``score_agreement``)
     missing  : stretches with speech that the transcript leaves out: their starts and ends in seconds, in order
     speech_s : seconds of speech in the recording, those that are missing included
     evidence : what a phone recogniser says of the transcript, which then decides (None: there is none)
@@ -89,16 +89,16 @@ class TranscriptFit:
         return fits
 
 
-def transcript_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
+def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     """Return how well the aligned phones of a transcript fit a recording.
 
-    audio, units : as of ``agreement_score``
+    audio, units : as of ``score_agreement``
     Forced alignment finds a place for every word, and fills the recording with them: where the transcript leaves words
     out, it stretches phones of their neighbours (``LONG_PHONE_S``), or calls loud sound silence (``LEAST_VOICE_S``).
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
     analysis = analysed(audio)
-    scored = _scored_frames(analysis, units)
+    scored = _score_frames(analysis, units)
     loud = find_loud_frames(analysis.log_energy)
     missing, speech_s = [], 0.0
     for span in units:
@@ -130,17 +130,17 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
         loud = _joined(
             [(at, at + 1 / FRAME_RATE_HZ) for at in np.flatnonzero(find_loud_frames(audio.log_energy)) / FRAME_RATE_HZ]
         )
-        missing = tuple(_unlabelled(stretch, spoken, loud) for stretch in found.missing)
+        missing = tuple(_find_unlabelled(stretch, spoken, loud) for stretch in found.missing)
     else:
         quiet = find_quiet_frames(audio.log_energy)
         silent = _joined([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
         idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= LEAST_IDLE_S)
-        missing, wrong = transcript_fit(audio, units).missing, ()
+        missing, wrong = measure_fit(audio, units).missing, ()
     fit = TranscriptFit(0.0, missing, sum(span.duration_s for span in spoken), None, idle, wrong)
     return replace(fit, speech_s=fit.speech_s + fit.missing_s)
 
 
-def _unlabelled(
+def _find_unlabelled(
     stretch: tuple[float, float], spoken: list[Span[Unit]], loud: tuple[tuple[float, float], ...]
 ) -> tuple[float, float]:
     """Return all the sound around a stretch in which phones are heard, as far as no phone is given."""
@@ -162,7 +162,7 @@ def _joined(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...
     return tuple(joined)
 
 
-def agreement_score(audio: Audio, units: Timeline[Unit]) -> float:
+def score_agreement(audio: Audio, units: Timeline[Unit]) -> float:
     """Return how well a recording agrees with phones in time, by the general models.
 
     audio : an ``AnalysedAudio`` shares its features with what else is computed of it
@@ -171,7 +171,7 @@ def agreement_score(audio: Audio, units: Timeline[Unit]) -> float:
     phone (at least ``WORST_SCORE``): 0 where no other phone is more probable, or nothing is spoken.
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
-    return _scored_frames(analysed(audio), units).mean()
+    return _score_frames(analysed(audio), units).mean()
 
 
 class _ScoredFrames(NamedTuple):
@@ -195,16 +195,16 @@ class _ScoredFrames(NamedTuple):
         return float((sums[counts > 0] / counts[counts > 0]).mean())
 
 
-def _scored_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames:
+def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames:
     spoken = [span for span in units if not is_silent(span.label.phone)]
     each = [np.arange(of_span.start, of_span.stop) for of_span in map(_frames_of, spoken)]
     phones = np.repeat(np.arange(len(spoken)), [len(of_span) for of_span in each])
-    first = np.array([density_column(span.label.phone, 0, STATES) for span in spoken], np.intp)[phones]
+    first = np.array([find_density(span.label.phone, 0, STATES) for span in spoken], np.intp)[phones]
     frames = np.concatenate([np.zeros(0, np.intp), *each])
     frames, phones, states = (rows[::FRAME_STEP] for rows in (frames, phones, first))
     if not len(frames):
         return _ScoredFrames(frames, phones, np.zeros(0, np.float32))
-    log_densities = general_model().log_density(audio.general_features[frames])
+    log_densities = load_general().log_density(audio.general_features[frames])
     of_phone = np.take_along_axis(log_densities, states[:, None] + np.arange(STATES), axis=1)
     return _ScoredFrames(frames, phones, of_phone.max(axis=1))
 

@@ -48,7 +48,7 @@ class Anchors:
     groups: NDArray[np.intp]
 
 
-def anchors_of(transcript: TimedTranscript) -> Anchors:
+def find_anchors(transcript: TimedTranscript) -> Anchors:
     """Return the times of the words of a transcript.
 
     Words have the times of their line; if some words of a line have times of their own, the others lie between these.
@@ -62,17 +62,17 @@ def anchors_of(transcript: TimedTranscript) -> Anchors:
             last = place == len(line.words) - 1
             end_s = line.end_s if word.end_s is None and (not own or last) else word.end_s
             tolerance_s = WORD_TOLERANCE_S if timed else LINE_TOLERANCE_S
-            rows.append((_none_to_nan(start_s), _none_to_nan(end_s), tolerance_s))
+            rows.append((_read_score(start_s), _read_score(end_s), tolerance_s))
     table = np.array(rows, float).reshape(-1, 3)
     differs = ~np.isclose(table[1:, :2], table[:-1, :2], equal_nan=True).all(axis=1)
     return Anchors(table[:, 0], table[:, 1], table[:, 2], np.append(0, np.cumsum(differs)))
 
 
-def _none_to_nan(time_s: float | None) -> float:
+def _read_score(time_s: float | None) -> float:
     return np.nan if time_s is None else time_s
 
 
-def fitted(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: float) -> TimedTranscript:
+def fit_transcript(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: float) -> TimedTranscript:
     """Return a transcript whose times fit a recording as a whole.
 
     If all are late or early they are corrected; lines that begin after the end of the recording are left out. Both are
@@ -115,7 +115,7 @@ def measure_lateness(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> fl
     larger than the tolerance of lines, and the correlation at least ``MIN_CORRELATION``, and by ``MIN_GAIN`` better
     than without a shift.
     """
-    anchors = anchors_of(transcript)
+    anchors = find_anchors(transcript)
     known = ~np.isnan(anchors.start_s) & ~np.isnan(anchors.end_s)
     max_shift = min(round(MAX_SHIFT_S * FRAME_RATE_HZ), len(loud) // 4)
     if len(np.unique(anchors.groups[known])) < MIN_TIMES or max_shift == 0:
@@ -145,7 +145,7 @@ def make_windows(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int
     """Return the frames in which each word may lie.
 
     A word without a time has those between the words with times around it. No word may begin before those ahead of it
-    may, nor end after those behind it may; out of order, times leave no room (``feasible_windows``).
+    may, nor end after those behind it may; out of order, times leave no room (``find_windows``).
     """
     first = np.floor((anchors.start_s - tolerance_s) * FRAME_RATE_HZ)
     end = np.ceil((anchors.end_s + tolerance_s) * FRAME_RATE_HZ) + 1
@@ -161,7 +161,7 @@ def _carry_forward(values: NDArray[np.float64], before: float) -> NDArray[np.flo
     return np.append(before, values)[latest][1:]
 
 
-def feasible_windows(
+def find_windows(
     anchors: Anchors, tolerance_s: NDArray[np.float64], min_frames: NDArray[np.intp], edge: int, frames: int
 ) -> tuple[Windows, NDArray[np.float64]]:
     """Return windows in which all words have room, and the tolerances, doubled around words that had none.
@@ -223,7 +223,7 @@ def align_within(
 ) -> tuple[list[PlacedWord], Windows]:
     """Return words aligned within their windows, and these.
 
-    min_frames, edge : as of ``feasible_windows``
+    min_frames, edge : as of ``find_windows``
     search      : aligns within windows, with the fit of each word
     Where words press against their windows, or fit badly, these are widened step by step, and stay so if the words then
     fit better by ``MIN_IMPROVEMENT``: words also press where speech beside them is not in the transcript. If all fit
@@ -271,7 +271,7 @@ def _place_words(
     search: Callable[[Windows], list[PlacedWord]],
 ) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
     """Return words aligned within windows that have room, these windows, and their tolerances."""
-    windows, tolerance_s = feasible_windows(anchors, tolerance_s, min_frames, edge, frames)
+    windows, tolerance_s = find_windows(anchors, tolerance_s, min_frames, edge, frames)
     return search(windows), windows, tolerance_s
 
 
@@ -297,7 +297,7 @@ def _average_neighbours(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.convolve(values, np.ones(3))[1:-1] / count
 
 
-def least_frames(words: Sequence[Sequence[Sequence[str]]], counts: dict[str, int]) -> NDArray[np.intp]:
+def count_min_frames(words: Sequence[Sequence[Sequence[str]]], counts: dict[str, int]) -> NDArray[np.intp]:
     """Return the fewest frames of each word, given its pronunciations: the states of the shortest."""
     of_words = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
     return np.array([of_words[id(word)] for word in words], np.intp)

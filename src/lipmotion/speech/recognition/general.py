@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import StateTable, UnitHmm
 from lipmotion.hmm.network import DensitySelection, LogLikelihoods
-from lipmotion.speech.features.mfcc import FFT_SIZE, checked_samples, liftered_cosine, log_mel, triangles
+from lipmotion.speech.features.mfcc import FFT_SIZE, build_cosine, check_samples, log_mel, triangles
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.mixture import Mixtures
@@ -91,7 +91,7 @@ class GeneralModel:
         return (np.log(np.maximum(mixed, np.float32(1e-30))) + best).reshape(len(x), -1)
 
 
-def density_column(phone: str, state: int, states: int) -> int:
+def find_density(phone: str, state: int, states: int) -> int:
     """Return the column of ``log_density`` for a state of a phone.
 
     phone  : of our inventory, or one of the two noises
@@ -107,7 +107,7 @@ GENERAL_PHONE_NAMES = {"ax": "AH", "axr": "ER", "ix": "IH", "el": "L", "em": "M"
 
 
 @cache
-def general_model() -> GeneralModel:
+def load_general() -> GeneralModel:
     """Return the models; they are read once. Raises MissingDependencyError: not installed, or of another version."""
     folder = find_english_data() / "en-us"
     try:
@@ -168,7 +168,7 @@ def general_features(audio: Audio) -> NDArray[np.float32]:
     Source: the model's own feat.params and CMU Sphinx's ``1s_c_d_dd``. Deviations: windows of 25 instead of
     25.6 ms, centred on their time; no noise removal.
     """
-    cepstra = log_mel(checked_samples(audio), _filters()) @ liftered_cosine(FILTERS, 0, CEPSTRA)
+    cepstra = log_mel(check_samples(audio), _filters()) @ build_cosine(FILTERS, 0, CEPSTRA)
     cepstra -= cepstra.mean(axis=0, dtype=np.float64).astype(np.float32)
     features = np.empty((len(cepstra), 3 * CEPSTRA), np.float32)
     features[:, :CEPSTRA] = cepstra
@@ -202,7 +202,7 @@ PROBABILITY_SHARE = {
 """The share of each of our phones in the probability of the general phone that it is a form of; all others: 1."""
 
 
-def english_bigram(units: Sequence[str]) -> NDArray[np.float64]:
+def load_bigram(units: Sequence[str]) -> NDArray[np.float64]:
     """Return P(next | unit) among some of our phones and the noises [shape=(V, V)]; the noises count as silence.
 
     Raises MissingDependencyError: pocketsphinx is not installed.
@@ -210,7 +210,7 @@ def english_bigram(units: Sequence[str]) -> NDArray[np.float64]:
     kinds = _phones()
     spelt = ["SIL" if unit.startswith("+") else GENERAL_PHONE_NAMES.get(unit, unit.upper()) for unit in units]
     rows = [kinds.index(name) for name in spelt]
-    pairs = _phone_bigram()[np.ix_(rows, rows)] * np.array([PROBABILITY_SHARE.get(unit, 1.0) for unit in units])
+    pairs = _read_bigram()[np.ix_(rows, rows)] * np.array([PROBABILITY_SHARE.get(unit, 1.0) for unit in units])
     return pairs / pairs.sum(axis=1, keepdims=True)
 
 
@@ -219,7 +219,7 @@ def _phones() -> list[str]:
 
 
 @cache
-def _phone_bigram() -> NDArray[np.float64]:
+def _read_bigram() -> NDArray[np.float64]:
     """Return P(next | phone) of the phone language model that comes with pocketsphinx."""
     try:
         from pocketsphinx import Config, LogMath, NGramModel
@@ -270,7 +270,7 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
         free=(*old.free, *(unit for unit in new if unit in NOISES or is_silent(unit))),
     )
     sources = np.array([*range(plain), *(source for *_, source in added), *range(plain, len(old.names))], np.intp)
-    english = english_bigram(table.units)
+    english = load_bigram(table.units)
     mixed, count = english.copy(), len(own.bigram.units)
     mixed[:count] *= ENGLISH_SHARE
     mixed[:count, :count] += (1 - ENGLISH_SHARE) * np.exp(own.bigram.log_probability.astype(float))
@@ -285,11 +285,11 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
     columns = []
     for unit, _, rest in (name.partition(".") for name in table.names):
         state = int(rest.partition("<")[0].partition(">")[0])
-        columns.append(density_column(unit, state, table.count(unit)))
+        columns.append(find_density(unit, state, table.count(unit)))
     return CombinedPhones(hmm, np.array(columns, np.intp))
 
 
-def combined_log_likelihoods(
+def combine_likelihoods(
     combined: CombinedPhones, own_features: NDArray[np.float32], own_weight: float, general: NDArray[np.float32]
 ) -> LogLikelihoods:
     """Return the log likelihoods of a recording under both models: a weighted sum of their log densities.
@@ -298,7 +298,7 @@ def combined_log_likelihoods(
     own_weight   : of the log densities of the own models, 0 to 1; those of the general ones have weight 1
     general      : features for the general models [shape=(T, 39)]
     """
-    model = general_model()
+    model = load_general()
     kept = model.log_density(general) if len(general) <= KEPT_FRAMES else None
 
     def log_density(first: int, end: int, chosen: DensitySelection) -> NDArray[np.float32]:

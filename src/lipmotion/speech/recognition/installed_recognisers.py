@@ -84,8 +84,8 @@ def _folder(recogniser: InstalledRecogniser, kind: str) -> Path:
     return folder
 
 
-def _whisper_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine] | None:
-    segments, about = _whisper_model(module, str(folder)).transcribe(
+def _transcribe_whisper(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine] | None:
+    segments, about = _load_whisper(module, str(folder)).transcribe(
         audio.samples, word_timestamps=True, vad_filter=True, condition_on_previous_text=False
     )
     if about.language != ENGLISH:
@@ -103,18 +103,18 @@ def _whisper_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLi
 
 
 @lru_cache(maxsize=1)
-def _whisper_model(module: Any, folder: str) -> Any:
+def _load_whisper(module: Any, folder: str) -> Any:
     try:
         return module.WhisperModel(folder, device="cpu", compute_type="int8", local_files_only=True)
     except (RuntimeError, ValueError, OSError) as error:
         raise InputError(f"{folder}: faster-whisper cannot read this model: {shorten(str(error))}") from error
 
 
-def _vosk_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine]:
-    recogniser = module.KaldiRecognizer(_vosk_model(module, str(folder)), audio.rate_hz)
+def _transcribe_vosk(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine]:
+    recogniser = module.KaldiRecognizer(_load_vosk(module, str(folder)), audio.rate_hz)
     recogniser.SetWords(True)
     lines = []
-    for result in _vosk_results(recogniser, audio):
+    for result in _read_vosk(recogniser, audio):
         words: list[TimedWord] = []
         for item in json.loads(result).get("result", ()):
             words += time_words(extract_spoken_text(item["word"]), float(item["start"]), float(item["end"]))
@@ -123,7 +123,7 @@ def _vosk_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLine]
     return lines
 
 
-def _vosk_results(recogniser: Any, audio: Audio) -> Iterator[str]:
+def _read_vosk(recogniser: Any, audio: Audio) -> Iterator[str]:
     """Yield the JSON of every stretch of speech."""
     for start in range(0, len(audio.samples), STEP):
         samples = np.clip(audio.samples[start : start + STEP] * 32_768, -32_768, 32_767).astype("<i2")
@@ -133,7 +133,7 @@ def _vosk_results(recogniser: Any, audio: Audio) -> Iterator[str]:
 
 
 @lru_cache(maxsize=1)
-def _vosk_model(module: Any, folder: str) -> Any:
+def _load_vosk(module: Any, folder: str) -> Any:
     module.SetLogLevel(-1)
     try:
         return module.Model(folder)
@@ -147,8 +147,8 @@ INSTALLED_RECOGNISERS = {
         "whisper",
         "LIPMOTION_WHISPER_MODEL",
         (("model.bin",), ("tokenizer.json",)),  # without a tokenizer in the folder it would be fetched
-        _whisper_lines,
+        _transcribe_whisper,
     ),
-    "vosk": InstalledRecogniser("vosk", "vosk", "LIPMOTION_VOSK_MODEL", (("am", "final.mdl"),), _vosk_lines),
+    "vosk": InstalledRecogniser("vosk", "vosk", "LIPMOTION_VOSK_MODEL", (("am", "final.mdl"),), _transcribe_vosk),
 }
 """By the name that ``--recogniser`` has for each."""

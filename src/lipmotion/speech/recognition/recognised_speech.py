@@ -92,19 +92,19 @@ def align_recognised_words(
     )
 
 
-def phone_bonus(hmm: UnitHmm, aligned: AlignedWords, bonus: float) -> NDArray[np.float32]:
+def weigh_phones(hmm: UnitHmm, aligned: AlignedWords, bonus: float) -> NDArray[np.float32]:
     """Return what is added to the log densities of a stretch, so that its words' phones become more probable.
 
     bonus : in nats, where the phone is in the alignment
     The result has the shape (N, G).
     """
     present = np.zeros((len(aligned.of_frame), len(FORMS)), np.float32)
-    phone = np.array([FORMS.index(compared_form(each)) for each in aligned.phones])[aligned.of_frame]
+    phone = np.array([FORMS.index(normalise_word(each)) for each in aligned.phones])[aligned.of_frame]
     present[np.arange(len(phone)), phone] = 1
-    return density_bonus(hmm, present, bonus, REACH_FRAMES)
+    return weigh_densities(hmm, present, bonus, REACH_FRAMES)
 
 
-def density_bonus(hmm: UnitHmm, present: NDArray[np.float32], bonus: float, reach: int) -> NDArray[np.float32]:
+def weigh_densities(hmm: UnitHmm, present: NDArray[np.float32], bonus: float, reach: int) -> NDArray[np.float32]:
     """Return what is added to the log densities of a stretch, so that phones become more probable [shape=(N, G)].
 
     present : how far each of ``FORMS`` is said in each frame, 0 to 1 [shape=(N, F)]
@@ -116,17 +116,17 @@ def density_bonus(hmm: UnitHmm, present: NDArray[np.float32], bonus: float, reac
         least = np.float32(1 - shift / (reach + 1))
         np.maximum(share[shift:], least * present[:-shift], out=share[shift:])
         np.maximum(share[:-shift], least * present[shift:], out=share[:-shift])
-    columns = [FORMS.index(compared_form(name)) for name in hmm.table.names]
+    columns = [FORMS.index(normalise_word(name)) for name in hmm.table.names]
     return np.float32(bonus) * share[:, columns]
 
 
-def compared_form(name: str) -> str:
+def normalise_word(name: str) -> str:
     """Return the general form of the phone of a density."""
     phone = name.partition(".")[0]
     return COMPARED_FORMS.get(phone, phone)
 
 
-FORMS = tuple(sorted({compared_form(phone) for phone in PHONES}))
+FORMS = tuple(sorted({normalise_word(phone) for phone in PHONES}))
 """The phones that are compared."""
 
 
@@ -210,7 +210,7 @@ class Recognition:
         return float(np.clip((confirmed - CONFIDENCES[0]) / (CONFIDENCES[1] - CONFIDENCES[0]), 0, 1))
 
 
-def level_range_db(log_energy: NDArray[np.floating[Any]]) -> float:
+def measure_level_range(log_energy: NDArray[np.floating[Any]]) -> float:
     """Return the decibels between loud and quiet moments of what is heard in a recording (``RANGE_PERCENTILES``).
 
     log_energy : natural logarithm of the energy of every frame [shape=(T,)]
@@ -221,7 +221,7 @@ def level_range_db(log_energy: NDArray[np.floating[Any]]) -> float:
     return float(np.ptp(np.percentile(heard, RANGE_PERCENTILES)) * 10 / np.log(10))
 
 
-def recognition_of(
+def build_recognition(
     units: Timeline[Unit],
     labels: Sequence[LabelledFrames],
     recognised: Sequence[RecognisedWord],
@@ -244,7 +244,7 @@ def recognition_of(
     return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity)
 
 
-def placed_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[LabelT]:
+def place_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[LabelT]:
     """Return labels in time of a passage that lie in its own frames, with times of the recording.
 
     first, own : as of ``Passage``
@@ -254,10 +254,10 @@ def placed_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[La
     return within.shifted(start / FRAME_RATE_HZ)
 
 
-def joined_units(parts: Iterable[Timeline[Unit]], silence: Unit, end_s: float) -> Timeline[Unit]:
+def join_units(parts: Iterable[Timeline[Unit]], silence: Unit, end_s: float) -> Timeline[Unit]:
     """Return the phones in time of a recording from those of its passages, with silence before, between and after them.
 
-    parts : of each passage, with times of the recording (``placed_units``)
+    parts : of each passage, with times of the recording (``place_units``)
     """
     joined: list[Span[Unit]] = []
     for part in [*parts, Timeline((Span(end_s, end_s, silence),))]:
@@ -275,21 +275,21 @@ def joined_units(parts: Iterable[Timeline[Unit]], silence: Unit, end_s: float) -
     return Timeline(tuple(joined) or (Span(0.0, end_s, silence),))
 
 
-def joined_recognition(parts: Sequence[tuple[Passage, Recognition]], duration_s: float) -> Recognition:
+def join_recognition(parts: Sequence[tuple[Passage, Recognition]], duration_s: float) -> Recognition:
     """Return the recognition of a recording from those of its passages.
 
     The phones of each passage are as reliable as they are there; the similarity is that of the longest passage.
     """
     units, words = list[Timeline[Unit]](), list[Span[RecognisedWord]]()
     for (first, own, _), part in parts:
-        units.append(placed_units(relied_on(part.units, part.reliability), first, own))
-        words += placed_units(part.words, first, own)
+        units.append(place_units(select_reliable(part.units, part.reliability), first, own))
+        words += place_units(part.words, first, own)
     speech_s = np.array([part.word_s + part.phone_s for _, part in parts])
     posteriors = np.array([np.nan if part.posterior is None else part.posterior for _, part in parts])
     decided = ~np.isnan(posteriors)
     posterior = float(np.average(posteriors[decided], weights=speech_s[decided] + 1e-9)) if decided.any() else None
     return Recognition(
-        joined_units(units, Unit(SILENCE), duration_s),
+        join_units(units, Unit(SILENCE), duration_s),
         Timeline(tuple(words)),
         sum(part.word_s for _, part in parts),
         sum(part.phone_s for _, part in parts),
@@ -298,7 +298,7 @@ def joined_recognition(parts: Sequence[tuple[Passage, Recognition]], duration_s:
     )
 
 
-def relied_on(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
+def select_reliable(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
     """Return phones in time as recognised ones, with a confidence where they have none yet."""
     return Timeline(
         tuple(
@@ -310,7 +310,7 @@ def relied_on(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
     )
 
 
-def labels_of_words(
+def label_words(
     aligned: AlignedWords, stretch: Stretch, believed: NDArray[np.bool_], first_word: int
 ) -> Iterator[LabelledStretch]:
     """Yield the labels of each run of words that are believed, with the frames that they take.
@@ -331,7 +331,7 @@ def labels_of_words(
             yield Stretch(firsts[0], firsts[-1]), list(map(LabelledFrames, firsts[:-1], phones, words))
 
 
-def spliced(base: Sequence[LabelledFrames], parts: Sequence[LabelledStretch], frames: int) -> list[LabelledFrames]:
+def splice(base: Sequence[LabelledFrames], parts: Sequence[LabelledStretch], frames: int) -> list[LabelledFrames]:
     """Return labels in which some stretches are replaced.
 
     parts  : stretches in order, without overlap, and their labels

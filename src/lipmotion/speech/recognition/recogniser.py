@@ -31,29 +31,29 @@ from lipmotion.speech.features.speaker_similarity import (
     speaker_similarity,
 )
 from lipmotion.speech.recognition.adaptation import Adaptation
-from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
-from lipmotion.speech.recognition.general import CombinedPhones, combine_phones, combined_log_likelihoods
+from lipmotion.speech.recognition.anchors import Anchors, align_within, count_min_frames
+from lipmotion.speech.recognition.general import CombinedPhones, combine_likelihoods, combine_phones
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
-    installed_phone_recogniser,
+    find_installed,
+    find_stretches,
     mean_posterior,
-    posterior_stretches,
 )
 from lipmotion.speech.recognition.recognised_speech import (
     WORD_POSTERIORS,
     LabelledFrames,
     RecognisedWord,
     Recognition,
-    joined_recognition,
-    recognition_of,
-    spliced,
+    build_recognition,
+    join_recognition,
+    splice,
 )
 from lipmotion.speech.recognition.word_search import (
     WordSearch,
-    begun_decoding,
-    free_labels,
-    network_words,
-    phones_without_words,
+    begin_decoding,
+    decode_network,
+    list_wordless,
+    recognise_free,
 )
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
@@ -120,15 +120,15 @@ class Recogniser:
         audio = analysed(audio, features)
         if not features.values.any() or not audio.passages:
             silence = _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
-            return recognition_of(silence, [LabelledFrames(0, SILENCE)], (), None)
+            return build_recognition(silence, [LabelledFrames(0, SILENCE)], (), None)
         if not audio.is_passage:
-            if (network := network_of(self.kind)) is not None:
-                posterior_stretches(network, audio, each)  # of all passages at once: several processes work on them
+            if (network := find_network(self.kind)) is not None:
+                find_stretches(network, audio, each)  # of all passages at once: several processes work on them
             passages = [
                 (passage, self.recognition(passage.audio, passage.audio.mfcc(), each, english=english))
                 for passage in audio.passages
             ]
-            return joined_recognition(passages, features.duration_s)
+            return join_recognition(passages, features.duration_s)
         is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
         similarity = speaker_similarity(self.own, audio) if is_judged else None
         known = (
@@ -137,13 +137,13 @@ class Recogniser:
             and similarity.score > OWN_SCORE
             and self.own.bigram.perplexity < SMALL_PERPLEXITY
         )
-        network = None if known else network_of(self.kind)
+        network = None if known else find_network(self.kind)
         if network is not None:
-            found = posterior_stretches(network, audio, each)
+            found = find_stretches(network, audio, each)
             if mean_posterior(found) >= WORD_POSTERIORS[0] or not english:
                 return self._network_recognition(audio, similarity, found, english=english)
         with_words = self.kind in USING_WORDS and not known
-        spoken = begun_decoding(audio, each) if with_words else None
+        spoken = begin_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
         labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
@@ -154,7 +154,7 @@ class Recogniser:
             parts, recognised = WordSearch(
                 hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words"
             ).words_of(spoken)
-            labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
+            labels = splice(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
         return _recognition(labels, recognised, len(path), features.duration_s, similarity)
 
     def _network_recognition(
@@ -170,16 +170,16 @@ class Recogniser:
         loud = find_loud_frames(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
-            parts, recognised = network_words(hmm, log_likelihoods, loud, found)
+            parts, recognised = decode_network(hmm, log_likelihoods, loud, found)
         else:
-            parts, recognised = phones_without_words(hmm, self._loop, log_likelihoods, found), []
-        labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))
+            parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, found), []
+        labels = splice([LabelledFrames(0, SILENCE)], parts, len(loud))
         recognition = _recognition(labels, recognised, len(loud), features.duration_s, similarity)
         return replace(recognition, posterior=mean_posterior(found))
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
-        labels = free_labels(self._loop, path)
+        labels = recognise_free(self._loop, path)
         if self.kind not in WEIGHTED or not self._has_few_gaussians:
             return labels
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
@@ -280,7 +280,7 @@ class Recogniser:
             # own models without weight are not evaluated: any features will do, and those of a long one are large
             own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
             general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
-            log_likelihoods = combined_log_likelihoods(self.combined, own, weight, general)
+            log_likelihoods = combine_likelihoods(self.combined, own, weight, general)
         return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
 
     def _own_transform(self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None) -> tuple[float, float]:
@@ -288,7 +288,7 @@ class Recogniser:
         if self.adaptation is not None:
             return self.adaptation.warp, self.adaptation.own_weight
         similarity = similarity or speaker_similarity(self.own, audio)
-        return similarity.warp, own_model_weight(similarity.score)
+        return similarity.warp, weigh_own_model(similarity.score)
 
     def _own_features(self, audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
         """Return the features for the own models, warped and, where there is an adaptation, transformed."""
@@ -309,7 +309,7 @@ def _aligned(
     else:
         counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
         edge, frames = counts[hmm.table.free[0]], log_likelihoods.frames
-        placed, windows = align_within(anchors, least_frames(words, counts), edge, frames, search)
+        placed, windows = align_within(anchors, count_min_frames(words, counts), edge, frames, search)
         spoken = [item.spoken for item in placed]
         of_units = spread_windows(spoken, windows, frames)
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
@@ -324,21 +324,21 @@ def _recognition(
 ) -> Recognition:
     named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
     units = _timeline(named, np.array([*(label.first for label in labels), frames]), duration_s)
-    return recognition_of(units, labels, recognised, similarity.score if similarity is not None else None)
+    return build_recognition(units, labels, recognised, similarity.score if similarity is not None else None)
 
 
-def network_of(kind: str) -> str | None:
+def find_network(kind: str) -> str | None:
     """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
-    return installed_phone_recogniser() if kind == "auto" else None
+    return find_installed() if kind == "auto" else None
 
 
 @lru_cache(maxsize=4)
-def cached_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
+def open_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
     """Return the recogniser of some models; the last four are kept, with the networks that they search."""
     return Recogniser(own, kind, adaptation)
 
 
-def own_model_weight(score: float) -> float:
+def weigh_own_model(score: float) -> float:
     """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
     return min(max((score - STRANGER_SCORE) / (FULL_WEIGHT_SCORE - STRANGER_SCORE), 0.0), 1.0)
 

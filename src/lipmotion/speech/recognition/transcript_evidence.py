@@ -102,7 +102,7 @@ class TranscriptEvidence:
         return self.said_share < LEAST_SAID_SHARE
 
 
-def transcript_evidence(
+def find_evidence(
     log_posteriors: Array, frame_s: float, units: Timeline[Unit], costs: tuple[float, float] = WORD_COSTS
 ) -> TranscriptEvidence:
     """Return what the posteriors say of a transcript.
@@ -191,8 +191,8 @@ def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[flo
     columns = np.concatenate([np.zeros(0, np.intp), *words])
     frames, count = len(log_posteriors), len(columns)
     edges = np.cumsum([0, *map(len, words)])
-    spoken = np.log(np.exp(log_posteriors) @ _taken_for())[:, columns]
-    silent = np.logaddexp.reduce(log_posteriors[:, _silent_columns()], axis=1)
+    spoken = np.log(np.exp(log_posteriors) @ _count_taken())[:, columns]
+    silent = np.logaddexp.reduce(log_posteriors[:, _find_silent()], axis=1)
     anything = np.maximum(log_posteriors.max(axis=1), silent)
     same = np.concatenate([[False], columns[1:] == columns[:-1]])[:count] & ~np.isin(np.arange(count), edges)
     entered = np.zeros((frames, count), bool)
@@ -286,7 +286,7 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     ends_s = np.array([span.end_s for span in spoken], float)
     phones = np.array([PHONES.index(span.label.phone) for span in spoken], np.intp)
     best = log_posteriors.argmax(axis=1)
-    heard = np.flatnonzero(~np.isin(best, _silent_columns()) & (np.diff(best, prepend=-1) != 0))
+    heard = np.flatnonzero(~np.isin(best, _find_silent()) & (np.diff(best, prepend=-1) != 0))
     times_s: Array = ((heard + 0.5) * frame_s).astype(float)
     first = np.searchsorted(ends_s, times_s - LABEL_REACH_S)
     stop = np.searchsorted(starts_s, times_s + LABEL_REACH_S, "right")
@@ -294,7 +294,7 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     confirmed = np.zeros(len(heard), bool)
     for number, column in enumerate(best[heard]):
         nearby = slice(first[number], stop[number])
-        alike = _taken_for()[column, phones[nearby]] > 0
+        alike = _count_taken()[column, phones[nearby]] > 0
         is_near[nearby], agrees[nearby], confirmed[number] = True, agrees[nearby] | alike, alike.any()
     alone = first >= stop
     middles_s: Array = (starts_s + ends_s) / 2
@@ -324,7 +324,7 @@ def _runs(starts_s: Array, ends_s: Array, least_s: float = LEAST_DOUBT_S) -> tup
 
 
 @cache
-def _taken_for() -> Array:
+def _count_taken() -> Array:
     """Return for each class and each phone whether the one may be taken for the other [shape=(48, 47)]."""
     taken = np.eye(len(PHONES) + 1, len(PHONES))
     for phone, others in SIMILAR_PHONES.items():
@@ -333,5 +333,5 @@ def _taken_for() -> Array:
     return taken
 
 
-def _silent_columns() -> list[int]:
+def _find_silent() -> list[int]:
     return [number for number, phone in enumerate(PHONES) if is_silent(phone)] + [len(PHONES)]

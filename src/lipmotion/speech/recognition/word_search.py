@@ -17,7 +17,7 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import LogLikelihoods, UnitLoop, decode_path, penalise_silence, wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.general import NOISES
-from lipmotion.speech.recognition.network.beam_search import decoded_words, english_words, scored
+from lipmotion.speech.recognition.network.beam_search import decode_words, load_english, score_stretch
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     WORD_BOUNDARY,
@@ -31,14 +31,14 @@ from lipmotion.speech.recognition.recognised_speech import (
     LabelledStretch,
     RecognisedWord,
     align_recognised_words,
-    compared_form,
-    density_bonus,
-    labels_of_words,
-    phone_bonus,
-    spliced,
+    label_words,
+    normalise_word,
+    splice,
+    weigh_densities,
+    weigh_phones,
 )
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stretches_of_sound
+from lipmotion.speech.sound.voice_activity import Stretch, find_sound, read_stretch
 from lipmotion.types import ParallelMap
 from lipmotion.units import PHONES, SILENCE, Lexicon, Pronunciation, is_silent
 from lipmotion.units.lexicon import find_english_data
@@ -61,7 +61,7 @@ _LOCK = threading.Lock()
 """A decoder works on one recording at a time."""
 
 
-def words_in(samples: bytes) -> tuple[FoundWord, ...]:
+def spot_words(samples: bytes) -> tuple[FoundWord, ...]:
     """Return the words that are recognised in a stretch of sound; none if there are none.
 
     samples : 16-bit integers at 16 kHz
@@ -148,11 +148,11 @@ class WordsInStretches(NamedTuple):
     words: Iterable[Sequence[FoundWord]]
 
 
-def begun_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> WordsInStretches:
+def begin_decoding(audio: AnalysedAudio, each: ParallelMap = map) -> WordsInStretches:
     """Return the words in all stretches of sound of a recording; where ``each`` starts processes, they begin now."""
-    stretches = stretches_of_sound(audio.log_energy)
+    stretches = find_sound(audio.log_energy)
     each = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
-    return WordsInStretches(stretches, each(words_in, (stretch_samples(audio, stretch) for stretch in stretches)))
+    return WordsInStretches(stretches, each(spot_words, (read_stretch(audio, stretch) for stretch in stretches)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +178,7 @@ class WordSearch:
     def words_of(self, spoken: WordsInStretches) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
         """Return the stretches in which words were recognised, with their phones, and these words.
 
-        spoken : of ``begun_decoding``
+        spoken : of ``begin_decoding``
         Raises MissingDependencyError: as ``words_in``.
         """
         parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
@@ -203,15 +203,15 @@ class WordSearch:
             return [], [LEAST_FIT] * len(words)
         fits, fit = aligned.fits(values, self.path[slice(*stretch)])
         believed = np.full(len(words), self.believing or fit > STRETCH_FIT) | (fits > WORD_FIT)
-        decided = list(labels_of_words(aligned, stretch, believed, first_word))
+        decided = list(label_words(aligned, stretch, believed, first_word))
         if not believed.all():
-            decided = [(stretch, spliced(self._favouring(stretch, aligned), decided, stretch.end))]
+            decided = [(stretch, splice(self._favouring(stretch, aligned), decided, stretch.end))]
         return decided, fits.tolist()
 
     def _favouring(self, stretch: Stretch, aligned: AlignedWords) -> list[LabelledFrames]:
         """Return the phones of a stretch that are recognised if those of words in it are more probable than others."""
-        values = self.free.stretch(*stretch) + phone_bonus(self.hmm, aligned, WORD_BONUS)
-        return free_labels(self.loop, self.loop.network.best_path(wrap_log_likelihoods(values)), stretch.first)
+        values = self.free.stretch(*stretch) + weigh_phones(self.hmm, aligned, WORD_BONUS)
+        return recognise_free(self.loop, self.loop.network.best_path(wrap_log_likelihoods(values)), stretch.first)
 
 
 def score_words(fit: float, posterior: float) -> float:
@@ -223,7 +223,7 @@ def score_words(fit: float, posterior: float) -> float:
     return float(1 / (1 + np.exp(-score)))
 
 
-def free_labels(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
+def recognise_free(loop: UnitLoop, path: NDArray[np.intp], first: int = 0) -> list[LabelledFrames]:
     """Return the phones of a path through a loop [shape=(T,)] whose first frame is ``first``; noises are silence."""
     phones, starts = decode_path(loop, path)
     return [
@@ -253,7 +253,7 @@ class SpokenItem:
     confidence: float
 
 
-def network_words(
+def decode_network(
     hmm: UnitHmm, aligning: LogLikelihoods, loud: NDArray[np.bool_], found: Sequence[PosteriorStretch]
 ) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
     """Return the stretches in which a phone recogniser finds something, with their phones, and the words.
@@ -264,7 +264,7 @@ def network_words(
     """
     parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
     for stretch, posteriors in found:
-        items = spoken_items(posteriors)
+        items = list_spoken(posteriors)
         lexicon = Lexicon({str(number): item.variants for number, item in enumerate(items)})
         names = [str(number) for number in range(len(items))]
         aligned = _align(hmm, aligning.stretch(*stretch), loud[slice(*stretch)], names, lexicon) if items else None
@@ -272,7 +272,7 @@ def network_words(
             wordless = {len(recognised) + number for number, item in enumerate(items) if not item.text}
             parts += [
                 (frames, [label._replace(word=-1) if label.word in wordless else label for label in labels])
-                for frames, labels in labels_of_words(aligned, stretch, np.ones(len(items), bool), len(recognised))
+                for frames, labels in label_words(aligned, stretch, np.ones(len(items), bool), len(recognised))
             ]
         recognised += [RecognisedWord(item.text, item.confidence) for item in items]
     return parts, recognised
@@ -288,12 +288,12 @@ def _align(
         return None
 
 
-def spoken_items(posteriors: PhonePosteriors) -> list[SpokenItem]:
+def list_spoken(posteriors: PhonePosteriors) -> list[SpokenItem]:
     """Return what is said in a stretch of English, in order; nothing where the network finds no phone."""
     if not _finds_phones(posteriors):
         return []
     items = []
-    for word in decoded_words(english_words(), scored(posteriors)):
+    for word in decode_words(load_english(), score_stretch(posteriors)):
         found = posteriors.phones_between(word.first, word.end)
         variants = Lexicon().pronunciations(word.text) if word.text else (tuple(found),)
         if not variants[0]:
@@ -309,7 +309,7 @@ def spoken_items(posteriors: PhonePosteriors) -> list[SpokenItem]:
     return items
 
 
-def phones_without_words(
+def list_wordless(
     hmm: UnitHmm, loop: UnitLoop, free: LogLikelihoods, found: Sequence[PosteriorStretch]
 ) -> list[LabelledStretch]:
     """Return the stretches in which something is said, with their phones: in any language, and where nobody is sure.
@@ -326,10 +326,10 @@ def phones_without_words(
             posterior = np.zeros((frames, len(FORMS)), np.float32)
             for column, phone in enumerate(PHONES):
                 if not is_silent(phone):
-                    posterior[:, FORMS.index(compared_form(phone))] += np.exp(posteriors.of_phones[row, column])
-            values = free.stretch(*stretch) + density_bonus(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
+                    posterior[:, FORMS.index(normalise_word(phone))] += np.exp(posteriors.of_phones[row, column])
+            values = free.stretch(*stretch) + weigh_densities(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
             path = loop.network.best_path(wrap_log_likelihoods(values))
-            parts.append((stretch, free_labels(loop, path, stretch.first)))
+            parts.append((stretch, recognise_free(loop, path, stretch.first)))
     return parts
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.loudness import find_loud_frames
-from lipmotion.speech.features.mfcc import HOP, WINDOW, checked_samples, log_energy, spectrum
+from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, log_energy, spectrum
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import Audio, ConditionSpectrum
 
@@ -23,22 +23,22 @@ SILENT_RMS = 1e-6
 Noise = NDArray[np.float32]
 
 
-def noisy_audio(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:
+def mix_noise(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:
     """Return a recording with noise of a kind added to it.
 
     kind    : one of ``NOISE_KINDS``
     snr_db  : as ``add_noise`` measures it
     talkers : recordings of the babble's talkers, other people than the one in ``audio``; white noise does not use them
-    Raises InputError: another kind, a talker that is the recording itself, or as ``add_noise`` and ``babble_noise``.
+    Raises InputError: another kind, a talker that is the recording itself, or as ``add_noise`` and ``make_babble``.
     """
     if kind not in NOISE_KINDS:
         raise InputError(f"unknown noise {kind!r}; required one of: {', '.join(NOISE_KINDS)}")
-    count = len(checked_samples(audio))
+    count = len(check_samples(audio))
     if kind == "white":
-        return add_noise(audio, white_noise(count, seed), snr_db)
+        return add_noise(audio, make_hiss(count, seed), snr_db)
     if any(np.array_equal(talker.samples, audio.samples) for talker in talkers):
         raise InputError("the recording is one of the talkers of its own babble; leave its speaker out of the talkers")
-    return add_noise(audio, babble_noise(talkers, count, seed), snr_db)
+    return add_noise(audio, make_babble(talkers, count, seed), snr_db)
 
 
 def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio:
@@ -46,14 +46,14 @@ def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio
 
     noise  : as many samples as the recording has [shape=(N,)], of any level
     snr_db : 10 · log10 of the mean power of the recording over that of the noise, both over the samples of speech
-             (``spoken_samples``); noise that the recording already has counts as speech there
+             (``mark_spoken``); noise that the recording already has counts as speech there
     The samples are not clipped: beyond full scale they are exact for features, not for sound files of integers.
     Raises InputError: the ratio is not finite, the lengths differ, the noise is silent or not finite, or there is no
     speech in the recording.
     """
     if not np.isfinite(snr_db):
         raise InputError(f"the signal-to-noise ratio is {snr_db} dB, required a finite number")
-    spoken = spoken_samples(audio)
+    spoken = mark_spoken(audio)
     if noise.shape != audio.samples.shape:
         raise InputError(f"the noise has shape {noise.shape}, required that of the recording, {audio.samples.shape}")
     noise_power = float(np.square(noise[spoken], dtype=float).mean())
@@ -63,13 +63,13 @@ def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio
     return Audio((audio.samples + gain * noise).astype(np.float32), audio.rate_hz)
 
 
-def white_noise(samples: int, seed: int = 0) -> Noise:
+def make_hiss(samples: int, seed: int = 0) -> Noise:
     """Return Gaussian noise of variance 1 [shape=(samples,)]. Raises InputError: fewer than 1 sample."""
     _check_length(samples)
     return np.random.default_rng(seed).standard_normal(samples, np.float32)
 
 
-def babble_noise(voices: Sequence[Audio], samples: int, seed: int = 0) -> Noise:
+def make_babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> Noise:
     """Return the sum of several talkers, each with the same power [shape=(samples,)].
 
     voices : at least ``FEWEST_TALKERS`` recordings at 16 kHz, none of them of the speaker to whom they are added
@@ -83,13 +83,13 @@ def babble_noise(voices: Sequence[Audio], samples: int, seed: int = 0) -> Noise:
     rng = np.random.default_rng(seed)
     total = np.zeros(samples)
     for voice in voices:
-        level = np.sqrt(_power(voice, spoken_samples(voice)))
+        level = np.sqrt(_power(voice, mark_spoken(voice)))
         start = int(rng.integers(len(voice.samples)))
         total += np.resize(np.roll(voice.samples, -start), samples) / level
     return total.astype(np.float32)
 
 
-def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
+def mark_spoken(audio: Audio) -> NDArray[np.bool_]:
     """Return which samples are speech [shape=(N,)]: the 10 ms around each frame that is loud for this recording.
 
     A frame is loud where its log energy (25 ms), averaged over 11 frames, lies above the middle between the 10th and
@@ -97,7 +97,7 @@ def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
     signal-to-noise ratio does not depend on how long they are.
     Raises InputError: not one channel of finite samples at 16 kHz, shorter than 25 ms, or silent.
     """
-    samples = checked_samples(audio)
+    samples = check_samples(audio)
     loud = find_loud_frames(log_energy(samples))
     if not loud.any():  # a steady tone has no quiet frames
         loud = np.ones_like(loud)
@@ -137,9 +137,7 @@ MU = 255.0
 Samples = NDArray[np.float64]
 
 
-def condition_spectra(
-    audio: Audio, voices: Sequence[Audio], count: int, seed: Sequence[int]
-) -> list[ConditionSpectrum]:
+def list_conditions(audio: Audio, voices: Sequence[Audio], count: int, seed: Sequence[int]) -> list[ConditionSpectrum]:
     """Return the spectrum of a recording as it is, and in ``count`` - 1 random conditions.
 
     voices : other recordings, whose voices, at other speeds, make the babble
@@ -153,12 +151,12 @@ def condition_spectra(
         sped = audio  # played ``tempo`` times as fast: tempo, pitch and formants change together
         if tempo != 1.0 and len(samples := _resample(audio.samples, tempo)) >= WINDOW:
             sped = Audio(samples.astype(np.float32), audio.rate_hz)
-        varied, distortion = in_condition(sped, voices, rng)
+        varied, distortion = apply_condition(sped, voices, rng)
         result.append(ConditionSpectrum(spectrum(varied, warp).astype(np.float16), tempo, distortion))
     return result
 
 
-def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator) -> tuple[Audio, float]:
+def apply_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator) -> tuple[Audio, float]:
     """Return a recording in a random acoustic condition, and its distortion, 0 to 1.
 
     Rooms are exponentially decaying noise, filters are smooth random curves or the band of a telephone. In one of five
@@ -166,7 +164,7 @@ def in_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Generator
     """
     samples, level = audio.samples.astype(float), 0.0
     with suppress(InputError):  # a recording without sound
-        level = _power(audio, spoken_samples(audio))
+        level = _power(audio, mark_spoken(audio))
     if level <= 0 or rng.random() < CLEAN_PROBABILITY:
         return audio, 0.0
     added = 0.0

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.sources import check_source, is_text, open_media, stated_duration_s, video_streams
+from lipmotion.storage.sources import check_source, is_text, list_video, open_media, read_duration
 from lipmotion.types import Audio
 
 HOLE_S = 0.04
@@ -123,7 +123,7 @@ class _TrackDecoder:
     def _stated_s(self) -> float:
         if self._container.streams.video and not self._stream.duration:
             return 0.0
-        return stated_duration_s(self._container, self._stream)
+        return read_duration(self._container, self._stream)
 
     def _frames(self) -> Iterator[Any]:
         """Yield the frames that can be decoded; damaged packets are counted."""
@@ -153,7 +153,7 @@ class _TrackDecoder:
             self._clock_s += frame.samples / frame.sample_rate
 
     def _start(self, time_s: float) -> None:
-        has_pictures = bool(video_streams(self._container))
+        has_pictures = bool(list_video(self._container))
         offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
         self._count += self._silence(max(offset_s, 0.0))
         self._cut = max(round(-offset_s * self._rate_hz), 0)
@@ -277,7 +277,7 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
     import av
 
     try:
-        with open_media(path, content=_corrected_wave(path)) as container:
+        with open_media(path, content=_correct_wave(path)) as container:
             if not container.streams.audio:
                 raise InputError(f"{path}: has no sound track; give a recording with sound")
             stream = container.streams.audio[0]
@@ -319,7 +319,7 @@ class _Wave(mmap.mmap):
         return super().tell() - self.start
 
 
-def _corrected_wave(path: Path) -> _Wave | None:
+def _correct_wave(path: Path) -> _Wave | None:
     """Return a WAVE file under a header that FFmpeg understands; None: its own is one, or it is no WAVE file.
 
     FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container: 24 bits in 32 as 24,

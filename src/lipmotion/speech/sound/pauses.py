@@ -26,36 +26,36 @@ MIN_SPEECH_S = 0.1
 QUIETEST_DB = -100.0
 
 
-def levels_db(audio: Audio) -> Array:
+def measure_levels_db(audio: Audio) -> Array:
     """Return the smoothed level of every 10 ms [shape=(floor(duration / 0.01),)], dB of full scale."""
     from scipy.ndimage import uniform_filter1d
 
     levels: Array = 10 * np.log10(
-        np.maximum(mean_powers(audio.samples, round(STEP_S * audio.rate_hz)), 10 ** (QUIETEST_DB / 10))
+        np.maximum(average_powers(audio.samples, round(STEP_S * audio.rate_hz)), 10 ** (QUIETEST_DB / 10))
     )
     return uniform_filter1d(levels, SMOOTHING_FRAMES, mode="nearest") if len(levels) else levels
 
 
-def mean_powers(samples: NDArray[np.float32], size: int) -> Array:
+def average_powers(samples: NDArray[np.float32], size: int) -> Array:
     """Return the mean square of every ``size`` samples [shape=(N // size,)]."""
     frames = samples[: len(samples) // size * size].reshape(-1, size)
     powers: Array = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
     return powers
 
 
-def levels_db_at(audio: Audio, times_s: Array) -> Array:
+def measure_levels_at(audio: Audio, times_s: Array) -> Array:
     """Return the smoothed level of a sound at some times, dB of full scale [same shape].
 
     times_s : rising, s [shape=(T,)]; before the first and after the last level that one is returned
     A sound of less than 10 ms has the level ``QUIETEST_DB``.
     """
-    levels = levels_db(audio)
+    levels = measure_levels_db(audio)
     if not len(levels):
         return np.full(len(times_s), QUIETEST_DB)
     return np.interp(times_s, (np.arange(len(levels)) + 0.5) * STEP_S, levels)
 
 
-def spoken_spans(levels: Array) -> list[tuple[float, float]]:
+def list_spans(levels: Array) -> list[tuple[float, float]]:
     """Return start and end of every stretch between two pauses, s.
 
     levels : of ``levels_db``
@@ -83,7 +83,7 @@ def spoken_spans(levels: Array) -> list[tuple[float, float]]:
     return [(start_s, end_s) for start_s, end_s in joined if end_s - start_s >= MIN_SPEECH_S]
 
 
-def quietest_s(levels: Array, start_s: float, end_s: float) -> float:
+def find_quietest(levels: Array, start_s: float, end_s: float) -> float:
     """Return the time of the lowest level from ``start_s`` to ``end_s``; their middle if no frame lies between."""
     first, last = round(start_s / STEP_S), round(end_s / STEP_S)
     part = levels[max(first, 0) : max(last, 0)]

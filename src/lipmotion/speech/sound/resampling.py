@@ -21,7 +21,7 @@ BLOCK = 1 << 16
 """Samples that are resampled at a time."""
 
 
-def at_speech_rate(sound: Audio) -> Audio:
+def resample_speech(sound: Audio) -> Audio:
     """Return sound at 16 kHz, bit by bit what ``read_audio`` returns of a ``.wav`` or ``.flac`` with its 16 bits."""
     import av
 
@@ -46,7 +46,7 @@ BETA = 5.0
 """Shape of the filter's Kaiser window."""
 
 
-def decimated(samples: Samples, factor: int) -> Samples:
+def decimate(samples: Samples, factor: int) -> Samples:
     """Return every ``factor``-th sample of a sound from which what the lower rate cannot hold is removed.
 
     samples : [shape=(N,)]
@@ -93,7 +93,7 @@ class JoinedPieces(NamedTuple):
     shifts: list[int]
 
 
-def overlapped(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, float]], rate_hz: int) -> JoinedPieces:
+def overlap_pieces(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, float]], rate_hz: int) -> JoinedPieces:
     """Return pieces of sounds, one after the other, which overlap where their waveforms are most alike.
 
     pieces_s : start and end of each piece in its recording, in seconds
@@ -110,7 +110,7 @@ def overlapped(sounds: Sequence[Samples], pieces_s: Sequence[tuple[float, float]
             shifts.append(0)
             continue
         tail = result[-2 * half :]
-        shifts.append(_best_shift(tail, sound, start - half, reach))
+        shifts.append(_find_shift(tail, sound, start - half, reach))
         start += shifts[-1]
         piece = _cut(sound, start - half, max(end, start + 1) + half)
         count = min(2 * half, len(tail), len(piece))
@@ -127,7 +127,7 @@ def _cut(sound: Samples, start: int, end: int) -> NDArray[np.float64]:
     return np.pad(inside, (max(-start, 0), max(end - max(start, 0) - len(inside), 0)))
 
 
-def _best_shift(tail: NDArray[np.float64], sound: Samples, start: int, reach: int) -> int:
+def _find_shift(tail: NDArray[np.float64], sound: Samples, start: int, reach: int) -> int:
     """Return by how many samples later a piece begins so that its waveform is most like the end of the one before."""
     area = _cut(sound, start - reach, start + reach + len(tail))
     products = np.correlate(area, tail, "valid")

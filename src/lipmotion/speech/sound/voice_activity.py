@@ -59,7 +59,7 @@ class Stretch(NamedTuple):
     end: int
 
 
-def stretches_of_sound(log_energy: NDArray[np.float32]) -> list[Stretch]:
+def find_sound(log_energy: NDArray[np.float32]) -> list[Stretch]:
     """Return the stretches of a recording that may hold speech, in order, without overlap.
 
     log_energy : of every frame, natural logarithm [shape=(T,)]
@@ -92,7 +92,7 @@ def _cut(stretch: Stretch, log_energy: NDArray[np.float32]) -> list[Stretch]:
     return [*pieces, Stretch(first, end)]
 
 
-def stretch_samples(audio: Audio, stretch: Stretch) -> bytes:
+def read_stretch(audio: Audio, stretch: Stretch) -> bytes:
     """Return the samples of a stretch of a recording at 16 kHz, as 16-bit integers."""
     return to_sixteen_bits(audio.samples[stretch.first * HOP : stretch.end * HOP]).astype("<i2").tobytes()
 
@@ -198,7 +198,7 @@ def _joined(runs: list[Stretch]) -> list[Stretch]:
 def fill_gaps(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the samples of a passage with noise in the digital silence between its words, as of a noise gate.
 
-    samples, log_energy : as of ``passage_gain``: the samples are those of the passage
+    samples, log_energy : as of ``find_passage_gain``: the samples are those of the passage
     Where nothing is recorded, features are unlike those of any room: all else would look alike beside them, and every
     voice like that of the training.
     """
@@ -214,7 +214,7 @@ def fill_gaps(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> 
     return filled
 
 
-def passage_gain(log_energy: NDArray[np.float32]) -> NDArray[np.float64]:
+def find_passage_gain(log_energy: NDArray[np.float32]) -> NDArray[np.float64]:
     """Return the factors that bring the frames of a passage to the level of all passages [shape=(T,)].
 
     log_energy : of its frames, natural logarithm [shape=(T,)]

@@ -37,10 +37,10 @@ from lipmotion.speech.voices.synthesiser import (
     Synthesiser,
     SyntheticVoice,
     complete_map,
-    program_output,
+    run_program,
 )
 from lipmotion.types import Audio, Span, Timeline
-from lipmotion.types.languages import ENGLISH, LANGUAGES, foreign_letters
+from lipmotion.types.languages import ENGLISH, LANGUAGES, find_foreign
 from lipmotion.units import SILENCE, Lexicon, Pronunciation, list_phone_classes
 from lipmotion.units.ipa_phones import read_ipa
 from lipmotion.units.lexicon import SpokenForm
@@ -57,7 +57,7 @@ the project's own alignments."""
 Starts = Sequence[tuple[str, float]]
 
 
-def corrected_phone_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHONES) -> Timeline[str]:
+def correct_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ESPEAK_PHONES) -> Timeline[str]:
     """Return phones in time: each from its corrected start to that of the next, or to the end of the sound."""
     labels = [label for label, _ in starts]
     edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
@@ -97,7 +97,7 @@ LARGEST_VOICE_BYTES = 1 << 16
 Start = tuple[str, float, int]
 
 
-def wheel_folder() -> Path | None:
+def find_wheel() -> Path | None:
     """Return the folder of the Python package with library and data; None: it is not installed."""
     spec = find_spec(WHEEL)  # it is not imported
     folders = list(spec.submodule_search_locations or ()) if spec else []
@@ -106,7 +106,7 @@ def wheel_folder() -> Path | None:
 
 def _library() -> dict[str, str]:
     """Return the paths of the library and of its data for a task; none for those of the system."""
-    folder = wheel_folder()
+    folder = find_wheel()
     if folder is None:
         return {}
     names = ("libespeak-ng.so", "libespeak-ng.dylib", "espeak-ng.dll")
@@ -116,19 +116,19 @@ def _library() -> dict[str, str]:
 
 def _data() -> Path | None:
     """Return the folder of languages and variants; None: espeak-ng is not installed."""
-    folder = wheel_folder()
+    folder = find_wheel()
     if folder is not None:
         return folder / DATA
-    return _system_data(shutil.which("espeak-ng"))
+    return _find_system_data(shutil.which("espeak-ng"))
 
 
 @cache
-def _system_data(program: str | None) -> Path | None:
+def _find_system_data(program: str | None) -> Path | None:
     """Return the data folder of the system's library, of which ``program`` tells that it is installed."""
     if program is None:
         return None
     try:
-        about = json.loads(program_output(PROGRAM, PACKAGE, given="{}"))
+        about = json.loads(run_program(PROGRAM, PACKAGE, given="{}"))
         return Path(about["data"])
     except (LipMotionError, ValueError, KeyError, TypeError):  # the library or its data are missing
         return None
@@ -158,7 +158,7 @@ def _others() -> tuple[SyntheticVoice, ...]:
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     ipa = voice.partition("+")[0] != LANGUAGE
     task = {"voice": voice, "texts": list(texts), "folder": str(folder), "ipa": ipa} | _library()
-    sentences = _answer(program_output(PROGRAM, PACKAGE, len(texts), json.dumps(task), folder))
+    sentences = _answer(run_program(PROGRAM, PACKAGE, len(texts), json.dumps(task), folder))
     labels = (label.lstrip(STRESS_MARKS) for said in sentences for label, _, _ in said)
     phone_map, unknown = complete_map(labels, NO_IPA if ipa else ESPEAK_PHONES, ipa=ipa)
     if unknown:
@@ -167,13 +167,13 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
         path = folder / f"{number}.wav"
         audio = read_audio(path)
         starts = [(label.lstrip(STRESS_MARKS), start_s) for label, start_s, _ in said]
-        phones = corrected_phone_times(starts, audio, phone_map)
-        words = _written_words(phones, [place for _, _, place in said], text)
+        phones = correct_times(starts, audio, phone_map)
+        words = _spell_words(phones, [place for _, _, place in said], text)
         yield SynthesisedSentence(audio, phones, path, words, phone_map)
         path.unlink()
 
 
-def pronounced_words(words: Sequence[str], voice: str) -> list[str]:
+def pronounce_words(words: Sequence[str], voice: str) -> list[str]:
     """Return the phones of each word in IPA, divided by ``|`` and blanks, with marks of stress and language (``(en)``).
 
     voice : of ``ESPEAK_NG.others()``
@@ -183,13 +183,13 @@ def pronounced_words(words: Sequence[str], voice: str) -> list[str]:
     if voice not in [each.name for each in _others()]:
         raise MissingDependencyError(f"espeak-ng is not installed, or has no {voice}: {install_command(EXTRA)}")
     task = {"voice": voice, "words": list(words)} | _library()
-    found = _answer(program_output(PROGRAM, PACKAGE, len(words), json.dumps(task)))
+    found = _answer(run_program(PROGRAM, PACKAGE, len(words), json.dumps(task)))
     if not isinstance(found, list) or len(found) != len(words):
         raise InputError(f"espeak-ng's library answers {str(found)[:40]!r}; install it again: {PACKAGE}")
     return [str(phones) for phones in found]
 
 
-def _written_words(phones: Timeline[str], places: Sequence[int], text: str) -> Timeline[str]:
+def _spell_words(phones: Timeline[str], places: Sequence[int], text: str) -> Timeline[str]:
     """Return the words of a text in time: what stands between blanks. Words that are said as one (*on the*) are one."""
     words = text.split()
     starts = [at for at in range(len(text)) if not text[at].isspace() and (at == 0 or text[at - 1].isspace())]
@@ -249,14 +249,14 @@ def _pronounce(words: Sequence[str], language: str) -> dict[str, tuple[Pronuncia
     """Return the pronunciations of words, by word. Raises as ``LanguageLexicon.with_words``."""
     spoken = LANGUAGES[language]
     for word in words:
-        if letters := foreign_letters(word, language):
+        if letters := find_foreign(word, language):
             raise InputError(
                 f"no rules say how {shorten(repr(word))} is said in {spoken.name} ({shorten(letters)}): write it "
                 f"as it is spoken ({' or '.join(spoken.scripts).lower()} letters), add it to a lexicon file, or give "
                 "another language"
             )
     try:
-        said = zip(words, pronounced_words(words, spoken.voice or language), strict=True)
+        said = zip(words, pronounce_words(words, spoken.voice or language), strict=True)
         found: dict[str, tuple[Pronunciation, ...]] = {
             word: (tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in read_ipa(label)[0]),)
             for word, ipa in said

@@ -15,15 +15,15 @@ from lipmotion.errors import InputError, LipMotionError, MissingDependencyError,
 from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
-from lipmotion.speech.voices.inventory_phones import inventory_timeline
+from lipmotion.speech.voices.inventory_phones import convert_phones
 from lipmotion.speech.voices.synthesiser import (
     ARPABET_PHONES,
     SynthesisedSentence,
     Synthesiser,
     SyntheticVoice,
-    program_output,
+    run_program,
 )
-from lipmotion.storage.locks import temporary_folder
+from lipmotion.storage.locks import open_temporary
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import Lexicon, split_words
 
@@ -33,10 +33,10 @@ UNUSED = frozenset({"kal", "awb_time"})
 SPEAKERS = {"kal16": "kal"}
 
 
-def _flite_voices() -> tuple[SyntheticVoice, ...]:
+def _list_flite() -> tuple[SyntheticVoice, ...]:
     if shutil.which("flite") is None:
         return ()
-    names = program_output(["flite", "-lv"], FLITE_PACKAGE).partition(":")[2].split()
+    names = run_program(["flite", "-lv"], FLITE_PACKAGE).partition(":")[2].split()
     return tuple(SyntheticVoice(name, "flite", SPEAKERS.get(name, name)) for name in names if name not in UNUSED)
 
 
@@ -44,7 +44,7 @@ def _say_with_flite(voice: str, texts: Sequence[str], folder: Path) -> Iterator[
     path = folder / "flite.wav"
     for text in texts:
         command = ["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text]
-        printed = program_output(command, FLITE_PACKAGE, folder=folder)
+        printed = run_program(command, FLITE_PACKAGE, folder=folder)
         yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed), path)
 
 
@@ -68,7 +68,7 @@ def parse_phone_ends(printed: str) -> Timeline[str]:
     return Timeline(tuple(spans))
 
 
-FLITE = Synthesiser("flite", FLITE_PACKAGE, _flite_voices, _say_with_flite, ARPABET_PHONES)
+FLITE = Synthesiser("flite", FLITE_PACKAGE, _list_flite, _say_with_flite, ARPABET_PHONES)
 
 
 FESTIVAL_PACKAGE = "festival festvox-us-slt-hts"
@@ -87,10 +87,10 @@ SPEAKING = f"""(define (say text path)
 """
 
 
-def _festival_voices() -> tuple[SyntheticVoice, ...]:
+def _list_festival() -> tuple[SyntheticVoice, ...]:
     if shutil.which("festival") is None:
         return ()
-    rows = [line.split() for line in program_output(["festival", "-b", LISTING], FESTIVAL_PACKAGE).splitlines()]
+    rows = [line.split() for line in run_program(["festival", "-b", LISTING], FESTIVAL_PACKAGE).splitlines()]
     names = [row[0] for row in rows if row[1:] == ["english", "american"]]
     speakers = (re.sub(r"_.*", "", re.sub(r"^cmu_us_", "", name)) for name in names)  # slt of cmu_us_slt_arctic_hts
     return tuple(SyntheticVoice(name, "festival", who) for name, who in zip(names, speakers, strict=True))
@@ -101,7 +101,7 @@ def _say_with_festival(voice: str, texts: Sequence[str], folder: Path) -> Iterat
     script = folder / "say.scm"
     calls = [f"(say {_quote(text)} {_quote(str(path))})" for text, path in zip(texts, paths, strict=True)]
     script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
-    printed = program_output(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts), folder=folder)
+    printed = run_program(["festival", "-b", str(script)], FESTIVAL_PACKAGE, len(texts), folder=folder)
     parts = printed.split(f"{MARK}\n")[1:]
     if len(parts) != len(texts):
         raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")
@@ -121,7 +121,7 @@ def _quote(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-FESTIVAL = Synthesiser("festival", FESTIVAL_PACKAGE, _festival_voices, _say_with_festival, ARPABET_PHONES)
+FESTIVAL = Synthesiser("festival", FESTIVAL_PACKAGE, _list_festival, _say_with_festival, ARPABET_PHONES)
 
 
 LOG = logging.getLogger("lipmotion")
@@ -154,12 +154,12 @@ class VoicedSentence:
         return read_audio(self.sound, rate_hz)
 
 
-def installed_voices() -> tuple[SyntheticVoice, ...]:
+def list_installed() -> tuple[SyntheticVoice, ...]:
     """Return the American English voices of the synthesisers that are installed; none where none is."""
     return tuple(voice for synthesiser in SYNTHESISERS.values() for voice in synthesiser.voices())
 
 
-def all_voices() -> tuple[SyntheticVoice, ...]:
+def list_voices() -> tuple[SyntheticVoice, ...]:
     """Return the installed voices of all languages: the American English ones first.
 
     A synthesiser that is installed and does not work is left out, with a warning.
@@ -179,7 +179,7 @@ def _works(synthesiser: Synthesiser) -> bool:
     return True
 
 
-def voice_named(name: str) -> SyntheticVoice:
+def find_voice(name: str) -> SyntheticVoice:
     """Return the installed voice of a name.
 
     name : ``SYNTHESISER:VOICE``, as in ``flite:slt`` or ``espeak-ng:de``; or the voice's name alone, where only one
@@ -192,7 +192,7 @@ def voice_named(name: str) -> SyntheticVoice:
         raise InputError(f"unknown synthesiser {shorten(maker)!r}; required one of: {', '.join(SYNTHESISERS)}")
     asked = [SYNTHESISERS[maker]] if colon else [each for each in SYNTHESISERS.values() if _works(each)]
     if not colon and not any(synthesiser.voices() for synthesiser in asked):
-        raise nothing_installed()
+        raise explain_missing()
     found = []
     for synthesiser in asked:
         listed = {voice.name: voice for voice in (*synthesiser.others(), *synthesiser.voices())}
@@ -202,7 +202,7 @@ def voice_named(name: str) -> SyntheticVoice:
             language = rest.partition("+")[0]
             found.append(SyntheticVoice(rest, synthesiser.name, f"espeak-{rest}", language))
         elif colon and not listed:
-            raise MissingDependencyError(f"{maker} is not installed: {how_to_install(synthesiser)}")
+            raise MissingDependencyError(f"{maker} is not installed: {explain_install(synthesiser)}")
     if len(found) == 1:
         return found[0]
     if found:
@@ -211,7 +211,7 @@ def voice_named(name: str) -> SyntheticVoice:
     raise InputError(f"no voice {shorten(name)!r} is installed; lipmotion speak --voices lists those that are")
 
 
-def default_voice() -> SyntheticVoice:
+def choose_voice() -> SyntheticVoice:
     """Return the first of ``DEFAULT_VOICES`` that is installed, else the first installed voice.
 
     Raises MissingDependencyError: no synthesiser is installed.
@@ -220,13 +220,13 @@ def default_voice() -> SyntheticVoice:
         voice = next((voice for voice in SYNTHESISERS[maker].voices() if voice.name == name), None)
         if voice is not None:
             return voice
-    voice = next(iter(all_voices()), None)
+    voice = next(iter(list_voices()), None)
     if voice is None:
-        raise nothing_installed()
+        raise explain_missing()
     return voice
 
 
-def nothing_installed() -> MissingDependencyError:
+def explain_missing() -> MissingDependencyError:
     """Return the error that says how to install a synthesiser."""
     debian = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
     return MissingDependencyError(
@@ -243,12 +243,12 @@ def speak_sentences(
     Raises MissingDependencyError: the synthesiser is not installed (the message names the package).
     Raises InputError: no such synthesiser or voice, a text without a word, or one that the synthesiser cannot say.
     """
-    with closing(voiced_sentences(texts, voice, lexicon)) as sentences:
+    with closing(voice_sentences(texts, voice, lexicon)) as sentences:
         for sentence in sentences:
             yield sentence.audio, sentence.units
 
 
-def voiced_sentences(
+def voice_sentences(
     texts: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None = None
 ) -> Generator[VoicedSentence, None, None]:
     """Yield several sentences in a voice, as ``speak_sentences``, each with the sound at the synthesiser's own rate."""
@@ -258,19 +258,19 @@ def voiced_sentences(
     names = [known.name for known in synthesiser.voices()]
     if not names:
         raise MissingDependencyError(
-            f"{synthesiser.name} is not installed, or has no English voice: {how_to_install(synthesiser)}"
+            f"{synthesiser.name} is not installed, or has no English voice: {explain_install(synthesiser)}"
         )
     if voice.name not in names and not _is_other(voice.name, synthesiser):
         raise InputError(f"{synthesiser.name} has no voice {voice.name!r} here; it has: {', '.join(names)}")
     words = [split_words(text) for text in texts]
     known = (lexicon or Lexicon()) if voice.is_english else None
-    with temporary_folder() as folder:
+    with open_temporary() as folder:
         plain = [" ".join(text.split()) for text in texts]
         sentences = synthesiser.synthesise(voice.name, plain, folder) if plain else iter(())
         for said, its_words in zip(sentences, words, strict=True):
             phone_map = said.phone_map or synthesiser.phone_map
             written = its_words if said.words is None else said.words
-            units = inventory_timeline(said.phones, phone_map, written, known, said.audio.duration_s)
+            units = convert_phones(said.phones, phone_map, written, known, said.audio.duration_s)
             yield VoicedSentence(said.audio, units, said.sound)
 
 
@@ -281,7 +281,7 @@ def _is_other(name: str, synthesiser: Synthesiser) -> bool:
     return language in {voice.name for voice in synthesiser.others()} and (not plus or variant in variants)
 
 
-def how_to_install(synthesiser: Synthesiser) -> str:
+def explain_install(synthesiser: Synthesiser) -> str:
     """Return the commands that install a synthesiser, for a message."""
     package = f"apt install {synthesiser.package}"
     return f"{package}, or {install_command(synthesiser.extra)}" if synthesiser.extra else package

@@ -25,7 +25,7 @@ WRITTEN_EDGES = re.compile(r"^[^\w]+|[^\w]+$")
 Phones = Sequence[tuple[str, float, float]]
 
 
-def inventory_timeline(
+def convert_phones(
     labels: Timeline[str],
     phone_map: PhoneMap,
     words: Sequence[str] | Timeline[str],

@@ -147,7 +147,7 @@ SHOWN_CHARACTERS = 200
 """Characters of a program's error message that ours repeats."""
 
 
-def program_output(
+def run_program(
     command: Sequence[str], package: str, sentences: int = 1, given: str = "", folder: Path | None = None
 ) -> str:
     """Return the standard output of a program. When it has ended, in whatever way, so have the programs it started.

@@ -43,7 +43,7 @@ from lipmotion.engines.coupled.training.chain_training import (
 )
 from lipmotion.engines.coupled.training.coupled_training import train_on_speech
 from lipmotion.measures.curves import correlate_pooled
-from lipmotion.motion.frame_labels import frames_away
+from lipmotion.motion.frame_labels import mark_distant
 from lipmotion.testing import examples
 from lipmotion.types import FRAME_RATE_HZ, GREY, Channel, Example, Motion, Span, Timeline, Unit, silent_monitor
 from oracles import coupled as oracle
@@ -160,7 +160,7 @@ def test_floors_are_of_observed_frames():
 
 def test_frames_away_from_speech_are_silence():
     units = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 0.7, Unit("aa")), Span(0.7, 1.5, Unit("sil"))))
-    away = frames_away(units, 151, 0.45)
+    away = mark_distant(units, 151, 0.45)
     assert away[:4].all()
     assert not away[6:114].any()
     assert away[116:].all()

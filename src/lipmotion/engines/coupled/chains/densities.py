@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.mixture import Mixtures, QuadraticForm, normalised_components, with_squares
+from lipmotion.stats.mixture import Mixtures, QuadraticForm, normalise_components, with_squares
 
 Index = NDArray[np.intp]
 Single = NDArray[np.float32]
@@ -103,7 +103,7 @@ class EmissionEvaluator:
                 log[~observed] = 0
             total += log
         total += log_weights
-        return normalised_components(total)
+        return normalise_components(total)
 
 
 @dataclass(frozen=True, eq=False)

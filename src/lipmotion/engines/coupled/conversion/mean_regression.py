@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import CorpusError
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
 from lipmotion.stats.pca import find_principal_axes, measure_covariance
-from lipmotion.stats.trees import ridge, zero_statistics
+from lipmotion.stats.trees import create_statistics, ridge
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -154,7 +154,7 @@ def fit_visual_regression(
     family              : the family of each regression [shape=(E,)]; that of a family has a ridge towards that of all
     """
     outputs, size, count = utterances[0].targets[stream].shape[1], inputs.basis.shape[1] + 1, len(family)
-    statistics = [zero_statistics(size, outputs) for _ in range(count)]
+    statistics = [create_statistics(size, outputs) for _ in range(count)]
     for utterance in utterances:
         z = inputs.observed_frames(utterance)
         weights = weigh_regressions(utterance.chain_posteriors[stream], regression_of_state, count)[utterance.observed]

@@ -53,7 +53,7 @@ from lipmotion.errors import CorpusError
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
-from lipmotion.motion.frame_labels import frames_away
+from lipmotion.motion.frame_labels import mark_distant
 from lipmotion.motion.generation import fit_scaling_factors
 from lipmotion.motion.modulation_filter import learn_filter
 from lipmotion.motion.predictors import PREDICTORS, Predictor, PredictorTraining
@@ -226,7 +226,7 @@ def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[Traini
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
     """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)]."""
     silent_poses = [
-        x[mask & frames_away(example.speech.units, len(x), AWAY_FROM_SPEECH_S)]
+        x[mask & mark_distant(example.speech.units, len(x), AWAY_FROM_SPEECH_S)]
         for example, x, mask in zip(examples, values, valid, strict=True)
     ]
     poses = np.concatenate(silent_poses)

@@ -93,7 +93,7 @@ class EnglishWords(NamedTuple):
 
 
 @cache
-def english_words() -> EnglishWords:
+def load_english() -> EnglishWords:
     """Return tree and language model of English; they are made once, in about a second.
 
     Raises MissingDependencyError: pocketsphinx is not installed, or without its language model.
@@ -116,7 +116,7 @@ def english_words() -> EnglishWords:
     words = np.array([names[number] for number in chosen.tolist()])
     numbers = [_numbers(pronounced[word]) for word in words.tolist()]
     del pronounced, names  # no string of theirs is kept, which would keep the memory of many
-    tree = word_tree(numbers, scores[chosen] * LANGUAGE_WEIGHT)
+    tree = build_word_tree(numbers, scores[chosen] * LANGUAGE_WEIGHT)
     return EnglishWords(tree, LanguageModel(tuple(words.tolist()), model, base))
 
 
@@ -142,7 +142,7 @@ def _numbers(pronunciations: list[str]) -> list[bytes]:
     return [phones for phones in each if len(phones) <= LONGEST_WORD]
 
 
-def word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float64]) -> WordTree:
+def build_word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float64]) -> WordTree:
     """Return the tree of words.
 
     pronunciations : of each word, as numbers in ``SOUNDS``
@@ -231,7 +231,7 @@ class Scored(NamedTuple):
     between: Scores
 
 
-def scored(posteriors: PhonePosteriors) -> Scored:
+def score_stretch(posteriors: PhonePosteriors) -> Scored:
     """Return what paths may do, by posteriors."""
     phones = np.exp(posteriors.of_phones.astype(float))
     sounds = np.zeros((len(phones), len(SOUNDS)))
@@ -288,7 +288,7 @@ class _Paths:
         return kept
 
 
-def decoded_words(english: EnglishWords, rows: Scored) -> list[DecodedWord]:
+def decode_words(english: EnglishWords, rows: Scored) -> list[DecodedWord]:
     """Return the words of the best path, in order; none where every path has been given up within a word."""
     return _BeamSearch(english).words(rows)
 
@@ -307,7 +307,7 @@ class _BeamSearch:
     named: list[tuple[int, ...]] = field(default_factory=lambda: [()])
 
     def words(self, rows: Scored) -> list[DecodedWord]:
-        """Return what ``decoded_words`` does."""
+        """Return what ``decode_words`` does."""
         none = np.zeros(1, np.int64)
         paths = _Paths(none, none, np.zeros(1), np.full(1, NEVER), none - 1)
         for row in range(len(rows.sounds)):

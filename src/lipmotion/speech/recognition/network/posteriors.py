@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import MissingDependencyError
 from lipmotion.extensions import Registry
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, Passage, analysed
-from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stretches_of_sound
+from lipmotion.speech.sound.voice_activity import Stretch, find_sound, read_stretch
 from lipmotion.types import Audio, JoinedRows, ParallelMap, TokenPosteriors
 from lipmotion.types.audio import from_sixteen_bits
 from lipmotion.units import PHONES
@@ -90,7 +90,7 @@ def phone_recogniser(name: str) -> PhoneRecogniser:
 
 
 @cache
-def installed_phone_recogniser() -> str | None:
+def find_installed() -> str | None:
     """Return the name of the first phone recogniser that can be used on this machine; None: there is none."""
     return next((name for name in PHONE_RECOGNISERS.names if PHONE_RECOGNISERS.load(name).is_installed()), None)
 
@@ -129,7 +129,7 @@ class PhonePosteriors:
     @cached_property
     def of_phones(self) -> NDArray[np.float32]:
         """Logarithms of the posteriors of ``PHONES``, and last of none of them [shape=(N, 48)]."""
-        summed = np.exp(self.values, dtype=np.float32) @ _phones_of(self.tokens)
+        summed = np.exp(self.values, dtype=np.float32) @ _sum_phones(self.tokens)
         return np.log(np.maximum(summed, np.finfo(np.float32).tiny))
 
     @cached_property
@@ -165,7 +165,7 @@ class PosteriorStretch(NamedTuple):
     posteriors: PhonePosteriors
 
 
-def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> list[PosteriorStretch]:
+def find_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> list[PosteriorStretch]:
     """Return the posteriors in all stretches of sound of a recording; they are computed once.
 
     Raises InputError, MissingDependencyError: as ``phone_recogniser``.
@@ -175,10 +175,10 @@ def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map
 
     def found() -> list[PosteriorStretch]:
         tokens = phone_recogniser(name).tokens
-        places = [(part, each_of) for part in audio.passages for each_of in stretches_of_sound(part.audio.log_energy)]
+        places = [(part, each_of) for part in audio.passages for each_of in find_sound(part.audio.log_energy)]
         chosen = each if sum(stretch.end - stretch.first for _, stretch in places) > SHORT_FRAMES else map
-        sounds = (stretch_samples(part.audio, stretch) for part, stretch in places)
-        rows = chosen(partial(stretch_posteriors, name), sounds)
+        sounds = (read_stretch(part.audio, stretch) for part, stretch in places)
+        rows = chosen(partial(infer_stretch, name), sounds)
         by_passage: dict[int, list[PosteriorStretch]] = {part.first: [] for part in audio.passages}
         for (part, stretch), values in zip(places, rows, strict=True):
             found_here = PhonePosteriors(values.astype(np.float32), tokens)
@@ -187,12 +187,12 @@ def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map
             return by_passage[0]
         for part in audio.passages:
             part.audio.cached(key, partial(by_passage.__getitem__, part.first))
-        return [each_of for part in audio.passages for each_of in _placed(by_passage[part.first], part)]
+        return [each_of for part in audio.passages for each_of in _place_stretches(by_passage[part.first], part)]
 
     return audio.cached(key, found)
 
 
-def _placed(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
+def _place_stretches(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
     for (first, end), posteriors in found:
         start, stop = max(passage.first + first, passage.own.start), min(passage.first + end, passage.own.stop)
         skipped = -(-(start - passage.first - first) // POSTERIOR_STEP)
@@ -208,24 +208,24 @@ def mean_posterior(found: Sequence[PosteriorStretch]) -> float:
     return float(np.dot(counts, means) / max(sum(counts), 1))
 
 
-def recording_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> PhonePosteriors:
+def read_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> PhonePosteriors:
     """Return the posteriors in the whole of a recording; where there is no sound, nothing is said.
 
-    name, each : as of ``posterior_stretches``, whose errors it raises
+    name, each : as of ``find_stretches``, whose errors it raises
     """
 
     def joined() -> PhonePosteriors:
-        return PhonePosteriors(np.asarray(_posterior_rows(name, audio, each)), phone_recogniser(name).tokens)
+        return PhonePosteriors(np.asarray(_join_posteriors(name, audio, each)), phone_recogniser(name).tokens)
 
     return audio.cached(f"all posteriors of {name}", joined)
 
 
-def _posterior_rows(name: str, audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:
+def _join_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:
     tokens = phone_recogniser(name).tokens
     silence = np.full(len(tokens), LEAST_LOG_POSTERIOR, np.float16)  # as stretches are computed
     silence[tokens.index(BLANK)] = 0
     rows, end, parts = -(-audio.frames // POSTERIOR_STEP), 0, list[NDArray[np.float16]]()
-    for stretch, posteriors in posterior_stretches(name, audio, each):
+    for stretch, posteriors in find_stretches(name, audio, each):
         first = stretch.first // POSTERIOR_STEP
         if first < end:  # the last row of the one before
             parts[-1] = parts[-1][: first - end]
@@ -235,20 +235,20 @@ def _posterior_rows(name: str, audio: AnalysedAudio, each: ParallelMap) -> Joine
     return JoinedRows([*parts, np.broadcast_to(silence, (rows - end, len(tokens)))])
 
 
-def token_posteriors(name: str, audio: Audio, each: ParallelMap = map, *, dense: bool = True) -> TokenPosteriors:
+def infer_tokens(name: str, audio: Audio, each: ParallelMap = map, *, dense: bool = True) -> TokenPosteriors:
     """Return the posteriors in a recording as the input of an engine.
 
     audio      : an ``AnalysedAudio`` shares them with what recognises its phones
-    name, each : as of ``posterior_stretches``, whose errors it raises
+    name, each : as of ``find_stretches``, whose errors it raises
     dense      : whether the values are an array; False: ``JoinedRows``
     """
     audio = analysed(audio)
-    values: Any = recording_posteriors(name, audio, each).values if dense else _posterior_rows(name, audio, each)
-    mean = mean_posterior(posterior_stretches(name, audio, each))
+    values: Any = read_posteriors(name, audio, each).values if dense else _join_posteriors(name, audio, each)
+    mean = mean_posterior(find_stretches(name, audio, each))
     return TokenPosteriors(values, phone_recogniser(name).source, mean)
 
 
-def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:
+def infer_stretch(name: str, samples: bytes) -> NDArray[np.float16]:
     """Return natural logarithms of the posteriors of a stretch of sound [shape=(N, K)].
 
     samples : 16-bit integers at 16 kHz
@@ -258,7 +258,7 @@ def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:
 
 
 @cache
-def _phones_of(tokens: tuple[str, ...]) -> NDArray[np.float32]:
+def _sum_phones(tokens: tuple[str, ...]) -> NDArray[np.float32]:
     """Return which phone each token is; several share it; the last column: none [shape=(K, 48)]."""
     table = np.zeros((len(tokens), len(PHONES) + 1), np.float32)
     for number, token in enumerate(tokens):
