@@ -4,7 +4,7 @@
 
 Each figure is work per CPU second of one thread, over rounds in which this package and the peer take turns: the median
 and the best round. Other processes slow both down, short runs most; so the ratio is compared. Peers
-that cannot be imported are left out (pip install hmmlearn nnmnkwii psutil).
+that cannot be imported are left out (pip install hmmlearn nnmnkwii librosa psutil).
 """
 
 from __future__ import annotations
@@ -45,9 +45,8 @@ CASES = {
     "Viterbi, K=1": PeerComparison(
         "bench_hmm.py", "viterbi", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "viterbi")
     ),
-    "Viterbi, beam 200": PeerComparison(
-        "bench_hmm.py", "narrow", "hmmlearn_scaling", "hmmlearn", (*LOOP, "--op", "viterbi")
-    ),
+    "MFCC": PeerComparison("bench_mfcc.py", "features", "librosa", "librosa", ("--minutes", "10")),
+    "cloning": PeerComparison("bench_poisson.py", "cloning", "cv2_seamlessClone", "cv2"),
 }
 
 
@@ -74,7 +73,7 @@ def em(options: Any) -> Work:
     return step
 
 
-def viterbi(options: Any, beam: float | None = None) -> Work:
+def viterbi(options: Any) -> Work:
     """Return the work: densities and best path of every recording."""
     import numba  # noqa: F401
 
@@ -86,15 +85,33 @@ def viterbi(options: Any, beam: float | None = None) -> Work:
         total = 0.0
         for x in data:
             density = mixtures.log_likelihood(x)
-            total += best_path(lambda a, b, density=density: density[a:b], len(x), network.arrays, beam)[1]
+            total += best_path(lambda a, b, density=density: density[a:b], len(x), network.arrays)[1]
         return (total,)
 
     return decode
 
 
-def narrow(options: Any) -> Work:
-    """Return the same work with a beam."""
-    return viterbi(options, 200.0)
+def features(options: Any) -> Work:
+    """Return the work: 39 features of every frame, normalised (the peers do not)."""
+    from lipmotion.speech.features.mfcc import mfcc
+    from lipmotion.types import Audio
+
+    audio = Audio(_harness("audio")(options).astype(np.float32) / 32768, 16_000)
+    return lambda: mfcc(audio).values
+
+
+def cloning(options: Any) -> Work:
+    """Return the work: a patch in every frame, with its gradient and the frame's edge."""
+    from lipmotion_faces.appearance.poisson import cloning_system
+
+    pictures, size = _harness("get")(options), options.size
+    top, left = pictures["y"], pictures["x"]
+    frames = np.stack(pictures["fr"] * 2)
+    source, mask = frames.copy(), np.zeros(frames.shape[1:3], bool)
+    source[:, top : top + size, left : left + size] = np.stack(pictures["pa"] * 2)
+    mask[top + 1 : top + size - 1, left + 1 : left + size - 1] = True
+    system = cloning_system(mask)
+    return lambda: system.clone(source, frames)[-1]
 
 
 def _harness(name: str) -> Any:
@@ -127,8 +144,6 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--only", nargs="*", default=list(CASES), choices=list(CASES))
     options = parser.parse_args()
-    for name, seconds in start_up().items():
-        print(json.dumps({"figure": name, "seconds": seconds}), flush=True)
     for name in options.only:
         print(json.dumps({"figure": name} | compared(options.bench, CASES[name], options.rounds)), flush=True)
 
@@ -153,30 +168,10 @@ def compared(bench: Path, case: PeerComparison, rounds: int) -> dict[str, Any]:
 
 def run(script: Path, implementation: str, options: tuple[str, ...]) -> dict[str, Any]:
     """Run one implementation in the harness, on one thread."""
-    paths = os.pathsep.join([str(HERE), str(HERE.parent / "src")])
+    paths = os.pathsep.join([str(HERE), str(HERE.parent / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, str(script), "--impl", implementation, "--threads", "1", *options]
     done = subprocess.run(command, env=os.environ | {"PYTHONPATH": paths}, check=True, capture_output=True, text=True)
     return json.loads(done.stdout.splitlines()[-1])
-
-
-def start_up() -> dict[str, float]:
-    """Return the median times of importing numba and of the first call of a kernel from the cache, in seconds."""
-    code = """
-import time, numpy as np
-start = time.perf_counter()
-import numba
-imported = time.perf_counter()
-from lipmotion.kernels.banded import solve_mlpg
-solve_mlpg(np.ones((3, 3, 2)), np.ones((3, 3, 2)))
-print(imported - start, time.perf_counter() - imported)
-"""
-    environment = os.environ | {"PYTHONPATH": str(HERE.parent / "src")}
-    times = []
-    for _ in range(6):
-        done = subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True, text=True)
-        times.append([*map(float, done.stdout.split())])
-    imported, loaded = (round(statistics.median(column[1:]), 3) for column in zip(*times, strict=True))
-    return {"import numba": imported, "first call of a kernel compiled before": loaded}
 
 
 if __name__ == "__main__":
