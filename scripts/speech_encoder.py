@@ -79,7 +79,7 @@ def main() -> None:
 def measure_background(folder: Path) -> Arrays:
     """Return mean and whitening of the speaker vectors of recordings, in quiet and in conditions of training."""
     plain = np.zeros(2 * COMPONENTS, np.float32), np.eye(2 * COMPONENTS, dtype=np.float32)
-    speaker_similarity.speaker_background = lambda: plain  # type: ignore[assignment]
+    speaker_similarity.read_background = lambda: plain  # type: ignore[assignment]
     sounds = {}
     for path in sorted(folder.rglob("*.flac")):
         audio = read_audio(path)

@@ -12,6 +12,7 @@ from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.meshes.fitting.eyes_and_brows import stage_liveliness as stage_liveliness  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion.types.delivery import SCENE as SCENE  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.types.delivery import SMALLEST_PX as SMALLEST_PX  # noqa: PLC0414 (part of this module's interface)
