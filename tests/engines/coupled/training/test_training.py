@@ -273,7 +273,7 @@ def speech_posteriors(chains: Any, one: AlignedUtterance) -> np.ndarray:
 
     Its states are the joint ones, its emissions those of speech, its moves the coupled ones.
     """
-    lattice, mixtures = em_steps.lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
+    lattice, mixtures = em_steps.build_lattice_utterance(chains, one).lattice, chains.groups[0].mixtures
     x, product = one.observations.streams[0], chains.transitions.product
     log = np.full((len(x), len(mixtures.means)), -np.inf)
     for frame, density in np.ndindex(log.shape):
@@ -359,8 +359,8 @@ def test_visual_densities_and_transitions_stay(kind: str) -> None:
 
 def test_a_weight_is_how_often_an_utterance_counts() -> None:
     chains, (one,) = trained(), aligned(examples(1))
-    twice = em_steps.e_step(chains, [em_steps.lattice_utterance(chains, one)] * 2)
-    heavy = em_steps.e_step(chains, [em_steps.lattice_utterance(chains, one, 2.0)])
+    twice = em_steps.e_step(chains, [em_steps.build_lattice_utterance(chains, one)] * 2)
+    heavy = em_steps.e_step(chains, [em_steps.build_lattice_utterance(chains, one, 2.0)])
     assert heavy.frames == twice.frames
     assert heavy.log_likelihood == pytest.approx(twice.log_likelihood)
     assert heavy.transition_counts == pytest.approx(twice.transition_counts, abs=1e-5)
