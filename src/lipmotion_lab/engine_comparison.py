@@ -16,7 +16,7 @@ from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, describe_training, train
 from lipmotion.storage.files import make_folder
 from lipmotion.storage.json_text import replace_nan
-from lipmotion.storage.locks import list_unfinished
+from lipmotion.storage.locks import keep_unfinished
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
 from lipmotion_lab import runner
@@ -67,7 +67,7 @@ def engine_models(
         if folder is None:
             model = train_engine(corpus, engine, here)
         else:
-            with list_unfinished(paths[name]) as work:
+            with keep_unfinished(paths[name]) as work:
                 save_model(train_engine(corpus, engine, here, work), paths[name])
             model = load_model(paths[name])  # as the next run finds it
         models[name] = EngineModel(model, perf_counter() - start_s)

@@ -23,7 +23,7 @@ from lipmotion.pipeline.edit_files import check_sound
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.storage.files import atomic_file, confine, create_folders, remove
-from lipmotion.storage.locks import list_unfinished
+from lipmotion.storage.locks import keep_unfinished
 from lipmotion.types import Item, Monitor, Progress, sub_monitor
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.progress import warnings_to
@@ -162,7 +162,7 @@ def _train_voice(order: TrainingOrder, recordings: Path, monitor: Monitor) -> di
     done = prepare(recordings, order.work / CORPUS, workers=order.workers, crops=False, monitor=preparing)
     corpus = Corpus.open(done.corpus)
     learned, held_out = split_names(corpus, (*done.prepared, *done.kept), held_out=order.options.held_out)
-    with list_unfinished(order.target) as work:
+    with keep_unfinished(order.target) as work:
         model, result = train(
             corpus,
             selection=Selection(names=learned),

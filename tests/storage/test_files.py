@@ -23,7 +23,7 @@ from lipmotion.storage.files import (
     make_portable,
     replace_folder,
 )
-from lipmotion.storage.locks import LOCK, list_unfinished, lock_folder
+from lipmotion.storage.locks import LOCK, keep_unfinished, lock_folder
 from lipmotion.storage.sources import Source, check_apart, check_kind
 
 Context = Callable[[Path], AbstractContextManager[Path]]
@@ -143,20 +143,20 @@ def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_pat
 
 
 def test_finished_work_leaves_no_folder(tmp_path: Path) -> None:
-    with list_unfinished(tmp_path / "model") as folder:
+    with keep_unfinished(tmp_path / "model") as folder:
         (folder / "stage").touch()
         assert names(tmp_path) == ["model.unfinished"]
     assert names(tmp_path) == []
-    with pytest.raises(RuntimeError), list_unfinished(tmp_path / "model"):  # nor does work without a result
+    with pytest.raises(RuntimeError), keep_unfinished(tmp_path / "model"):  # nor does work without a result
         raise RuntimeError
     assert names(tmp_path) == []
-    with pytest.raises(ExportError, match="does not exist"), list_unfinished(tmp_path / "missing" / "model"):
+    with pytest.raises(ExportError, match="does not exist"), keep_unfinished(tmp_path / "missing" / "model"):
         raise AssertionError
 
 
 def test_unfinished_work_is_found_again(tmp_path: Path) -> None:
     def interrupted() -> None:
-        with list_unfinished(tmp_path / "model") as folder:
+        with keep_unfinished(tmp_path / "model") as folder:
             (folder / "stage").touch()
             (folder / f"{TEMPORARY}half").touch()
             raise KeyboardInterrupt
@@ -164,7 +164,7 @@ def test_unfinished_work_is_found_again(tmp_path: Path) -> None:
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
             interrupted()
-    with list_unfinished(tmp_path / "model") as folder:
+    with keep_unfinished(tmp_path / "model") as folder:
         assert names(folder) == [LOCK, "stage"]
 
 
@@ -205,7 +205,7 @@ def test_a_link_that_leads_nowhere(tmp_path: Path) -> None:
 def test_unfinished_work_lies_beside_what_a_link_points_to(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "m").symlink_to("there/model")
-    with list_unfinished(tmp_path / "m") as folder:
+    with keep_unfinished(tmp_path / "m") as folder:
         assert folder == (tmp_path / "there").resolve() / "model.unfinished"
     assert names(tmp_path / "there") == []
 

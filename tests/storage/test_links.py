@@ -12,7 +12,7 @@ from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.pipeline.batch.ledger import Place, open_ledger
 from lipmotion.storage import files
 from lipmotion.storage.archive import Checkpoint
-from lipmotion.storage.locks import LOCK, list_unfinished, lock_folder, open_temporary, remove_unfinished
+from lipmotion.storage.locks import LOCK, keep_unfinished, lock_folder, open_temporary, remove_unfinished
 from lipmotion_faces.corpus.sync import sync
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST
@@ -83,7 +83,7 @@ def answer_study(folder: Path) -> None:
 
 
 def train(folder: Path) -> None:
-    with list_unfinished(folder / "m") as work:
+    with keep_unfinished(folder / "m") as work:
         Checkpoint(work, "of this").save("stage", {"a": np.zeros(1)})
         raise KeyboardInterrupt
 

@@ -44,7 +44,7 @@ class Inputs:
     """What an engine takes besides acoustic features, phones in time and motion.
 
     f0           : F0, ``Speech.log_f0``
-    conditions   : acoustic conditions in which training takes each example (``Example.list_conditions``), and with
+    conditions   : acoustic conditions in which training takes each example (``Example.condition_spectra``), and with
                    them spectra (``Speech.spectrum``); 0: neither
     prior        : what another model makes of the speech, ``Speech.prior``: its models can stand on other ones
     posteriors   : those of a phone recogniser, ``Speech.posteriors``, where one is installed

@@ -89,7 +89,7 @@ class Predictor(ABC):
 
     @classmethod
     def conditions(cls, motion_s: float, most: int) -> int:  # noqa: ARG003
-        """Return in how many acoustic conditions training takes each example (``Example.list_conditions``).
+        """Return in how many acoustic conditions training takes each example (``Example.condition_spectra``).
 
         motion_s : seconds of measured motion
         most     : as many as the configuration allows

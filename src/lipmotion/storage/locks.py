@@ -153,7 +153,7 @@ def open_temporary() -> Iterator[Path]:
 
 
 @contextmanager
-def list_unfinished(target: Path) -> Iterator[Path]:
+def keep_unfinished(target: Path) -> Iterator[Path]:
     """Give a locked folder beside ``target`` for the finished parts of the work on it.
 
     The folder is deleted when the block ends without an error; after an error, or when the process is killed, a later
@@ -182,7 +182,7 @@ def list_unfinished(target: Path) -> Iterator[Path]:
 
 
 def name_work_folder(target: Path) -> Path:
-    """Return the path of the folder that ``list_unfinished`` gives."""
+    """Return the path of the folder that ``keep_unfinished`` gives."""
     target = find_place(target)
     return target.with_name(target.name + UNFINISHED)
 

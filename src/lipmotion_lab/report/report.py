@@ -281,7 +281,7 @@ class _Writer:
     def _run(self, name: str, settings: ExperimentSettings) -> None:
         part, target = PARTS[name], self.folder / name
         models = self.folder / "models" / self.key("models")[:KEY_DIGITS]  # of other recordings, other models
-        with locks.list_unfinished(self.folder / f"{name}.json") as work:
+        with locks.keep_unfinished(self.folder / f"{name}.json") as work:
             stamp = Stamp()
             keeper = ClipKeeper(work / MOTION, self.key(name))
             running = replace(settings.part(0, 0.95), receive=keeper)

@@ -71,7 +71,7 @@ def run_experiment(
     ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
     from lipmotion.corpora.store import Corpus
-    from lipmotion.storage.locks import list_unfinished
+    from lipmotion.storage.locks import keep_unfinished
     from lipmotion_lab.folds import in_blocks
     from lipmotion_lab.report.report import PARTS
     from lipmotion_lab.report.sections import blocks_section
@@ -88,7 +88,7 @@ def run_experiment(
         corpus = Corpus.open(options.corpus)
         if getattr(options, "quick", False):
             corpus = take_quick_part(corpus, settings.seed)
-        with list_unfinished(options.output) if options.output and has_parts else nullcontext() as work:
+        with keep_unfinished(options.output) if options.output and has_parts else nullcontext() as work:
             figures = experiment(corpus, work=work, settings=settings)
         return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
 

@@ -44,7 +44,7 @@ class OutputArgument:
 
     name       : of the option in the namespace
     is_folder  : whether it is a folder
-    keeps_work : whether finished stages are kept in a folder beside it (``locks.list_unfinished``)
+    keeps_work : whether finished stages are kept in a folder beside it (``locks.keep_unfinished``)
     """
 
     name: str

@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.model import GEOMETRY, save_model
     from lipmotion.pipeline.training.other_speakers import synthesise_others
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.storage.locks import list_unfinished
+    from lipmotion.storage.locks import keep_unfinished
     from lipmotion.units import Lexicon
 
     workers = options.workers if isinstance(options.workers, str) else count_workers(options)
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> None:
         voices = synthesise_others(
             synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
         )
-        with list_unfinished(options.output) as work:
+        with keep_unfinished(options.output) as work:
             model, result = train(
                 Corpus.open(options.corpus),
                 selection=Selection(list_or_all(options.split), tuple(options.speaker)),

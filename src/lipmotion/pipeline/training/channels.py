@@ -146,7 +146,7 @@ def with_sound_inputs(
     """Return examples with what the engine's training takes from their sound (``Inputs``).
 
     These are posteriors of a phone recogniser (``Speech.posteriors``), where one is installed, the encoding of the
-    sound, and spectra in many acoustic conditions (``Example.list_conditions``). The noise of babble is made of the
+    sound, and spectra in many acoustic conditions (``Example.condition_spectra``). The noise of babble is made of the
     recordings themselves; all is drawn from the number of the recording.
     """
     inputs = engine.inputs(sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ)

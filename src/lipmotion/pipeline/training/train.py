@@ -118,7 +118,7 @@ class Run:
 
     monitor : called with reports of progress, and with the utterances that are not used
     work    : a folder for checkpoints, from which the same call continues after it was stopped
-              (``storage.locks.list_unfinished`` creates one); the model is the same to the byte. None: no checkpoints
+              (``storage.locks.keep_unfinished`` creates one); the model is the same to the byte. None: no checkpoints
     workers : number of processes, fewer if the corpus is small. With more than one, a script must be guarded by
               ``if __name__ == "__main__":``. Or the address of a Dask scheduler, as ``tcp://HOST:8786``
 
