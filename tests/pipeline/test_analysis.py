@@ -278,12 +278,14 @@ def test_phones_that_the_engine_recognises_are_aligned_as_in_training(toy_model,
     assert np.median(errors) < 0.03
 
 
-def test_the_recogniser_says_what_the_engine_does_not_know(toy_model, toy_sentence):
-    """Or what general models alone are asked for, or what does not fit the sound."""
+def test_the_recogniser_says_what_the_engine_does_not_know(toy_model, toy_sentence, monkeypatch):
+    """Or what general models alone are asked for, what does not fit the sound, or a voice unknown to the model."""
     crowd = [span for n in range(30) for span in Timeline(toy_sentence.units.spans[1:-1]).shifted(3.0 * n)]
     for found, kind in ((None, "own"), (toy_sentence.units, "general"), (Timeline(tuple(crowd)), "own")):
         speech = recognised(RecognisingEngine(found=found), toy_model, toy_sentence, kind)
         assert speech.units[1].label.phone == "aa"
+    monkeypatch.setattr("lipmotion.pipeline.analysis.speech_analysis.voice_knowledge", lambda *_: 0.0)
+    assert recognised(RecognisingEngine(found=toy_sentence.units), toy_model, toy_sentence).units[1].label.phone == "aa"
 
 
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence):

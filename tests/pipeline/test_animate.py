@@ -136,10 +136,7 @@ def test_pins_are_met_exactly(move, toy_sentence):
 
 def test_a_pin_that_cannot_be_met(move):
     for pin, message in (
-        (
-            Pin(0.5, "jaw", 0.1),
-            r"cannot pin 'jaw' \(is it jawOpen\?\); channels that can be pinned: opening, width, outer",
-        ),
+        (Pin(0.5, "jaw", 0.1), r"cannot pin 'jaw' \(is it jawOpen\?\); channels that can be pinned: opening, width"),
         (Pin(9.0, "opening", 0.1), r"pin at 9.0 s lies outside the recording \(0 to 2.76 s\)"),
         (Pin(-0.1, "opening", 0.1), "pin at -0.1 s lies outside"),
         (Pin(0.5, "opening", float("nan")), "sets opening to nan, required a finite number"),

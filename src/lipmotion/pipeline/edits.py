@@ -312,7 +312,7 @@ def remove_pins(steps: Sequence[Step]) -> tuple[Step, ...]:
         ]
         if not there:
             pins = [repr(str(each)) for each in left if str(each).startswith(f"pin {step.channel} ")]
-            raise InputError(f"{str(step)!r}: pinned is {'; '.join(pins) or 'nothing'}")
+            raise InputError(f"{str(step)!r}: not pinned there; pins of it: {'; '.join(pins) or 'none'}")
         left = [each for each in left if each not in there]
     return tuple(left)
 
@@ -361,7 +361,7 @@ def find_locks(steps: Sequence[Step]) -> dict[int, LockStep]:
             same = [n for n, lock in locks.items() if (lock.start_s, lock.end_s) == (step.start_s, step.end_s)]
             if not same:
                 locked = "; ".join(map(repr, map(str, locks.values()))) or "nothing"
-                raise InputError(f"{str(step)!r}: locked is {locked}")
+                raise InputError(f"{str(step)!r}: not locked there; locked: {locked}")
             del locks[same[-1]]
     return locks
 

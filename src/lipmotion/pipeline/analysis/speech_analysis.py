@@ -384,8 +384,8 @@ def recognise_speech(
     """Return the speech of a recording whose words are not known, with recognised phones in time.
 
     recognise : recognises phones in time, for speakers that the engine does not recognise itself
-    If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
-    training were; else the result of ``recognise`` is used.
+    If the model knows the voice at all, and its engine recognises phones, these are aligned by ``phones``, as those of
+    the training were; else the result of ``recognise`` is used.
     """
     audio = analysed(audio, features)
     speech = build_speech(engine, audio, features, Timeline(()), phones.kind, each)
@@ -393,7 +393,7 @@ def recognise_speech(
     units, spoken, found = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
         within = None
-        if phones.kind not in ("general", "words"):
+        if phones.kind not in ("general", "words") and voice_knowledge(phones.own, sound):
             within = engine.recognise(learned, part.speech)
         if within is not None:
             try:

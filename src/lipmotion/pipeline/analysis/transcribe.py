@@ -290,7 +290,7 @@ def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
 
     corrected : whether what is said instead is recognised
     """
-    places = f"at {format_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
+    places = f"at {format_places(fit.missing)} ({min(fit.missing_s, fit.speech_s):.1f} of {fit.speech_s:.1f} s spoken)"
     if fit.is_doubtful:
         why = f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
         if fit.evidence is not None:

@@ -168,16 +168,16 @@ def check_edit(edit: CurveEdit, motion: Motion, others: Collection[str] = ()) ->
 
     others : names of curves that outputs will have besides
     """
-    known = (*motion.names, *GESTURES, *KNOWN_CURVES, *others)
+    own = dict.fromkeys(name for name in (*motion.names, *GESTURES) if name not in EDITED.values())
+    known = (*own, *KNOWN_CURVES, *others)
     if edit.channel and edit.channel not in known:
         verb = {Pin: "pin", DrawnCurve: "draw"}.get(type(edit), "change")
         lower = {name.lower(): name for name in known}
         near = get_close_matches(edit.channel.lower(), lower, 1)
-        pinned = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
         name = shorten(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
         raise InputError(
-            f"cannot {verb} {name}; channels that can be pinned: {pinned}; lip points, as y_14; curves, as "
-            "jawOpen, viseme_PP, open_jaw"
+            f"cannot {verb} {name}; channels that can be pinned: {', '.join(n for n in own if not LIP_POINT.match(n))}"
+            "; lip points, as y_14; curves, as jawOpen, viseme_PP, open_jaw"
         )
     last_s = (len(motion.values) - 1) / motion.rate_hz
     if isinstance(edit, Pin):
