@@ -393,7 +393,7 @@ def recognise_speech(
     units, spoken, found = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
         within = None
-        if phones.kind not in ("general", "words") and voice_knowledge(phones.own, sound):
+        if phones.kind not in ("general", "words") and rate_knowledge(phones.own, sound):
             within = engine.recognise(learned, part.speech)
         if within is not None:
             try:
