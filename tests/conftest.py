@@ -126,7 +126,7 @@ def hasty_training(request: pytest.FixtureRequest) -> Iterator[None]:
         if HASTY & set(request.path.parts):
             patched.setattr(posterior_network, "STEPS", 4.0)
             few = partial(curves.compute_interval, draws=50)
-            patched.setattr("lipmotion_lab.evaluation.evaluate.bootstrap_interval", few)
+            patched.setattr("lipmotion_lab.evaluation.evaluate.compute_interval", few)
         yield
 
 

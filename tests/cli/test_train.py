@@ -114,7 +114,7 @@ def test_other_voices_are_learned_from_but_those_for_judging(run, toy_model, toy
         return toy_model, TrainReport((), {}, {})
 
     both = tuple(SyntheticVoice(name, "flite", name) for name in ("slt", "rms"))
-    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.installed_voices", lambda: both)
+    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.list_installed", lambda: both)
     monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthesise_sentences", say)
     monkeypatch.setattr("lipmotion.pipeline.training.train.train", learn)
     (here / "open" / "friend").mkdir(parents=True)

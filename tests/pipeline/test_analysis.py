@@ -284,7 +284,7 @@ def test_the_recogniser_says_what_the_engine_does_not_know(toy_model, toy_senten
     for found, kind in ((None, "own"), (toy_sentence.units, "general"), (Timeline(tuple(crowd)), "own")):
         speech = recognised(RecognisingEngine(found=found), toy_model, toy_sentence, kind)
         assert speech.units[1].label.phone == "aa"
-    monkeypatch.setattr("lipmotion.pipeline.analysis.speech_analysis.voice_knowledge", lambda *_: 0.0)
+    monkeypatch.setattr("lipmotion.pipeline.analysis.speech_analysis.rate_knowledge", lambda *_: 0.0)
     assert recognised(RecognisingEngine(found=toy_sentence.units), toy_model, toy_sentence).units[1].label.phone == "aa"
 
 

@@ -68,7 +68,7 @@ def test_words_decide_the_phones_of_english(welcome: Audio) -> None:
 
 @pytest.mark.parametrize("kind", ["fast", "own"])
 def test_other_kinds_do_not_search_for_words(welcome: Audio, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(word_search, "words_in")
+    monkeypatch.delattr(word_search, "spot_words")
     found = recognition(welcome, kind)
     assert texts(found) == []
     assert found.word_s == pytest.approx(0)
