@@ -182,9 +182,9 @@ def _channel_figures(
     figures = {
         "acc": curves.correlate_pooled(generated, reference),
         "rmse": curves.rmse(generated, reference),
-        "nrmse": curves.normalise_rmse(generated, reference),
-        "variance": curves.compare_variance(generated, reference),
-        "jerk": curves.compare_jerk(generated, reference),
+        "nrmse": curves.measure_nrmse(generated, reference),
+        "variance": curves.measure_variance_ratio(generated, reference),
+        "jerk": curves.measure_jerk_ratio(generated, reference),
         "modulation_db": measure_modulation_distance(generated, reference, rate_hz),
     }
     moves = curves.select_moving(reference, [channel.unit for channel in channels])

@@ -8,8 +8,8 @@ from lipmotion.articulation.mouth import (
     TUCKED_GAP,
     WIDTH_REACH,
     SpokenMouth,
-    drop_jaw,
     find_mouth,
+    measure_jaw_drop,
     weigh_upper,
 )
 from lipmotion.errors import InputError
@@ -75,14 +75,14 @@ def test_the_opening_alone_is_enough():
     mouth = find_mouth(motion(opening=[0, 0.1, 0.3]), NOTHING_SAID)
     assert mouth.width[0] == mouth.fullness[0] == 1
     assert mouth.width[2] < mouth.width[1] < 1
-    assert mouth.jaw == pytest.approx(drop_jaw(mouth.gap))
+    assert mouth.jaw == pytest.approx(measure_jaw_drop(mouth.gap))
 
 
 def test_the_tracked_chin_moves_the_jaw_within_reason():
     opening = np.r_[np.zeros(20), np.full(60, 0.1)]
     chin = np.r_[np.full(20, -1.4), np.full(20, -1.475), np.full(20, -1.4), np.full(20, -2.0)]
     jaw = find_mouth(motion(opening=opening, y_152=chin), NOTHING_SAID).jaw
-    usual = float(drop_jaw(opening_to_gap(np.array(0.1))))
+    usual = float(measure_jaw_drop(opening_to_gap(np.array(0.1))))
     assert 0.75 * usual < jaw[30] < 1.15 * usual + 0.01
     assert jaw[50] == pytest.approx(0.75 * usual)
     assert jaw[70] == pytest.approx(1.15 * usual + 0.01)

@@ -189,7 +189,7 @@ def test_figures_are_those_of_the_measures(clips):
     wanted = curves.correlate_pooled(near, original).mean()
     assert evaluate.correlation_statistic(near, original).value == pytest.approx(wanted, abs=1e-12)
     assert evaluate.distance_statistic(near, original).value == pytest.approx(
-        curves.find_distance(near, original), abs=1e-12
+        curves.measure_mean_distance(near, original), abs=1e-12
     )
     some, others = [g[:, :1] for g in near], [o[:, :1] for o in original]
     score = closures.measure_closures([g[:, 0] for g in near], [o[:, 0] for o in original], 50, 25).score

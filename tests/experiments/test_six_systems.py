@@ -88,7 +88,7 @@ def test_a_preset_is_the_row_of_the_table(name, figures, work, toy_corpus):
     row, generated = rows["audio only"][name], [clip.generated for clip in made]
     original = [clip.original for clip in made]
     assert row["acc"] == pytest.approx(curves.correlate_pooled(generated, original).mean())
-    assert row["amse"] == pytest.approx(curves.find_distance(generated, original))
+    assert row["amse"] == pytest.approx(curves.measure_mean_distance(generated, original))
     assert training[name]["parameters"] == model.learned.chains.parameters
     if name == systems.REFERENCE_SYSTEM:
         by_path = engines.engine_named("coupled", model.engine.config.as_mapping() | {"conversion": "viterbi"})

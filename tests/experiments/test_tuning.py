@@ -46,7 +46,7 @@ def test_systems_are_judged_by_the_correlation_of_what_they_make(validation):
         made = generate_clips(validation, "audio only", system.engine, system.model)
         generated, original = [clip.generated for clip in made], [clip.original for clip in made]
         assert trial.acc == pytest.approx(curves.correlate_pooled(generated, original).mean())
-        assert trial.amse == pytest.approx(curves.find_distance(generated, original))
+        assert trial.amse == pytest.approx(curves.measure_mean_distance(generated, original))
     best = systems.choose_best(found)
     assert best.tried == tuple(trial for trial, _ in found)
     assert best.engine is max(found, key=lambda pair: pair[0].acc)[1].engine

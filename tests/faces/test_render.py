@@ -192,7 +192,7 @@ LIPS = WOMAN.lips
 
 
 def pose(gap: float, width: float = 1.0, fullness: float = 1.0, **gestures: float) -> MouthPose:
-    return MouthPose(gap, width, fullness, float(mouth.drop_jaw(gap)), **gestures)
+    return MouthPose(gap, width, fullness, float(mouth.measure_jaw_drop(gap)), **gestures)
 
 
 shares = {name: st.floats(0, 1) for name in ("tuck", "tongue", "protrusion", "spread", "press", "teeth", "oval")}

@@ -8,21 +8,21 @@ from lipmotion.measures import closures
 from lipmotion.measures.curves import (
     MIN_CLIPS,
     MIN_SCORE,
-    compare_jerk,
-    compare_variance,
     compute_interval,
     correlate_clips,
     correlate_pooled,
     correlation,
-    find_distance,
     find_offset,
     find_pooled_offset,
+    measure_jerk_ratio,
     measure_lag,
     measure_landmarks,
     measure_lip_error,
+    measure_mean_distance,
     measure_modulation_distance,
+    measure_nrmse,
     measure_upper_face,
-    normalise_rmse,
+    measure_variance_ratio,
     rmse,
     select_moving,
     shift_scores,
@@ -70,13 +70,13 @@ def test_pooled_means_are_those_of_all_frames_and_per_clip_of_each():
 def test_distance_is_the_mean_norm_not_its_square():
     generated = [np.array([[3.0, 4.0], [0.0, 0.0]]), np.array([[0.0, 1.0]])]
     original = [np.zeros((2, 2)), np.zeros((1, 2))]
-    assert find_distance(generated, original) == pytest.approx((5 + 0 + 1) / 3)
+    assert measure_mean_distance(generated, original) == pytest.approx((5 + 0 + 1) / 3)
 
 
 def test_error_is_in_units_of_the_channels_deviation():
     original = [column(0, 2), column(0, 2)]
     generated = [column(1, 2), column(0, 3)]
-    assert normalise_rmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4) / 1)
+    assert measure_nrmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4) / 1)
     assert rmse(generated, original)[0] == pytest.approx(np.sqrt(2 / 4))
 
 
@@ -85,14 +85,14 @@ def test_error_is_in_units_of_the_channels_deviation():
 def test_predicting_the_mean_is_an_error_of_one_and_a_range_of_none(seed):
     original = clips(seed)
     flat = [np.tile(np.concatenate(original).mean(axis=0), (len(clip), 1)) for clip in original]
-    assert normalise_rmse(flat, original) == pytest.approx([1, 1])
-    assert compare_variance(flat, original) == pytest.approx([0, 0], abs=1e-12)
+    assert measure_nrmse(flat, original) == pytest.approx([1, 1])
+    assert measure_variance_ratio(flat, original) == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_range_is_the_ratio_of_mean_deviations():
     original = [column(0, 2), column(0, 6)]  # deviations 1 and 3
     generated = [column(5, 6), column(9, 10)]  # ½ each
-    assert compare_variance(generated, original)[0] == pytest.approx(0.5 / 2)
+    assert measure_variance_ratio(generated, original)[0] == pytest.approx(0.5 / 2)
 
 
 @given(seed=SEEDS, gain=st.floats(0.1, 5))
@@ -100,7 +100,7 @@ def test_range_is_the_ratio_of_mean_deviations():
 def test_scaling_scales_range_and_jerk(seed, gain):
     original = clips(seed)
     scaled = [gain * clip + 3 for clip in original]
-    for ratio in (compare_variance, compare_jerk):
+    for ratio in (measure_variance_ratio, measure_jerk_ratio):
         assert ratio(original, original) == pytest.approx([1, 1])
         assert ratio(scaled, original) == pytest.approx([gain, gain])
 
@@ -108,7 +108,7 @@ def test_scaling_scales_range_and_jerk(seed, gain):
 def test_jerk_by_hand_never_looks_across_clips():
     original = [column(0, 0, 0, 1), column(100, 100, 100, 102), column(7, 8, 9)]  # third differences 1 and 2, none
     generated = [column(0, 0, 1, 0, 0), column(5, 5, 5, 5), column(0, 50, 0)]  # 3, 3 and 0
-    assert compare_jerk(generated, original)[0] == pytest.approx(2 / 1.5)
+    assert measure_jerk_ratio(generated, original)[0] == pytest.approx(2 / 1.5)
 
 
 def smooth(seed: int, frames: int) -> np.ndarray:
@@ -150,7 +150,7 @@ def test_a_constant_with_rounding_is_a_constant():
         assert correlation(still, wave) == 0
         assert correlation(wave, still) == 0
         assert not select_moving([still], ["a"]).any()
-        for measure in (normalise_rmse, compare_variance, compare_jerk):
+        for measure in (measure_nrmse, measure_variance_ratio, measure_jerk_ratio):
             assert np.isnan(measure([wave], [still])).all()
             assert np.isfinite(measure([still], [wave])).all()
 
@@ -231,14 +231,14 @@ def test_the_interval_holds_the_figure_itself(seed):
 def test_clips_are_drawn_whole_and_together():
     """Every clip has its own value, generated and original alike, so clips that were drawn separately would differ."""
     values = [np.full((3, 1), float(n)) for n in range(5)]
-    assert compute_interval(find_distance, values, values, seed=0, draws=50) == (0, 0)
+    assert compute_interval(measure_mean_distance, values, values, seed=0, draws=50) == (0, 0)
 
 
 def test_95_percent_of_the_draws_lie_inside():
     """The mean of 200 values is nearly normal: 1.96 standard errors to either side."""
     values = np.abs(np.random.default_rng(4).normal(5, 1, 200))
     generated, original = [np.full((1, 1), value) for value in values], [np.zeros((1, 1))] * 200
-    low, high = compute_interval(find_distance, generated, original, seed=0)
+    low, high = compute_interval(measure_mean_distance, generated, original, seed=0)
     assert (low + high) / 2 == pytest.approx(values.mean(), abs=0.02)
     assert high - low == pytest.approx(2 * 1.96 * values.std() / np.sqrt(200), rel=0.07)
 

@@ -230,7 +230,7 @@ def find_mouth(
     thickness, fullness = _thickness(motion), 1 - 0.4 * np.clip(opening, 0, 0.4)
     if thickness is not None and rest.thickness is not None:
         fullness = np.clip(thickness / rest.thickness, 0.75, 1.25)
-    jaw = usual = drop_jaw(gap)
+    jaw = usual = measure_jaw_drop(gap)
     if rest.chin is not None:  # as tracked (point 152, y upwards), within limits that suit the gap
         drop = rest.chin - motion["y_152"].astype(np.float64)
         jaw = np.clip(drop, LEAST_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)
@@ -267,7 +267,7 @@ def weigh_upper(gap: Any) -> Any:
     return LARGEST_UPPER_RISE * (1 - np.exp(-UPPER_RATE * np.asarray(gap)))
 
 
-def drop_jaw(gap: Any) -> Any:
+def measure_jaw_drop(gap: Any) -> Any:
     """Return how far the chin drops for a gap."""
     return JAW_SHARE * (np.asarray(gap) - weigh_upper(gap))
 

@@ -68,7 +68,7 @@ def correlate_clips(generated: Clips, original: Clips) -> Array:
     return np.mean([correlation(g, o) for g, o in zip(generated, original, strict=True)], axis=0)
 
 
-def find_distance(generated: Clips, original: Clips) -> float:
+def measure_mean_distance(generated: Clips, original: Clips) -> float:
     """Return the mean over frames of the Euclidean distance, in the channels' unit. Source: Xie & Liu, Eq. 20."""
     return float(np.linalg.norm(np.concatenate(generated) - np.concatenate(original), axis=1).mean())
 
@@ -78,21 +78,21 @@ def rmse(generated: Clips, original: Clips) -> Array:
     return np.sqrt(np.square(np.concatenate(generated) - np.concatenate(original)).mean(axis=0))
 
 
-def normalise_rmse(generated: Clips, original: Clips) -> Array:
+def measure_nrmse(generated: Clips, original: Clips) -> Array:
     """Return the RMSE of every channel in units of its standard deviation over all frames [shape=(P,)].
 
-    NaN where the original is constant but for rounding, as in ``compare_variance`` and ``compare_jerk``.
+    NaN where the original is constant but for rounding, as in ``measure_variance_ratio`` and ``measure_jerk_ratio``.
     """
     return rmse(generated, original) / _mark_moving(original, np.concatenate(original).std(axis=0))
 
 
-def compare_variance(generated: Clips, original: Clips) -> Array:
+def measure_variance_ratio(generated: Clips, original: Clips) -> Array:
     """Return mean over clips of std(generated) / mean over clips of std(original) [shape=(P,)]."""
     spread = np.mean([o.std(axis=0) for o in original], axis=0)
     return np.mean([g.std(axis=0) for g in generated], axis=0) / _mark_moving(original, spread)
 
 
-def compare_jerk(generated: Clips, original: Clips) -> Array:
+def measure_jerk_ratio(generated: Clips, original: Clips) -> Array:
     """Return mean |third difference|, generated over original [shape=(P,)]."""
 
     def jerk(clips: Clips) -> Array:

@@ -55,9 +55,9 @@ def figures_of(clips: Sequence[held_out.ComparedClip], recordings: Compared, see
     measured = {
         "acc": curves.correlate_pooled(generated, original),
         "acc_per_clip": curves.correlate_clips(generated, original),
-        "nrmse": curves.normalise_rmse(generated, original),
-        "global_variance": curves.compare_variance(generated, original),
-        "jerk": curves.compare_jerk(generated, original),
+        "nrmse": curves.measure_nrmse(generated, original),
+        "global_variance": curves.measure_variance_ratio(generated, original),
+        "jerk": curves.measure_jerk_ratio(generated, original),
     }
     per_channel = {name: {key: float(of[i]) for key, of in measured.items()} for i, name in enumerate(compared)}
     eigenlips = {name: per_channel[name] for name in recordings.eigenlips_channels}
@@ -69,7 +69,9 @@ def figures_of(clips: Sequence[held_out.ComparedClip], recordings: Compared, see
     led = [clip[:, column] for clip in generated], [clip[:, column] for clip in original]
 
     def distance(columns: NDArray[np.bool_]) -> float:
-        return curves.find_distance([clip[:, columns] for clip in generated], [clip[:, columns] for clip in original])
+        return curves.measure_mean_distance(
+            [clip[:, columns] for clip in generated], [clip[:, columns] for clip in original]
+        )
 
     figures = {
         "channels": {name: row for name, row in per_channel.items() if name not in eigenlips},
@@ -261,7 +263,7 @@ def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
 
 
 def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
-    """Return ``curves.find_distance`` of clips [each shape=(T_i, P)]."""
+    """Return ``curves.measure_mean_distance`` of clips [each shape=(T_i, P)]."""
     errors = [np.linalg.norm(g - o, axis=1) for g, o in zip(generated, original, strict=True)]
     sums = [np.array([error.sum(), len(error)]) for error in errors]
     return ClipStatistic(sums, ratio)

@@ -353,9 +353,9 @@ def test_figures_are_those_of_the_measures():
     sides = ([late.values[:, columns]], [SPEECH.values[:, columns]])
     for name, of in (
         ("acc", curves.correlate_pooled),
-        ("variance", curves.compare_variance),
-        ("jerk", curves.compare_jerk),
-        ("nrmse", curves.normalise_rmse),
+        ("variance", curves.measure_variance_ratio),
+        ("jerk", curves.measure_jerk_ratio),
+        ("nrmse", curves.measure_nrmse),
     ):
         assert [row[name] for row in pair["channels"].values()] == pytest.approx(of(*sides)), name
     assert pair["channels"]["opening"]["lag_ms"] == pytest.approx(3000 / SPEECH.rate_hz, abs=10)
