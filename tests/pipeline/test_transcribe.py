@@ -101,7 +101,7 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(welcom
     assert part.fit.share < 0.8
     (record,) = caplog.records
     assert re.search(
-        r"to leave out words at \d\.\d to \d\.\d s.* \(\d\.\d of \d\.\d s of speech\)", record.getMessage()
+        r"to leave out words at \d\.\d to \d\.\d s.* \(\d\.\d of \d\.\d s spoken\)", record.getMessage()
     )
     said = {span.label.word: span for span in whole.units}
     assert part.units is not None
@@ -153,7 +153,7 @@ def test_three_stretches_are_named(caplog):
     warn_of_misfit(TranscriptFit(-2.0, ((0.0, 2.0), (3.0, 3.5), (5.0, 9.0), (10.0, 11.04)), 20.0))
     assert caplog.messages == [
         "the transcript seems to leave out words at 0.0 to 2.0 s, 5.0 to 9.0 s, 10.0 to 11.0 s and at 1 more places "
-        "(7.5 of 20.0 s of speech): the lips are wrong there; add the words, or leave the whole transcript out"
+        "(7.5 of 20.0 s spoken): the lips are wrong there; add the words, or leave the whole transcript out"
     ]
 
 
