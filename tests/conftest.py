@@ -22,11 +22,12 @@ import pytest
 from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
-from lipmotion import Corpus, FilmedFace, Model, save_face, save_model, train
+from lipmotion import Corpus, Model, save_model, train
 from lipmotion.engines import engine_named
 from lipmotion.measures import curves
 from lipmotion.motion import posterior_network
 from lipmotion.speech.recognition.network.posteriors import Hama
+from lipmotion_faces.filmed.face import FilmedFace, save_face  # also where no entry point is installed
 from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
 
