@@ -100,9 +100,7 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(welcom
     part = corrected(audio, words[kept])
     assert part.fit.share < 0.8
     (record,) = caplog.records
-    assert re.search(
-        r"to leave out words at \d\.\d to \d\.\d s.* \(\d\.\d of \d\.\d s spoken\)", record.getMessage()
-    )
+    assert re.search(r"to leave out words at \d\.\d to \d\.\d s.* \(\d\.\d of \d\.\d s spoken\)", record.getMessage())
     said = {span.label.word: span for span in whole.units}
     assert part.units is not None
     recognised = {span.label.word for span in part.units if span.label.confidence is not None}
