@@ -29,10 +29,10 @@ from lipmotion.types import Generation
 from lipmotion_blender.curves import at_frames
 from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.scene import Scene
-from lipmotion_faces.head.pose import head_poses
+from lipmotion_faces.head.pose import list_head_poses
 from lipmotion_faces.head.skin import COLUMNS, VISIBLE_RINGS
-from lipmotion_faces.head.stage import figure, head_mesh, mouth_weights
-from lipmotion_faces.outputs.scenes import character_scene, head_scene, write_scene
+from lipmotion_faces.head.stage import make_figure, build_head_mesh, fit_mouth_weights
+from lipmotion_faces.outputs.scenes import build_character_scene, build_head_scene, write_scene
 from programs import gltf_report, gltf_validator, python_with, run_with
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -51,9 +51,9 @@ def main() -> None:
         result = lipmotion.animate(sound, transcript=EXAMPLES / "welcome.txt")
         prosody = measure_prosody(sound)
         print(json.dumps(fit(result)), flush=True)
-        makers = {"head": lambda: head_scene(result, prosody=prosody)}
+        makers = {"head": lambda: build_head_scene(result, prosody=prosody)}
         for path in options.characters:
-            makers[path.stem] = lambda path=path: character_scene(result, load_character(path), prosody=prosody)
+            makers[path.stem] = lambda path=path: build_character_scene(result, load_character(path), prosody=prosody)
         for name, make in makers.items():
             started = time.process_time()
             scene = make()
@@ -70,10 +70,10 @@ def main() -> None:
 
 def fit(result: Generation) -> dict[str, object]:
     """Return how far the lips of the 3D head's mesh are from where its videos show them, in eye distances."""
-    character = figure()
-    mesh = head_mesh(character)
-    poses = head_poses(result.motion, result.units, 100.0)
-    curves = mouth_weights(character, mesh, poses)
+    character = make_figure()
+    mesh = build_head_mesh(character)
+    poses = list_head_poses(result.motion, result.units, 100.0)
+    curves = fit_mouth_weights(character, mesh, poses)
     lips = character.skin.lip_rows()[:VISIBLE_RINGS]
     rows, ring = lips.ravel(), slice((VISIBLE_RINGS - 1) * COLUMNS, VISIBLE_RINGS * COLUMNS)
     moved = mesh.displacements(rows)

@@ -102,7 +102,7 @@ def features(options: Any) -> Work:
 
 def cloning(options: Any) -> Work:
     """Return the work: a patch in every frame, with its gradient and the frame's edge."""
-    from lipmotion_faces.appearance.poisson import cloning_system
+    from lipmotion_faces.appearance.poisson import build_cloning_system
 
     pictures, size = _harness("get")(options), options.size
     top, left = pictures["y"], pictures["x"]
@@ -110,7 +110,7 @@ def cloning(options: Any) -> Work:
     source, mask = frames.copy(), np.zeros(frames.shape[1:3], bool)
     source[:, top : top + size, left : left + size] = np.stack(pictures["pa"] * 2)
     mask[top + 1 : top + size - 1, left + 1 : left + size - 1] = True
-    system = cloning_system(mask)
+    system = build_cloning_system(mask)
     return lambda: system.clone(source, frames)[-1]
 
 

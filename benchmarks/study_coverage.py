@@ -25,9 +25,9 @@ from scipy.special import ndtr, ndtri, stdtrit
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from lipmotion_studio.study.analysis import crossed
-from lipmotion_studio.study.analysis.analyse import power_of, raters_needed
-from lipmotion_studio.study.analysis.crossed import RANKS, Components, Interval, RatingTable, rating_figures
-from lipmotion_studio.study.analysis.paired import fit_strengths, paired_figures
+from lipmotion_studio.study.analysis.analyse import compute_power, find_raters_needed
+from lipmotion_studio.study.analysis.crossed import RANKS, Components, Interval, RatingTable, analyse_ratings
+from lipmotion_studio.study.analysis.paired import fit_strengths, analyse_pairs
 from study.simulated import Effects, comparisons, expected_preference, expected_rating, ratings
 
 Array = NDArray[np.float64]
@@ -114,7 +114,7 @@ def rated(draw: np.random.Generator, size: tuple[int, int], effects: Effects) ->
     """Yield the intervals of one study of opinion scores."""
     truth = {f"c{i}": expected_rating(float(mean), effects) for i, mean in enumerate(MEANS)}
     table = ratings(draw, MEANS, size, effects)
-    figures = rating_figures(table, "c0")
+    figures = analyse_ratings(table, "c0")
     for row in figures["conditions"]:
         yield Found("mean", Interval(row["low"], row["high"]), truth[row["condition"]])
     for row in figures["pairs"]:
@@ -138,7 +138,7 @@ def compared(draw: np.random.Generator, size: tuple[int, int], effects: Effects)
     lost = 1 - chance - np.eye(len(chance))
     model, share = fit_strengths(chance, lost), (chance + lost.T) / 2
     table = comparisons(draw, STRENGTHS, size, effects, ORDER)
-    figures = paired_figures(table)
+    figures = analyse_pairs(table)
     for row in figures["pairs"]:
         i, j = (int(row[name][1:]) for name in ("condition", "other"))
         yield Found("share", Interval(row["low"], row["high"]), share[i, j])
@@ -177,16 +177,16 @@ def power(studies: int) -> list[dict[str, Any]]:
     for rater, sentence, difference in ((0.4, 0.1, 0.5), (0.4, 0.3, 0.5), (0.2, 0.1, 0.3), (0.0, 0.0, 0.2)):
         for sentences in (6, 20):
             components = Components(rater**2, sentence**2, 1.0)
-            raters = raters_needed(components, difference, sentences)
+            raters = find_raters_needed(components, difference, sentences)
             if raters is None:
                 continue
             draw, told = np.random.default_rng([studies, raters, sentences]), 0
             for _ in range(studies):
                 values = difference + draw.normal(size=(raters, sentences))
                 values += rater * draw.normal(size=(raters, 1)) + sentence * draw.normal(size=(1, sentences))
-                told += crossed.crossed_mean(values, 4.0).p_value < 0.05
+                told += crossed.estimate_crossed_mean(values, 4.0).p_value < 0.05
             row = {"rater": rater, "sentence": sentence, "difference": difference, "sentences": sentences}
-            said = power_of(components, difference, raters, sentences)
+            said = compute_power(components, difference, raters, sentences)
             rows.append(row | {"raters": raters, "said": said, "told": told / studies})
             print(rows[-1], flush=True)
     return rows

@@ -20,16 +20,16 @@ from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import Motion, Timeline, Utterance
 from lipmotion_faces.appearance import lower_face
-from lipmotion_faces.appearance.candidates import squared_distances
-from lipmotion_faces.appearance.placing import inverse_map, place
+from lipmotion_faces.appearance.candidates import measure_squared_distances
+from lipmotion_faces.appearance.placing import invert_map, place
 from lipmotion_faces.film import filmed_video
 from lipmotion_faces.film.background import open_background, steady_face
 from lipmotion_faces.film.filmed_video import FILM, make_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion_faces.registry import make_face
-from lipmotion_faces.tracking.head_pose import region_to_image
-from lipmotion_faces.tracking.track import footage_frames, track_footage
+from lipmotion_faces.tracking.head_pose import map_region_to_image
+from lipmotion_faces.tracking.track import decode_footage, track_footage
 from lipmotion_faces.tracking.trackers import LIP_POINTS
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ class RecordedClip:
     @cached_property
     def to_frame(self) -> Array:
         """The maps from pixels of the mouth region to their positions in the image [shape=(T, 2, 3)]."""
-        return np.stack([region_to_image(one) for one in self.maps])
+        return np.stack([map_region_to_image(one) for one in self.maps])
 
     @cached_property
     def lower_face_to_frame(self) -> Array:
@@ -114,7 +114,7 @@ class Way:
 def recorded_clip(corpus: Corpus, name: str, path: Path) -> RecordedClip:
     """Return a clip of a corpus with the frames of its video, and the pose of the head in every frame."""
     footage = track_footage(path)
-    frames = np.stack(list(footage_frames(footage)))
+    frames = np.stack(list(decode_footage(footage)))
     utterance = corpus.utterance(name)
     if len(frames) != len(utterance.track.seen):
         raise InputError(f"{path}: {len(frames)} frames, required {len(utterance.track.seen)}, as in the corpus")
@@ -130,8 +130,8 @@ def video_of(clips: Path, name: str) -> Path:
 def training_video(path: Path) -> tuple[Pictures, Array]:
     """Return the frames of a video, and the maps from the mouth region to them."""
     footage = track_footage(path)
-    maps = np.stack([region_to_image(one) for one in footage.face_to_image])
-    return np.stack(list(footage_frames(footage))), maps
+    maps = np.stack([map_region_to_image(one) for one in footage.face_to_image])
+    return np.stack(list(decode_footage(footage))), maps
 
 
 class RecordedMouths:
@@ -156,7 +156,7 @@ class RecordedMouths:
 
     def nearest(self, motion: Array) -> NDArray[np.intp]:
         """Return the number of the picture whose lip points are nearest, in each frame [shape=(T,)]."""
-        found = squared_distances(motion.astype(np.float32), self.lips.astype(np.float32)).argmin(axis=1)
+        found = measure_squared_distances(motion.astype(np.float32), self.lips.astype(np.float32)).argmin(axis=1)
         return np.asarray(found)
 
     def frame(self, number: int) -> tuple[Pictures, Array]:
@@ -218,7 +218,7 @@ def pasted(clip: RecordedClip, pictures: Pictures) -> Iterator[Pictures]:
 def mouth_in_frame(frame: Pictures, to_frame: Array) -> NDArray[np.float32]:
     """Return where the mouth region lies in a frame: 1 inside, 0 outside [shape=(H, W)]."""
     rows, columns = np.mgrid[: frame.shape[0], : frame.shape[1]]
-    back = inverse_map(to_frame)
+    back = invert_map(to_frame)
     x, y = np.einsum("ij,jhw->ihw", back[:, :2], np.stack([columns, rows])) + back[:, 2, None, None]
     inside = (x > 0.5) & (x < WIDTH - 1.5) & (y > 0.5) & (y < HEIGHT - 1.5)
     return inside.astype(np.float32)
@@ -244,7 +244,7 @@ def simple_ways(mouths: RecordedMouths, engines: Sequence[str]) -> list[Way]:
         for number, frame, to_frame in zip(mouths.nearest(lips(motion)), clip.frames, clip.to_frame, strict=True):
             source, to_source = mouths.frame(int(number))
             made = frame.copy()
-            place(made, source, mouth_in_frame(source, to_source), composed(to_frame, inverse_map(to_source)))
+            place(made, source, mouth_in_frame(source, to_source), composed(to_frame, invert_map(to_source)))
             yield made
 
     def mapped(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:
@@ -299,7 +299,7 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
             model = None if eigenlips is None else replace(load_model(), eigenlips=eigenlips)
             return make_film(face, shown, sound=sound, model=model, options=with_clip).frames
 
-        mask = lower_face.mouth_ellipse(1) if options.jaw == "none" else _replaced(face)
+        mask = lower_face.mark_mouth(1) if options.jaw == "none" else _replaced(face)
         return Way(f"filmed, {name}", source, render, np.pad(mask, AROUND_PX))
 
     ways = [way("own eigenlips", "tracked", FILM, mouths.eigenlips)]
@@ -322,4 +322,4 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
 
 def _replaced(face: FilmedFace) -> Mask:
     """Return the part of the lower face that is replaced."""
-    return lower_face.replaced_part(face.appearance.shape, 1)
+    return lower_face.mark_replaced(face.appearance.shape, 1)

@@ -45,9 +45,9 @@ def as_shown(value: Any, form: str) -> str:
     if value is None:
         return "–"
     if form == "*":
-        from lipmotion_lab.evaluation.evaluate import significance_mark
+        from lipmotion_lab.evaluation.evaluate import mark_significance
 
-        return significance_mark(value)
+        return mark_significance(value)
     if isinstance(value, list):
         return (" to " if form.startswith("+") else "–").join(as_shown(each, form) for each in value)
     text = format(value, form)
@@ -106,11 +106,11 @@ def sheets() -> dict[str, Sheet]:
 def current_models() -> frozenset[str]:
     """Return the stamps of what makes figures now: the shipped model, every engine with its defaults, no model."""
     from lipmotion.engines import ENGINES
-    from lipmotion_lab.runner import engine_digest
+    from lipmotion_lab.runner import digest_engine
 
     (model,) = (ROOT / "src" / "lipmotion").rglob(SHIPPED)
     shipped = f"shipped {hashlib.sha256(model.read_bytes()).hexdigest()[:8]}"
-    return frozenset({"none", shipped, *(f"{name} {engine_digest(name)}" for name in ENGINES.built_in)})
+    return frozenset({"none", shipped, *(f"{name} {digest_engine(name)}" for name in ENGINES.built_in)})
 
 
 def made_by(model: str, current: frozenset[str]) -> str:

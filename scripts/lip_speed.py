@@ -21,8 +21,8 @@ from lipmotion_faces.corpus.sound_offset import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     WEIGHTS,
-    context_features,
-    measured_opening_speed,
+    stack_context,
+    measure_opening_speed,
 )
 
 RIDGE = 100.0
@@ -53,14 +53,14 @@ def main() -> None:
 def fit_opening_speed(examples: Iterable[tuple[Features, np.ndarray]]) -> np.ndarray:
     """Return the weights of the prediction [shape=(143,)], by ridge regression.
 
-    examples : features, and the ``measured_opening_speed`` of the lips [shape=(at most T,)], of clips where both are in
+    examples : features, and the ``measure_opening_speed`` of the lips [shape=(at most T,)], of clips where both are in
                step
     """
     count = STATIC_FEATURES * len(FRAME_OFFSETS)
     products = RIDGE * np.eye(count)
     targets = np.zeros(count)
     for features, measured in examples:
-        inputs = context_features(features)[: len(measured)]
+        inputs = stack_context(features)[: len(measured)]
         inputs -= inputs.mean(axis=0)
         target = measured[: len(inputs)] / max(float(measured.std()), 1e-9)
         products += inputs.T @ inputs
@@ -77,7 +77,7 @@ def examples(corpus: lipmotion.Corpus, names: tuple[str, ...]) -> Iterator[tuple
             opening = np.asarray(motion["opening"], float)[:, None]
             frames = len(utterance.features.values)
             values, valid = resample_to_model(opening, seen, motion.rate_hz, frames, FRAME_RATE_HZ)
-            yield utterance.features, measured_opening_speed(values[valid, 0])
+            yield utterance.features, measure_opening_speed(values[valid, 0])
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from PIL import Image
 import lipmotion
 from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
 from lipmotion_faces import Staging
-from lipmotion_faces.tracking.track import Footage, footage_frames, track_footage
+from lipmotion_faces.tracking.track import Footage, decode_footage, track_footage
 
 STRIP = Path(__file__).parent.parent / "docs" / "images" / "strip.webp"
 WIDTH_PX, HEIGHT_PX = 300, 340
@@ -59,7 +59,7 @@ def pictures(footage: Footage) -> list[NDArray[np.uint8]]:
     px = float(np.sqrt(abs(np.linalg.det(place[:, :2])))) * EYE_DISTANCE_PX / EYES_PX
     left, top = place[:, 2] - px * np.array(EYES_AT_PX)
     cut = (left, top, left + px * WIDTH_PX, top + px * HEIGHT_PX)
-    whole = [Image.fromarray(frame) for frame in footage_frames(footage)]
+    whole = [Image.fromarray(frame) for frame in decode_footage(footage)]
     return [np.asarray(each.resize((WIDTH_PX, HEIGHT_PX), Image.Resampling.LANCZOS, cut)) for each in whole]
 
 

@@ -119,7 +119,7 @@ class StoredVideo:
 
     @cached_property
     def _layout(self) -> tuple[list[int], list[int]]:
-        return _layout(self.data)
+        return _read_layout(self.data)
 
     def groups(self) -> FrameGroups:
         """Return access to any frame, each uint8 RGB [shape=(H, W, 3)]; memory does not grow with the video's length.
@@ -184,7 +184,7 @@ def encode_pictures(pictures: Pictures, crf: float = PICTURES_CRF) -> Stream:
 def decode_pictures(data: Stream) -> Pictures:
     """Return the pictures of ``encode_pictures`` [shape=(N, H, W, 3)]. Raises ModelFormatError: they are damaged."""
     with format_errors("the stored pictures", _REMEDY, verb="are"):
-        begins, _ = _layout(data)
+        begins, _ = _read_layout(data)
         decoded = _decode(data, begins, None)
         first = next(decoded, None)
         count = len(begins) - 1
@@ -248,7 +248,7 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
                 raise InputError(f"a picture of shape {shape}, required (H, W, 3)")
             if shape[0] * shape[1] > MAX_PIXELS:
                 raise InputError(f"a picture of shape {shape}, required at most {MAX_PIXELS} pixels; scale the video")
-            context = _encoder(shape, crf, group, pixel_format)
+            context = _open_encoder(shape, crf, group, pixel_format)
         if frame.shape != shape or frame.dtype != np.uint8:
             raise InputError(f"frame {n} is {frame.dtype} {frame.shape}, required uint8 {shape} as the first")
         rest = (context.height - shape[0], context.width - shape[1])
@@ -260,7 +260,7 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
     yield from map(bytes, context.encode(None))
 
 
-def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) -> Any:
+def _open_encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) -> Any:
     import av
 
     context: Any = av.CodecContext.create("libx264", "w")
@@ -278,7 +278,7 @@ def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) 
     return context
 
 
-def _layout(data: Stream) -> tuple[list[int], list[int]]:
+def _read_layout(data: Stream) -> tuple[list[int], list[int]]:
     """Return where each frame begins, and the end; and the first frame of each group, and the number of frames."""
     if data.ndim != 1 or data.dtype != np.uint8 or len(data) < 8:
         raise ValueError(f"a stream of shape {data.shape} and type {data.dtype}, required bytes")

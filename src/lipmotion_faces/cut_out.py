@@ -60,7 +60,7 @@ def read_cut_out(folder: Path) -> CutOut:
     """Return the character of a folder of pictures. Raises InputError: a shape is missing or twice, or sizes differ."""
     files = picture_files(folder)
     named = {path: match[1].lower() for path in files if (match := _NAME.search(path.stem))}
-    readings = (_shapes(named, names) for names in (LETTERS, BLAIR))
+    readings = (_name_shapes(named, names) for names in (LETTERS, BLAIR))
     chosen = max(readings, key=lambda reading: len(reading.keys() & set(REQUIRED)))
     missing = [name for name in REQUIRED if name not in chosen]
     if missing:
@@ -77,11 +77,11 @@ def read_cut_out(folder: Path) -> CutOut:
             raise InputError(f"{chosen[name]}: the pictures are {sizes}, required one size; export them alike")
         if (len(pictures) + 1) * picture.shape[0] * picture.shape[1] > MAX_PIXELS:
             raise InputError(f"{folder}: the pictures have more than {MAX_PIXELS} pixels together; export them smaller")
-        pictures[name] = picture if below is None else _over(picture, below)
+        pictures[name] = picture if below is None else _lay_over(picture, below)
     return CutOut(pictures)
 
 
-def _shapes(named: Mapping[Path, str], names: Mapping[str, str]) -> dict[str, Path]:
+def _name_shapes(named: Mapping[Path, str], names: Mapping[str, str]) -> dict[str, Path]:
     """Return the pictures by the letters of their shapes. Raises InputError: two of one shape."""
     shapes: dict[str, Path] = {}
     for path, name in named.items():
@@ -113,7 +113,7 @@ def _read(path: Path) -> Picture:
         raise InputError(f"{path}: no picture that can be read ({error}); export it as PNG") from error
 
 
-def _over(upper: Picture, lower: Picture) -> Picture:
+def _lay_over(upper: Picture, lower: Picture) -> Picture:
     """Return a picture over another one, both with straight alpha [shape=(H, W, 4)]."""
     cover, below = upper[..., 3:] / 255, lower[..., 3:] / 255
     alpha = cover + below * (1 - cover)
@@ -137,4 +137,4 @@ def _stage(picture: Picture, staging: Staging) -> Picture:
         return picture
     ground = np.empty_like(picture)
     ground[:] = (*(staging.colour or WHITE), 255)
-    return np.ascontiguousarray(_over(picture, ground)[..., :3])
+    return np.ascontiguousarray(_lay_over(picture, ground)[..., :3])

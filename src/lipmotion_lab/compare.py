@@ -86,9 +86,9 @@ def _read_side(source: Source, number: int) -> _Side:
 
 def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
     """Return the figures of one pair. Raises InputError: as ``compare``."""
-    names, notes = _common_channels(reference, other)
+    names, notes = _match_channels(reference, other)
     rate_hz = min(reference.motion.rate_hz, other.motion.rate_hz, HIGHEST_RATE_HZ)
-    time_s, time_notes = _common_times(reference, other, rate_hz)
+    time_s, time_notes = _match_times(reference, other, rate_hz)
     notes += time_notes
     measured = np.ones(len(time_s), bool)
     for side in (reference, other):  # the frame next to each time
@@ -107,7 +107,7 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
     axes = {name[2:]: tuple(f"{axis}_{name[2:]}" for axis in "xyz") for name in names if name.startswith("x_")}
     points = {point: parts for point, parts in axes.items() if set(names).issuperset(parts)}
     coordinates = {axis for parts in points.values() for axis in parts}
-    channel_figures, still = _channel_figures(made, original, [name for name in names if name not in coordinates])
+    channel_figures, still = _measure_channels(made, original, [name for name in names if name not in coordinates])
     if still:
         notes.append(f"left out, for they do not move in the reference: {', '.join(still)}")
     accuracies = [row["acc"] for row in channel_figures.values()]
@@ -120,20 +120,20 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
         "acc": float(np.mean(accuracies)) if accuracies else None,
     }
     if OPENING in channel_figures:
-        generated, recorded = ([_values(side, [OPENING])[:, 0]] for side in (made, original))
+        generated, recorded = ([_select_values(side, [OPENING])[:, 0]] for side in (made, original))
         threshold = find_threshold(recorded)
         closures = asdict(measure_closures(generated, recorded, threshold, rate_hz))
         figures["closures"] = closures | {"closed_under": threshold}
     if points:
-        figures["points"] = _point_figures(made, original, points)
+        figures["points"] = _measure_points(made, original, points)
     if upper := [name for name in UPPER_FACE if name in names]:  # weights, which are 0 at rest
-        generated, recorded = ([_values(side, upper)[:, :, None]] for side in (made, original))
+        generated, recorded = ([_select_values(side, upper)[:, :, None]] for side in (made, original))
         deviation = curves.measure_upper_face(generated, recorded, rest=np.zeros((len(upper), 1)))
         figures["upper_face"] = {"curves": len(upper), "deviation": deviation}
     return figures
 
 
-def _common_channels(reference: _Side, other: _Side) -> tuple[list[str], list[str]]:
+def _match_channels(reference: _Side, other: _Side) -> tuple[list[str], list[str]]:
     """Return the names of the channels that both have, in the same unit, and notes on the others."""
     units = {channel.name: channel.unit for channel in other.motion.channels}
     same = [each.name for each in reference.motion.channels if units.get(each.name) == each.unit]
@@ -151,7 +151,7 @@ def _common_channels(reference: _Side, other: _Side) -> tuple[list[str], list[st
     return same, notes
 
 
-def _common_times(reference: _Side, other: _Side, rate_hz: float) -> tuple[Array, list[str]]:
+def _match_times(reference: _Side, other: _Side, rate_hz: float) -> tuple[Array, list[str]]:
     """Return the times of the frames that both have, and notes on what is resampled and left out."""
     lengths = [(len(side.motion.values) - 1) / side.motion.rate_hz for side in (reference, other)]
     notes = [
@@ -167,18 +167,18 @@ def _common_times(reference: _Side, other: _Side, rate_hz: float) -> tuple[Array
     return np.arange(int(np.floor(min(lengths) * rate_hz + 1e-6)) + 1) / rate_hz, notes
 
 
-def _values(motion: Motion, names: Sequence[str]) -> Array:
+def _select_values(motion: Motion, names: Sequence[str]) -> Array:
     return np.asarray(motion.values[:, [motion.column(name) for name in names]], np.float64)
 
 
-def _channel_figures(
+def _measure_channels(
     made: Motion, original: Motion, names: Sequence[str]
 ) -> tuple[dict[str, dict[str, Any]], list[str]]:
     """Return the figures of every channel of these that moves in the original, and the names of the others."""
     rate_hz, channels = made.rate_hz, [original.channels[original.column(name)] for name in names]
     if not names:
         return {}, []
-    generated, reference = [_values(made, names)], [_values(original, names)]
+    generated, reference = [_select_values(made, names)], [_select_values(original, names)]
     figures = {
         "acc": curves.correlate_pooled(generated, reference),
         "rmse": curves.rmse(generated, reference),
@@ -200,11 +200,11 @@ def _channel_figures(
     return rows, [name for name in names if name not in rows]
 
 
-def _point_figures(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
+def _measure_points(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
     """Return the figures of points in mm (None: no points); at rest, points above the eyes are at their median."""
 
     def places(side: Motion, wanted: Sequence[str]) -> Array:
-        coordinates = _values(side, [axis for point in wanted for axis in points[point]])
+        coordinates = _select_values(side, [axis for point in wanted for axis in points[point]])
         return coordinates.reshape(len(coordinates), -1, 3) * MILLIMETRES
 
     def both(wanted: Sequence[str]) -> tuple[list[Array], list[Array]]:

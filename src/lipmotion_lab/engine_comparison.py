@@ -20,7 +20,7 @@ from lipmotion.storage.locks import keep_unfinished
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
+from lipmotion_lab.evaluation.evaluate import sum_correlations, measure_clips, pair_curves
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings, generate_compared, make_speech
 from lipmotion_lab.learning_curve import check_training_names
 
@@ -38,7 +38,7 @@ class EngineModel:
     seconds: float | None
 
 
-def engine_models(
+def train_engines(
     corpus: Corpus, folder: Path | None, settings: runner.ExperimentSettings, names: Sequence[str] = ENGINES_COMPARED
 ) -> dict[str, EngineModel]:
     """Return models of the corpus's training list, each engine by its defaults.
@@ -106,7 +106,7 @@ WIDTH, WIDTH_FIGURES = "width", ("acc", "nrmse", "global_variance")
 
 
 @limit_threads()
-def engines(
+def compare_engines(
     corpus: Corpus,
     *,
     split: str | None = "val",
@@ -119,12 +119,12 @@ def engines(
     The phones in time are those of the trajectory engine's phone models, for all of them.
     Raises CorpusError: no training list, no utterances of this split or some of the training list among them, or
     motion without an opening.
-    Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
+    Raises InputError, ModelFormatError, ExportError: as ``train_engines``.
     """
     held_out = corpus.required(split)
     check_training_names(corpus, corpus.required("train"), held_out)
     channels = runner.check_opening(corpus, held_out)
-    trained = engine_models(corpus, models, settings.part(0, 0.6))
+    trained = train_engines(corpus, models, settings.part(0, 0.6))
     phones = trained[REFERENCE_ENGINE].model.phones
     recordings = runner.recognise_held_out(corpus, phones, held_out, settings.part(0.6, 0.7), channels=channels)
     steps = [(condition, name) for condition in recordings.conditions for name in trained]
@@ -151,23 +151,23 @@ def engines(
         }
         for name, each in trained.items()
     }
-    conditions = {name: {"systems": _rows(recordings, found, settings.seed)} for name, found in made.items()}
+    conditions = {name: {"systems": _make_rows(recordings, found, settings.seed)} for name, found in made.items()}
     return replace_nan(about | {"conditions": conditions})
 
 
-def _rows(
+def _make_rows(
     recordings: HeldOutRecordings,
     made: Mapping[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]],
     seed: int,
 ) -> dict[str, dict[str, Any]]:
     """Return the figures of systems, with ACC gains over each system; ``unpinned``: without forced closures."""
-    acc = {name: correlation_statistic(*opening_curves(recordings, clips)) for name, (clips, _) in made.items()}
+    acc = {name: sum_correlations(*pair_curves(recordings, clips)) for name, (clips, _) in made.items()}
     rows = {}
     for name, (clips, free) in made.items():
-        figures = figures_of(clips, recordings, seed)
+        figures = measure_clips(clips, recordings, seed)
         width = figures["channels"].get(WIDTH, {})
-        row = runner.opening_row(figures) | {f"{WIDTH}_{key}": width.get(key) for key in WIDTH_FIGURES}
+        row = runner.make_opening_row(figures) | {f"{WIDTH}_{key}": width.get(key) for key in WIDTH_FIGURES}
         row |= {"acc_gain_95": {other: acc[name].gain(statistic, seed) for other, statistic in acc.items()}}
         row |= {"jerk": figures["channels"][OPENING]["jerk"], "lag_ms": figures["lag_ms"]}
-        rows[name] = row | {"unpinned": runner.opening_row(figures_of(free, recordings, seed))}
+        rows[name] = row | {"unpinned": runner.make_opening_row(measure_clips(free, recordings, seed))}
     return rows

@@ -22,7 +22,7 @@ from lipmotion.measures.closures import find_threshold
 from lipmotion.measures.curves import correlate_pooled
 from lipmotion.storage.json_text import replace_nan
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import clip_statistics, figures_of
+from lipmotion_lab.evaluation.evaluate import list_statistics, measure_clips
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings, choose_channels
 
 FOLDS = 5
@@ -61,7 +61,7 @@ def _fold_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> _GeneratedFold:
 
 
 @limit_threads()
-def folds(
+def cross_validate(
     corpus: Corpus,
     *,
     count: int | None = None,
@@ -89,7 +89,7 @@ def folds(
         what = "speakers" if by_speaker else "utterances"
         raise InputError(f"{count} folds; required: from 2 to {len(groups)}, which is how many {what} there are")
     runner.check_opening(corpus, names)
-    mixed = runner.shuffled(groups, settings.seed)
+    mixed = runner.shuffle(groups, settings.seed)
     key = runner.PartKey(engine_named("trajectory"), names, others=f"{count} {by_speaker}")
     kept, results = runner.open_parts(work, corpus, settings, key), []
     for fold, part in enumerate(runner.share_out(settings, [f"fold {fold + 1}" for fold in range(count)])):
@@ -115,8 +115,8 @@ def folds(
 def _make_row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, by_speaker: bool) -> dict[str, Any]:
     """Return the figures of the clips of all folds in one condition, and the correlation of each speaker's opening."""
     pooled = [clip for result in results for clip in result.clips[condition]]
-    figures = figures_of(pooled, results[0], seed)
-    row = runner.opening_row(figures)
+    figures = measure_clips(pooled, results[0], seed)
+    row = runner.make_opening_row(figures)
     if not by_speaker:
         return row
     clips: dict[str, list[ComparedClip]] = {}
@@ -131,7 +131,7 @@ def _make_row(results: Sequence[_GeneratedFold], condition: str, seed: int, *, b
 
 
 @limit_threads()
-def in_blocks(
+def cross_validate_blocks(
     experiment: Callable[..., dict[str, Any]],
     corpus: Corpus,
     references: Sequence[str],
@@ -206,7 +206,7 @@ def _make_rows(
     compared: _GeneratedFold, systems: Mapping[str, Sequence[ComparedClip]], references: Sequence[str], seed: int
 ) -> dict[str, Any]:
     """Return the figures of systems on the same clips, with intervals, also of their gains over references."""
-    statistics = {system: clip_statistics(compared, clips) for system, clips in systems.items()}
+    statistics = {system: list_statistics(compared, clips) for system, clips in systems.items()}
     rows = {}
     for system, clips in systems.items():
         row: dict[str, Any] = {}
@@ -215,6 +215,6 @@ def _make_rows(
             others = [each for each in references if each in systems]
             row[f"{name}_gain_95"] = {each: own.gain(statistics[each][name], seed) for each in others}
         if compared.closed_under is not None:
-            row["opening"] = runner.opening_row(figures_of(clips, compared, seed))
+            row["opening"] = runner.make_opening_row(measure_clips(clips, compared, seed))
         rows[system] = row
     return rows

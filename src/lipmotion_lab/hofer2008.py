@@ -62,7 +62,7 @@ class _System:
 
 
 @limit_threads()
-def hofer2008(
+def run_hofer2008(
     corpus: Corpus,
     options: PhoneticTableOptions = FULL,
     *,
@@ -80,7 +80,7 @@ def hofer2008(
     """
     runner.check_opening(corpus, compared := corpus.required(split))  # before the long work
     validation, names = corpus.required("val"), tuple(sorted(corpus.required("train")))
-    key = runner.PartKey(_engine(channels=options.channels), (*names, *validation, *compared))
+    key = runner.PartKey(_create_engine(channels=options.channels), (*names, *validation, *compared))
     checkpoint, utterances = runner.open_parts(work, corpus, settings, key), [corpus.utterance(name) for name in names]
     phones, examples = runner.train_phones(utterances, settings.part(0, 0.1), checkpoint)
     read = partial(runner.recognise_held_out, corpus, phones, channels=(OPENING,))
@@ -92,7 +92,7 @@ def hofer2008(
     }
     parts = runner.share_out(settings, [f"{units}, {states} states" for states, units in cells], 0.15)
     for (states, units), part in zip(cells, parts, strict=True):
-        engine = _engine(units=units, states=states, channels=options.channels)
+        engine = _create_engine(units=units, states=states, channels=options.channels)
         system = _train_system(engine, options, examples, choosing, checkpoint, part.monitor)
         for condition in recordings.conditions:
             speech = held_out.make_speech(recordings, condition, system.engine, system.model)
@@ -106,13 +106,13 @@ def hofer2008(
     about |= {"closed_under": recordings.closed_under, "mixtures": list(options.mixtures), "seed": settings.seed}
     about |= {"channels": options.channels, "motion_mixtures": list(options.motion_mixtures)}
     tables = [
-        {"condition": condition, "pins": pins} | _table(recordings, rows, settings.seed) | {"states": states}
+        {"condition": condition, "pins": pins} | _make_table(recordings, rows, settings.seed) | {"states": states}
         for (states, condition, pins), rows in made.items()
     ]
     return replace_nan(about | {"tables": tables})
 
 
-def _engine(**options: Any) -> JointEngine:
+def _create_engine(**options: Any) -> JointEngine:
     return JointEngine(JointEngineConfig(**{**JointEngineConfig.presets[PRESET], **options}))
 
 
@@ -137,10 +137,10 @@ def _train_system(
             if (speech, motion) in tried or speech not in options.mixtures or motion not in options.motion_mixtures:
                 continue
             clips = held_out.generate_clips(choosing, AUDIO_ONLY, engine, model)
-            tried[speech, motion] = evaluate.correlation_statistic(*evaluate.opening_curves(choosing, clips)).value
-            if _best_count(tried) == (speech, motion):
+            tried[speech, motion] = evaluate.sum_correlations(*evaluate.pair_curves(choosing, clips)).value
+            if _find_best_count(tried) == (speech, motion):
                 arrays.update(engine.to_arrays(model))
-            if speech * motion >= TWICE_DOUBLED * np.prod(_best_count(tried)):
+            if speech * motion >= TWICE_DOUBLED * np.prod(_find_best_count(tried)):
                 return
 
     stage = f"{config.units}-{config.states}-{options.mixtures}-{options.motion_mixtures}"
@@ -149,7 +149,7 @@ def _train_system(
         if not tried:
             raise InputError(f"no state has data for {min(options.mixtures)} Gaussians; compare also fewer, from 1")
         if max(options.motion_mixtures) > 1:
-            most = {"mixtures": _best_count(tried)[0], "motion_mixtures": max(options.motion_mixtures)}
+            most = {"mixtures": _find_best_count(tried)[0], "motion_mixtures": max(options.motion_mixtures)}
             try_numbers(sub_monitor(monitor, 0.6, 1), **most)
         kept = arrays | {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
         checkpoint.save(stage, kept)
@@ -158,26 +158,26 @@ def _train_system(
     return _System(engine, model, acc)
 
 
-def _best_count(acc: Mapping[tuple[int, int], float]) -> tuple[int, int]:
+def _find_best_count(acc: Mapping[tuple[int, int], float]) -> tuple[int, int]:
     """Return the numbers of Gaussians with the highest correlation; among equals the smallest."""
     return max(acc, key=lambda counts: (acc[counts], -counts[0], -counts[1]))
 
 
-def _table(
+def _make_table(
     recordings: HeldOutRecordings, made: Mapping[str, tuple[_System, Sequence[ComparedClip]]], seed: int
 ) -> dict[str, Any]:
     """Return the figures of all sets in one condition, and the intervals of the differences of every two of them."""
-    openings = {units: evaluate.opening_curves(recordings, clips) for units, (_, clips) in made.items()}
+    openings = {units: evaluate.pair_curves(recordings, clips) for units, (_, clips) in made.items()}
     threshold = recordings.closed_under or 0.0
-    scores = {units: evaluate.closing_score_statistic(*pair, threshold) for units, pair in openings.items()}
-    acc = {units: evaluate.correlation_statistic(*pair) for units, pair in openings.items()}
+    scores = {units: evaluate.sum_closings(*pair, threshold) for units, pair in openings.items()}
+    acc = {units: evaluate.sum_correlations(*pair) for units, pair in openings.items()}
     rows = {}
     for units, (system, clips) in made.items():
-        figures = evaluate.figures_of(clips, recordings, seed)
-        rows[units] = runner.opening_row(figures) | {
+        figures = evaluate.measure_clips(clips, recordings, seed)
+        rows[units] = runner.make_opening_row(figures) | {
             "units": UNIT_SETS[units].count,
             "paper": PAPER_SCORES[units],
-            **dict(zip(("gaussians", "motion_gaussians"), _best_count(system.acc), strict=True)),
+            **dict(zip(("gaussians", "motion_gaussians"), _find_best_count(system.acc), strict=True)),
             "acc_on_val": {f"{speech}, {motion}": value for (speech, motion), value in system.acc.items()},
             "jerk": figures["channels"][OPENING]["jerk"],
             "score_95": scores[units].interval(seed),

@@ -35,8 +35,8 @@ from lipmotion.storage.json_text import as_json, from_json, replace_nan
 from lipmotion.types import Audio, Monitor, Span, Timeline, Unit, Utterance, silent_monitor, sub_monitor, with_progress
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import Lexicon, is_silent
-from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic, ratio
-from lipmotion_lab.report.page import FPS, RECORDED, FinishedPart, draw_mouths, report_html
+from lipmotion_lab.evaluation.evaluate import BILABIAL, ClipStatistic, divide_sums
+from lipmotion_lab.report.page import FPS, RECORDED, FinishedPart, draw_mouths, write_html
 from lipmotion_lab.report.section import Column, Section, Table, warn_of_few, write_text
 
 Array = NDArray[np.float64]
@@ -306,7 +306,7 @@ def fit_map(rows: Array, original: Array) -> Array:
     return coefficients
 
 
-def at_best_sync(recording: Recording, motion: Array, lag_s: float, limit_s: float) -> Array:
+def synchronise(recording: Recording, motion: Array, lag_s: float, limit_s: float) -> Array:
     """Return motion [shape=(T, 2)] in the frames of a recording, moved by up to ``limit_s`` to fit its opening best."""
     shifts = np.arange(-limit_s, limit_s + 1e-9, SYNC_STEP_S) if limit_s else np.zeros(1)
     times = recording.time_s[:, None] + lag_s + shifts
@@ -336,19 +336,19 @@ def choose(
             else:
                 placed = (interpolate_rows(w, GRID_HZ, r.time_s + lag_s) for w, r in zip(weights, chosen, strict=True))
                 coefficients = fit_map(np.concatenate(list(placed)), original)
-            moved = [at_best_sync(r, w @ coefficients, lag_s, limit_s) for w, r in zip(weights, chosen, strict=True)]
+            moved = [synchronise(r, w @ coefficients, lag_s, limit_s) for w, r in zip(weights, chosen, strict=True)]
             score = float(curves.correlate_clips([each[:, :1] for each in moved], opened)[0])
             if score > choice.score + 1e-4:
                 choice, made = Choice(setting, lag_s, smoothing_s, coefficients, score=score), moved
     level = float(np.percentile(np.concatenate([each[:, 0] for each in made]), 95))
     counts = {
-        share: np.sum([closing_counts(each, m, share * level)[0] for each, m in zip(chosen, made, strict=True)], axis=0)
+        share: np.sum([count_closings(each, m, share * level)[0] for each, m in zip(chosen, made, strict=True)], axis=0)
         for share in SHUT_SHARES
     }
-    return replace(choice, shut=level * max(counts, key=lambda share: np.nan_to_num(_f1(counts[share]))))
+    return replace(choice, shut=level * max(counts, key=lambda share: np.nan_to_num(_compute_f1(counts[share]))))
 
 
-def closing_counts(recording: Recording, made: Array, shut: float) -> tuple[Array, Array]:
+def count_closings(recording: Recording, made: Array, shut: float) -> tuple[Array, Array]:
     """Return matched, missed and false closings, of all and of p, b and m [each shape=(3,)].
 
     Of p, b and m: missed are the speaker's closings there, false are generated ones in other phones, where the speaker
@@ -372,12 +372,12 @@ def closing_counts(recording: Recording, made: Array, shut: float) -> tuple[Arra
     return everything, np.array([hits, len(wanted) - hits, len(false)], float)
 
 
-def _f1(counts: Array) -> float:
+def _compute_f1(counts: Array) -> float:
     matched, missed, false = counts
-    return ratio(np.array([2 * matched, 2 * matched + missed + false]))
+    return divide_sums(np.array([2 * matched, 2 * matched + missed + false]))
 
 
-def onset_errors(recording: Recording, made: Array, shut: float) -> Array:
+def measure_onsets(recording: Recording, made: Array, shut: float) -> Array:
     """Return the sum of errors, in ms, with which movements of the mouth begin, and their number [shape=(2,)]."""
     own, frame_s = find_threshold([recording.original[:, 0]]), float(np.median(np.diff(recording.time_s)))
     original = find_closings(-recording.original[:, 0], -own)  # the first open frame after a closed one
@@ -392,18 +392,18 @@ def measure(recordings: Sequence[Recording], made: Sequence[tuple[Array, float, 
     sums = []
     for recording, (motion, shut, seconds) in zip(recordings, made, strict=True):
         acc, width = curves.correlation(motion, recording.original)
-        everything, lips = closing_counts(recording, motion, shut)
+        everything, lips = count_closings(recording, motion, shut)
         speech = ~is_away_from_speech(recording.time_s, [s[:2] for s in recording.phones if s[2]], 0.0)
         speech |= ~speech.any()  # nothing is spoken: all of it
         both = (motion[:, 0], recording.original[:, 0])
         row: dict[str, Any] = {"acc": [acc, 1], "width": [width, 1], "f1": everything, "lips": lips}
         row["strength"] = [np.percentile(each[speech], 98) for each in both]
         row["jerk"] = [np.abs(np.diff(each, 3)).sum() for each in both]
-        row["onset"] = onset_errors(recording, motion, shut)
+        row["onset"] = measure_onsets(recording, motion, shut)
         row["seconds"] = [seconds, recording.utterance.audio.duration_s]
         sums.append({name: np.array(each) for name, each in row.items()})
-    counted = {"f1": _f1, "lips": _f1}
-    return {name: ClipStatistic([row[name] for row in sums], counted.get(name, ratio)) for name in sums[0]}
+    counted = {"f1": _compute_f1, "lips": _compute_f1}
+    return {name: ClipStatistic([row[name] for row in sums], counted.get(name, divide_sums)) for name in sums[0]}
 
 
 def split_choices(reported: int, choosing: int) -> Iterator[tuple[list[int], list[int]]]:
@@ -450,7 +450,7 @@ def play(
         for n in held:
             answer = tried[choice.setting][n]
             motion = prepare_weights(answer, choice.smoothing_s) @ choice.coefficients
-            done[n] = at_best_sync(recordings[n], motion, choice.lag_s, sync_s), choice.shut, answer.seconds
+            done[n] = synchronise(recordings[n], motion, choice.lag_s, sync_s), choice.shut, answer.seconds
     made = [done[n] for n in range(reported)]
     return Standing(rival, [motion for motion, *_ in made], measure(recordings[:reported], made), chosen)
 
@@ -472,7 +472,7 @@ class League:
         return others[0] if others else None
 
 
-def league(  # noqa: PLR0913
+def measure_league(  # noqa: PLR0913
     corpus: Corpus,
     adapters: Path,
     work: Path,
@@ -485,7 +485,7 @@ def league(  # noqa: PLR0913
 ) -> League:
     """Return how rivals, and our engines, move the lips of the same recordings.
 
-    adapters : the folder ``extras/league``, with a table of rivals
+    adapters : the folder ``extras/measure_league``, with a table of rivals
     work     : answers are kept there: a run that was stopped goes on
     choosing : another corpus, on whose list ``val`` (without one: on all) settings are chosen. None: the corpus's own
                ``val``, and its ``test`` is reported; without both lists, in folds over its recordings
@@ -570,7 +570,7 @@ def describe_league(found: League) -> Section:
 
 def write_league(found: League, folder: Path) -> dict[str, Any]:
     """Write the page of a league, with its pictures and all figures, to a folder; return the figures."""
-    section, motion, part = describe_league(found), _shown(found), folder / PART
+    section, motion, part = describe_league(found), _choose_excerpt(found), folder / PART
     names = [each.utterance.name for each in found.recordings]
     accs = {each.rival.title: [acc for acc, _ in each.figures["acc"].sums] for each in found.standings}
     figures: dict[str, Any] = {"about": found.about, "best_rival": section.table.reference or None}
@@ -582,14 +582,14 @@ def write_league(found: League, folder: Path) -> dict[str, Any]:
     write_text(part / "figures.json", as_json(figures) + "\n")
     record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": found.about}
     finished = [FinishedPart(PART, record, motion, section)]
-    page = report_html(
+    page = write_html(
         "The league", found.about, finished, found.absent, found.failed, subtitle=SUBTITLE, how_to_read=HOW_TO_READ
     )
     write_text(folder / "index.html", page)
     return figures
 
 
-def _shown(found: League) -> dict[str, Any]:
+def _choose_excerpt(found: League) -> dict[str, Any]:
     """Return what systems do in the seconds that have most p, b and m, as the page of a report shows it."""
     if not found.standings:
         return {}

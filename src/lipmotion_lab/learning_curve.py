@@ -17,9 +17,9 @@ from lipmotion.motion.space import resample_track
 from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import Example, Speech, Timeline
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, figures_of, opening_curves
+from lipmotion_lab.evaluation.evaluate import sum_correlations, measure_clips, pair_curves
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, generate_clips, load_held_out
-from lipmotion_lab.xie_liu2007.systems import BLSTM, as_row, best_trial, tune_network, with_inputs_of
+from lipmotion_lab.xie_liu2007.systems import BLSTM, as_row, find_best_trial, tune_network, with_inputs_of
 
 SIZES = (20, 50, 100, 200)
 """Default numbers of recordings: those of them that are smaller than the list; and the whole list."""
@@ -29,7 +29,7 @@ _ROW = "row"
 
 
 @limit_threads()
-def learning_curve(
+def run_learning_curve(
     corpus: Corpus,
     *,
     order: Sequence[str] | None = None,
@@ -49,7 +49,7 @@ def learning_curve(
     Raises CorpusError: names that are not in the corpus, twice in the list or in the split; no utterances of this
     split; or motion without an opening.
     """
-    listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), settings.seed)
+    listed = tuple(order) if order is not None else runner.shuffle(corpus.required("train"), settings.seed)
     held_out, validation = corpus.required(split), corpus.required("val") if rival else ()
     steps = choose_sizes(sizes, len(listed))
     check_training_names(corpus, listed, (*held_out, *validation))
@@ -61,7 +61,7 @@ def learning_curve(
         found = kept.load(str(count))
         if found is None:
             result = runner.train_and_generate(corpus, listed[:count], held_out, channels, part, work)
-            row = {"names": count} | _row(corpus, result, settings.seed)
+            row = {"names": count} | _make_row(corpus, result, settings.seed)
             if rival:
                 row[BLSTM] = _compare_network(corpus, result, validation, part)
             for condition, clips in result.clips.items():
@@ -100,14 +100,14 @@ def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequen
             raise CorpusError(f"{corpus.path}: {len(names)} of {len(listed)} names to train on ({some}) {reason}")
 
 
-def _row(corpus: Corpus, result: runner.HeldOutResult, seed: int) -> dict[str, Any]:
+def _make_row(corpus: Corpus, result: runner.HeldOutResult, seed: int) -> dict[str, Any]:
     """Return the figures of one model, by condition; None for channels that the corpus does not have."""
     conditions = {}
     for name, clips in result.clips.items():
-        figures = figures_of(clips, result.recordings, seed)
+        figures = measure_clips(clips, result.recordings, seed)
         channels = figures["channels"]
         accs = {f"acc_{other}": channels[other]["acc"] if other in channels else None for other in OTHERS}
-        conditions[name] = runner.opening_row(figures) | accs
+        conditions[name] = runner.make_opening_row(figures) | accs
     return {
         "used": len(result.used),
         "minutes": sum(corpus.utterance(name).audio.duration_s for name in result.used) / 60,
@@ -135,8 +135,8 @@ def _compare_network(
     ours = generate_clips(recordings, AUDIO_ONLY, free, result.model.learned)
     channels: dict[str, Any] = {}
     for channel in recordings.channels:
-        own, other = (correlation_statistic(*opening_curves(recordings, made, channel)) for made in (ours, clips))
+        own, other = (sum_correlations(*pair_curves(recordings, made, channel)) for made in (ours, clips))
         channels[channel] = {"ours": own.value, "acc": other.value, "acc_95": other.interval(settings.seed)}
         channels[channel]["gain_95"] = own.gain(other, settings.seed)
-    best = best_trial(system.tried).options
+    best = find_best_trial(system.tried).options
     return {"options": best, "tried": [*map(as_row, system.tried)], "channels": channels}

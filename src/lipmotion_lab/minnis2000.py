@@ -37,8 +37,8 @@ from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab import runner
-from lipmotion_lab.engine_comparison import EngineModel, engine_models, train_engine
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic, figures_of, opening_curves
+from lipmotion_lab.engine_comparison import EngineModel, train_engines, train_engine
+from lipmotion_lab.evaluation.evaluate import sum_correlations, sum_distances, measure_clips, pair_curves
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, generate_compared, make_speech
 from lipmotion_lab.learning_curve import check_training_names
 
@@ -48,7 +48,7 @@ REACH = 4
 HALF = 0.5
 
 
-def join_figures(
+def measure_joins(
     engine: SelectionEngine, model: SelectionModel, speech: Sequence[Speech], utterances: Sequence[Utterance]
 ) -> dict[str, Any]:
     """Return how many joins some speech takes, and how much the velocity of the opening changes there.
@@ -63,12 +63,12 @@ def join_figures(
         candidates += [len(costs.candidates(target, number)) for number in range(len(target))]
         opening = engine.generate(model, spoken).motion[OPENING]
         frames = np.array([round(piece.start_s * FRAME_RATE_HZ) for piece in pieces[1:]], np.intp)
-        changes.append(velocity_change(opening)[np.minimum(frames, len(opening) - 1)])
+        changes.append(measure_velocity_change(opening)[np.minimum(frames, len(opening) - 1)])
         kinds += [piece.join for piece in pieces[1:]]
         motion = utterance.track.motion
         original = np.interp(np.arange(len(opening)) / FRAME_RATE_HZ, motion.time_s, motion[OPENING])
         start_s, end_s = target.windows.times_s[0, 1], target.windows.times_s[-1, 0]
-        recorded.append(velocity_change(original)[int(start_s * FRAME_RATE_HZ) : int(end_s * FRAME_RATE_HZ)])
+        recorded.append(measure_velocity_change(original)[int(start_s * FRAME_RATE_HZ) : int(end_s * FRAME_RATE_HZ)])
     made, own = np.concatenate(changes), np.concatenate(recorded)
     bound = float(np.percentile(own, 95)) if len(own) else float("nan")
     return {
@@ -88,13 +88,13 @@ def select_pieces(engine: SelectionEngine, model: SelectionModel, speech: Speech
     return costs, target, to_pieces(costs, target, select(costs, target).units)
 
 
-def overlap_times_s(costs: Costs, target: Target, pieces: Sequence[Piece]) -> Array:
+def list_overlaps(costs: Costs, target: Target, pieces: Sequence[Piece]) -> Array:
     """Return start and end of the phones in which pieces overlap in other shares than halves [shape=(N, 2)]."""
     shared = [piece.first - (piece.join == JOIN_BEFORE) for piece in pieces[1:] if piece.join != ABUTTING_JOIN]
     return target.windows.times_s[[number for number in shared if costs.forward_share(target, number) != HALF]]
 
 
-def velocity_change(curve: NDArray[np.floating[Any]]) -> Array:
+def measure_velocity_change(curve: NDArray[np.floating[Any]]) -> Array:
     """Return the size of the second difference over 40 ms on both sides of each frame [shape=(T,)]."""
     padded = np.pad(np.asarray(curve, float), REACH, mode="edge")
     return np.abs(padded[2 * REACH :] - 2 * padded[REACH:-REACH] + padded[: -2 * REACH])
@@ -131,7 +131,7 @@ _ROW, _SUMS, _OVERLAP = "row", "correlation", "overlap"
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 
-def rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
+def list_configurations(*, guided: bool = True) -> dict[str, SelectionConfig]:
     """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged.
 
     guided : with the rows whose models learn from the sound, a guide or phones of the speaker's own
@@ -148,7 +148,7 @@ def rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
 
 
 @limit_threads()
-def minnis2000(
+def run_minnis2000(
     corpus: Corpus,
     *,
     models: Path | None = None,
@@ -162,13 +162,13 @@ def minnis2000(
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
     quick  : only see that it runs: few epochs
-    guided : as of ``rows``; without, training takes a minute instead of twenty, and no model is kept
+    guided : as of ``list_configurations``; without, training takes a minute instead of twenty, and no model is kept
     work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
     the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/test_minnis2000.py).
     Raises CorpusError: no utterances to train on or of ``test``, or motion without an opening.
-    Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
+    Raises InputError, ModelFormatError, ExportError: as ``train_engines``.
     """
     splits = [split for split in ("val", "test") if split == "test" or corpus.names(split)]
     lists = {split: corpus.required(split) for split in splits}
@@ -182,23 +182,23 @@ def minnis2000(
         model = train_engine(corpus, engine, training, work)
         trained = EngineModel(model, perf_counter() - start_s)
     else:
-        trained = engine_models(corpus, kept_in, training, [ENGINE])[ENGINE]
+        trained = train_engines(corpus, kept_in, training, [ENGINE])[ENGINE]
     found = {}
     for (split, names), part in zip(lists.items(), runner.share_out(settings, [*lists], 0.6), strict=True):
-        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(rows(guided=guided)))
+        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(list_configurations(guided=guided)))
         kept = runner.open_parts(work and work / split, corpus, settings, key)
-        found[split] = _on_list(corpus, names, trained.model, rows(guided=guided), kept, part)
+        found[split] = _measure_list(corpus, names, trained.model, list_configurations(guided=guided), kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
     printed = vars(SelectionConfig.parsed(MINNIS_2000))
     about["rows"] = {
         name: {key: value for key, value in vars(config).items() if value != printed[key]}
-        for name, config in rows(guided=guided).items()
+        for name, config in list_configurations(guided=guided).items()
     }
     return replace_nan(about | {"lists": found})
 
 
-def _on_list(
+def _measure_list(
     corpus: Corpus,
     names: Sequence[str],
     model: Model,
@@ -215,21 +215,21 @@ def _on_list(
     @cache
     def speak(condition: str, by_own_recogniser: bool) -> list[Speech]:
         listening = SelectionConfig(joint_recogniser=by_own_recogniser)
-        return make_speech(recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening))
+        return make_speech(recordings, condition, SelectionEngine(listening), _simplify_model(model.learned, listening))
 
     @cache
     def find_overlaps(condition: str) -> list[NDArray[np.bool_]]:
         """Return which frames of each recording ``overlap`` is about: where the system as printed overlaps units."""
         system, masks = SelectionEngine(systems[PRINTED]), list[NDArray[np.bool_]]()
-        units = _of_the_row(model.learned, system.config)
+        units = _simplify_model(model.learned, system.config)
         for utterance, speech in zip(recordings.utterances, speak(condition, False), strict=True):
             time_s = np.flatnonzero(utterance.track.seen) / utterance.track.motion.rate_hz
-            start_s, end_s = overlap_times_s(*select_pieces(system, units, speech)).T[:, :, None]
+            start_s, end_s = list_overlaps(*select_pieces(system, units, speech)).T[:, :, None]
             masks.append(((time_s >= start_s) & (time_s < end_s)).any(axis=0))
         return masks
 
     for name, config in with_progress(list(systems.items()), "comparing", sub_monitor(settings.monitor, 0.4, 1)):
-        learned = _of_the_row(model.learned, config)
+        learned = _simplify_model(model.learned, config)
         for condition, found in conditions.items():
             stage = f"{len(found)} {condition}"
             arrays = kept.load(stage)
@@ -238,16 +238,16 @@ def _on_list(
                 speech = speak(condition, config.joint_recogniser and condition == AUDIO_ONLY)
                 clips = generate_compared(recordings, speech, engine, learned)
                 settings.receive(name, condition, recordings, clips)
-                figures = figures_of(clips, recordings, settings.seed)
-                row = runner.opening_row(figures)
+                figures = measure_clips(clips, recordings, settings.seed)
+                row = runner.make_opening_row(figures)
                 row["channels"] = {
                     channel: {figure: values[figure] for figure in WHAT_IS_SHOWN}
                     for channel, values in figures["channels"].items()
                 }
-                row["joins"] = join_figures(engine, learned, speech, recordings.utterances)
-                both, inside = opening_curves(recordings, clips), find_overlaps(condition)
+                row["joins"] = measure_joins(engine, learned, speech, recordings.utterances)
+                both, inside = pair_curves(recordings, clips), find_overlaps(condition)
                 parts = ([x[mask] for x, mask in zip(each, inside, strict=True)] for each in both)
-                statistics = correlation_statistic(*both), distance_statistic(*parts)
+                statistics = sum_correlations(*both), sum_distances(*parts)
                 sums = [np.stack(each.sums) for each in statistics]
                 gains = [
                     each.gain(replace(each, sums=list(printed)), settings.seed)
@@ -266,7 +266,7 @@ def _on_list(
     return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}
 
 
-def _of_the_row(learned: SelectionModel, config: SelectionConfig) -> SelectionModel:
+def _simplify_model(learned: SelectionModel, config: SelectionConfig) -> SelectionModel:
     """Return what training with a configuration makes of the same recordings."""
     if not config.articulation:
         learned = replace(learned, motion=replace(learned.motion, prior=None))

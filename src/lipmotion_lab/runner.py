@@ -158,14 +158,14 @@ def check_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ...]:
     return channels
 
 
-def shuffled(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
+def shuffle(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
     """Return the items in an order that depends on the seed alone."""
     return tuple(items[i] for i in np.random.default_rng(seed).permutation(len(items)))
 
 
 def take_quick_part(corpus: Corpus, seed: int) -> Corpus:
     """Return a corpus with a few utterances of each list: those of every quick run with this seed."""
-    return corpus.part([name for split in SPLITS for name in shuffled(corpus.names(split), seed)[: QUICK_CLIPS[split]]])
+    return corpus.part([name for split in SPLITS for name in shuffle(corpus.names(split), seed)[: QUICK_CLIPS[split]]])
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ def clips_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[ComparedClip]:
     return list(map(ComparedClip, original, generated, time_s, spoken))
 
 
-def opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:
+def make_opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return the figures of the opening that all tables show, from the figures of a condition; shares in %."""
     opening, closing, lips = figures["channels"][OPENING], figures["closures"], figures["closures_p_b_m"]
     return {
@@ -262,18 +262,18 @@ class Stamp:
             "seed": settings.seed,
             "options": {"workers": settings.workers, "lexicon": lexicon},
             "commit": commit(ROOT),
-            "engines": {name: engine_digest(name) for name in ENGINES.built_in},
-            **_machine(),
+            "engines": {name: digest_engine(name) for name in ENGINES.built_in},
+            **_describe_machine(),
         }
 
 
-def engine_digest(name: str) -> str:
+def digest_engine(name: str) -> str:
     """Return the digits that name the default options of an engine."""
     options = json.dumps(ENGINES.load(name).Config().as_mapping(), sort_keys=True)
     return hashlib.sha256(options.encode()).hexdigest()[:DIGITS]
 
 
-def _machine() -> dict[str, Any]:
+def _describe_machine() -> dict[str, Any]:
     try:
         lines = CPU_INFO.read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -21,7 +21,7 @@ from lipmotion_studio.recording import OpenRecording
 from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.web.listening import read_page
-from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, failed
+from lipmotion_studio.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, reply_failed
 
 FIRST = "studio.html"
 """The page itself, whose address is empty."""
@@ -31,7 +31,7 @@ PAGE_POLICY = HEADERS["content-security-policy"] + (
 """Pictures, sounds and textures of models become objects of the page, whose addresses begin with ``blob:``."""
 
 
-def studio_application(studio: Studio, access: Access) -> Starlette:
+def create_application(studio: Studio, access: Access) -> Starlette:
     """Return the application; access: the token, and the addresses that the server has."""
     recordings, project = RecordingReplies(studio, access), ProjectReplies(studio)
     page = dict(read_page(files("lipmotion_studio") / "page"))
@@ -84,7 +84,7 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         Route("/", packaged),
         Route("/{name:path}", packaged),
     ]
-    application = Starlette(routes=routes, exception_handlers=ERRORS | {RevisionError: partial(failed, 409)})
+    application = Starlette(routes=routes, exception_handlers=ERRORS | {RevisionError: partial(reply_failed, 409)})
     application.add_middleware(Guard, refusal=access.refusal)
     application.add_middleware(SecurityHeaders, headers=HEADERS | {"content-security-policy": PAGE_POLICY})
     return application

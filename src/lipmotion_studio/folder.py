@@ -42,11 +42,11 @@ from lipmotion_studio.project import (
     Project,
     ProjectRecording,
     check_recordings,
-    digest_of,
+    digest_edits,
     parse_project,
-    project_document,
+    describe_project,
 )
-from lipmotion_studio.votes import Vote, read_votes, votes_text
+from lipmotion_studio.votes import Vote, read_votes, format_votes
 
 LOG = logging.getLogger("lipmotion")
 PROJECT, SOUNDS, EDITS, EXPORTS, LEXICON = "project.json", "sounds", "edits", "exports", "lexicon.txt"
@@ -80,16 +80,16 @@ class EditsSummary:
     error: str = ""
 
 
-NO_EDITS = EditsSummary(0, digest_of(()), "")
+NO_EDITS = EditsSummary(0, digest_edits(()), "")
 
 
-def summary_of(file: EditFile) -> EditsSummary:
+def summarise_edits(file: EditFile) -> EditsSummary:
     """Return what lists say of a file of edits."""
     steps = file.edits.sentences
-    return EditsSummary(len(steps), digest_of(steps), digest_of((*steps, "", *map(str, file.undone))))
+    return EditsSummary(len(steps), digest_edits(steps), digest_edits((*steps, "", *map(str, file.undone))))
 
 
-def revision_of(recording: ProjectRecording, edits: EditsSummary) -> int:
+def compute_revision(recording: ProjectRecording, edits: EditsSummary) -> int:
     """Return the revision of a recording: another number after every change that somebody can make of it."""
     versions = [[version.number, *version.steps] for version in recording.versions]
     return _revision([recording.transcript, recording.mark, versions, edits.state])
@@ -155,7 +155,7 @@ class ProjectFolder:
         """Give a recording, seen at this revision, to be changed. Raises RevisionError: changed. InputError: gone."""
         with self.lock:
             recording = self.recording(number)
-            check_revision("the recording", revision_of(recording, self.summary(recording)), revision)
+            check_revision("the recording", compute_revision(recording, self.summary(recording)), revision)
             yield recording
 
     def summary(self, recording: ProjectRecording) -> EditsSummary:
@@ -166,7 +166,7 @@ class ProjectFolder:
                 summary = NO_EDITS
                 if state:
                     try:
-                        summary = summary_of(read_edits(self.edits(recording), phones=False))
+                        summary = summarise_edits(read_edits(self.edits(recording), phones=False))
                     except InputError as error:
                         summary = EditsSummary(0, "", f"damaged: {error}", str(self._damage(recording, error)))
                 cached = self._summaries[recording.number] = state, summary
@@ -218,7 +218,7 @@ class ProjectFolder:
         path, copy = self.edits(recording), self._copy(recording)
         with self.lock, create_folders([path.parent, copy.parent]):
             write_with_copy(path, copy, lambda first: write_edits(file, first))
-            self._summaries[recording.number] = self._file_state(recording), summary_of(file)
+            self._summaries[recording.number] = self._file_state(recording), summarise_edits(file)
 
     def adopt(self, recording: ProjectRecording, file: EditFile) -> EditFile:
         """Return a recording's edits with the digest of its sound, where a project of an earlier version has none.
@@ -293,7 +293,7 @@ class ProjectFolder:
     def save(self) -> None:
         """Write the project. Raises ExportError: it cannot be written."""
         with self.lock:
-            text = as_json_rows(project_document(self.project), ensure_ascii=False)
+            text = as_json_rows(describe_project(self.project), ensure_ascii=False)
             with atomic_file(self.path / PROJECT) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
@@ -388,16 +388,16 @@ class ProjectFolder:
         with self.lock:
             votes = (*read_votes(self.path / VOTES), vote)
             with atomic_file(self.path / VOTES) as temporary:
-                temporary.write_text(votes_text(votes), encoding="utf-8")
+                temporary.write_text(format_votes(votes), encoding="utf-8")
             return votes
 
     @property
     def voice_revision(self) -> int:
-        """The revision of the voice that moves the recordings, as ``revision_of`` is that of a recording."""
+        """The revision of the voice that moves the recordings, as ``compute_revision`` is that of a recording."""
         return _revision(self.project.model)
 
     def word_revision(self, word: str) -> int:
-        """Return the revision of the project's pronunciations of a word, as ``revision_of`` is that of a recording."""
+        """Return the revision of the project's pronunciations of a word, as ``compute_revision`` is that of a recording."""
         return _revision([word, self.lexicon().user.get(word, ())])
 
     def add_pronunciation(self, word: str, phones: tuple[str, ...], revision: int) -> None:
@@ -411,7 +411,7 @@ class ProjectFolder:
                 temporary.write_text("".join(rows), encoding="utf-8")
 
 
-def project_path(source: Path | None, out: Path | None = None) -> Path:
+def find_project_path(source: Path | None, out: Path | None = None) -> Path:
     """Return the folder of the project of a recording, of a folder or a list of recordings, or of the project itself.
 
     A path that ends as projects do, and is not there, is that of an empty project.
@@ -442,8 +442,8 @@ def _is_new(source: Path) -> bool:
 
 @contextmanager
 def open_folder(source: Path | None, out: Path | None = None) -> Iterator[ProjectFolder]:
-    """Open the project of ``project_path``, or create it. Raises ExportError: in use. InputError: unreadable."""
-    path = project_path(source, out)
+    """Open the project of ``find_project_path``, or create it. Raises ExportError: in use. InputError: unreadable."""
+    path = find_project_path(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
     with lock_folder(path):
         remove_unfinished(path)  # what was dropped on a studio that was killed

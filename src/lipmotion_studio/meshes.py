@@ -18,7 +18,7 @@ from lipmotion_faces.characters.file_limits import Budget
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.filmed.face import SUFFIX
 from lipmotion_faces.mesh import MeshFace
-from lipmotion_faces.outputs.scenes import KEPT, head_scene, write_scene
+from lipmotion_faces.outputs.scenes import KEPT, build_head_scene, write_scene
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.registry import FACES
 
@@ -76,9 +76,9 @@ class Faces:
             self._meshes[name] = Budget().file_bytes(path, "character")
             return self._meshes[name]
         if path is not None:
-            scene = self.shown(name).scene(_still(), OutputSettings(self.shown(name)), None)
+            scene = self.shown(name).scene(_create_still(), OutputSettings(self.shown(name)), None)
         elif name in (HEAD, HEAD_OF_MOODS):
-            scene = head_scene(_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
+            scene = build_head_scene(_create_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
         else:
             raise InputError(f"no mesh {shorten(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
         with open_temporary() as folder:
@@ -87,7 +87,7 @@ class Faces:
         return self._meshes[name]
 
 
-def _still(*keys: MoodKey) -> Generation:
+def _create_still(*keys: MoodKey) -> Generation:
     """Return a frame of a closed mouth, with the channels of moods."""
     closed = Motion(np.zeros((1, 1)), FRAME_RATE_HZ, (Channel("opening"),))
     motion = with_moods(closed, keys) if keys else closed

@@ -26,12 +26,12 @@ from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_studio.folder import RevisionError
 from lipmotion_studio.project import APPROVED, MAX_RECORDINGS, ProjectRecording, find_preset
 from lipmotion_studio.recording import OpenRecording
-from lipmotion_studio.requests import Access, member, objects, read_content, seconds, stretch, text, texts, whole
+from lipmotion_studio.requests import Access, take_member, take_objects, read_content, take_seconds, take_stretch, take_text, take_texts, take_whole
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.trainer import MAX_LISTED
 from lipmotion_studio.training import FACE, VOICE, VoiceOptions, check_options
 from lipmotion_studio.votes import Vote, tally
-from lipmotion_studio.web.replies import FRESH, json_reply, write_body
+from lipmotion_studio.web.replies import FRESH, reply_json, write_body
 from lipmotion_studio.workspace import READY, WORKING
 
 MAX_STEPS = 1000
@@ -58,7 +58,7 @@ class RecordingReplies:
     async def edits(self, request: Request) -> Response:
         """Edits to be made."""
         number, content, revision = await self._change(request)
-        steps, instead = texts(content, "steps", most=MAX_STEPS), whole(content, "instead", 0)
+        steps, instead = take_texts(content, "steps", most=MAX_STEPS), take_whole(content, "instead", 0)
         commands = self._studio.add_phones(steps)
         return await self._state_after(number, lambda recording: recording.edit(revision, commands, instead))
 
@@ -67,7 +67,7 @@ class RecordingReplies:
 
         async def reply(request: Request) -> Response:
             number, content, revision = await self._change(request)
-            count = whole(content, "count", 1, least=1)
+            count = take_whole(content, "count", 1, least=1)
             return await self._state_after(number, lambda recording: step(recording, revision, count))
 
         return reply
@@ -80,11 +80,11 @@ class RecordingReplies:
     async def transcript(self, request: Request) -> Response:
         """Words of a recording, or of a stretch of it."""
         number, content, revision = await self._change(request)
-        words = text(content, "text", longest=MAX_TRANSCRIPT)
+        words = take_text(content, "text", longest=MAX_TRANSCRIPT)
         is_part = "start_s" in content or "end_s" in content
         if not is_part and self._studio.analyse_again(number, revision, words):
             return self._waiting(number)
-        start_s, end_s = seconds(content, "start_s", 0.0), seconds(content, "end_s", 1e6)
+        start_s, end_s = take_seconds(content, "start_s", 0.0), take_seconds(content, "end_s", 1e6)
 
         def change(recording: OpenRecording) -> Changed:
             last_s = min(end_s, recording.last_s)
@@ -110,15 +110,15 @@ class RecordingReplies:
     async def vote(self, request: Request) -> Response:
         """Which of two motions somebody found better."""
         number, content, revision = await self._change(request)
-        shown = [text(side, "by", "") for side in objects(content, "shown")]
-        better = None if content.get("better") is None else whole(content, "better", most=1)
+        shown = [take_text(side, "by", "") for side in take_objects(content, "shown")]
+        better = None if content.get("better") is None else take_whole(content, "better", most=1)
 
         def add() -> dict[str, Any]:
             with self._studio.folder.check_out(number, revision) as recording:
                 vote = Vote(recording.name, tuple(self._studio.side(number, by) for by in shown), better)
                 return tally(self._studio.folder.add_vote(vote), vote)
 
-        return json_reply(await self._workspace.run_apart(add))
+        return reply_json(await self._workspace.run_apart(add))
 
     async def keep(self, request: Request) -> Response:
         """The edits as they are, to be kept as a version."""
@@ -130,13 +130,13 @@ class RecordingReplies:
     async def forget(self, request: Request) -> Response:
         """A version that is kept no longer."""
         number, content, revision = await self._change(request)
-        name = text(content, "version")
+        name = take_text(content, "version")
         return await self._change_versions(number, revision, lambda now, _: now.without_version(name))
 
     async def back(self, request: Request) -> Response:
         """A version to go back to; the edits as they are become one, too."""
         number, content, revision = await self._change(request)
-        name = text(content, "version")
+        name = take_text(content, "version")
         return await self._state_after(number, lambda recording: recording.restore_version(revision, name))
 
     async def restore(self, request: Request) -> Response:
@@ -151,11 +151,11 @@ class RecordingReplies:
     async def motion(self, request: Request) -> Response:
         """Numbers of the motion."""
         query = request.query_params
-        of = text(query, "of", "motion")
+        of = take_text(query, "of", "motion")
         if of not in NUMBERS:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
-        names = text(query, "names", longest=MAX_NAMES).split(",") if "names" in query else None
-        by, number = text(query, "by", ""), self._number(request)
+        names = take_text(query, "names", longest=MAX_NAMES).split(",") if "names" in query else None
+        by, number = take_text(query, "by", ""), self._number(request)
 
         def reply(recording: OpenRecording) -> Response:
             motion = self._studio.vary(number, recording, by).numbers("variance" if of == "deviation" else of)
@@ -165,35 +165,35 @@ class RecordingReplies:
                     known = ", ".join(motion.names)
                     raise InputError(f"names: there is no {shorten(repr(unknown[0]))}, required some of: {known}")
                 motion = motion.selected(chosen)
-            frames = stretch(query, motion.rate_hz, len(motion.values))
+            frames = take_stretch(query, motion.rate_hz, len(motion.values))
             values = motion.values[frames]
             if of == "deviation":
                 values = np.sqrt(np.maximum(values, 0))
-            return _numbers_reply(replace(motion, values=values), frames.start, {})
+            return _reply_numbers(replace(motion, values=values), frames.start, {})
 
         return await self._workspace.run(number, reply)
 
     async def weights(self, request: Request) -> Response:
         """The weights of a face's morph targets."""
         query = request.query_params
-        name, by, number = text(query, "face", "head"), text(query, "by", ""), self._number(request)
+        name, by, number = take_text(query, "face", "head"), take_text(query, "by", ""), self._number(request)
 
         def reply(opened: OpenRecording) -> Response:
             recording = self._studio.vary(number, opened, by)
             styled = recording.numbers("delivered")
-            frames = stretch(query, styled.rate_hz, len(styled.values))
+            frames = take_stretch(query, styled.rate_hz, len(styled.values))
             is_part = frames.stop - frames.start < len(styled.values)
             motion = recording.weights(self._studio.faces.shown(name), frames if is_part else None)
             mesh = self._studio.faces.mesh_name(name, styled)
-            return _numbers_reply(motion, frames.start, {"x-lipmotion-mesh": quote(mesh)})
+            return _reply_numbers(motion, frames.start, {"x-lipmotion-mesh": quote(mesh)})
 
         return await self._workspace.run(number, reply)
 
     async def picture(self, request: Request) -> Response:
         """A picture of a drawn face, as PNG."""
         query = request.query_params
-        time_s, face = seconds(query, "time"), self._studio.drawn_face(text(query, "face", "woman"))
-        by, number = text(query, "by", ""), self._number(request)
+        time_s, face = take_seconds(query, "time"), self._studio.drawn_face(take_text(query, "face", "woman"))
+        by, number = take_text(query, "by", ""), self._number(request)
 
         def draw(recording: OpenRecording) -> bytes:
             from PIL import Image
@@ -207,8 +207,8 @@ class RecordingReplies:
     async def video(self, request: Request) -> Response:
         """A video of a stretch."""
         content = await read_content(request)
-        start_s, end_s = seconds(content, "start_s"), seconds(content, "end_s")
-        name, by, number = text(content, "face", "woman"), text(content, "by", ""), self._number(request)
+        start_s, end_s = take_seconds(content, "start_s"), take_seconds(content, "end_s")
+        name, by, number = take_text(content, "face", "woman"), take_text(content, "by", ""), self._number(request)
 
         def write(opened: OpenRecording) -> bytes:
             self._studio.folder.check_sound(self._studio.folder.recording(number))
@@ -226,12 +226,12 @@ class RecordingReplies:
 
     async def why(self, request: Request) -> Response:
         """What determined a frame."""
-        time_s, number = seconds(request.query_params, "time"), self._number(request)
-        return json_reply(await self._workspace.run(number, lambda recording: recording.why(time_s)))
+        time_s, number = take_seconds(request.query_params, "time"), self._number(request)
+        return reply_json(await self._workspace.run(number, lambda recording: recording.why(time_s)))
 
     async def doubts(self, request: Request) -> Response:
         """The phones, the least sure first."""
-        return json_reply(await self._workspace.run(self._number(request), OpenRecording.doubts))
+        return reply_json(await self._workspace.run(self._number(request), OpenRecording.doubts))
 
     def _number(self, request: Request) -> int:
         """Return the number of a recording. Raises HTTPException: there is none of that number."""
@@ -240,7 +240,7 @@ class RecordingReplies:
     async def _change(self, request: Request) -> tuple[int, dict[str, Any], int]:
         """Return the recording of a change, what it brings, and the revision that its author saw."""
         content = await read_content(request)
-        return self._number(request), content, whole(content, "revision")
+        return self._number(request), content, take_whole(content, "revision")
 
     async def _change_versions(
         self, number: int, revision: int, changed: Callable[[ProjectRecording, OpenRecording], ProjectRecording]
@@ -266,7 +266,7 @@ class RecordingReplies:
             with self._studio.folder.lock:
                 state |= self._studio.recording_document(number) | {"revision": recording.revision}
             state["transcript"] = state["transcript"] or recording.transcript
-            return json_reply({**changed, "state": state} if status == 409 else state | changed, status)
+            return reply_json({**changed, "state": state} if status == 409 else state | changed, status)
 
         return await self._workspace.run(number, reply)
 
@@ -274,7 +274,7 @@ class RecordingReplies:
         document = self._studio.recording_document(number) | {"media": self._media(number)}
         if document["status"] == READY:  # since it was looked up: its state comes with the next request
             document["status"] = WORKING
-        return json_reply(document)
+        return reply_json(document)
 
     def _media(self, number: int) -> dict[str, Any]:
         video = self._studio.find_video(number)
@@ -283,7 +283,7 @@ class RecordingReplies:
         return addresses | ({"sound_begins_s": video[1]} if video else {})
 
 
-def _numbers_reply(motion: Motion, first: int, more: dict[str, str]) -> Response:
+def _reply_numbers(motion: Motion, first: int, more: dict[str, str]) -> Response:
     headers = {
         "x-lipmotion-names": as_json(list(motion.names), ensure_ascii=True),
         "x-lipmotion-rate": f"{motion.rate_hz:g}",
@@ -310,27 +310,27 @@ class ProjectReplies:
     async def project(self, request: Request) -> Response:
         """The recordings, page by page, and what forms need."""
         query = request.query_params
-        first, count = whole(query, "from", 0), whole(query, "count", 200, most=2000)
-        chosen = {name: text(query, name, "") for name in ("order", "status", "mark")}
+        first, count = take_whole(query, "from", 0), take_whole(query, "count", 200, most=2000)
+        chosen = {name: take_text(query, name, "") for name in ("order", "status", "mark")}
         document = await self._run_apart(lambda: self._studio.list_recordings(first, count, **chosen))
-        return json_reply(document | {"largest_upload_bytes": MAX_UPLOAD_BYTES})
+        return reply_json(document | {"largest_upload_bytes": MAX_UPLOAD_BYTES})
 
     async def progress(self, _: Request) -> Response:
         """What is at work."""
-        return json_reply(self._studio.progress())
+        return reply_json(self._studio.progress())
 
     async def understand(self, request: Request) -> Response:
         """Recordings that are to be analysed."""
         content = await read_content(request)
         known = self._studio.folder.project.lines
-        numbers = list(known) if content.get("lines") == ALL else member(content, "lines", None, items(NUMBER))
+        numbers = list(known) if content.get("lines") == ALL else take_member(content, "lines", None, items(NUMBER))
         if not set(numbers) <= known.keys():
             raise HTTPException(404, "no such recording")
-        return json_reply({"waiting": self._studio.workspace.queue(numbers)})
+        return reply_json({"waiting": self._studio.workspace.queue(numbers)})
 
     async def dropped(self, request: Request) -> Response:
         """A recording that was dropped on the page, as body."""
-        name = text(request.query_params, "name", longest=500)
+        name = take_text(request.query_params, "name", longest=500)
         transcript = unquote(request.headers.get("x-lipmotion-transcript", ""), errors="replace")
         file = self._studio.folder.path / f"{TEMPORARY}{uuid4().hex}"
         try:
@@ -340,21 +340,21 @@ class ProjectReplies:
         finally:
             remove(file)
         self._studio.workspace.queue([number])
-        return json_reply(self._studio.row(self._studio.folder.recording(number)), 201)
+        return reply_json(self._studio.row(self._studio.folder.recording(number)), 201)
 
     async def mark(self, request: Request) -> Response:
         """A mark of a recording."""
         number, content = self._number(request), await read_content(request)
-        mark, revision = text(content, "mark"), whole(content, "revision")
-        return json_reply(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
+        mark, revision = take_text(content, "mark"), take_whole(content, "revision")
+        return reply_json(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
 
     async def remove(self, request: Request) -> Response:
         """A recording that leaves the project; its files stay."""
         number, folder = self._number(request), self._studio.folder
-        with folder.check_out(number, whole(await read_content(request), "revision")):
+        with folder.check_out(number, take_whole(await read_content(request), "revision")):
             folder.change(lambda project: project.without_recording(number))
             self._studio.workspace.forget(number)
-        return json_reply({"removed": number})
+        return reply_json({"removed": number})
 
     async def export_one(self, request: Request) -> Response:
         """Files of one recording."""
@@ -364,16 +364,16 @@ class ProjectReplies:
     async def export_all(self, request: Request) -> Response:
         """Files of the recordings that are approved, or of all."""
         content = await read_content(request)
-        only = text(content, "only", APPROVED)
+        only = take_text(content, "only", APPROVED)
         if only not in (APPROVED, ALL):
             raise InputError(f"only is {only!r}, required {APPROVED} or {ALL}")
         recordings = self._studio.folder.project.lines.values()
         return await self._export(content, [each.number for each in recordings if only == ALL or each.mark == APPROVED])
 
     async def _export(self, content: dict[str, object], numbers: list[int]) -> Response:
-        files = texts(content, "files", most=20, longest=40) if "files" in content else ()
-        preset, face = find_preset(text(content, "preset", ""), files), text(content, "face", "")
-        return json_reply(await self._run_apart(lambda: self._studio.export_several(numbers, preset, face)))
+        files = take_texts(content, "files", most=20, longest=40) if "files" in content else ()
+        preset, face = find_preset(take_text(content, "preset", ""), files), take_text(content, "face", "")
+        return reply_json(await self._run_apart(lambda: self._studio.export_several(numbers, preset, face)))
 
     async def mesh(self, request: Request) -> Response:
         """The ``.glb`` of a face."""
@@ -386,12 +386,12 @@ class ProjectReplies:
 
     async def pronunciations(self, request: Request) -> Response:
         """How a word is pronounced."""
-        return self._reply_word(_word(request.query_params))
+        return self._reply_word(_take_word(request.query_params))
 
     async def pronounce(self, request: Request) -> Response:
         """A pronunciation that the project keeps."""
         content = await read_content(request)
-        word, phones, revision = _word(content), texts(content, "phones", most=MAX_PHONES), whole(content, "revision")
+        word, phones, revision = _take_word(content), take_texts(content, "phones", most=MAX_PHONES), take_whole(content, "revision")
         if not phones or not set(phones) <= set(PHONES):
             raise InputError(f"the phones of a word are some of: {' '.join(PHONES)}")
         await self._run_apart(lambda: self._studio.folder.add_pronunciation(word, phones, revision))
@@ -402,7 +402,7 @@ class ProjectReplies:
             lexicon, revision = self._studio.folder.lexicon(), self._studio.folder.word_revision(word)
         known = {"word": word, "known": lexicon.known(word), "own": word in lexicon.user}
         pronunciations = [list(phones) for phones in lexicon.pronunciations(word)]
-        return json_reply(known | {"pronunciations": pronunciations, "revision": revision})
+        return reply_json(known | {"pronunciations": pronunciations, "revision": revision})
 
     async def training(self, _: Request) -> Response:
         """What is being made, or was made last; what can be made, and of what."""
@@ -411,8 +411,8 @@ class ProjectReplies:
     async def begin_training(self, request: Request) -> Response:
         """A voice or a face that is to be made."""
         content = await read_content(request)
-        kind, name = text(content, "kind"), text(content, "name", "")
-        numbers = list(dict.fromkeys(member(content, "lines", [], items(NUMBER, most=MAX_RECORDINGS))))
+        kind, name = take_text(content, "kind"), take_text(content, "name", "")
+        numbers = list(dict.fromkeys(take_member(content, "lines", [], items(NUMBER, most=MAX_RECORDINGS))))
         options = check_options(content.get("options", {}))
         await self._run_apart(lambda: self._trainer.begin(kind, name, numbers, options))
         return await self._reply_training(201)
@@ -430,13 +430,13 @@ class ProjectReplies:
     async def voice(self, request: Request) -> Response:
         """The voice that the project uses from now on."""
         content = await read_content(request)
-        name, revision = text(content, "voice"), whole(content, "revision")
+        name, revision = take_text(content, "voice"), take_whole(content, "revision")
         path, voice = await self._run_apart(lambda: self._studio.load_voice(name))
         self._studio.use_voice(path, voice, revision)
         return await self._reply_training()
 
     async def _reply_training(self, status: int = 200) -> Response:
-        return json_reply(await self._run_apart(self._training_document), status)
+        return reply_json(await self._run_apart(self._training_document), status)
 
     def _training_document(self) -> dict[str, Any]:
         folder, trainer = self._studio.folder, self._trainer
@@ -464,9 +464,9 @@ class ProjectReplies:
         return self._studio.number(str(request.path_params["number"]))
 
 
-def _word(content: Mapping[str, Any]) -> str:
+def _take_word(content: Mapping[str, Any]) -> str:
     """Return the word of a request as lexicons have it. Raises InputError: it is none, or several."""
-    given = text(content, "word", longest=MAX_WORD)
+    given = take_text(content, "word", longest=MAX_WORD)
     words = split_words(given)
     if len(words) != 1:
         raise InputError(f"{given!r} is {len(words)} words, required one")

@@ -58,7 +58,7 @@ class EditVersion:
     @property
     def digest(self) -> str:
         """The digest of its edits."""
-        return digest_of(self.steps)
+        return digest_edits(self.steps)
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def check_recordings(project: Project) -> None:
     check_names((BatchLine(recording.name, recording.sound) for recording in project.lines.values()), (EDITS_SUFFIX,))
 
 
-def project_document(project: Project) -> dict[str, Any]:
+def describe_project(project: Project) -> dict[str, Any]:
     """Return a project as an object of JSON."""
     usual = {each.name: each.default for each in fields(ProjectRecording)}
     rows = []
@@ -225,10 +225,10 @@ _PROJECT = values.members(
 )
 
 
-def digest_of(sentences: Iterable[str]) -> str:
+def digest_edits(sentences: Iterable[str]) -> str:
     """Return the digest of edits, by their sentences.
 
-    >>> digest_of(["phone 2 is p"])[:8]
+    >>> digest_edits(["phone 2 is p"])[:8]
     '2a0d1f5a'
     """
     return sha256("\n".join(sentences).encode("utf-8", "surrogatepass")).hexdigest()
@@ -279,7 +279,7 @@ def find_preset(name: str, files: tuple[str, ...]) -> Preset:
         if name not in PRESETS:
             raise InputError(f"no preset {shorten(repr(name))}; required one of: {', '.join(PRESETS)}")
         return PRESETS[name]
-    known = suffixes()
+    known = list_suffixes()
     for suffix in files:
         if suffix not in known or not _SUFFIX.fullmatch(suffix):
             raise InputError(f"nothing is written as {shorten(repr(suffix))}; required some of: {' '.join(known)}")
@@ -288,7 +288,7 @@ def find_preset(name: str, files: tuple[str, ...]) -> Preset:
     return Preset("", "", tuple(dict.fromkeys(files)))
 
 
-def suffixes() -> tuple[str, ...]:
+def list_suffixes() -> tuple[str, ...]:
     """Return the suffixes of all files that can be exported."""
     everything = list_outputs(OutputSettings(shown_face("head")))
     return tuple(suffix for suffix in everything if _SUFFIX.fullmatch(suffix))

@@ -31,13 +31,13 @@ from lipmotion_faces.base import Face
 from lipmotion_faces.film.filmed_video import write_film
 from lipmotion_faces.filmed.face import FilmedFace
 from lipmotion_faces.outputs.drawn_video import DRAWN_HZ, read_sound
-from lipmotion_faces.outputs.scenes import delivered_scene
+from lipmotion_faces.outputs.scenes import build_scene
 from lipmotion_faces.outputs.session_pictures import SessionPictures
 from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_faces.video.mp4 import write_mp4
-from lipmotion_studio.folder import ProjectFolder, check_revision, revision_of, summary_of
+from lipmotion_studio.folder import ProjectFolder, check_revision, compute_revision, summarise_edits
 from lipmotion_studio.meshes import with_turn
-from lipmotion_studio.project import ProjectRecording, digest_of
+from lipmotion_studio.project import ProjectRecording, digest_edits
 
 MIN_MOVE = 5e-4
 """Frames whose values differ by less, in the units of the channels, have not moved: 0.03 mm of a mouth."""
@@ -71,7 +71,7 @@ class OpenRecording:
     ) -> None:
         self.file, self.folder, self.number, self.model, self.audio = file, folder, number, model, audio
         self.sound_path, self.settled = folder.sound(folder.recording(number)), True
-        known, self.summary = folder.summary(folder.recording(number)), summary_of(file)
+        known, self.summary = folder.summary(folder.recording(number)), summarise_edits(file)
         if known.state == self.summary.state:  # else others have changed the file since it was read
             self.summary = known
         self._others: dict[tuple[int, int], OpenRecording] = {}
@@ -124,8 +124,8 @@ class OpenRecording:
 
     @property
     def revision(self) -> int:
-        """The number of the recording as it is now; another one after each change (``folder.revision_of``)."""
-        return revision_of(self.folder.recording(self.number), self.summary)
+        """The number of the recording as it is now; another one after each change (``folder.compute_revision``)."""
+        return compute_revision(self.folder.recording(self.number), self.summary)
 
     def settle(self, revision: int) -> dict[str, Any]:
         """Make the full motion, where it is not yet; return what moved. Raises RevisionError: as ``edit``."""
@@ -210,10 +210,10 @@ class OpenRecording:
             "rate_hz": motion.rate_hz,
             "frames": len(motion.values),
             "words": rows,
-            "phones": phone_rows(generation.units, self.session.units()),
+            "phones": list_phones(generation.units, self.session.units()),
             "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
             "steps": list(self.file.edits.sentences),
-            "edits_digest": digest_of(self.file.edits.sentences),
+            "edits_digest": digest_edits(self.file.edits.sentences),
             "undo": len(self.file.edits.steps),
             "redo": len(self.file.undone),
             "warnings": list(outlook.advice) if outlook else [],
@@ -227,12 +227,12 @@ class OpenRecording:
         if of == "variance":
             return replace(generation.motion, values=generation.variance)
         if of == "confidence":
-            return Motion(frame_confidence(generation)[:, None], generation.motion.rate_hz, CONFIDENCE)
+            return Motion(rate_frames(generation)[:, None], generation.motion.rate_hz, CONFIDENCE)
         return generation.motion
 
     def weights(self, face: ShownFace, frames: slice | None = None) -> Motion:
         """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them."""
-        weights = with_turn(delivered_scene(self.performance(face), frames))
+        weights = with_turn(build_scene(self.performance(face), frames))
         if frames is None or len(weights.values) == frames.stop - frames.start:
             return weights
         return replace(weights, values=weights.values[frames])
@@ -314,7 +314,7 @@ def find_moved(before: Motion, after: Motion) -> dict[str, float] | None:
     return {"start_s": float(moved[0] / after.rate_hz), "end_s": float(moved[-1] / after.rate_hz)}
 
 
-def phone_rows(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, Any]]:
+def list_phones(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, Any]]:
     """Return phones in time as objects of JSON; those that are not among ``plain`` were edited."""
 
     def identity(span: Span[Unit]) -> tuple[str, float, float]:
@@ -334,7 +334,7 @@ def phone_rows(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, A
     ]
 
 
-def frame_confidence(generation: Generation) -> NDArray[np.float64]:
+def rate_frames(generation: Generation) -> NDArray[np.float64]:
     """Return how sure each frame is; 1 where it is not known."""
     confidence = generation.confidence
     return np.ones(len(generation.motion.values)) if confidence is None else confidence
@@ -342,7 +342,7 @@ def frame_confidence(generation: Generation) -> NDArray[np.float64]:
 
 def list_doubts(generation: Generation) -> list[dict[str, Any]]:
     """Return the phones that are said, by the mean confidence of their frames, the least sure first."""
-    confidence, hertz = frame_confidence(generation), generation.motion.rate_hz
+    confidence, hertz = rate_frames(generation), generation.motion.rate_hz
     rows = []
     for number, span in enumerate(generation.units, 1):
         frames = confidence[int(span.start_s * hertz) : max(int(span.end_s * hertz), int(span.start_s * hertz) + 1)]
@@ -352,7 +352,7 @@ def list_doubts(generation: Generation) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: row["confidence"])[:MAX_DOUBTS]
 
 
-def mean_doubt(generation: Generation) -> float:
+def average_doubt(generation: Generation) -> float:
     """Return the mean doubt of a recording's speech, 0 to 1; without speech 1."""
     rows = list_doubts(generation)
     return 1.0 - float(np.mean([row["confidence"] for row in rows])) if rows else 1.0
@@ -386,7 +386,7 @@ def analyse_recording(
     file, generation = create_edit_file(replace(named, lexicon=None), session)
     digest = recording.sha256 or file.sha256
     folder.check_sound(replace(recording, sha256=digest))  # it may have been replaced since
-    duration_s, doubt = audio.duration_s, mean_doubt(generation)
+    duration_s, doubt = audio.duration_s, average_doubt(generation)
     with folder.lock:
         folder.recording(recording.number)  # it may have been removed since
         folder.write_edits(recording, replace(file, sha256=digest))
@@ -406,6 +406,6 @@ def open_recording(
     named = replace(file.named, recording=folder.sound(recording), model=folder.model_file)
     opened = OpenRecording(replace(file, named=named), folder, recording.number, model, audio)
     if recording.duration_s is None:  # it was analysed by a studio that was killed before the project was written
-        duration_s, doubt = audio.duration_s, mean_doubt(opened.generation)
+        duration_s, doubt = audio.duration_s, average_doubt(opened.generation)
         folder.change_recording(recording.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt))
     return opened

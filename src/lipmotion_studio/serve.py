@@ -46,18 +46,18 @@ def serve_studio(  # noqa: PLR0913
     check_installed("the studio", "studio")
     if recordings is not None and not recordings.is_dir():
         raise InputError(f"{recordings}: no such folder; give a folder of videos of one person")
-    from lipmotion_studio.application import studio_application
+    from lipmotion_studio.application import create_application
     from lipmotion_studio.folder import PROJECT, open_folder
     from lipmotion_studio.requests import Access
-    from lipmotion_studio.studio import Studio, known_model
+    from lipmotion_studio.studio import Studio, load_known_model
 
     def prepare() -> None:
         """Load what the first edit will need, while the page is opened."""
         from lipmotion.kernels.compiler import numba_works
-        from lipmotion_faces.head.stage import mesh_of_figure
+        from lipmotion_faces.head.stage import make_figure_mesh
 
         numba_works()
-        mesh_of_figure()
+        make_figure_mesh()
 
     with open_socket(HOST, port) as place, open_folder(source, out) as folder:
         file = folder.path.absolute() / PROJECT
@@ -71,10 +71,10 @@ def serve_studio(  # noqa: PLR0913
             changes["recordings"] = sound_reference(recordings.absolute(), file)
         if changes:
             folder.change(lambda now: replace(now, **changes))
-        other = known_model(against) if against else None
+        other = load_known_model(against) if against else None
         token = token_urlsafe(TOKEN_BYTES)
         hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
         with closing(Studio(folder, against=other)) as studio:
             Thread(target=prepare, name="prepare", daemon=True).start()
-            application = studio_application(studio, Access(token, hosts))
+            application = create_application(studio, Access(token, hosts))
             serve(application, place, started=lambda address: started(f"{address}#{token}") if started else None)

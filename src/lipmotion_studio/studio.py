@@ -36,7 +36,7 @@ from lipmotion_faces.base import Face
 from lipmotion_faces.outputs.drawn_video import VideoOutput, read_sound
 from lipmotion_faces.tracking.track import read_video_frames
 from lipmotion_faces.video.mp4 import write_mp4
-from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revision, revision_of
+from lipmotion_studio.folder import EXPORTS, NO_EDITS, ProjectFolder, check_revision, compute_revision
 from lipmotion_studio.meshes import Faces
 from lipmotion_studio.project import (
     EDITS_SUFFIX,
@@ -46,8 +46,8 @@ from lipmotion_studio.project import (
     Preset,
     Project,
     ProjectRecording,
-    digest_of,
-    suffixes,
+    digest_edits,
+    list_suffixes,
 )
 from lipmotion_studio.recording import LONGEST_VIDEO_S, OpenRecording
 from lipmotion_studio.trainer import VOICES, Trainer
@@ -76,7 +76,7 @@ def find_real_video(recording: Path) -> Path | None:
     return next((path for path in siblings if path.is_file() and has_video(path)), None)
 
 
-def media_type(path: Path) -> str | None:
+def find_media_type(path: Path) -> str | None:
     """Return the media type of a video that browsers play as it is; None: they do not, and it is written anew."""
     kind, codecs = PLAYED.get(path.suffix.lower(), ("", ()))
     if not kind:
@@ -86,7 +86,7 @@ def media_type(path: Path) -> str | None:
         return kind if is_known and (container.start_time or 0) < IN_STEP_S * 1e6 else None
 
 
-def sound_begins_s(video: Path, sound: Path) -> float:
+def find_sound_start(video: Path, sound: Path) -> float:
     """Return when in a real video the sound of its recording begins, in seconds from the beginning of the video.
 
     sound : the recording: the video itself, of which the readers have silence before a sound that begins later than
@@ -102,11 +102,11 @@ def sound_begins_s(video: Path, sound: Path) -> float:
                 late_s = max(start_s - (container.start_time or 0) / 1e6, 0.0)
     if late_s < IN_STEP_S:
         return 0.0
-    whole, other = map(_loudness, (video, sound))
+    whole, other = map(_measure_loudness, (video, sound))
     return late_s if _correlate(whole[round(late_s * LOUDNESS_HZ) :], other) > _correlate(whole, other) else 0.0
 
 
-def _loudness(path: Path) -> NDArray[np.float64]:
+def _measure_loudness(path: Path) -> NDArray[np.float64]:
     samples, each = np.abs(read_audio(path, warn=False).samples), SPEECH_RATE_HZ // LOUDNESS_HZ
     return np.sqrt(samples[: len(samples) // each * each].reshape(-1, each).mean(axis=1, dtype=float))
 
@@ -145,7 +145,7 @@ class KnownModel:
         return self.name if self.name != other.name else f"{self.name} ({self.digest[:DIGEST_DIGITS]})"
 
 
-def known_model(file: Path | None) -> KnownModel:
+def load_known_model(file: Path | None) -> KnownModel:
     """Return the model of a file; None: the one that ships. Raises as ``load_model``."""
     model, path = load_model(file), file or find_shipped()
     return KnownModel(model, path.stem, hash_file(path))
@@ -164,7 +164,7 @@ class Studio:
         if used is None and file is not None and not file.exists():
             LOG.warning("%s: the model of the project is not there; the one that ships is used", file)
             file = None
-        self.used = used or known_model(file)
+        self.used = used or load_known_model(file)
         self.workspace = Workspace(folder, self.used.model)
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
         self.trainer = Trainer(folder)
@@ -221,7 +221,7 @@ class Studio:
             "id": recording.number,
             "name": recording.name,
             "status": self.workspace.status(recording),
-            "revision": revision_of(recording, summary),
+            "revision": compute_revision(recording, summary),
             "mark": recording.mark,
             "marked": recording.marked,
             "edits_digest": summary.digest,
@@ -238,7 +238,7 @@ class Studio:
             recording, work = self.folder.recording(number), self.workspace.work(number)
             document: dict[str, Any] = {"id": number, "name": recording.name, "mark": recording.mark}
             document |= {"transcript": recording.transcript}
-            document["revision"] = revision_of(recording, self.folder.summary(recording))
+            document["revision"] = compute_revision(recording, self.folder.summary(recording))
         document["versions"] = [
             {"name": each.name, "number": each.number, "edits": len(each.steps), "digest": each.digest}
             for each in recording.versions
@@ -248,12 +248,12 @@ class Studio:
             restorable = status == FAILED and self.folder.is_restorable(recording)
             return document | {"status": status, "progress": None, "error": error, "restorable": restorable}
         status = WORKING if work.status == READY and work.recording is None else work.status
-        return document | {"status": status, "progress": _progress(work), "error": work.error}
+        return document | {"status": status, "progress": _describe_work(work), "error": work.error}
 
     def progress(self) -> dict[str, Any]:
         """Return which recordings wait, or are at work, or were until a short while ago."""
         works = self.workspace.current_work()
-        rows = [{"id": work.number, "status": work.status, **_progress(work), "error": work.error} for work in works]
+        rows = [{"id": work.number, "status": work.status, **_describe_work(work), "error": work.error} for work in works]
         waiting = sum(work.status == WAITING for work in works)
         document = {"lines": rows, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
         return document | {"training": self.trainer.short_document()}
@@ -271,7 +271,7 @@ class Studio:
         if name not in voices:
             raise InputError(f"no voice {shorten(repr(name))}; required one of: {', '.join(filter(None, voices))}")
         file = Path(os.path.normpath(self.folder.path / voices[name])) if voices[name] else None
-        return voices[name], known_model(file)
+        return voices[name], load_known_model(file)
 
     def use_voice(self, path: str, voice: KnownModel, revision: int) -> None:
         """Let another model move the recordings of the project, from now on; their phones and edits stay.
@@ -313,7 +313,7 @@ class Studio:
                 {"name": each.name, "title": each.title, "files": list(each.files)} for each in PRESETS.values()
             ],
             "preset": self.folder.project.preset,
-            "suffixes": list(suffixes()),
+            "suffixes": list(list_suffixes()),
             "edit_forms": list(FORMS),
             "controls": controls,
             "marks": list(MARKS),
@@ -383,7 +383,7 @@ class Studio:
         sound = self.folder.sound(self.folder.recording(number))
         if sound not in self._videos:
             video = find_real_video(sound)
-            self._videos[sound] = (video, sound_begins_s(video, sound)) if video else None
+            self._videos[sound] = (video, find_sound_start(video, sound)) if video else None
         return self._videos[sound]
 
     def prepare_video(self, number: int) -> tuple[Path, str]:
@@ -391,7 +391,7 @@ class Studio:
         video, _ = self.find_video(number) or (None, 0.0)
         if video is None or not video.is_file():
             raise HTTPException(404, "the recording has no video")
-        kind = media_type(video)
+        kind = find_media_type(video)
         if kind is not None:
             return video, kind
         path = self._sounds / f"{number}.mp4"
@@ -455,7 +455,7 @@ class Studio:
             preset.name,
             digests,
             copy.relative_to(self.folder.path).as_posix(),
-            digest_of(file.edits.sentences),
+            digest_edits(file.edits.sentences),
             self.used.digest,
             find_version(),
         )
@@ -483,5 +483,5 @@ class Studio:
         return {"exported": exported, "failed": failed}
 
 
-def _progress(work: Work) -> dict[str, Any]:
+def _describe_work(work: Work) -> dict[str, Any]:
     return {"stage": work.stage, "share": round(work.share, 3)}

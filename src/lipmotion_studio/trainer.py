@@ -179,7 +179,7 @@ class Trainer:
                     if left.name != name_work_folder(order.target).name:
                         remove(left)
             before = self._request, self._status
-            self._request, self._status = request, {"state": WORKING, **_empty_status()}
+            self._request, self._status = request, {"state": WORKING, **_create_status()}
             try:
                 self._write()
             except ExportError:
@@ -317,7 +317,7 @@ def _read_jobs(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
         VoiceOptions.stored(request.options)  # raises where there are no such options
         state = INTERRUPTED if status["state"] == WORKING else status["state"]
         request = replace(request, name=clean_name(request.name))
-        return TrainingJob(request, {**_empty_status(), **status, "state": state})
+        return TrainingJob(request, {**_create_status(), **status, "state": state})
 
     text = read_text_file(file, "training")
     try:
@@ -354,7 +354,7 @@ _STATE = values.members(
 )
 
 
-def _empty_status() -> dict[str, Any]:
+def _create_status() -> dict[str, Any]:
     return {"stage": "", "share": 0.0, "warnings": [], "skipped": [], "error": "", "report": None}
 
 

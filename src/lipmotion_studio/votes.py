@@ -78,7 +78,7 @@ def tally(votes: Sequence[Vote], vote: Vote) -> dict[str, Any]:
     return {"better": better, "neither": neither}
 
 
-def votes_text(votes: Sequence[Vote]) -> str:
+def format_votes(votes: Sequence[Vote]) -> str:
     """Return votes as the text of their file."""
     return as_json([asdict(vote) for vote in votes]) + "\n"
 

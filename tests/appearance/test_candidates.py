@@ -15,13 +15,13 @@ from lipmotion_faces.appearance.candidates import (
     PAPER,
     RefinementOptions,
     Refiner,
-    best_sequence,
+    find_best_sequence,
     choose_candidates,
     draw_to_recorded,
     make_candidates,
     measure_details,
     sharpen,
-    squared_distances,
+    measure_squared_distances,
 )
 from oracles.components import components, share
 
@@ -91,7 +91,7 @@ def test_what_nothing_can_be_chosen_from() -> None:
 def test_squared_distances_are_those_of_the_definition() -> None:
     some, others = mouths(1)[:9], mouths(2)[:5]
     expected = [[float(np.square(a.astype(float) - b).sum()) for b in others] for a in some]
-    assert squared_distances(some, others) == pytest.approx(np.array(expected), rel=1e-4, abs=1e-2)
+    assert measure_squared_distances(some, others) == pytest.approx(np.array(expected), rel=1e-4, abs=1e-2)
 
 
 def test_a_candidate_is_its_eigenlips_and_its_detail(space: Eigenlips) -> None:
@@ -240,8 +240,8 @@ def test_a_change_is_worth_its_cost() -> None:
     costs = np.array([[[0.0, 5.0], [3.0, 0.0], [0.0, 5.0]]], np.float32)
     numbers = np.tile([0, 1], (1, 3, 1))
     change = np.array([[[0.0, 1.0], [1.0, 0.0]]], np.float32)
-    assert best_sequence(costs, numbers, change).tolist() == [[0, 1, 0]]
-    assert best_sequence(costs, numbers, 2 * change).tolist() == [[0, 0, 0]]
+    assert find_best_sequence(costs, numbers, change).tolist() == [[0, 1, 0]]
+    assert find_best_sequence(costs, numbers, 2 * change).tolist() == [[0, 0, 0]]
 
 
 def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:

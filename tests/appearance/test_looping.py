@@ -9,7 +9,7 @@ from lipmotion.storage.archive import read_archive, write_archive
 from lipmotion_faces.appearance import camera_noise, looping
 
 RATE_HZ = 25.0
-FADE_FRAMES = looping.fade_frames(RATE_HZ)
+FADE_FRAMES = looping.count_fade_frames(RATE_HZ)
 
 
 def background(path, blinks=(), noise: float = 0.02) -> looping.FrameDescriptors:
@@ -41,7 +41,7 @@ def runs_of(order: looping.LoopOrder) -> list[int]:
 
 def test_a_long_background_is_shown_as_it_is():
     for count in (1, 30, 75):
-        order = looping.loop_order(background(wander(75)), count, RATE_HZ)
+        order = looping.find_loop_order(background(wander(75)), count, RATE_HZ)
         assert len(order) == count
         assert order.joins == ()
         np.testing.assert_array_equal(np.diff(order.first), 1)
@@ -51,7 +51,7 @@ def test_a_long_background_is_shown_as_it_is():
 def test_it_begins_and_ends_calmly():
     steps = np.full(200, 1.0)
     steps[[*range(40, 50), *range(140, 150)]] = 0.01
-    order = looping.loop_order(background(np.cumsum(steps) * 0.1), 101, RATE_HZ)
+    order = looping.find_loop_order(background(np.cumsum(steps) * 0.1), 101, RATE_HZ)
     assert 40 <= order.first[0] < 50
     assert 140 <= order.first[-1] < 150
 
@@ -59,7 +59,7 @@ def test_it_begins_and_ends_calmly():
 def test_a_short_one_goes_to_and_fro():
     descriptors = background(wander(75))
     for count, seed in ((76, 0), (200, 1), (2000, 2)):
-        order = looping.loop_order(descriptors, count, RATE_HZ, seed=seed)
+        order = looping.find_loop_order(descriptors, count, RATE_HZ, seed=seed)
         assert len(order) == len(list(order)) == count
         assert order.first.min() >= 0
         assert max(order.first.max(), order.second.max()) < 75
@@ -73,7 +73,7 @@ def test_no_step_is_much_larger_than_usual():
     descriptors = background(wander(150))
     rows = descriptors.standardise([(0, 150)])
     usual = np.linalg.norm(np.diff(rows, axis=0), axis=1)
-    order = looping.loop_order(descriptors, 3000, RATE_HZ)
+    order = looping.find_loop_order(descriptors, 3000, RATE_HZ)
     shown = np.linalg.norm(np.diff(displayed(order, rows), axis=0), axis=1)
     assert shown.max() <= 1.1 * max(usual.max(), looping.JUMP_LIMIT)
     turns = [join.cost for join in order.joins if join.kind == "turn"]
@@ -83,7 +83,7 @@ def test_no_step_is_much_larger_than_usual():
 def test_a_motion_that_repeats_is_looped_forwards():
     path = 3 * np.sin(2 * np.pi * np.arange(130) / 50)
     descriptors = background(path)
-    order = looping.loop_order(descriptors, 1500, RATE_HZ)
+    order = looping.find_loop_order(descriptors, 1500, RATE_HZ)
     jumps = [join for join in order.joins if join.kind == "jump"]
     assert len(jumps) >= 3
     for jump in jumps:
@@ -95,7 +95,7 @@ def test_a_motion_that_repeats_is_looped_forwards():
 
 def test_jumps_go_on_in_the_same_direction():
     path = np.abs(np.arange(240) % 80 - 40) * 0.2  # to and fro: the same places, in both directions
-    order = looping.loop_order(background(path), 2000, RATE_HZ)
+    order = looping.find_loop_order(background(path), 2000, RATE_HZ)
     for at in (join.at for join in order.joins if join.kind == "jump"):
         old, new = order.first[at - FADE_FRAMES], order.first[min(at + FADE_FRAMES, 1999)]
         way = 1 if old > order.first[at - FADE_FRAMES - 1] else -1
@@ -106,21 +106,21 @@ def test_jumps_go_on_in_the_same_direction():
 def test_no_join_in_a_blink_or_near_one():
     again_and_again = np.abs(np.arange(150) % 50) * 0.2
     for path, blinks in ((wander(150), (30, 75, 120)), (again_and_again, (20, 50, 80, 110, 140))):
-        order = looping.loop_order(background(path, blinks), 3000, RATE_HZ)
+        order = looping.find_loop_order(background(path, blinks), 3000, RATE_HZ)
         assert len(order.joins) > 20
         for last in [*(order.first[join.at - 1] for join in order.joins), order.first[-1]]:
             assert min(abs(last - blink - 0.5) for blink in blinks) > 2.5 + looping.BUSY_S * RATE_HZ
 
 
 def test_runs_are_not_short():
-    order = looping.loop_order(background(wander(150)), 4000, RATE_HZ)
+    order = looping.find_loop_order(background(wander(150)), 4000, RATE_HZ)
     assert min(runs_of(order)[:-1]) >= 0.8 * RATE_HZ
 
 
 def test_what_was_not_shown_comes_first():
     """Four scenes of one head: ten seconds show more than half of them, and scenes follow one another by jumps."""
     path = np.tile(wander(75), 4)
-    order = looping.loop_order(background(path), 1500, RATE_HZ, cuts=(75, 150, 225))
+    order = looping.find_loop_order(background(path), 1500, RATE_HZ, cuts=(75, 150, 225))
     fresh = [len(set(order.first[n : n + 250].tolist())) / 250 for n in range(0, 1250, 25)]
     assert np.mean(fresh) > 0.6
     assert sum(join.kind == "jump" for join in order.joins) > sum(join.kind == "turn" for join in order.joins)
@@ -128,7 +128,7 @@ def test_what_was_not_shown_comes_first():
 
 def test_the_seed_alone_decides():
     descriptors = background(wander(100))
-    orders = [looping.loop_order(descriptors, 1000, RATE_HZ, seed=seed).first for seed in (4, 4, 5)]
+    orders = [looping.find_loop_order(descriptors, 1000, RATE_HZ, seed=seed).first for seed in (4, 4, 5)]
     np.testing.assert_array_equal(orders[0], orders[1])
     assert (orders[0] != orders[2]).any()
 
@@ -136,7 +136,7 @@ def test_the_seed_alone_decides():
 def test_only_frames_that_may_be_shown():
     usable = np.ones(120, bool)
     usable[[0, 1, 50, 51, 119]] = False
-    order = looping.loop_order(background(wander(120)), 2000, RATE_HZ, usable=usable, cuts=(90,))
+    order = looping.find_loop_order(background(wander(120)), 2000, RATE_HZ, usable=usable, cuts=(90,))
     assert usable[order.first].all()
     assert usable[order.second].all()
     crossings = [(a, b) for a, b in pairwise(order.first.tolist()) if (a < 90) != (b < 90)]
@@ -147,16 +147,16 @@ def test_only_frames_that_may_be_shown():
 def test_nothing_to_show_is_refused():
     for count, usable in ((0, None), (5, np.zeros(50, bool)), (5, np.ones(49, bool))):
         with pytest.raises(InputError, match="required at least one of each"):
-            looping.loop_order(background(wander(50)), count, RATE_HZ, usable=usable)
+            looping.find_loop_order(background(wander(50)), count, RATE_HZ, usable=usable)
 
 
 def test_tiny_and_still_backgrounds():
     for length in (1, 2, 3, 5, 21):
-        order = looping.loop_order(background(wander(length)), 100, RATE_HZ)
+        order = looping.find_loop_order(background(wander(length)), 100, RATE_HZ)
         assert len(order) == 100
         assert set(order.first.tolist()) <= set(range(length))
         assert np.abs(np.diff(order.first)).max() <= 1
-    assert len(looping.loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)) == 500
+    assert len(looping.find_loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)) == 500
 
 
 MAP = np.array([[0.7, 0, 80.0], [0, 0.7, 60.0]])
@@ -180,7 +180,7 @@ def distances_of(frames: np.ndarray, moves=None) -> np.ndarray:
     count = len(frames)
     descriptors = looping.describe_frames(frames, maps(np.zeros((count, 2)) if moves is None else moves))
     assert len(descriptors) == count
-    return looping.row_distances(descriptors.standardise([(0, count)]))
+    return looping.measure_row_distances(descriptors.standardise([(0, count)]))
 
 
 def test_equal_frames_have_no_distance_and_the_mouth_does_not_count():
@@ -279,7 +279,7 @@ def test_what_are_no_pictures() -> None:
 
 def test_noise_through_a_file_and_hostile_files(tmp_path) -> None:
     noise = camera_noise.CameraNoise(COVARIANCE, np.array([0.8, 0.0]))
-    write_archive(tmp_path / "n", {}, camera_noise.camera_noise_arrays(noise))
+    write_archive(tmp_path / "n", {}, camera_noise.camera_noise_to_arrays(noise))
     again = camera_noise.camera_noise_from_arrays(read_archive(tmp_path / "n"))
     assert np.array_equal(still(3, again), still(3, noise))
     for changes, says in (
@@ -289,4 +289,4 @@ def test_noise_through_a_file_and_hostile_files(tmp_path) -> None:
         ({"noise_spread_px": np.array([0.5, 1e6])}, "required 0 to 3"),
     ):
         with pytest.raises(ModelFormatError, match=f"{says}.*build it again"):
-            camera_noise.camera_noise_from_arrays(camera_noise.camera_noise_arrays(noise) | changes)
+            camera_noise.camera_noise_from_arrays(camera_noise.camera_noise_to_arrays(noise) | changes)

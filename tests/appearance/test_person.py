@@ -13,7 +13,7 @@ from pipeline.damage import DAMAGES, UNREADABLE, damaged
 from testing.toy import toy_motion, toy_sentences
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
 
-MOUTH = (slice(None), *lower_face.mouth_part(1))
+MOUTH = (slice(None), *lower_face.find_mouth_part(1))
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_its_parts(appearance: Appearance, footage: FootagePictures) -> None:
     assert appearance.from_motion.names == ("opening", "width", "outer")
     assert (appearance.mouth.explained > 0.98).all()
     assert np.sqrt(np.diag(appearance.noise.covariance)) == pytest.approx([NOISE] * 3, rel=0.05)
-    light = np.median(lower_face.cheek_light(np.concatenate(footage.clips)[MOUTH]), axis=0)
+    light = np.median(lower_face.measure_cheek_light(np.concatenate(footage.clips)[MOUTH]), axis=0)
     assert appearance.light == pytest.approx(light)
 
 
@@ -122,9 +122,9 @@ def test_a_jaw_of_sound_is_the_least_squares_line_of_its_level(
 def test_jaws_differ_in_the_jaw_alone(appearance: Appearance) -> None:
     """Their mouth is the mean one, and so is what is further away from the jaw than cloning reads."""
     same = (appearance.jaws == appearance.jaws[0]).all(axis=(0, 3))
-    inside = lower_face.replaced_part(SHAPE, 1)
-    assert same[lower_face.mouth_ellipse(1)].all()
-    assert not same[inside & ~lower_face.mouth_ellipse(1)].any()
+    inside = lower_face.mark_replaced(SHAPE, 1)
+    assert same[lower_face.mark_mouth(1)].all()
+    assert not same[inside & ~lower_face.mark_mouth(1)].any()
     rows, columns = np.nonzero(~same)
     reach = np.nonzero(inside)
     for found, wanted in ((rows, reach[0]), (columns, reach[1])):
@@ -138,7 +138,7 @@ def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
     dimmed = replace(footage, clips=(footage.clips[0], lower_face.relight(footage.clips[1], lamp), *footage.clips[2:]))
     found, wanted = learn_appearance(dimmed), learn_appearance(footage)
     assert found.light == pytest.approx(wanted.light, abs=0.5)
-    assert lower_face.cheek_light(found.mouths) == pytest.approx(np.tile(found.light, (len(found.mouths), 1)), abs=0.5)
+    assert lower_face.measure_cheek_light(found.mouths) == pytest.approx(np.tile(found.light, (len(found.mouths), 1)), abs=0.5)
     motion = types.Motion(footage.motion[::5], 25.0, footage.channels)
     pictures = [each.mouth.restore(each.predict_codes(motion).mouth).astype(int) for each in (found, wanted)]
     assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
@@ -151,7 +151,7 @@ def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatc
     learned = set(choose_evenly(120, len(footage.motion)))
     damaged = next(n for n in range(20, 60) if n not in learned)
     clip = footage.clips[0].copy()
-    rows, columns = lower_face.mouth_part(1)
+    rows, columns = lower_face.find_mouth_part(1)
     clip[damaged, rows.start + 20 : rows.start + 28, columns.start + 30 : columns.start + 38] = [0, 0, 255]
     found = learn_appearance(replace(footage, clips=(clip, *footage.clips[1:])))
     whole = learn_appearance(footage)
@@ -292,12 +292,12 @@ def test_channels_are_found_by_name(fitted: motion_map.MotionMap) -> None:
     values = poses(50, seed=5)
     order = [3, 1, 2, 0]
     turned = types.Motion(values[:, order], 25.0, tuple(CHANNELS[n] for n in order))
-    assert motion_map.channel_values(turned, ("opening", "width")) == pytest.approx(values[:, :2])
+    assert motion_map.select_channels(turned, ("opening", "width")) == pytest.approx(values[:, :2])
     assert fitted.predict(turned) == pytest.approx(fitted.predict(motion(values)))
 
 
 def test_as_arrays_and_back_and_damaged_arrays(fitted: motion_map.MotionMap) -> None:
-    arrays, values = motion_map.motion_map_arrays(fitted), motion(poses(50, seed=6))
+    arrays, values = motion_map.motion_map_to_arrays(fitted), motion(poses(50, seed=6))
     again = motion_map.motion_map_from_arrays(arrays, 4)
     assert (again.names, np.array_equal(again.predict(values), fitted.predict(values))) == (fitted.names, True)
     assert arrays.keys() == motion_map.MOTION_MAP.keys()
@@ -390,10 +390,10 @@ def test_the_jaw_moves_less_towards_its_joints() -> None:
 
 def test_the_part_that_may_differ_holds_all_that_does() -> None:
     for scale in (1, 2):
-        part = lower_face.moved_part(scale)
+        part = lower_face.mark_moved(scale)
         assert part.shape == (lower_face.HEIGHT * scale, lower_face.WIDTH * scale)
         assert not np.concatenate([part[[0, -1]].ravel(), part[:, [0, -1]].ravel()]).any()
-        inside = lower_face.replaced_part(lower_face.FaceShape(44.0, 120.0), scale)
+        inside = lower_face.mark_replaced(lower_face.FaceShape(44.0, 120.0), scale)
         assert (part & inside).sum() == inside.sum()
 
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion_faces.appearance import poisson
-from lipmotion_faces.appearance.poisson import CLEARANCE, CloningSystem, GridFiller, cloning_system, nested_grids
+from lipmotion_faces.appearance.poisson import CLEARANCE, CloningSystem, GridFiller, build_cloning_system, nest_grids
 from oracles.membranes import cloned
 
 WIDTH, HEIGHT = 72, 56
@@ -49,7 +49,7 @@ def noise(shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("name", MASKS)
 def test_the_result_is_within_one_grey_level_of_the_printed_equation(name: str) -> None:
-    system = cloning_system(MASKS[name])
+    system = build_cloning_system(MASKS[name])
     source, background = (noise((2, *system.mask.shape, 3), seed) for seed in (1, 2))
     result = system.clone(source, background)
     assert result.dtype == np.uint8
@@ -69,7 +69,7 @@ def test_mouths_of_a_film_are_within_one_grey_level_of_the_printed_equation() ->
         skin = np.array([190, 140, 110]) * (1 - 0.004 * np.abs(x - 20))[..., None]
         pictures.append(light * (skin - lips * [40, 70, 50]) + draw.normal(0, 3, (HEIGHT, WIDTH, 3)))
     source, background = (np.rint(np.clip(each, 0, 255)).astype(np.uint8) for each in pictures)
-    system = cloning_system(MASKS["ellipse"])
+    system = build_cloning_system(MASKS["ellipse"])
     exact = cloned(system.mask, source, background)
     assert np.abs(exact - source)[system.mask].max() > 20
     assert np.abs(system.clone(source[None], background[None])[0] - np.clip(np.rint(exact), 0, 255)).max() <= 1
@@ -79,7 +79,7 @@ def test_mouths_of_a_film_are_within_one_grey_level_of_the_printed_equation() ->
 def test_constants_and_linear_functions_are_reproduced() -> None:
     """A difference on the edge that is linear in x and y has itself as its membrane, on every grid; none, none."""
     for name in ("ellipse", "scattered"):
-        system = cloning_system(MASKS[name])
+        system = build_cloning_system(MASKS[name])
         height, width = system.mask.shape
         y, x = np.mgrid[:height, :width] / max(height, width)
         linear = np.stack([np.full_like(x, 40), 90 * x - 30 * y, 120 * y], axis=-1)[None]
@@ -90,14 +90,14 @@ def test_constants_and_linear_functions_are_reproduced() -> None:
 
 def test_another_colour_of_the_light_vanishes() -> None:
     """A source that differs from the background by a colour alone gives the background, on both sides of the edge."""
-    system = cloning_system(MASKS["ellipse"])
+    system = build_cloning_system(MASKS["ellipse"])
     background = np.random.default_rng(1).uniform(60, 190, (2, HEIGHT, WIDTH, 3))
     result = system.clone(background + np.array([25.0, -30.0, 10.0]), background)
     assert np.abs(result - background).max() <= 0.51
 
 
 def test_floats_and_grey_levels_give_the_same() -> None:
-    system = cloning_system(MASKS["parts"])
+    system = build_cloning_system(MASKS["parts"])
     source, background = (noise((2, *system.mask.shape, 3), seed) for seed in (1, 2))
     given = source, background, background + 0.4
     copies = [each.copy() for each in given]
@@ -108,7 +108,7 @@ def test_floats_and_grey_levels_give_the_same() -> None:
 
 
 def test_many_pictures_give_what_each_gives_alone() -> None:
-    system = cloning_system(ellipse(20, 24))
+    system = build_cloning_system(ellipse(20, 24))
     count = poisson.BATCH + 7
     source, background = (noise((count, 20, 24, 3), seed) for seed in (1, 2))
     together = correct(system, source, background)
@@ -124,7 +124,7 @@ def test_the_membrane_lies_between_its_edge_values(seed: int, height: int, width
     draw = np.random.default_rng(seed)
     mask = draw.random((height, width)) < share
     mask[1, 1] = True
-    system = cloning_system(mask)
+    system = build_cloning_system(mask)
     source, background = (draw.integers(0, 256, (1, height, width, 3), np.uint8) for _ in range(2))
     correction = correct(system, source, background)[0]
     exact = cloned(system.mask, source[0], background[0]) - source[0]
@@ -135,7 +135,7 @@ def test_the_membrane_lies_between_its_edge_values(seed: int, height: int, width
 
 
 def test_pictures_that_do_not_fit_are_refused() -> None:
-    system = cloning_system(MASKS["parts"])
+    system = build_cloning_system(MASKS["parts"])
     good = noise((2, 50, 70, 3))
     bad = good.astype(float)
     bad[1, 7, 7, 2] = np.nan
@@ -162,7 +162,7 @@ def test_other_than_a_mask_is_refused() -> None:
         ((x + y) % 2 == 0, f"at most {poisson.LARGEST_EDGE}"),
     ):
         with pytest.raises(InputError, match=message):
-            cloning_system(mask)  # type: ignore[arg-type]
+            build_cloning_system(mask)  # type: ignore[arg-type]
 
 
 def disc(height: int, width: int) -> np.ndarray:
@@ -171,7 +171,7 @@ def disc(height: int, width: int) -> np.ndarray:
 
 @pytest.mark.parametrize("shape", [(57, 71), (130, 101), (5, 40), (3, 3)])
 def test_filling_is_the_matrix(shape: tuple[int, int]) -> None:
-    grids = nested_grids(disc(*shape))
+    grids = nest_grids(disc(*shape))
     matrix = grids.matrix()
     for colours in (1, 3):
         filler = GridFiller(grids, 2, colours)
@@ -184,7 +184,7 @@ def test_filling_is_the_matrix(shape: tuple[int, int]) -> None:
 
 
 def test_cubic_functions_are_exact() -> None:
-    grids = nested_grids(disc(130, 150))
+    grids = nest_grids(disc(130, 150))
     y, x = np.mgrid[:130, :150] / 150 - 0.5
     cubic = (x**3 - 3 * x * y**2 + y**2 - x).ravel()
     filled = grids.matrix() @ cubic[np.concatenate(grids.nodes)]
@@ -194,6 +194,6 @@ def test_cubic_functions_are_exact() -> None:
 
 def test_all_pixels_near_the_edge_are_nodes_and_few_inside() -> None:
     nodes = np.zeros((200, 200), bool)
-    nodes.flat[np.concatenate(nested_grids(np.pad(np.ones((198, 198), bool), 1)).nodes)] = True
+    nodes.flat[np.concatenate(nest_grids(np.pad(np.ones((198, 198), bool), 1)).nodes)] = True
     assert nodes[1 : 1 + CLEARANCE, 1:-1].all()
     assert nodes[80:120, 80:120].mean() < 0.01

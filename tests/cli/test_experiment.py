@@ -37,7 +37,7 @@ def figures_of(run, here):
 
 @pytest.mark.long
 def test_the_table_is_that_of_the_figures(figures_of, toy_corpus, here):
-    figures = figures_of(sections.hofer_section, "hofer2008", toy_corpus.path, "--split", "val", "--quick")
+    figures = figures_of(sections.build_hofer_section, "hofer2008", toy_corpus.path, "--split", "val", "--quick")
     assert (figures["split"], figures["clips"], figures["mixtures"]) == ("val", 2, [1, 2])
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
@@ -46,14 +46,14 @@ def test_the_table_is_that_of_the_figures(figures_of, toy_corpus, here):
 def test_the_learning_curve_of_a_list(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
     chosen = ("--order", "order.txt", "--sizes", "3", "--split", "val")
-    figures = figures_of(sections.learning_section, "learning-curve", toy_corpus.path, *chosen)
+    figures = figures_of(sections.build_learning_section, "learning-curve", toy_corpus.path, *chosen)
     assert (figures["split"], figures["order"], figures["workers"]) == ("val", "given", 1)
     assert [row["names"] for row in figures["rows"]] == [3]
 
 
 @pytest.mark.long
 def test_folds_of_the_training_list(figures_of, toy_corpus):
-    figures = figures_of(sections.folds_section, "folds", toy_corpus.path, "--folds", "2")
+    figures = figures_of(sections.build_folds_section, "folds", toy_corpus.path, "--folds", "2")
     assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
 
 
@@ -62,7 +62,7 @@ def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
     few = ("--systems", "ph-MSHMM;mean pose", "--order", "order.txt")
     chosen = (*few, "--sizes", "3", "--plots", "pictures")
-    figures = figures_of(sections.xie_liu_section, "xieliu2007", toy_corpus.path, *chosen)
+    figures = figures_of(sections.build_xie_liu_section, "xieliu2007", toy_corpus.path, *chosen)
     assert [row["names"] for row in figures["rows"]] == [3]
     assert (figures["order"], figures["validation"]) == ("given", 0)
     assert len(list((here / "pictures").iterdir())) == 3
@@ -72,10 +72,10 @@ def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
 @pytest.mark.long
 def test_all_engines(figures_of, run, toy_corpus, here):
     chosen = ("engines", toy_corpus.path, "--split", "test", "--models", "models")
-    figures = figures_of(sections.engines_section, *chosen)
+    figures = figures_of(sections.build_engines_section, *chosen)
     assert (figures["split"], figures["clips"]) == ("test", 2)
     kept = sorted(path.name for path in (here / "models").iterdir())
     assert kept == ["coupled.lipmotion", "selection.lipmotion", "trajectory.lipmotion"]
-    assert sections.engines_section(figures_of(sections.engines_section, *chosen)) == sections.engines_section(figures)
+    assert sections.build_engines_section(figures_of(sections.build_engines_section, *chosen)) == sections.build_engines_section(figures)
     (here / "models" / "coupled.lipmotion").write_bytes(b"no model")
     assert is_one_error(run("experiment", *chosen, "-o", "a.json", "--workers", "1"), 6)

@@ -20,9 +20,9 @@ from lipmotion.testing import examples as sentences
 from lipmotion.types import Example, TokenPosteriors, silent_monitor
 from lipmotion_lab import learning_curve as module
 from lipmotion_lab.baselines import REACH, BlstmBaseline, ContextRidge, FrameRegressionModel, MeanPose
-from lipmotion_lab.engine_comparison import ENGINES_COMPARED, engines
-from lipmotion_lab.learning_curve import learning_curve
-from lipmotion_lab.report.sections import learning_section
+from lipmotion_lab.engine_comparison import ENGINES_COMPARED, compare_engines
+from lipmotion_lab.learning_curve import run_learning_curve
+from lipmotion_lab.report.sections import build_learning_section
 from lipmotion_lab.runner import ExperimentSettings
 from testing.toy import SMALL
 
@@ -39,7 +39,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
-    return engines(toy_corpus, split="test", models=folder, settings=SETTINGS)
+    return compare_engines(toy_corpus, split="test", models=folder, settings=SETTINGS)
 
 
 @LONG
@@ -83,7 +83,7 @@ def test_a_second_run_trains_nothing(figures, toy_corpus, folder):
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
     received: set[tuple[str, str]] = set()
     settings = replace(SETTINGS, receive=lambda system, condition, *_: received.add((condition, system)))
-    again = engines(toy_corpus, split="test", models=folder, settings=settings)
+    again = compare_engines(toy_corpus, split="test", models=folder, settings=settings)
     assert received == {(c, s) for c, found in again["conditions"].items() for s in found["systems"]}
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
     assert sorted(before) == sorted(f"{name}.lipmotion" for name in ENGINES_COMPARED)
@@ -98,24 +98,24 @@ def test_models_of_something_else_are_refused(figures, toy_corpus, folder, tmp_p
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "coupled.lipmotion").write_bytes((folder / "trajectory.lipmotion").read_bytes())
     with pytest.raises(InputError, match="a model of the engine 'trajectory', required 'coupled'; move it away"):
-        engines(toy_corpus, models=tmp_path / "a", settings=SETTINGS)
+        compare_engines(toy_corpus, models=tmp_path / "a", settings=SETTINGS)
     fewer = copied(
         toy_corpus, tmp_path, lambda u: replace(u, split="test") if u.name in ("toy00", "toy01", "toy03") else u
     )
     wanted = r"minutes 0\.\d, required the training list of this corpus: corpus \['copy'\], minutes 0\.\d; move it"
     with pytest.raises(InputError, match=wanted):
-        engines(fewer, models=folder, settings=SETTINGS)
+        compare_engines(fewer, models=folder, settings=SETTINGS)
     with pytest.raises(ExportError, match="the corpus"):
-        engines(toy_corpus, models=toy_corpus.path, settings=SETTINGS)
+        compare_engines(toy_corpus, models=toy_corpus.path, settings=SETTINGS)
     (tmp_path / "file").write_text("")
     with pytest.raises(ExportError, match="is a file; give the name"):
-        engines(toy_corpus, models=tmp_path / "file", settings=SETTINGS)
+        compare_engines(toy_corpus, models=tmp_path / "file", settings=SETTINGS)
 
 
 def test_recordings_of_the_training_are_not_compared(toy_corpus):
     for split in ("train", None):
         with pytest.raises(CorpusError, match="are in the split that is compared with"):
-            engines(toy_corpus, split=split, settings=SETTINGS)
+            compare_engines(toy_corpus, split=split, settings=SETTINGS)
 
 
 def fitted(examples: list[Example], **options: float) -> FrameRegressionModel:
@@ -213,7 +213,7 @@ def order(toy_corpus: Corpus) -> tuple[str, ...]:
 
 @pytest.fixture(scope="module")
 def curve_figures(toy_corpus: Corpus, order: tuple[str, ...]) -> dict[str, Any]:
-    return learning_curve(toy_corpus, order=order, sizes=[8, 4, 4], settings=SETTINGS)
+    return run_learning_curve(toy_corpus, order=order, sizes=[8, 4, 4], settings=SETTINGS)
 
 
 @pytest.mark.long
@@ -243,10 +243,10 @@ def test_a_row_is_what_train_and_evaluate_say(curve_figures, toy_corpus, order):
 
 @pytest.mark.long
 def test_channels_that_are_not_there_are_dashes(toy_corpus, tmp_path):
-    made = learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SETTINGS)
+    made = run_learning_curve(renamed(toy_corpus, tmp_path, "opening", "smile"), sizes=[8], settings=SETTINGS)
     row = made["rows"][0]["conditions"]["audio only"]
     assert (row["acc_width"], row["acc_outer"]) == (None, None)
-    assert learning_section(made).table.as_lines()[1].split()[-2:] == ["–", "–"]
+    assert build_learning_section(made).table.as_lines()[1].split()[-2:] == ["–", "–"]
 
 
 def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_trained_again(
@@ -264,13 +264,13 @@ def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_traine
         return SimpleNamespace(recordings=SimpleNamespace(closed_under=0.1), clips={"audio only": []})
 
     monkeypatch.setattr("lipmotion_lab.runner.train_and_generate", result)
-    monkeypatch.setattr(module, "_row", lambda *_: {})
+    monkeypatch.setattr(module, "_make_row", lambda *_: {})
     received: list[tuple[str, str]] = []
     settings = ExperimentSettings(seed=1, receive=lambda *given: received.append(given[:2]))
     with pytest.raises(KeyboardInterrupt):
-        learning_curve(toy_corpus, sizes=[3, 8], work=tmp_path, settings=settings)
+        run_learning_curve(toy_corpus, sizes=[3, 8], work=tmp_path, settings=settings)
     del trained[1:]
-    curve_figures = learning_curve(toy_corpus, sizes=[3, 8], work=tmp_path, settings=settings)
+    curve_figures = run_learning_curve(toy_corpus, sizes=[3, 8], work=tmp_path, settings=settings)
     assert [row["names"] for row in curve_figures["rows"]] == [3, 8]
     assert received == [("3 recordings", "audio only"), ("8 recordings", "audio only")]
     names = toy_corpus.names("train")
@@ -282,12 +282,12 @@ def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_traine
 
 def test_what_cannot_be_trained_on(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="sizes none; required: from 1 to 8"):
-        learning_curve(toy_corpus, sizes=[])
+        run_learning_curve(toy_corpus, sizes=[])
     for order, words in (
         (["x1", "x2", "x3", "x4", "x5", "x6"], r"6 of 6 names to train on \(x1, x2, x3, x4, x5, ...\) are not"),
         (["toy00", "toy01", "toy00"], r"1 of 3 names to train on \(toy00\) stand in the list more than once"),
     ):
         with pytest.raises(CorpusError, match=words):
-            learning_curve(toy_corpus, order=order)
+            run_learning_curve(toy_corpus, order=order)
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
-        learning_curve(renamed(toy_corpus, tmp_path, "smile", "frown"))
+        run_learning_curve(renamed(toy_corpus, tmp_path, "smile", "frown"))

@@ -16,8 +16,8 @@ from lipmotion_lab import folds as module
 from lipmotion_lab import runner
 from lipmotion_lab.evaluation import evaluate
 from lipmotion_lab.evaluation.held_out import ComparedClip, generate_clips, load_held_out
-from lipmotion_lab.folds import folds, in_blocks
-from lipmotion_lab.report.sections import blocks_section, folds_section
+from lipmotion_lab.folds import cross_validate, cross_validate_blocks
+from lipmotion_lab.report.sections import build_blocks_section, build_folds_section
 from testing.toy import SMALL
 
 CONDITIONS = ["audio only", "with transcript"]
@@ -30,7 +30,7 @@ OPENING_ROW = (
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus) -> dict[str, Any]:
-    return folds(toy_corpus, count=3, settings=SETTINGS)
+    return cross_validate(toy_corpus, count=3, settings=SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +69,9 @@ def test_figures_are_of_all_clips_as_one_split(figures, by_hand):
 
 def test_corpora_that_cannot_be(toy_corpus, tmp_path):
     with pytest.raises(errors.CorpusError, match="no utterances of split 'train'"):
-        folds(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))
+        cross_validate(copied(toy_corpus, tmp_path / "a", lambda utterance: replace(utterance, split="test")))
     with pytest.raises(errors.CorpusError, match="compared by the channel 'opening', which is not in it"):
-        folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
+        cross_validate(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
 
 
 def replace_training(
@@ -82,8 +82,8 @@ def replace_training(
 ) -> None:
     """Let functions stand for training with generation, for the figures of clips, and for the row of figures."""
     monkeypatch.setattr(runner, "train_and_generate", result)
-    monkeypatch.setattr(module, "figures_of", lambda clips, *_: figures_of(clips))
-    monkeypatch.setattr(runner, "opening_row", row_of)
+    monkeypatch.setattr(module, "measure_clips", lambda clips, *_: figures_of(clips))
+    monkeypatch.setattr(runner, "make_opening_row", row_of)
 
 
 def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,7 +98,7 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
         return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1, utterances=[]))
 
     replace_training(monkeypatch, result, sorted)
-    figures = folds(toy_corpus, count=3)
+    figures = cross_validate(toy_corpus, count=3)
     assert sorted(name for held_out in cut for name in held_out) == sorted(toy_corpus.names("train"))
     assert [len(held_out) for held_out in cut] == [3, 3, 2]
     assert (figures["trained_on"], figures["closed_under"]) == ([5, 5, 6], 0.1)
@@ -106,7 +106,7 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
     assert figures["conditions"] == {"audio only": {"clips": wanted}}
     first = cut[:]
     cut.clear()
-    folds(toy_corpus, count=3, settings=runner.ExperimentSettings(seed=1))
+    cross_validate(toy_corpus, count=3, settings=runner.ExperimentSettings(seed=1))
     assert cut != first
 
 
@@ -123,7 +123,7 @@ def test_finished_parts_are_not_generated_again(toy_corpus, tmp_path, monkeypatc
         return SimpleNamespace(used=names, clips=dict.fromkeys(CONDITIONS, clips), recordings=recordings)
 
     def run(work: Path | None) -> dict[str, Any]:
-        return folds(toy_corpus, count=2, by_speaker=False, work=work)
+        return cross_validate(toy_corpus, count=2, by_speaker=False, work=work)
 
     def as_lists(clips: Sequence[ComparedClip]) -> list[Any]:
         return [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
@@ -157,18 +157,18 @@ def test_by_speaker_everybody_is_a_stranger_once(toy_corpus, tmp_path, monkeypat
 
     row = dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6], "false_per_minute": 1.0, "original_per_minute": 2.0}
     replace_training(monkeypatch, result, lambda _: {}, lambda _: row)
-    figures = folds(corpus, by_speaker=True)
+    figures = cross_validate(corpus, by_speaker=True)
     assert sorted(map(sorted, left_out)) == [[""], ["anna"], ["ben"], ["eve"]]
     assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(
         {"anna": 1, "ben": -1, "eve": 1, "unknown": 1}
     )
     told = ["4 speakers: mean ACC 0.500, -1.000 (ben) to 1.000 (unknown)."]
-    assert folds_section(figures).words["Speakers unknown to the model"] == told
+    assert build_folds_section(figures).words["Speakers unknown to the model"] == told
     left_out.clear()
-    folds(corpus, by_speaker=True, count=2)
+    cross_validate(corpus, by_speaker=True, count=2)
     assert [len(each) for each in left_out] == [2, 2]
     with pytest.raises(errors.InputError, match="5 folds; required: from 2 to 4, which is how many speakers there are"):
-        folds(corpus, by_speaker=True, count=5)
+        cross_validate(corpus, by_speaker=True, count=5)
 
 
 Clips = list[np.ndarray]
@@ -187,26 +187,26 @@ def clips() -> tuple[Clips, Clips, Clips]:
 def test_figures_are_those_of_the_measures(clips):
     original, near, _ = clips
     wanted = curves.correlate_pooled(near, original).mean()
-    assert evaluate.correlation_statistic(near, original).value == pytest.approx(wanted, abs=1e-12)
-    assert evaluate.distance_statistic(near, original).value == pytest.approx(
+    assert evaluate.sum_correlations(near, original).value == pytest.approx(wanted, abs=1e-12)
+    assert evaluate.sum_distances(near, original).value == pytest.approx(
         curves.measure_mean_distance(near, original), abs=1e-12
     )
     some, others = [g[:, :1] for g in near], [o[:, :1] for o in original]
     score = closures.measure_closures([g[:, 0] for g in near], [o[:, 0] for o in original], 50, 25).score
-    assert evaluate.closing_score_statistic(some, others, 50).value == pytest.approx(100 * score)
+    assert evaluate.sum_closings(some, others, 50).value == pytest.approx(100 * score)
 
 
 def test_a_channel_that_stands_still_explains_nothing(clips):
     original, near, _ = clips
     still = [np.concatenate([g[:, :2], np.full((len(g), 1), 0.1)], axis=1) for g in near]
-    assert evaluate.correlation_statistic(still, original).value == pytest.approx(
+    assert evaluate.sum_correlations(still, original).value == pytest.approx(
         curves.correlate_pooled(still, original).mean(), abs=1e-12
     )
 
 
 def test_nothing_closes():
     open_mouth = [np.ones((5, 1))]
-    assert np.isnan(evaluate.closing_score_statistic(open_mouth, open_mouth, 0.5).value)
+    assert np.isnan(evaluate.sum_closings(open_mouth, open_mouth, 0.5).value)
 
 
 def test_the_interval_is_that_of_drawn_clips(clips):
@@ -217,12 +217,12 @@ def test_the_interval_is_that_of_drawn_clips(clips):
     def acc(made: Clips, chosen: np.ndarray) -> float:
         return float(curves.correlate_pooled([made[i] for i in chosen], [original[i] for i in chosen]).mean())
 
-    one, other = evaluate.correlation_statistic(near, original), evaluate.correlation_statistic(far, original)
+    one, other = evaluate.sum_correlations(near, original), evaluate.sum_correlations(far, original)
     wanted = np.percentile([acc(near, chosen) for chosen in drawn], [2.5, 97.5])
     assert one.interval(7) == pytest.approx(tuple(wanted), abs=1e-12)
     paired = np.percentile([acc(near, chosen) - acc(far, chosen) for chosen in drawn], [2.5, 97.5])
     assert one.gain(other, 7) == pytest.approx(tuple(paired), abs=1e-12)
-    assert evaluate.significance_mark(one.gain(other, 7)) == "*"
+    assert evaluate.mark_significance(one.gain(other, 7)) == "*"
     assert one.gain(one, 7) == (0, 0)
 
 
@@ -236,7 +236,7 @@ def test_the_interval_of_one_clip_is_its_value():
     [((0.1, 0.2), "*"), ((-2, -0.1), "*"), ((-0.1, 0.1), ""), ((0, 0), ""), ((2e-10, 7e-9), ""), ((None, None), "")],
 )
 def test_marks(gain, wanted):
-    assert evaluate.significance_mark(gain) == wanted
+    assert evaluate.mark_significance(gain) == wanted
 
 
 def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy_corpus, tmp_path):
@@ -258,7 +258,7 @@ def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy
                 settings.receive(system, "audio only", recordings, clips)
         return {}
 
-    figures = in_blocks(experiment, toy_corpus, ["true"], count=4, work=tmp_path)
+    figures = cross_validate_blocks(experiment, toy_corpus, ["true"], count=4, work=tmp_path)
     names = list(toy_corpus.names())
     assert [name for _, _, test in cut for name in test] == names
     assert all(sorted([*train, *val, *test]) == names for train, val, test in cut)
@@ -268,8 +268,8 @@ def test_in_blocks_each_clip_is_compared_once_by_systems_that_did_not_see_it(toy
     assert rows["true"]["score"] == rows["true"]["opening"]["score"] == 100
     assert rows["noisy"]["acc"] < 1
     assert rows["noisy"]["acc_gain_95"]["true"][1] < 0 < rows["noisy"]["amse_gain_95"]["true"][0]
-    assert in_blocks(experiment, toy_corpus, ["true"], count=4, work=tmp_path) == figures
+    assert cross_validate_blocks(experiment, toy_corpus, ["true"], count=4, work=tmp_path) == figures
     assert len(cut) == 4
-    assert blocks_section(figures).verdict == "Highest ACC: true, 1.000."
+    assert build_blocks_section(figures).verdict == "Highest ACC: true, 1.000."
     with pytest.raises(errors.InputError, match="2 blocks; required: from 3 to 12"):
-        in_blocks(experiment, toy_corpus, [], count=2)
+        cross_validate_blocks(experiment, toy_corpus, [], count=2)

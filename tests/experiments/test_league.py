@@ -15,7 +15,7 @@ import pytest
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Channel, Motion, Track
-from lipmotion_lab.league import League, Rival, closing_counts, league, load_recordings, read_rivals, write_league
+from lipmotion_lab.league import League, Rival, count_closings, measure_league, load_recordings, read_rivals, write_league
 
 ADAPTERS = Path(__file__).parents[2] / "extras" / "league"
 STANDIN = """
@@ -63,7 +63,7 @@ def hold(adapters: Path, corpus: Corpus, rows: dict[str, dict[str, Any]], **opti
     python = {"run": ["{NOT_SET:python}", "standin.py"], "needs": "install it"}
     table = {name: {"title": name.upper(), **python, **row} for name, row in rows.items()}
     (adapters / "rivals.json").write_text(json.dumps(table))
-    return league(corpus, adapters, adapters.parent / "work", **options)
+    return measure_league(corpus, adapters, adapters.parent / "work", **options)
 
 
 def does(*what: str, **more: Any) -> dict[str, Any]:
@@ -144,10 +144,10 @@ def test_what_cannot_be_compared(adapters, toy_corpus, tmp_path):
 def test_closings_of_the_lips(toy_corpus, tmp_path):
     recording = load_recordings(toy_corpus, toy_corpus.names("test")[:1], tmp_path, lambda _: None)[0]
     shut = 0.1 * float(np.percentile(recording.original[:, 0], 95))
-    everything, lips = closing_counts(recording, recording.original, shut)
+    everything, lips = count_closings(recording, recording.original, shut)
     assert everything[1:].tolist() == lips[1:].tolist() == [0, 0]
     still = np.zeros_like(recording.original)
-    assert closing_counts(recording, still, shut)[0][0] == 0  # a mouth that never opens closes nowhere
+    assert count_closings(recording, still, shut)[0][0] == 0  # a mouth that never opens closes nowhere
 
 
 ONNX = """
@@ -168,10 +168,10 @@ def test_audio2face_is_asked_as_its_network_wants(toy_corpus, tmp_path, monkeypa
     (tmp_path / "network.onnx").touch()
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]))
     monkeypatch.setenv("LIPMOTION_AUDIO2FACE", str(tmp_path))
-    found = league(toy_corpus, ADAPTERS, tmp_path / "work", only=["audio2face"])
+    found = measure_league(toy_corpus, ADAPTERS, tmp_path / "work", only=["audio2face"])
     assert (found.failed, found.absent) == ({}, {})
     (tmp_path / "network.onnx").unlink()
-    absent = league(toy_corpus, ADAPTERS, tmp_path / "other", only=["audio2face"]).absent
+    absent = measure_league(toy_corpus, ADAPTERS, tmp_path / "other", only=["audio2face"]).absent
     assert "network.onnx" in absent["Audio2Face-3D"]
 
 
@@ -189,7 +189,7 @@ INSTALLED = {
 def test_real_adapters_answer(name, toy_corpus, tmp_path):
     if not INSTALLED[name]():
         pytest.skip(f"{name} is not installed")
-    found = league(toy_corpus, ADAPTERS, tmp_path, only=[name])
+    found = measure_league(toy_corpus, ADAPTERS, tmp_path, only=[name])
     assert not found.failed
     assert not found.absent
     assert np.isfinite(found.standings[0].figures["acc"].value)

@@ -17,17 +17,17 @@ from lipmotion.engines.selection.concatenation import to_pieces
 from lipmotion.engines.selection.costs import SelectionConfig
 from lipmotion.errors import CorpusError
 from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
-from lipmotion_lab.hofer2008 import PhoneticTableOptions, hofer2008
+from lipmotion_lab.hofer2008 import PhoneticTableOptions, run_hofer2008
 from lipmotion_lab.minnis2000 import (
     ADDITIONS,
     EVERYTHING,
     PRINTED,
-    minnis2000,
-    overlap_times_s,
-    rows,
-    velocity_change,
+    run_minnis2000,
+    list_overlaps,
+    list_configurations,
+    measure_velocity_change,
 )
-from lipmotion_lab.report.sections import hofer_section
+from lipmotion_lab.report.sections import build_hofer_section
 from testing.toy import SMALL
 
 LONG = pytest.mark.long
@@ -35,32 +35,32 @@ LONG = pytest.mark.long
 
 def test_all_additions_together_are_the_default():
     """Each row has an option of its own; without a row, an addition would be hidden in another one."""
-    printed, everything = rows()[PRINTED], rows()[EVERYTHING]
+    printed, everything = list_configurations()[PRINTED], list_configurations()[EVERYTHING]
     pair = ("candidates", "beam")
     options = {key for keys in ADDITIONS.values() if len(keys) == 1 or keys == pair for key in keys}
     alone = {key: getattr(everything, key) for key in options}
     assert replace(printed, **alone) == everything == SelectionConfig(closures=False)
-    assert len({str(config) for config in rows().values()}) == len(rows())
+    assert len({str(config) for config in list_configurations().values()}) == len(list_configurations())
 
 
 def test_without_a_guide_nothing_is_learned_from_the_sound():
-    alone = rows(guided=False)
+    alone = list_configurations(guided=False)
     assert (PRINTED in alone, EVERYTHING in alone) == (True, False)
     assert {(config.guide, config.joint_recogniser) for config in alone.values()} == {(0.0, False)}
-    assert alone.items() <= rows().items()
+    assert alone.items() <= list_configurations().items()
 
 
 def test_overlaps_count_where_table_1_leaves_the_middle():
     costs = costs_of(inventory("s aa f", "f aa m", levels=(0, 1)), hard=1.0)
     for text, inside in (("s aa m", [(PHONE_S, 2 * PHONE_S)]), ("m aa m", [])):
         target = target_of(costs, text)
-        found = overlap_times_s(costs, target, to_pieces(costs, target, np.array([0, 1, 5])))
+        found = list_overlaps(costs, target, to_pieces(costs, target, np.array([0, 1, 5])))
         assert found == pytest.approx(np.reshape(inside, (-1, 2))), text
 
 
 def test_a_bend_is_the_change_of_the_velocity():
     curve = np.maximum(np.arange(30.0) - 12, 0)
-    change = velocity_change(curve)
+    change = measure_velocity_change(curve)
     assert change[12] == pytest.approx(4)
     assert change[[3, 25]] == pytest.approx(0)
 
@@ -72,7 +72,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
-    return minnis2000(toy_corpus, models=folder, settings=SETTINGS)
+    return run_minnis2000(toy_corpus, models=folder, settings=SETTINGS)
 
 
 @LONG
@@ -92,9 +92,9 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
         received.append((recordings.utterances[0].split, condition, system, len(clips)))
 
     settings = replace(SETTINGS, receive=receive)
-    again = minnis2000(toy_corpus, models=folder, settings=settings)
+    again = run_minnis2000(toy_corpus, models=folder, settings=settings)
     conditions = {(split, c, 2) for split, found in again["lists"].items() for c in found["conditions"]}
-    assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in rows())
+    assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in list_configurations())
     assert (figures["seconds"] > 0, again["seconds"]) == (True, None)
     assert again["lists"] == figures["lists"]
 
@@ -109,9 +109,9 @@ def test_a_run_that_was_stopped_goes_on(figures, toy_corpus, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        minnis2000(toy_corpus, work=tmp_path, settings=replace(SETTINGS, receive=stop))
+        run_minnis2000(toy_corpus, work=tmp_path, settings=replace(SETTINGS, receive=stop))
     before = states(tmp_path)
-    again = minnis2000(toy_corpus, work=tmp_path, settings=SETTINGS)
+    again = run_minnis2000(toy_corpus, work=tmp_path, settings=SETTINGS)
     assert (again["seconds"], again["lists"]) == (None, figures["lists"])  # the model was kept, too
     assert before.items() <= states(tmp_path).items()
 
@@ -127,7 +127,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def hofer_figures(toy_corpus: Corpus, work: Path) -> dict[str, Any]:
     with few_sets():
-        return hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
+        return run_hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
 
 
 @pytest.mark.long
@@ -158,9 +158,9 @@ def test_a_row_is_what_the_preset_trains_and_evaluate_says(hofer_figures, toy_co
 def test_what_was_finished_is_not_trained_again(hofer_figures, toy_corpus, work):
     before = states(work)
     with few_sets():
-        again = hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
+        again = run_hofer2008(toy_corpus, TWO, work=work, settings=SETTINGS)
     assert states(work) == before
-    assert hofer_section(again).as_text() == hofer_section(hofer_figures).as_text()
+    assert build_hofer_section(again).as_text() == build_hofer_section(hofer_figures).as_text()
 
 
 @pytest.mark.long
@@ -176,6 +176,6 @@ def test_pins_move_the_lips_of_the_same_units(hofer_figures):
 
 def test_nothing_to_train_on_or_to_compare_with(toy_corpus, tmp_path):
     with pytest.raises(CorpusError, match="no utterances of split 'val'"):
-        hofer2008(copied(toy_corpus, tmp_path, partial(replace, split="test")))
+        run_hofer2008(copied(toy_corpus, tmp_path, partial(replace, split="test")))
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
-        hofer2008(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"))
+        run_hofer2008(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"))

@@ -73,12 +73,12 @@ def state(folder: Path) -> dict[str, tuple[int, bytes]]:
 
 def test_what_is_finished_is_not_run_again_and_no_byte_changes(ran, toy_corpus, tmp_path):
     folder = tmp_path / "a" / "report"
-    found = report.experiment_report(toy_corpus, folder)
+    found = report.write_report(toy_corpus, folder)
     assert (ran, list(found.made), found.left_out) == (list(report.PARTS), list(report.PARTS), {})
     assert "of the paper's 10 pairs" in found.verdicts["hofer2008"]
     assert sorted(path.name for path in folder.iterdir()) == sorted([report.PAGE, "models", *report.PARTS])
     before = state(folder)
-    again = report.experiment_report(toy_corpus, folder)
+    again = report.write_report(toy_corpus, folder)
     assert (len(ran), list(again.made), again.verdicts) == (len(report.PARTS), [], found.verdicts)
     assert state(folder) == before
     links = Links(folder / report.PAGE)
@@ -100,13 +100,13 @@ def test_a_run_that_was_stopped_goes_on(ran, toy_corpus, tmp_path, monkeypatch):
     whole = stand_ins["folds"]
     monkeypatch.setitem(stand_ins, "folds", replace(whole, run=stopped))
     with pytest.raises(KeyboardInterrupt):
-        report.experiment_report(toy_corpus, tmp_path / "r", only=TWO)
+        report.write_report(toy_corpus, tmp_path / "r", only=TWO)
     text = Links(tmp_path / "r" / report.PAGE).text
     assert "the same command goes on with it" in text
     assert "Hofer, Yamagishi" in text
     assert (tmp_path / "r" / "folds.json.unfinished" / "half").is_file()
     monkeypatch.setitem(stand_ins, "folds", whole)
-    assert report.experiment_report(toy_corpus, tmp_path / "r", only=TWO).made == ["folds"]
+    assert report.write_report(toy_corpus, tmp_path / "r", only=TWO).made == ["folds"]
     assert ran == ["hofer2008", "folds"]
     assert not list((tmp_path / "r").glob("*.unfinished"))
     assert "not chosen" in Links(tmp_path / "r" / report.PAGE).text
@@ -123,23 +123,23 @@ def test_what_fails_is_told_and_stops_nothing_else(ran, toy_corpus, tmp_path, mo
     monkeypatch.setitem(stand_ins, "hofer2008", replace(whole["hofer2008"], run=broken))
     reports: list[tuple[str, str]] = []
     settings = runner.ExperimentSettings(monitor=lambda event: reports.append((event.name, event.outcome)))
-    found = report.experiment_report(toy_corpus, tmp_path / "r", only=TWO, settings=settings)
+    found = report.write_report(toy_corpus, tmp_path / "r", only=TWO, settings=settings)
     assert (list(found.failed), list(found.made), reports) == (["hofer2008"], ["folds"], [("hofer2008", "failed")])
     monkeypatch.setitem(stand_ins, "hofer2008", whole["hofer2008"])
     monkeypatch.setitem(stand_ins, "folds", replace(whole["folds"], section=broken))
-    found = report.experiment_report(toy_corpus, tmp_path / "r", only=TWO)
+    found = report.write_report(toy_corpus, tmp_path / "r", only=TWO)
     assert (list(found.failed), list(found.verdicts), list(found.made)) == (["folds"], ["hofer2008"], ["hofer2008"])
     text = Links(tmp_path / "r" / report.PAGE).text
     assert "foldsfailed: KeyError: 'no such figure'; mend that" in text
     assert "not finished" not in text
     monkeypatch.setitem(stand_ins, "folds", whole["folds"])
-    assert not report.experiment_report(toy_corpus, tmp_path / "r", only=TWO).failed
+    assert not report.write_report(toy_corpus, tmp_path / "r", only=TWO).failed
     assert ran == ["folds", "hofer2008"]
 
 
 @pytest.mark.long
 def test_other_recordings_or_settings_are_run_again(ran, toy_corpus, tmp_path):
-    run: Callable[..., report.WrittenReport] = partial(report.experiment_report, folder=tmp_path / "r", only=["folds"])
+    run: Callable[..., report.WrittenReport] = partial(report.write_report, folder=tmp_path / "r", only=["folds"])
     run(toy_corpus)
     assert run(toy_corpus, quick=True).made == ["folds"]
     assert "quick run" in Links(tmp_path / "r" / report.PAGE).text
@@ -154,15 +154,15 @@ def test_other_recordings_or_settings_are_run_again(ran, toy_corpus, tmp_path):
 @pytest.mark.usefixtures("ran")
 def test_a_corpus_without_a_list_has_what_can_be_run(toy_corpus, tmp_path):
     without_val = toy_corpus.part([*toy_corpus.names("train"), *toy_corpus.names("test")])
-    found = report.experiment_report(without_val, tmp_path / "r")
+    found = report.write_report(without_val, tmp_path / "r")
     assert set(found.left_out) == {"hofer2008"}
     assert "left out: the corpus has no recordings of the list val" in Links(tmp_path / "r" / report.PAGE).text
     with pytest.raises(errors.CorpusError, match="hofer2008 is left out: the corpus has no recordings of the list val"):
-        report.experiment_report(without_val, tmp_path / "other", only=["hofer2008"])
+        report.write_report(without_val, tmp_path / "other", only=["hofer2008"])
     train_alone = toy_corpus.part(toy_corpus.names("train"))
-    assert set(report.experiment_report(train_alone, tmp_path / "s").verdicts) == {"folds"}
+    assert set(report.write_report(train_alone, tmp_path / "s").verdicts) == {"folds"}
     with pytest.raises(errors.CorpusError, match="the list train"):
-        report.experiment_report(toy_corpus.part(toy_corpus.names("val")), tmp_path / "other")
+        report.write_report(toy_corpus.part(toy_corpus.names("val")), tmp_path / "other")
     assert not (tmp_path / "other").exists()
 
 
@@ -176,9 +176,9 @@ def test_what_cannot_be_used_is_refused_before_the_work(ran, toy_corpus, tmp_pat
         (toy_corpus.path, "is the corpus itself"),
     ):
         with pytest.raises(errors.ExportError, match=words):
-            report.experiment_report(toy_corpus, folder)
+            report.write_report(toy_corpus, folder)
     with pytest.raises(errors.CorpusError, match="'opening', which is not in it"):
-        report.experiment_report(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"), tmp_path / "r")
+        report.write_report(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"), tmp_path / "r")
     assert (ran, sorted(path.name for path in tmp_path.iterdir())) == ([], ["b", "file", "full"])
 
 
@@ -188,7 +188,7 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> rep
     folder = tmp_path_factory.mktemp("real")
     bare = copied(toy_corpus, folder, lambda each: replace(each, track=replace(each.track, crops=None)))
     with few_sets():
-        return report.experiment_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
+        return report.write_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SETTINGS)
 
 
 @pytest.mark.long

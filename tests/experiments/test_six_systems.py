@@ -16,9 +16,9 @@ from lipmotion.pipeline.training.other_speakers import SpokenSentence
 from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.storage.archive import read_archive
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
-from lipmotion_lab.report.sections import xie_liu_section
+from lipmotion_lab.report.sections import build_xie_liu_section
 from lipmotion_lab.xie_liu2007 import six_systems, systems
-from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
+from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, run_xieliu2007
 from testing.toy import SMALL, toy_sentences
 
 LONG = pytest.mark.long
@@ -43,7 +43,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def figures(toy_corpus: Corpus, folder: Path, work: Path) -> dict[str, Any]:
     options = ComparisonOptions(systems=SYSTEMS, mixtures=2, transcripts=True)
-    return xieliu2007(toy_corpus, options, sizes=[8, 3], plots=folder, work=work, settings=SETTINGS)
+    return run_xieliu2007(toy_corpus, options, sizes=[8, 3], plots=folder, work=work, settings=SETTINGS)
 
 
 @LONG
@@ -118,7 +118,7 @@ def test_a_number_of_gaussians_is_the_best_that_was_tried(figures):
 def test_it_goes_on_from_what_is_finished(figures, work, toy_corpus):
     before = states(work)
     options = ComparisonOptions(systems=[*CHAINS, "mean pose"], mixtures=2)
-    again = xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SETTINGS)
+    again = run_xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SETTINGS)
     for name in CHAINS:
         kept, rows = (each["rows"][-1]["conditions"]["audio only"][name] for each in (again, figures))
         assert kept == rows
@@ -146,7 +146,7 @@ def test_pictures_are_written(figures, folder):
 
 @LONG
 def test_the_text_names_every_system(figures):
-    section = xie_liu_section(figures)
+    section = build_xie_liu_section(figures)
     assert [list(table.rows) for table in section.tables[:4]] == [SYSTEMS] * 4
     assert len(section.words["Settings, the best on val"]) == 2
 
@@ -157,7 +157,7 @@ def test_eigenlips(visual, toy_corpus):
     options = ComparisonOptions(systems=["trajectory HMM"], visual=visual)
     received: list[tuple[str, str]] = []
     settings = replace(SETTINGS, receive=lambda *given: received.append(given[:2]))
-    made = xieliu2007(toy_corpus, options, settings=settings)
+    made = run_xieliu2007(toy_corpus, options, settings=settings)
     assert made["rows"][0]["names"] == 8
     assert received == [(name, "audio only") for name in made["rows"][0]["training"]]
     model = train(toy_corpus, recogniser=SMALL, visual=visual)[0]
@@ -170,21 +170,21 @@ def test_eigenlips(visual, toy_corpus):
     assert len(made["channels"]) == len(expected_figures["eigenlips"]["channels"]) + (3 if visual == "both" else 0)
     assert (row["opening"] is None) == (visual == "eigenlips")
     assert json.loads(json.dumps(made, allow_nan=False))
-    assert ("ACC, eigenlips" in xie_liu_section(made).table.as_lines()[0]) == (visual == "both")
+    assert ("ACC, eigenlips" in build_xie_liu_section(made).table.as_lines()[0]) == (visual == "both")
 
 
 @LONG
 def test_two_stages_beside_one(toy_corpus):
     others = tuple(SpokenSentence(s.name, "anna", s.audio, s.units) for s in toy_sentences(3))
     options = ComparisonOptions(systems=[systems.REFERENCE_SYSTEM + systems.TWO_STAGES], voices=others)
-    (row,) = xieliu2007(toy_corpus, options, sizes=[4], settings=SETTINGS)["rows"]
+    (row,) = run_xieliu2007(toy_corpus, options, sizes=[4], settings=SETTINGS)["rows"]
     assert [(each["better"], each["worse"]) for each in row["pairs"]] == [
         (options.systems[0], systems.REFERENCE_SYSTEM)
     ]
     one, two = row["training"].values()
     assert two["parameters"] > one["parameters"]
     with pytest.raises(InputError, match="two stages needs speech of others; give it by --recordings or --voices"):
-        xieliu2007(toy_corpus, replace(options, voices=()), settings=SETTINGS)
+        run_xieliu2007(toy_corpus, replace(options, voices=()), settings=SETTINGS)
 
 
 def test_systems_in_the_order_of_the_table():
@@ -211,13 +211,13 @@ def test_other_engines_are_compared_when_named():
 def test_without_matplotlib_there_are_no_pictures(toy_corpus, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingDependencyError, match=r'need matplotlib.*; pip install ".*\[plots\]"'):
-        xieliu2007(toy_corpus, plots=tmp_path)
+        run_xieliu2007(toy_corpus, plots=tmp_path)
 
 
 def test_what_cannot_be_chosen(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="sizes 9; required: from 1 to 8"):
-        xieliu2007(toy_corpus, ComparisonOptions(systems=[systems.REFERENCE_SYSTEM]), sizes=[9], settings=SETTINGS)
+        run_xieliu2007(toy_corpus, ComparisonOptions(systems=[systems.REFERENCE_SYSTEM]), sizes=[9], settings=SETTINGS)
     with pytest.raises(CorpusError, match="are in the split that is compared with"):
-        xieliu2007(toy_corpus, order=toy_corpus.names("val"))
+        run_xieliu2007(toy_corpus, order=toy_corpus.names("val"))
     with pytest.raises(CorpusError, match="no utterances of split 'val'"):
-        xieliu2007(copied(toy_corpus, tmp_path / "b", lambda u: replace(u, split="test") if u.split == "val" else u))
+        run_xieliu2007(copied(toy_corpus, tmp_path / "b", lambda u: replace(u, split="test") if u.split == "val" else u))

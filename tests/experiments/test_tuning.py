@@ -58,14 +58,14 @@ def test_the_network_with_the_best_settings_is_chosen(validation, monkeypatch):
     found = systems.tune_network(examples(3), validation, types.silent_monitor)
     assert [trial.options["rate"] for trial in found.tried] == [1e-9, 1e-2]
     assert {trial.options["cells"] for trial in found.tried} == {8}  # one kind of setting after another
-    best = systems.best_trial(found.tried)
+    best = systems.find_best_trial(found.tried)
     assert best.options["rate"] == found.engine.rate
     made = generate_clips(validation, "audio only", found.engine, found.model)
     assert systems.measure_clips(made) == pytest.approx((best.acc, best.amse))
 
 
 def test_of_equal_trials_the_first_is_the_best():
-    assert systems.best_trial([systems.Trial({"a": 1}, 0.5, 0, 0), systems.Trial({"a": 2}, 0.5, 0, 0)]).options == {
+    assert systems.find_best_trial([systems.Trial({"a": 1}, 0.5, 0, 0), systems.Trial({"a": 2}, 0.5, 0, 0)]).options == {
         "a": 1
     }
 

@@ -16,7 +16,7 @@ from PIL import Image
 
 from lipmotion import errors, types
 from lipmotion.formats.web_page import SHARED_COLOURS, Html, build_page, element, find_colour, joined
-from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, add_inset, inset_box
+from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, add_inset, place_inset
 from lipmotion_faces.video import mp4, synthetic_mark
 
 RATES = [24, 29.97, 60]
@@ -71,7 +71,7 @@ def test_streams_start_at_zero_and_keep_their_lengths(tmp_path, fps, duration_s)
         assert (video.codec_context.name, sound_stream.codec_context.name) == ("h264", "aac")
         assert video.codec_context.pix_fmt == "yuv420p"
         assert video.frames == count
-        assert video.average_rate == mp4.frame_rate(fps)
+        assert video.average_rate == mp4.find_frame_rate(fps)
         assert float(video.duration * video.time_base) == pytest.approx(count / fps, abs=1e-3)
         assert float(sound_stream.duration * sound_stream.time_base) == pytest.approx(duration_s, abs=1e-3)
     time_s, _ = pictures(tmp_path / "a.mp4")
@@ -112,7 +112,7 @@ def test_colours_come_back(tmp_path):
 def test_the_frame_rate_is_exact():
     exact = {24: Fraction(24), 25.0: Fraction(25), 12.5: Fraction(25, 2), 23.976: Fraction(24000, 1001)}
     exact |= {29.97: Fraction(30000, 1001), 30000 / 1001: Fraction(30000, 1001), 59.94: Fraction(60000, 1001)}
-    assert {fps: mp4.frame_rate(fps) for fps in exact} == exact
+    assert {fps: mp4.find_frame_rate(fps) for fps in exact} == exact
 
 
 @pytest.mark.parametrize("write", [mp4.write_mp4, mp4.write_with_alpha])
@@ -349,7 +349,7 @@ def test_it_lies_in_the_lower_right_corner(size, frame_size):
     (made,) = add_inset([frame], [picture])
     assert (made.shape, made.dtype) == (frame.shape, np.uint8)
     rows, columns = drawn(frame, made)
-    assert inset_box(frame_size, size) == (columns.start, rows.start, columns.stop, rows.stop)
+    assert place_inset(frame_size, size) == (columns.start, rows.start, columns.stop, rows.stop)
     margin = round(MARGIN_SHARE * min(frame_size))
     assert (rows.stop, columns.stop) == (frame_size[0] - margin, frame_size[1] - margin)
     inner = (made[rows, columns] == 130).all(axis=2)
@@ -394,7 +394,7 @@ def test_every_frame_has_its_own_picture_and_is_not_changed():
 
 def test_a_label_leaves_the_inset_free():
     (made,) = add_inset(grey_frames(1, 288, 360), [np.full((56, 72, 3), 130, np.uint8)])
-    left, top, right, bottom = inset_box((288, 360), (56, 72))
+    left, top, right, bottom = place_inset((288, 360), (56, 72))
     (marked,) = synthetic_mark.mark_frames([made], (left, top, right, bottom))
     assert np.array_equal(marked[top:bottom, left:right], made[top:bottom, left:right])
     assert (marked != made).any()

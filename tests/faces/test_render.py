@@ -20,9 +20,9 @@ from lipmotion_faces.portrait.geometry import (
     HeadField,
     HeadPlacement,
     MouthPose,
-    grid,
-    lip_outlines,
-    mouth_interior,
+    list_grid,
+    outline_lips,
+    outline_interior,
 )
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 
@@ -160,7 +160,7 @@ def test_columns_and_rows_are_those_of_the_pixel_centres():
 def test_a_head_that_rolls_is_turned_about_its_neck():
     """Each place moves at right angles to its distance from the pivot, and clockwise; below the neck nothing moves."""
     window = layer.View(160).window(-9, -9, 9, 9)
-    x, y = grid(window)
+    x, y = list_grid(window)
     right, down = HeadField(window).shifts(HeadPlacement(roll=0.1))
     head = y < NECK_TOP
     assert (right * x + down * (y - PIVOT_Y))[head] == pytest.approx(0, abs=1e-9)
@@ -208,8 +208,8 @@ designs = st.sampled_from(sorted(DESIGNS))
 def test_outlines_never_cross_and_the_gap_is_exact(name, drawn):
     """The mouth ends at its corners and is symmetric; closed lips touch along all of it."""
     design = DESIGNS[name]
-    shape = lip_outlines(design.lips, drawn, X)
-    within = mouth_interior(design.lips, drawn, X, shape)
+    shape = outline_lips(design.lips, drawn, X)
+    within = outline_interior(design.lips, drawn, X, shape)
     for upper, lower in [
         (shape.upper_outer, shape.upper_inner), (shape.upper_inner, shape.lower_inner),
         (shape.lower_inner, shape.lower_outer), (shape.upper_inner, within.teeth_upper),
@@ -227,7 +227,7 @@ def test_outlines_never_cross_and_the_gap_is_exact(name, drawn):
     assert shape.upper_outer[outside][0] == pytest.approx(shape.corner_y, abs=1e-6)
     assert shape.lower_outer == pytest.approx(shape.lower_outer[::-1])
     assert 0.55 < shape.upper_outer.min() < shape.lower_outer.max() < 1.7
-    closed = lip_outlines(design.lips, drawn._replace(gap=0.0), X)
+    closed = outline_lips(design.lips, drawn._replace(gap=0.0), X)
     assert np.abs(closed.upper_inner - closed.lower_inner).max() < 1e-9
     assert closed.seam[MIDDLE] > 0
 
@@ -235,18 +235,18 @@ def test_outlines_never_cross_and_the_gap_is_exact(name, drawn):
 def test_upper_teeth_stay_with_the_skull_and_lower_teeth_go_with_the_jaw():
     for gap in (0.1, 0.15, 0.3):
         drawn = pose(gap, teeth=1.0)
-        within = mouth_interior(LIPS, drawn, X, lip_outlines(LIPS, drawn, X))
+        within = outline_interior(LIPS, drawn, X, outline_lips(LIPS, drawn, X))
         assert within.teeth_upper[MIDDLE] == pytest.approx(LIPS.line_y + TEETH_EDGE)
         assert within.teeth_lower[MIDDLE] >= within.teeth_upper[MIDDLE]
-    low, high = (mouth_interior(LIPS, p, X, lip_outlines(LIPS, p, X)) for p in (pose(0.1, teeth=1), pose(0.3, teeth=1)))
+    low, high = (outline_interior(LIPS, p, X, outline_lips(LIPS, p, X)) for p in (pose(0.1, teeth=1), pose(0.3, teeth=1)))
     assert high.teeth_lower[MIDDLE] > low.teeth_lower[MIDDLE]
 
 
 def test_lower_teeth_are_hidden_but_where_both_rows_are_shown():
     def shown(**gestures: float) -> float:
         drawn = pose(0.08, **gestures)
-        shape = lip_outlines(LIPS, drawn, X)
-        return float(shape.lower_inner[MIDDLE] - mouth_interior(LIPS, drawn, X, shape).teeth_lower[MIDDLE])
+        shape = outline_lips(LIPS, drawn, X)
+        return float(shape.lower_inner[MIDDLE] - outline_interior(LIPS, drawn, X, shape).teeth_lower[MIDDLE])
 
     assert shown(teeth=0.0, protrusion=1.0, width=0.7) < 0.004
     assert shown(teeth=0.5) < 0.004
@@ -256,29 +256,29 @@ def test_lower_teeth_are_hidden_but_where_both_rows_are_shown():
 def test_tucked_the_lower_lip_is_behind_the_upper_teeth():
     for gap in mouth.TUCKED_GAP:
         drawn = pose(gap, tuck=1.0)
-        shape = lip_outlines(LIPS, drawn, X)
+        shape = outline_lips(LIPS, drawn, X)
         near = np.abs(X) < 0.05
-        teeth = mouth_interior(LIPS, drawn, X, shape).teeth_upper
+        teeth = outline_interior(LIPS, drawn, X, shape).teeth_upper
         assert np.abs(teeth - shape.lower_inner)[near].max() < 1e-9  # their edge is hidden by the lip
         thickness = shape.lower_outer[MIDDLE] - shape.lower_inner[MIDDLE]
-        free = lip_outlines(LIPS, pose(gap), X)
+        free = outline_lips(LIPS, pose(gap), X)
         assert thickness < 0.65 * (free.lower_outer[MIDDLE] - free.lower_inner[MIDDLE])
 
 
 def test_the_raised_tongue_reaches_the_upper_teeth_and_beyond_the_lip_when_out():
     for gap in (0.08, 0.1, 0.2):
         low, up, out = (pose(gap, tongue=value) for value in (0.0, 0.6, 1.0))
-        rest, raised, between = (mouth_interior(LIPS, p, X, lip_outlines(LIPS, p, X)) for p in (low, up, out))
+        rest, raised, between = (outline_interior(LIPS, p, X, outline_lips(LIPS, p, X)) for p in (low, up, out))
         assert raised.tongue_top[MIDDLE] < rest.tongue_top[MIDDLE]
         assert abs(raised.teeth_upper[MIDDLE] - raised.tongue_top[MIDDLE]) < 0.02
-        assert between.tongue_bottom[MIDDLE] > lip_outlines(LIPS, out, X).lower_inner[MIDDLE] + 0.004
+        assert between.tongue_bottom[MIDDLE] > outline_lips(LIPS, out, X).lower_inner[MIDDLE] + 0.004
 
 
 def test_sounds_have_shapes_of_their_own():
     """Wide and low for ee, narrow and round for oo, smaller for w, high for aa: by width and height of the opening."""
 
     def hole(drawn: MouthPose) -> tuple[float, float]:
-        shape = lip_outlines(LIPS, drawn, X)
+        shape = outline_lips(LIPS, drawn, X)
         return 2 * shape.inner_half_width, float((shape.lower_inner - shape.upper_inner).max())
 
     ee = hole(pose(0.07, 1.07, spread=1.0, teeth=0.9))
@@ -297,10 +297,10 @@ def test_sounds_have_shapes_of_their_own():
 @pytest.mark.parametrize("name", sorted(DESIGNS))
 def test_protruded_lips_are_a_narrow_ring_round_a_round_hole_and_the_seam_beside_it_ends(name) -> None:
     lips = DESIGNS[name].lips
-    rest = lip_outlines(lips, pose(0.0), X).half_width
+    rest = outline_lips(lips, pose(0.0), X).half_width
     narrower = []
     for gap, width in ((0.045, 0.87), (0.06, 0.89), (0.08, 0.89)):
-        shape = lip_outlines(lips, pose(gap, width, protrusion=1.0), X)
+        shape = outline_lips(lips, pose(gap, width, protrusion=1.0), X)
         assert 1.8 < 2 * shape.inner_half_width / gap < 2.6
         assert np.abs(X)[shape.seam > 0.3 * lips.seam].max() < 1.1 * shape.inner_half_width
         narrower.append(shape.half_width / rest)
@@ -310,14 +310,14 @@ def test_protruded_lips_are_a_narrow_ring_round_a_round_hole_and_the_seam_beside
 
 
 def test_the_corners_of_an_oval_are_halfway_down() -> None:
-    shape = lip_outlines(LIPS, pose(0.2, 0.85, oval=1.0), X)
+    shape = outline_lips(LIPS, pose(0.2, 0.85, oval=1.0), X)
     assert abs(shape.corner_y - (shape.upper_inner[MIDDLE] + shape.lower_inner[MIDDLE]) / 2) < 0.02
 
 
 def test_above_a_tucked_lip_the_opening_is_full_of_upper_teeth_and_arched_upwards() -> None:
     drawn = pose(mouth.TUCKED_GAP[0], tuck=1.0)
-    shape = lip_outlines(LIPS, drawn, X)
-    within = mouth_interior(LIPS, drawn, X, shape)
+    shape = outline_lips(LIPS, drawn, X)
+    within = outline_interior(LIPS, drawn, X, shape)
     near = np.abs(X) < 0.6 * shape.inner_half_width
     assert (within.teeth_upper >= shape.lower_inner - 1e-9)[near].all()
     assert (within.teeth_lower >= shape.lower_inner - 1e-9)[near].all()

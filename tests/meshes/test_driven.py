@@ -28,7 +28,7 @@ from lipmotion.units import PHONES
 from lipmotion_faces.base import stage_liveliness
 from lipmotion_faces.characters import binding_files, gltf_scene
 from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
-from lipmotion_faces.head.pose import head_poses
+from lipmotion_faces.head.pose import list_head_poses
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, VISEMES, head, lip_points, renamed, shaped, write_glb, write_obj
 from meshes.speech import motion, units
@@ -408,7 +408,7 @@ def test_eyes_hold_their_target_under_a_head_that_is_given() -> None:
 
 def test_the_3d_head_shows_what_was_captured() -> None:
     curves = {f"{name}{side}": 0.9 for name in ("eyeBlink", "cheekSquint", "mouthSmile") for side in ("Left", "Right")}
-    pose = head_poses(with_mouth(captured({**curves, "headRoll": 0.2, "noseSneerLeft": 1.0})), Timeline(()), 30.0)[30]
+    pose = list_head_poses(with_mouth(captured({**curves, "headRoll": 0.2, "noseSneerLeft": 1.0})), Timeline(()), 30.0)[30]
     assert (pose.shut, pose.mood.cheek, pose.mood.sneer, pose.turn[2]) == pytest.approx((0.9, 0.9, 0.5, 0.2))
     assert pose.smile > 0.04
 

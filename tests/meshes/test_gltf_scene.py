@@ -360,9 +360,9 @@ def test_colours_of_vertices_are_written_and_a_channel_that_is_no_shape_is_refus
 
 @pytest.mark.parametrize(
     ("extras", "found"),
-    [(gltf_writer.sound_extras("../a b/#1 50%.wav", 0.5), "../a b/#1 50%.wav"),
+    [(gltf_writer.describe_sound("../a b/#1 50%.wav", 0.5), "../a b/#1 50%.wav"),
      ({"audio": {"uri": "ä.wav"}}, "ä.wav"),
-     (gltf_writer.sound_extras("a.wav", 2**63), None),
+     (gltf_writer.describe_sound("a.wav", 2**63), None),
      ({"audio": {"uri": "https://example.org/a.wav"}}, None),
      ({"audio": {"uri": "file:a.wav"}}, None),
      ({"audio": {"uri": "/a.wav"}}, None),

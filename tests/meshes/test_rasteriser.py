@@ -9,8 +9,8 @@ from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, Mes
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.characters import character_files, gltf_scene, textures
 from lipmotion_faces.characters.textures import decode_srgb
-from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, TexturedCanvas, drawn_surface, flat, gradient
-from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches
+from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, TexturedCanvas, prepare_surface, fill_background, shade_background
+from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach
 from meshes.gltf import UV, document, glb, textured_document, with_colours
 
 CAMERA = Camera(120, 100, (0.5, -0.25), across=2.0, distance=8.0)
@@ -46,7 +46,7 @@ def test_the_height_of_the_picture_is_as_stated_and_nearer_things_are_larger():
     assert low[1] - high[1] == pytest.approx(100)
     assert near[1] < high[1]
     assert near[2] < high[2]
-    light = gradient(Camera(100, 100))  # the background is brightest in the middle
+    light = shade_background(Camera(100, 100))  # the background is brightest in the middle
     assert light[42, 50].sum() > light[5, 5].sum()
     for size in ((63, 100), (120, 62), (120, 101)):
         with pytest.raises(InputError, match="even number of at least 64"):
@@ -73,7 +73,7 @@ def test_a_mesh_is_seen_in_its_colour_at_its_place():
 def test_the_edge_of_what_is_cut_out_is_as_light_as_its_middle():
     """Straight alpha: over black, a pixel that is covered in part has its part of the light."""
     mesh, camera = ball(), Camera(100, 100, across=2.0)
-    canvas = Canvas(camera, flat(camera, (0, 0, 0)))
+    canvas = Canvas(camera, fill_background(camera, (0, 0, 0)))
     light = np.full((len(mesh.vertices), 3), 0.5, np.float32)
     seen = canvas.cut_out(mesh.vertices, light, mesh.triangles).astype(int)
     inside, edge = seen[..., 3] == 255, (seen[..., 3] > 60) & (seen[..., 3] < 255)
@@ -113,7 +113,7 @@ def test_a_floor_under_a_roof_gets_less_light_than_the_floor_beside_it():
     index = np.arange(61 * 61).reshape(61, 61)
     a, b, c = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel()
     triangles = np.stack([a, b, c], axis=1).astype(np.int32)
-    sky, key = reaches(places, normals, triangles, np.ones(len(places), bool)).T[:, : 61 * 61]
+    sky, key = measure_reach(places, normals, triangles, np.ones(len(places), bool)).T[:, : 61 * 61]
     under = (np.abs(floor[:, 0]) < 0.15) & (np.abs(floor[:, 2]) < 0.15)
     beside = (floor[:, 0] > 0.8) & (floor[:, 2] > 0.8)
     assert sky[under].max() < 0.6 * sky[beside].min()
@@ -141,8 +141,8 @@ def textured(tmp_path, *, image: bytes | None = None, material=None, extension=N
 def square_picture(mesh: Mesh) -> np.ndarray:
     """The square from (0, 0) to (1, 1), 40 pixels wide, under even light, before black."""
     camera = Camera(64, 64, (0.5, 0.5), across=1.6, distance=50.0)
-    drawn = drawn_surface(mesh, np.ones(len(mesh.triangles), bool), 40.0)
-    canvas = TexturedCanvas(camera, drawn.triangles, flat(camera, (0, 0, 0)))
+    drawn = prepare_surface(mesh, np.ones(len(mesh.triangles), bool), 40.0)
+    canvas = TexturedCanvas(camera, drawn.triangles, fill_background(camera, (0, 0, 0)))
     light = np.tile(drawn.colours.astype(np.float32), (1, 1))
     return canvas.picture(mesh.vertices[drawn.rows], light, np.zeros_like(light))
 
@@ -214,10 +214,10 @@ def test_far_away_a_chequered_picture_is_grey():
 
 
 def test_reductions_end_with_one_pixel_and_clear_pixels_do_not_colour_them():
-    table = textures.texture_table([Texture(np.repeat(np.repeat(QUARTERS, 3, axis=0), 2, axis=1))])
+    table = textures.build_texture_table([Texture(np.repeat(np.repeat(QUARTERS, 3, axis=0), 2, axis=1))])
     assert table.levels[:, 1:].tolist() == [[4, 6], [2, 3], [1, 1]]
     clear = Texture(np.array([[[255, 0, 0, 255], [0, 255, 0, 0]]], np.uint8))
-    last = textures.texture_table([clear]).texels[-1]
+    last = textures.build_texture_table([clear]).texels[-1]
     assert last.tolist() == [65535, 0, 0, 32768]
 
 

@@ -23,11 +23,11 @@ from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curv
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
-from lipmotion_faces.head.pose import head_poses
-from lipmotion_faces.head.stage import figure, head_mesh, lip_gap
-from lipmotion_faces.outputs.scenes import character_scene, head_scene
+from lipmotion_faces.head.pose import list_head_poses
+from lipmotion_faces.head.stage import make_figure, build_head_mesh, measure_lip_gap
+from lipmotion_faces.outputs.scenes import build_character_scene, build_head_scene
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths
-from lipmotion_faces.portrait.portrait_rasteriser import face_poses
+from lipmotion_faces.portrait.portrait_rasteriser import list_face_poses
 from meshes.heads import VISEMES, head, lip_points, renamed, write_glb, write_obj
 from meshes.speech import motion, units
 from pipeline.made import read_character
@@ -130,7 +130,7 @@ def _of_scene(character: Any) -> Reader:
     gap = dict(zip(character.shapes.names, character.shapes.gap.tolist(), strict=True))
 
     def read(generation: Generation, fps: float) -> Mask:
-        weights = character_scene(generation, character, fps).weights
+        weights = build_character_scene(generation, character, fps).weights
         apart = sum(gap[name] * weights[name] for name in weights.names if name in gap)
         return np.asarray(apart < TOUCHING_GAP)
 
@@ -139,11 +139,11 @@ def _of_scene(character: Any) -> Reader:
 
 def _of_head_scene(generation: Generation, fps: float) -> Mask:
     moved = of_motion(with_mouth(generation.motion), generation.units)
-    weights = head_scene(moved, fps).weights
-    character = figure()
-    mesh = head_mesh(character, moods=any(name.startswith("mood_") for name in generation.motion.names))
+    weights = build_head_scene(moved, fps).weights
+    character = make_figure()
+    mesh = build_head_mesh(character, moods=any(name.startswith("mood_") for name in generation.motion.names))
     moved = mesh.displacements(np.arange(len(character.skin.rest)))
-    parting = dict(zip(mesh.shape_names, lip_gap(moved[:, character.skin.lip_rows()]), strict=True))
+    parting = dict(zip(mesh.shape_names, measure_lip_gap(moved[:, character.skin.lip_rows()]), strict=True))
     return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING_GAP)
 
 
@@ -167,12 +167,12 @@ def _closed(curves: Motion) -> Mask:
 
 
 def _drawn(generation: Generation, fps: float) -> Mask:
-    poses = face_poses(with_mouth(generation.motion), generation.units, fps, Staging())
+    poses = list_face_poses(with_mouth(generation.motion), generation.units, fps, Staging())
     return np.array([pose.mouth.gap < TOUCHING_GAP for pose in poses])
 
 
 def _of_head(generation: Generation, fps: float) -> Mask:
-    poses = head_poses(with_mouth(generation.motion), generation.units, fps)
+    poses = list_head_poses(with_mouth(generation.motion), generation.units, fps)
     return np.array([pose.gap < TOUCHING_GAP for pose in poses])
 
 
@@ -263,8 +263,8 @@ def spoken(session: Session) -> Edits:
 def show(generation: Generation, character: Any) -> dict[str, Rows]:
     """Return what each face and each set of curves shows of the mouth, 100 times a second [each shape=(T, N)]."""
     seen = deliver_to_face(generation, Delivery(), 100.0, staging=STILL)
-    drawn = [pose.mouth for pose in face_poses(seen.motion, seen.units, 100.0, STILL)]
-    poses = head_poses(seen.motion, seen.units, 100.0, STILL)
+    drawn = [pose.mouth for pose in list_face_poses(seen.motion, seen.units, 100.0, STILL)]
+    poses = list_head_poses(seen.motion, seen.units, 100.0, STILL)
     sheet = cues(generation, fps=100.0, hold_frames=1)
     letters = [
         ord(span.label) for span in sheet.cues for _ in range(round(100 * span.end_s) - round(100 * span.start_s))
@@ -279,8 +279,8 @@ def show(generation: Generation, character: Any) -> dict[str, Rows]:
         curves = make_curves(generation.motion, generation.units, name, staging=STILL, edits=generation.curve_edits)
         rows[name] = curves.values / (1000 if name == "fap" else 1)
     for name, scene in (
-        ("head.glb", head_scene(generation, staging=STILL)),
-        ("character", character_scene(generation, character, staging=STILL)),
+        ("head.glb", build_head_scene(generation, staging=STILL)),
+        ("character", build_character_scene(generation, character, staging=STILL)),
     ):
         rows[name] = scene.weights.values
     return rows
@@ -329,6 +329,6 @@ def test_a_pin_of_any_curve_shows_on_every_face(session: Session, spoken: Edits,
     seen = deliver_to_face(
         session.generate(spoken.then("pin browInnerUp 0.9 at 1.1", "pin mouthPucker 1 at 1.1")), Delivery(), 100.0
     )
-    pose = head_poses(seen.motion, seen.units, 100.0)[110]
+    pose = list_head_poses(seen.motion, seen.units, 100.0)[110]
     assert pose.mood.inner > 0.5
     assert pose.roundness > 0.6

@@ -21,7 +21,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.pipeline.outputs.motion_files import fit_to_format, read_generation, thin_keys
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion_faces import Staging
-from lipmotion_faces.characters.calibration import POSES, calibrate_rows, pose_sources
+from lipmotion_faces.characters.calibration import POSES, calibrate_rows, list_pose_sources
 from pipeline.made import in_mood
 from speech import stand_in_voice
 
@@ -166,7 +166,7 @@ def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(gene
 def test_controls_of_a_rig_have_the_stated_values(tmp_path):
     (tmp_path / "rig.csv").write_text("control,source,gain,offset\nJaw,jawOpen,-25,\nJaw,mouthPucker,-5,1\nLip,ou,1,\n")
     rows = read_rig_table(tmp_path / "rig.csv")
-    sources = pose_sources(tmp_path / "rig.csv", rows)
+    sources = list_pose_sources(tmp_path / "rig.csv", rows)
     changed = calibrate_rows(rows, sources, {"open": {"Jaw": -20}, "closed": {"Jaw": 2}, "rounded": {"Lip": 3}})
     assert _values(changed, sources, "Jaw")[:2] == pytest.approx([-20, 2])
     assert _values(changed, sources, "Lip")[2] == pytest.approx(3)

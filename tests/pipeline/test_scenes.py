@@ -17,8 +17,8 @@ from lipmotion_faces.characters import fbx
 from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.skin import VISIBLE_RINGS
-from lipmotion_faces.head.stage import figure, head_mesh
-from lipmotion_faces.outputs.scenes import character_scene, delivered_scene, head_scene, write_scene
+from lipmotion_faces.head.stage import make_figure, build_head_mesh
+from lipmotion_faces.outputs.scenes import build_character_scene, build_scene, build_head_scene, write_scene
 from meshes.heads import head, write_glb
 from pipeline.made import in_mood, performed, read_character
 from programs import gltf_report, gltf_validator, python_with, run_with
@@ -29,14 +29,14 @@ TIMES_S = (0.0, 0.31, 0.555, 0.75, 0.95, 1.15, 1.62, 2.0)
 
 @pytest.fixture(scope="module")
 def own_head(generation: Generation) -> Scene:
-    return head_scene(generation)
+    return build_head_scene(generation)
 
 
 @pytest.fixture(scope="module")
 def character(generation: Generation, tmp_path_factory: pytest.TempPathFactory) -> Scene:
     path = tmp_path_factory.mktemp("character") / "head.glb"
     write_glb(path, head())
-    return character_scene(generation, read_character(path))
+    return build_character_scene(generation, read_character(path))
 
 
 @pytest.fixture(scope="module", params=["own_head", "character"])
@@ -47,7 +47,7 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 
 def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
     table, mesh = own_head.table(), own_head.mesh
-    ring = figure().skin.lip_rows()[VISIBLE_RINGS - 1]
+    ring = make_figure().skin.lip_rows()[VISIBLE_RINGS - 1]
     upper, lower = ring[20], ring[60]
     places = mesh.vertices[[upper, lower], 1]
     gaps = places + np.einsum("ts,sv->tv", table, mesh.displacements(np.array([upper, lower]))[:, :, 1])
@@ -61,7 +61,7 @@ def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
 
 
 def test_the_rate_is_that_of_the_keys(generation):
-    made = head_scene(generation, 30.0)
+    made = build_head_scene(generation, 30.0)
     assert made.weights.rate_hz == pytest.approx(30.0)
     assert len(made.weights.values) == 61
 
@@ -78,10 +78,10 @@ def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
     long = replace(
         generation, motion=moved, units=Timeline(tuple(units)), spread=np.zeros(moved.values.shape), curve_edits=(pin,)
     )
-    scene = head_scene
+    scene = build_head_scene
     if own:
         write_glb(tmp_path / "own.glb", head())
-        scene = partial(character_scene, character=read_character(tmp_path / "own.glb"))
+        scene = partial(build_character_scene, character=read_character(tmp_path / "own.glb"))
     whole = scene(long)
     for frames in (slice(0, 30), slice(250, 310), slice(len(values) - 20, len(values))):
         part = scene(long, frames=frames)
@@ -93,7 +93,7 @@ def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
 
 def test_a_motion_without_opening_is_refused(generation):
     with pytest.raises(InputError, match="no channel 'opening'"):
-        head_scene(generation.selected(["x_13"]))
+        build_head_scene(generation.selected(["x_13"]))
 
 
 def test_the_sound_is_in_the_extras_of_the_scene(character, tmp_path):
@@ -142,7 +142,7 @@ def test_held_weights_change_at_once_and_others_do_not(character, tmp_path):
 
 
 def test_keys_that_others_give_are_left_out(generation, tmp_path):
-    scene = delivered_scene(performed(generation, "head", delivery=Delivery(key_tolerance=0.02)))
+    scene = build_scene(performed(generation, "head", delivery=Delivery(key_tolerance=0.02)))
     assert scene.thinning.tolerance == 0.02
     assert len(scene.thinning.closed_s) == 2  # m and p
     write_scene(tmp_path / "a.glb", scene)
@@ -159,7 +159,7 @@ def test_keys_that_others_give_are_left_out(generation, tmp_path):
 
 
 def test_the_shapes_of_the_head_are_those_of_its_mesh(own_head):
-    assert own_head.mesh.shape_names == head_mesh(figure()).shape_names
+    assert own_head.mesh.shape_names == build_head_mesh(make_figure()).shape_names
     assert set(own_head.weights.names) == set(own_head.mesh.shape_names)
 
 

@@ -32,7 +32,7 @@ from lipmotion.pipeline.outputs.output import (
 from lipmotion.types import Audio, Generation, Prosody, Timeline
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
-from lipmotion_faces.outputs.scenes import delivered_scene
+from lipmotion_faces.outputs.scenes import build_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
 from pipeline.made import performed, read_character
@@ -252,7 +252,7 @@ def test_files_say_when_the_sound_begins(generation, offset_ms, toy_speech, tmp_
     write(generation, paths, speech=toy_speech, delivery=delivery, curves="arkit", channels=["jawOpen"])
     assert json.loads(paths[0].read_text())["source"] == {"file": toy_speech.name, "start_s": f"{offset_ms / 1000:g}"}
     assert f"SOUND_S = {offset_ms / 1000!r}\n" in paths[1].read_text()
-    scene = delivered_scene(performed(generation, "head", outputs=Outputs(rate_hz=12.0), delivery=delivery))
+    scene = build_scene(performed(generation, "head", outputs=Outputs(rate_hz=12.0), delivery=delivery))
     assert scene.sound_s == pytest.approx(offset_ms / 1000)
 
 

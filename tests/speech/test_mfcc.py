@@ -159,18 +159,18 @@ def test_the_fit_finds_the_map_behind_the_data() -> None:
 
 def test_the_map_that_ships_is_linear_and_local() -> None:
     given = drawn_features(1)
-    whole = sound_offset.predicted_opening_speed(given)
+    whole = sound_offset.predict_opening_speed(given)
     assert whole.shape == (200,)
     twice = types.Features(2 * given.values, given.duration_s)
-    assert sound_offset.predicted_opening_speed(twice) == pytest.approx(2 * whole)
+    assert sound_offset.predict_opening_speed(twice) == pytest.approx(2 * whole)
     changed = given.values.copy()
     changed[100, : sound_offset.STATIC_FEATURES] += 1
-    moved = np.flatnonzero(np.abs(sound_offset.predicted_opening_speed(types.Features(changed, 2.0)) - whole) > 1e-6)
+    moved = np.flatnonzero(np.abs(sound_offset.predict_opening_speed(types.Features(changed, 2.0)) - whole) > 1e-6)
     assert moved.tolist() == [100 - step for step in reversed(sound_offset.FRAME_OFFSETS)]
 
 
 def test_speed_is_the_slope() -> None:
-    assert sound_offset.measured_opening_speed(0.03 * np.arange(20.0))[3:-3] == pytest.approx(0.03, abs=1e-6)
+    assert sound_offset.measure_opening_speed(0.03 * np.arange(20.0))[3:-3] == pytest.approx(0.03, abs=1e-6)
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lipmotion import errors, types
-from lipmotion_faces.corpus.sound_offset import ALIKE, BEEP, CLAP, sound_marks, sound_offset
+from lipmotion_faces.corpus.sound_offset import ALIKE, BEEP, CLAP, find_marks, measure_offset
 from speech.recorded_twice import RATE_HZ, beep, clap, recorded_twice, speech_like
 
 MARK_S = 1.2
@@ -22,11 +22,11 @@ def test_the_offset_is_found():
         cut, before = int(chance.integers(0, RATE_HZ)), int(chance.integers(0, 3 * RATE_HZ))
         camera, recorder, late_s = recorded_twice(scene(chance, mark), chance, cut, before, noise_db)
         for first, second, true_s in ((camera, recorder, late_s), (recorder, camera, -late_s)):
-            found = sound_offset(first, second)
+            found = measure_offset(first, second)
             assert abs(found.late_s - true_s) * 1000 <= most_ms
             assert found.how in {mark, ALIKE}
         if mark:
-            assert sound_offset(camera, recorder).how == mark
+            assert measure_offset(camera, recorder).how == mark
 
 
 def test_a_mark_alone_is_enough():
@@ -38,7 +38,7 @@ def test_a_mark_alone_is_enough():
         apart = both.copy()
         apart[int((MARK_S + 0.4) * RATE_HZ) :] = 0
         _, recorder, late_s = recorded_twice(apart, chance, 3_000, 20_000)
-        found = sound_offset(camera, recorder)
+        found = measure_offset(camera, recorder)
         assert found.how == mark
         assert abs(found.late_s - late_s) * 1000 <= most_ms
 
@@ -47,14 +47,14 @@ def test_claps_and_beeps_are_found_where_they_are():
     chance = np.random.default_rng(1)
     samples = scene(chance, CLAP) + 1e-3 * chance.normal(size=int(6.2 * RATE_HZ))
     samples[: RATE_HZ // 4] += beep(2000.0)[: RATE_HZ // 4]
-    marks = sound_marks(types.Audio(samples.astype(np.float32), RATE_HZ))
+    marks = find_marks(types.Audio(samples.astype(np.float32), RATE_HZ))
     assert [(mark.kind, round(mark.time_s, 1)) for mark in marks if mark.time_s < 2] == [(BEEP, 0.0), (CLAP, MARK_S)]
     assert marks[0].hertz == pytest.approx(2000, abs=32)
 
 
 def test_speech_holds_no_beep():
     chance = np.random.default_rng(2)
-    marks = sound_marks(types.Audio(scene(chance, "").astype(np.float32), RATE_HZ))
+    marks = find_marks(types.Audio(scene(chance, "").astype(np.float32), RATE_HZ))
     assert not [mark for mark in marks if mark.kind == BEEP]
 
 
@@ -62,15 +62,15 @@ def test_different_sounds_are_refused():
     chance = np.random.default_rng(3)
     one, other = (types.Audio(scene(chance, "").astype(np.float32), RATE_HZ) for _ in range(2))
     with pytest.raises(errors.InputError, match=r"is not clear: no clap and no beep is in both.*give the offset"):
-        sound_offset(one, other)
+        measure_offset(one, other)
 
 
 def test_silence_and_two_rates_are_refused():
     for samples in (np.zeros(RATE_HZ), np.full(RATE_HZ, 0.5), np.zeros(50)):
         silent = types.Audio(samples.astype(np.float32), RATE_HZ)
         with pytest.raises(errors.InputError):
-            sound_offset(silent, silent)
-        assert sound_marks(silent) == ()
+            measure_offset(silent, silent)
+        assert find_marks(silent) == ()
     sound = np.zeros(RATE_HZ, np.float32)
     with pytest.raises(errors.InputError, match="16000 and 48000 Hz, required one rate"):
-        sound_offset(types.Audio(sound, RATE_HZ), types.Audio(sound, 48_000))
+        measure_offset(types.Audio(sound, RATE_HZ), types.Audio(sound, 48_000))

@@ -13,7 +13,7 @@ from lipmotion.pipeline.batch.ledger import Place, open_ledger
 from lipmotion.storage import files
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.locks import LOCK, keep_unfinished, lock_folder, open_temporary, remove_unfinished
-from lipmotion_faces.corpus.sync import sync
+from lipmotion_faces.corpus.sync import remove_offsets
 from lipmotion_studio.folder import open_folder
 from lipmotion_studio.study.manifest import MANIFEST
 from lipmotion_studio.study.store import ANSWERS, StudyStore
@@ -69,7 +69,7 @@ def add_to_corpus(folder: Path) -> None:
 
 
 def sync_corpus(folder: Path) -> None:
-    sync(Corpus.create(folder))
+    remove_offsets(Corpus.create(folder))
 
 
 def begin_batch(folder: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lipmotion import Model
-from lipmotion_studio.application import studio_application
+from lipmotion_studio.application import create_application
 from lipmotion_studio.folder import ProjectFolder, open_folder
 from lipmotion_studio.requests import TOKEN_HEADER, Access
 from lipmotion_studio.studio import KnownModel, Studio
@@ -73,4 +73,4 @@ def open_studio(speech: Path, transcript: str, model: Model, folder: Path) -> It
         shutil.copy(speech, sound)
         sound.with_suffix(".txt").write_text(transcript, encoding="utf-8")
     with open_folder(sound) as opened, closing(Studio(opened, toy(model))) as studio:
-        yield OpenStudio(opened, studio, studio_application(studio, Access(TOKEN, frozenset({HOST}))))
+        yield OpenStudio(opened, studio, create_application(studio, Access(TOKEN, frozenset({HOST}))))

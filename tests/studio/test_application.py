@@ -18,11 +18,11 @@ pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.storage.locks import LOCK
 from lipmotion_studio import recording as recording_module
-from lipmotion_studio.application import studio_application
+from lipmotion_studio.application import create_application
 from lipmotion_studio.folder import ProjectFolder, open_folder
 from lipmotion_studio.project import parse_project
 from lipmotion_studio.requests import TOKEN_HEADER, Access
-from lipmotion_studio.studio import Studio, known_model
+from lipmotion_studio.studio import Studio, load_known_model
 from lipmotion_studio.votes import read_votes
 from studio.open_studio import HOST, TOKEN, TOY_DIGEST, OpenStudio, open_studio, toy
 from study.asgi import Reply
@@ -286,7 +286,7 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio):
 
 def test_a_model_is_called_as_its_file(toy_model, tmp_path):
     save_model(replace(toy_model, about={**toy_model.about, "name": "trajectory"}), tmp_path / "Sam.lipmotion")
-    assert known_model(tmp_path / "Sam.lipmotion").name == "Sam"
+    assert load_known_model(tmp_path / "Sam.lipmotion").name == "Sam"
 
 
 def test_a_project_outlives_its_model(tmp_path, caplog):
@@ -355,7 +355,7 @@ def test_a_filmed_face_the_real_video_and_another_model(
     with open_folder(sound) as opened:
         opened.change(lambda now: replace(now, characters={"toy": str(filmed_face_file)}))
         with closing(Studio(opened, toy(toy_model), replace(toy(coupled_model), digest=OTHER_DIGEST))) as running:
-            studio = OpenStudio(opened, running, studio_application(running, Access(TOKEN, frozenset({HOST}))))
+            studio = OpenStudio(opened, running, create_application(running, Access(TOKEN, frozenset({HOST}))))
             _compared(studio)
             assert _film(studio) == (video_frames(0.2, 0.6), "video/mp4")
             _exported(studio)

@@ -7,9 +7,9 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.storage.files import make_portable
-from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, project_path
-from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, parse_project, project_document
-from lipmotion_studio.votes import Side, Vote, read_votes, tally, votes_text
+from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, find_project_path
+from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, parse_project, describe_project
+from lipmotion_studio.votes import Side, Vote, read_votes, tally, format_votes
 from pipeline.made import write_sound
 from testing.toy import ToySentence
 
@@ -58,10 +58,10 @@ def test_a_second_one_is_told(lines):
 
 
 def test_the_folder_of_a_project(tmp_path, lines):
-    assert project_path(lines / "a.wav") == lines / "a.studio"
-    assert project_path(lines, tmp_path / "x") == tmp_path / "x"
+    assert find_project_path(lines / "a.wav") == lines / "a.studio"
+    assert find_project_path(lines, tmp_path / "x") == tmp_path / "x"
     with pytest.raises(InputError, match="no such file"):
-        project_path(tmp_path / "nothing")
+        find_project_path(tmp_path / "nothing")
 
 
 def test_a_project_that_is_not_there_is_an_empty_one(tmp_path):
@@ -88,7 +88,7 @@ def test_a_project_is_what_its_document_says():
     project = Project(
         {1: ProjectRecording(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", "4", (RECORD,))}, preset="arkit"
     )
-    assert parse_project(json.loads(json.dumps(project_document(project)))) == replace(project, next_number=2)
+    assert parse_project(json.loads(json.dumps(describe_project(project)))) == replace(project, next_number=2)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_a_project_is_what_its_document_says():
     ],
 )  # fmt: skip
 def test_documents_that_are_refused(tmp_path, change):
-    document = project_document(Project()) | {"lines": [LINE]}
+    document = describe_project(Project()) | {"lines": [LINE]}
     assert list(parse_project(document).lines) == [1]
     (tmp_path / PROJECT).write_text(json.dumps(document | change), encoding="utf-8")
     with pytest.raises((InputError, ExportError)):
@@ -111,7 +111,7 @@ def test_documents_that_are_refused(tmp_path, change):
 @pytest.mark.parametrize("name", ["CON.wav", "nul .wav", "Aux..wav", "com1.take.wav"])
 def test_what_is_called_as_a_device_gets_another_name(lines, tmp_path, name):
     sound = (lines / "a.wav").rename(tmp_path / name)
-    assert make_portable(project_path(sound).name) == project_path(sound).name
+    assert make_portable(find_project_path(sound).name) == find_project_path(sound).name
     with open_folder(sound, tmp_path / "own") as folder:
         (folder.path / "came").write_text("sound", encoding="utf-8")
         for number in (1, folder.drop(name, folder.path / "came", "")):
@@ -124,8 +124,8 @@ def test_what_is_called_as_a_device_gets_another_name(lines, tmp_path, name):
 def test_the_usual_folder_of_a_project_is_no_link(lines, tmp_path):
     (lines / "a.studio").symlink_to(tmp_path)
     with pytest.raises(InputError, match="is a link"):
-        project_path(lines / "a.wav")
-    assert project_path(lines / "a.wav", lines / "a.studio") == lines / "a.studio"
+        find_project_path(lines / "a.wav")
+    assert find_project_path(lines / "a.wav", lines / "a.studio") == lines / "a.studio"
 
 
 A, B, C = (Side(name, digest * 64, "e" * 64) for name, digest in (("voice", "a"), ("voice", "b"), ("other", "c")))
@@ -158,7 +158,7 @@ def test_votes_are_read_as_they_were_written_and_old_ones_by_their_names(tmp_pat
     assert [vote.better for vote in old] == [0, None]
     assert tally(old, old[0]) == {"better": [1, 0], "neither": 1}
     votes = (*old, Vote("one", (A, KEPT), 1))
-    path.write_text(votes_text(votes), encoding="utf-8")
+    path.write_text(format_votes(votes), encoding="utf-8")
     assert read_votes(path) == votes
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion_studio.studio import MP4, find_real_video, media_type, sound_begins_s, write_playable
+from lipmotion_studio.studio import MP4, find_real_video, find_media_type, find_sound_start, write_playable
 from pipeline.made import write_sound
 from testing.toy import ToySentence, write_film
 
@@ -21,25 +21,25 @@ def video(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactory) -
 
 
 def test_sound_that_begins_with_the_video_is_in_step(video, toy_speech):
-    assert sound_begins_s(video, video) == sound_begins_s(video, toy_speech) == 0
+    assert find_sound_start(video, video) == find_sound_start(video, toy_speech) == 0
 
 
 def test_a_later_sound_is_found_in_the_video(video, toy_speech, tmp_path):
     late = shifted(video, tmp_path / "late.mp4", sound_s=LATE_S)
-    assert sound_begins_s(late, late) == 0  # the readers have silence before it
-    assert sound_begins_s(late, toy_speech) == pytest.approx(LATE_S, abs=0.03)  # and the silence of the encoder
+    assert find_sound_start(late, late) == 0  # the readers have silence before it
+    assert find_sound_start(late, toy_speech) == pytest.approx(LATE_S, abs=0.03)  # and the silence of the encoder
     with_silence = tmp_path / "with silence.wav"
     write_sound(with_silence, read_audio(late))
-    assert sound_begins_s(late, with_silence) == 0
+    assert find_sound_start(late, with_silence) == 0
 
 
 def test_what_begins_later_than_0_is_written_anew(video, tmp_path):
-    assert media_type(video) == MP4
+    assert find_media_type(video) == MP4
     later = shifted(video, tmp_path / "later.mp4", all_s=1.0)
     assert find_real_video(later) == later
-    assert media_type(later) is None
+    assert find_media_type(later) is None
     write_playable(later, later, tmp_path / "playable.mp4")
-    assert media_type(tmp_path / "playable.mp4") == MP4
+    assert find_media_type(tmp_path / "playable.mp4") == MP4
 
 
 def shifted(video: Path, path: Path, *, sound_s: float = 0.0, all_s: float = 0.0) -> Path:

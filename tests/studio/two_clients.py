@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from lipmotion import Model
-from lipmotion_studio.application import studio_application
+from lipmotion_studio.application import create_application
 from lipmotion_studio.folder import open_folder
-from lipmotion_studio.project import digest_of
+from lipmotion_studio.project import digest_edits
 from lipmotion_studio.requests import Access
 from lipmotion_studio.studio import Studio
 from pipeline.made import write_sound
@@ -96,7 +96,7 @@ class TwoClients(RuleBasedStateMachine):
         folder = self.closing.enter_context(open_folder(self.folder / "a.studio"))
         studio = self.closing.enter_context(closing(Studio(folder, toy(self.model))))
         folder.change(lambda project: replace(project, recogniser="own"))  # which is the fastest one
-        application = studio_application(studio, Access(TOKEN, frozenset({HOST})))
+        application = create_application(studio, Access(TOKEN, frozenset({HOST})))
         self.studio = OpenStudio(folder, studio, application)
 
     def teardown(self) -> None:
@@ -118,7 +118,7 @@ class TwoClients(RuleBasedStateMachine):
             assert state["status"] == "ready", state
             assert (state["steps"], state["redo"]) == (line.steps, len(line.undone))
             assert {each["name"]: each["digest"] for each in state["versions"]} == {
-                name: digest_of(steps) for name, steps in line.versions.items()
+                name: digest_edits(steps) for name, steps in line.versions.items()
             }
         return state
 
@@ -371,7 +371,7 @@ class TwoClients(RuleBasedStateMachine):
         ]
         for row, line in zip(rows, self.lines.values(), strict=True):
             if not line.damage and row["status"] == "ready":
-                assert (row["edits"], row["edits_digest"]) == (len(line.steps), digest_of(line.steps))
+                assert (row["edits"], row["edits_digest"]) == (len(line.steps), digest_edits(line.steps))
         for line in [*self.lines.values(), *self.removed]:
             assert sha256_of(line.sound) == line.sha256
         for line in self.removed:

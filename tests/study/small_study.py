@@ -34,8 +34,8 @@ def small_study(
 def planned(folder: Path, kind: str, sentences: tuple[str, ...], videos: list[manifest.StudyVideo]) -> manifest.Study:
     """Write the manifest of a study with one trial for practice and one that checks attention, and return it."""
     numbers = {(video.sentence, video.condition): n for n, video in enumerate(videos)}
-    trials = manifest.main_trials(kind, CONDITIONS, sentences, numbers)
-    anchors = manifest.anchor_trials("recording", sentences[:1], numbers) if kind == PAIRED else []
+    trials = manifest.make_main_trials(kind, CONDITIONS, sentences, numbers)
+    anchors = manifest.make_anchor_trials("recording", sentences[:1], numbers) if kind == PAIRED else []
     study = manifest.Study(
         kind=kind,
         title="A study",
@@ -47,10 +47,10 @@ def planned(folder: Path, kind: str, sentences: tuple[str, ...], videos: list[ma
         sentences={name: {"file": name} for name in sentences},
         videos=tuple(videos),
         trials=(
-            *manifest.practice_trials(trials, 1, 3),
+            *manifest.make_practice_trials(trials, 1, 3),
             *trials,
             *anchors,
-            *manifest.attention_trials(kind, trials, 1, 3),
+            *manifest.make_attention_trials(kind, trials, 1, 3),
         ),
         made_by={"lipmotion": "test"},
     )

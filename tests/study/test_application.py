@@ -13,7 +13,7 @@ from children import wait_until
 from lipmotion.errors import InputError
 from lipmotion_studio.study import conduct, store
 from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, RANKING, read_answers
-from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, RateLimit, check_sheet, study_application
+from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, RateLimit, check_sheet, create_application
 from lipmotion_studio.study.conduct import export_answers, forget_rater
 from lipmotion_studio.study.manifest import VIDEOS, Study, check_videos, order_trials
 from lipmotion_studio.study.store import AnswerSheet, StudyStore
@@ -50,7 +50,7 @@ def place(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Open]:
     folder = tmp_path / "study"
     study = small_study(folder, request.param)
     with closing(StudyStore(folder)) as store:
-        yield Open(study, folder, study_application(study, check_videos(study, folder), store), store)
+        yield Open(study, folder, create_application(study, check_videos(study, folder), store), store)
 
 
 @pytest.mark.parametrize("place", KINDS, indirect=True)
@@ -169,7 +169,7 @@ def test_every_reply_has_the_headers_that_keep_others_out(place):
     ],
 )  # fmt: skip
 def test_only_the_page_itself_by_its_own_names_gets_an_answer(place, headers, status):
-    application = study_application(place.study, {}, place.store, ["study.example.org"])
+    application = create_application(place.study, {}, place.store, ["study.example.org"])
     assert ask(application, "/api/study", headers=headers).status == status
     assert ask(application, "/api/raters", {"agrees": True}, headers=headers).status == (201 if status == 200 else 403)
 

@@ -209,7 +209,7 @@ SHOWN = {(sentence, name): n for n, (sentence, name) in enumerate((s, c) for s i
 
 def test_the_trials_of_hofer_2008():
     """Three conditions and six sentences: every pair in both orders, 36 trials, no two alike."""
-    trials = manifest.main_trials(answers.PAIRED, CONDITIONS, SENTENCES, SHOWN)
+    trials = manifest.make_main_trials(answers.PAIRED, CONDITIONS, SENTENCES, SHOWN)
     assert len({trial.videos for trial in trials}) == len(trials) == 36
     names = {number: key for key, number in SHOWN.items()}
     shown = Counter(tuple(names[number] for number in trial.videos) for trial in trials)
@@ -222,21 +222,21 @@ def test_the_trials_of_hofer_2008():
 
 def test_every_video_once_for_opinions():
     late = SHOWN | {("two", answers.ANCHOR): 99}
-    trials = manifest.main_trials(answers.MOS, CONDITIONS, SENTENCES, late)
+    trials = manifest.make_main_trials(answers.MOS, CONDITIONS, SENTENCES, late)
     assert sorted(trial.videos[0] for trial in trials) == sorted(late.values())
 
 
 def test_the_condition_in_step_is_expected_first_and_second():
     late = SHOWN | {("one", answers.ANCHOR): 100, ("two", answers.ANCHOR): 101}
-    first, second = manifest.anchor_trials("phones", ("one", "two"), late)
+    first, second = manifest.make_anchor_trials("phones", ("one", "two"), late)
     assert (first.videos, first.expected) == ((SHOWN["one", "phones"], 100), "first")
     assert (second.videos, second.expected) == ((101, SHOWN["two", "phones"]), "second")
 
 
 @pytest.mark.parametrize("kind", [answers.PAIRED, answers.MOS, answers.RANKING])
 def test_a_check_of_attention_tells_the_answer_that_it_expects(kind):
-    trials = manifest.main_trials(kind, CONDITIONS, SENTENCES, SHOWN)
-    checks = manifest.attention_trials(kind, trials, 2, seed=1)
+    trials = manifest.make_main_trials(kind, CONDITIONS, SENTENCES, SHOWN)
+    checks = manifest.make_attention_trials(kind, trials, 2, seed=1)
     assert len({check.expected for check in checks}) == 2
     for check in checks:
         assert check.expected in check.note
@@ -264,7 +264,7 @@ def test_orders_are_balanced_over_raters(tmp_path):
 
 def test_every_order_of_three_is_equally_likely():
     """Of 6000, 1000 each: chi-squared of five degrees of freedom is under 20.5 in 99.9 % of draws."""
-    counts = Counter("".join(manifest.shuffled("abc", "seed", n)) for n in range(6000))
+    counts = Counter("".join(manifest.shuffle("abc", "seed", n)) for n in range(6000))
     assert len(counts) == 6
     assert sum((count - 1000) ** 2 / 1000 for count in counts.values()) < 20.5
 

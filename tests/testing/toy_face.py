@@ -14,7 +14,7 @@ from lipmotion.speech.sound.pauses import STEP_S, measure_levels_db
 from lipmotion.types import Audio, Motion
 from lipmotion_faces.appearance.lower_face import CORNER, HEIGHT, WIDTH, FaceShape
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
-from lipmotion_faces.appearance.placing import inverse_map
+from lipmotion_faces.appearance.placing import invert_map
 from lipmotion_faces.coded_video import encode_video
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake, StoredBackground
 from testing.toy import CAMERA_HZ, INNER_WIDTH, INSIDE, LIPS, SKIN, ToySentence, toy_motion, toy_sentences
@@ -89,7 +89,7 @@ def toy_frames(motion: Motion, places: Array, *, noise: float = NOISE, seed: int
     centres = np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1)
     draw = np.random.default_rng(seed)
     for shape, place in zip(_shapes(motion), places, strict=True):
-        position = centres @ inverse_map(place).T
+        position = centres @ invert_map(place).T
         yield _picture(position[..., 0], position[..., 1], shape, 1 / SCALE, noise, draw)
 
 

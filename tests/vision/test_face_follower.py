@@ -362,7 +362,7 @@ def test_a_large_picture_is_reduced_and_the_box_is_not(finder):
 @pytest.mark.parametrize(("height", "width"), [(720, 1280), (1280, 720), (600, 600)])
 def test_parts_cover_the_picture(height, width):
     covered = np.zeros((height, width), bool)
-    for left, top, side in mediapipe.parts(height, width):
+    for left, top, side in mediapipe.list_parts(height, width):
         assert 0 <= left <= width - side
         assert 0 <= top <= height - side
         covered[top : top + side, left : left + side] = True

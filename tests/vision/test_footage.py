@@ -15,8 +15,8 @@ from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_map
 from lipmotion_faces.tracking.track import (
     CHANNELS,
     Footage,
-    footage_frames,
-    footage_groups,
+    decode_footage,
+    open_footage,
     measure_motion,
     read_video_frames,
     track,
@@ -89,7 +89,7 @@ def test_frames_come_in_their_constant_order(write_video, scripted, dropped):
     ticks = [n for n in range(20) if n not in dropped]
     scripted([FACES[n] for n in ticks])
     footage = track_footage(write_video(ticks=ticks))
-    shown = [ticks[index] for index in levels(footage_frames(footage))]
+    shown = [ticks[index] for index in levels(decode_footage(footage))]
     assert len(shown) == len(footage) == 20
     assert [shown[n] for n in ticks] == ticks
     distance = np.abs(np.array(shown) - np.arange(20))
@@ -100,15 +100,15 @@ def test_a_part_is_the_same_as_in_the_whole(write_video, scripted):
     ticks = [n for n in range(20) if n not in (5, 12, 13)]
     scripted([FACES[n] for n in ticks])
     footage = track_footage(write_video(ticks=ticks))
-    whole = levels(footage_frames(footage))
+    whole = levels(decode_footage(footage))
     for start, stop in ((0, 20), (0, 1), (7, 7), (12, 17), (19, None), (3, None)):
-        assert levels(footage_frames(footage, start, stop)) == whole[start:stop]
+        assert levels(decode_footage(footage, start, stop)) == whole[start:stop]
     scripted(FACES[5:15])
     footage = track_footage(write_video(ticks=range(20)), VideoSpan(0.2, 0.6))
-    assert levels(footage_frames(footage, 4, 8)) == list(range(9, 13))
+    assert levels(decode_footage(footage, 4, 8)) == list(range(9, 13))
     for start, stop in ((-1, 5), (6, 5), (0, 11), (11, None)):
         with pytest.raises(InputError, match=rf"frames {start} to {stop or 10} of .*, required within 0 to 10"):
-            footage_frames(footage, start, stop)
+            decode_footage(footage, start, stop)
 
 
 def test_frames_in_any_order(write_video, scripted):
@@ -116,9 +116,9 @@ def test_frames_in_any_order(write_video, scripted):
     scripted([FACES[n] for n in ticks])
     footage = track_footage(write_video(ticks=ticks))
     order = [*range(20), *range(18, -1, -1), 3, 17]
-    shown = levels(footage_frames(footage))
+    shown = levels(decode_footage(footage))
     for most_bytes in (0, 20 * 48 * 64 * 3):
-        groups = footage_groups(footage, most_bytes)
+        groups = open_footage(footage, most_bytes)
         assert levels(groups.frame(n) for n in order) == [shown[n] for n in order]
         assert groups.nbytes <= max(most_bytes, 2 * 48 * 64 * 3)
 
@@ -128,16 +128,16 @@ def test_a_video_that_was_exchanged_is_noticed(write_video, scripted):
     footage = track_footage(write_video(ticks=range(20)))
     other = write_video("other.mp4", ticks=range(20), size=(32, 32))
     with pytest.raises(InputError, match="a picture is not 64 × 48 as when it was tracked"):
-        list(footage_frames(replace(footage, path=other)))
+        list(decode_footage(replace(footage, path=other)))
 
 
 def test_a_video_that_became_shorter_shows_its_last_picture(write_video, scripted):
     scripted(FACES)
     footage = track_footage(write_video(ticks=range(20)))
     shorter = replace(footage, path=write_video("shorter.mp4", ticks=range(15)))
-    assert levels(footage_frames(shorter)) == [*range(15), *([14] * 5)]
+    assert levels(decode_footage(shorter)) == [*range(15), *([14] * 5)]
     with pytest.raises(InputError, match=r"no picture from 0\.72 s on"):
-        list(footage_frames(shorter, 18))
+        list(decode_footage(shorter, 18))
 
 
 def test_untracked_frames_hold_the_last_picture(write_video):

@@ -14,9 +14,9 @@ from lipmotion_faces.tracking import frames
 from lipmotion_faces.tracking.frames import (
     VideoFrame,
     VideoSpan,
-    frame_count,
-    nearest_indices,
-    nominal_rate_hz,
+    count_frames,
+    find_nearest,
+    find_nominal_rate,
     open_video,
     resample_to_constant_rate,
 )
@@ -87,7 +87,7 @@ class LateContainer:
 
 def test_where_seeking_ends_too_late_all_is_decoded():
     damage: list[str] = []
-    found = frames._pictures_from(LateContainer(), SimpleNamespace(time_base=Fraction(1)), 5.0, damage)
+    found = frames._decode_pictures_from(LateContainer(), SimpleNamespace(time_base=Fraction(1)), 5.0, damage)
     assert [picture.time for picture in found] == [5, 6, 7, 8, 9]
     assert damage == []  # what is damaged before the span is none of its business
 
@@ -236,21 +236,21 @@ def test_a_cover_before_the_video_is_not_the_video(tmp_path, write_video):
 
 def test_the_stated_rate_is_believed_when_it_fits():
     rounded = np.round(np.arange(90) / 30, 3)  # 33, 33, 34 ms
-    assert nominal_rate_hz(rounded, [30.0]) == 30.0
-    assert nominal_rate_hz(np.delete(rounded, [4, 30, 31]), [30.0, 29.1]) == 30.0
-    assert nominal_rate_hz(np.arange(50) / 25, [1000.0]) == pytest.approx(25)
-    assert nominal_rate_hz(np.arange(50) / 25, [1000.0, 24.9]) == 24.9
-    assert nominal_rate_hz(np.arange(50) / 25, []) == pytest.approx(25)
-    assert [nominal_rate_hz(np.zeros(1), stated) for stated in ([50.0], [])] == [50.0, 25.0]  # of one frame
-    assert frame_count(np.arange(75) / 25, 25.0) == 75
-    assert frame_count(np.array([0, 0.033, 0.067, 2.967]), 30.0) == 90
+    assert find_nominal_rate(rounded, [30.0]) == 30.0
+    assert find_nominal_rate(np.delete(rounded, [4, 30, 31]), [30.0, 29.1]) == 30.0
+    assert find_nominal_rate(np.arange(50) / 25, [1000.0]) == pytest.approx(25)
+    assert find_nominal_rate(np.arange(50) / 25, [1000.0, 24.9]) == 24.9
+    assert find_nominal_rate(np.arange(50) / 25, []) == pytest.approx(25)
+    assert [find_nominal_rate(np.zeros(1), stated) for stated in ([50.0], [])] == [50.0, 25.0]  # of one frame
+    assert count_frames(np.arange(75) / 25, 25.0) == 75
+    assert count_frames(np.array([0, 0.033, 0.067, 2.967]), 30.0) == 90
 
 
 def test_nearest_is_nearest():
     times_s, wanted_s = np.sort(np.random.default_rng(1).random(30)), np.linspace(-0.2, 1.2, 99)
     expected = np.abs(times_s[None] - wanted_s[:, None]).min(axis=1)
-    np.testing.assert_array_equal(np.abs(times_s[nearest_indices(times_s, wanted_s)] - wanted_s), expected)
-    assert nearest_indices(np.array([3.0]), wanted_s).tolist() == [0] * 99
+    np.testing.assert_array_equal(np.abs(times_s[find_nearest(times_s, wanted_s)] - wanted_s), expected)
+    assert find_nearest(np.array([3.0]), wanted_s).tolist() == [0] * 99
 
 
 def test_frames_in_their_place_stay_as_they_are():

@@ -95,14 +95,14 @@ def test_an_upright_face_of_the_right_size_is_cut_out_as_it_is():
     eyes = np.array([[60.0, 50.0], [150.0, 50.0]])  # 90 px apart, the middle at 105, 50
     image = ramp(256, 200)
     np.testing.assert_array_equal(
-        head_pose.crop_mouth(image, head_pose.eyes_to_image(eyes)), image[98 : 98 + 56, 69 : 69 + 72]
+        head_pose.crop_mouth(image, head_pose.map_eyes_to_image(eyes)), image[98 : 98 + 56, 69 : 69 + 72]
     )
 
 
 def test_the_eyes_of_the_turned_head_become_level():
     angle = np.deg2rad(20)
     half = 45 * np.array([np.cos(angle), np.sin(angle)])
-    crop = head_pose.crop_mouth(ramp(256, 200), head_pose.eyes_to_image(np.array([130, 80]) + np.stack([-half, half])))
+    crop = head_pose.crop_mouth(ramp(256, 200), head_pose.map_eyes_to_image(np.array([130, 80]) + np.stack([-half, half])))
     along = np.diff(crop[28].astype(int), axis=0).mean(axis=0)
     np.testing.assert_allclose(along[:2], [np.cos(angle), np.sin(angle)], atol=0.03)
 
@@ -110,12 +110,12 @@ def test_the_eyes_of_the_turned_head_become_level():
 def test_a_large_face_is_averaged_not_skipped_and_outside_of_the_image_its_edge_repeats():
     image = np.random.default_rng(0).integers(0, 256, (2000, 2000, 3)).astype(np.uint8)
     crop = head_pose.crop_mouth(
-        image, head_pose.eyes_to_image(np.array([[600.0, 600.0], [1320.0, 600.0]]))
+        image, head_pose.map_eyes_to_image(np.array([[600.0, 600.0], [1320.0, 600.0]]))
     )  # eight times the size
     assert crop.shape == (56, 72, 3)
     assert crop.std() < 20  # of noise with a deviation of 74
     flat = np.full((100, 160, 3), 77, np.uint8)
-    assert (head_pose.crop_mouth(flat, head_pose.eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77).all()
+    assert (head_pose.crop_mouth(flat, head_pose.map_eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77).all()
 
 
 def nodding(frames: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -142,7 +142,7 @@ def test_the_lips_are_found_whatever_the_head_does():
     head, turns, sizes, places = nodding()
     points = (sizes[:, None, None] * head @ turns.transpose(0, 2, 1) + places[:, None]) * (1, -1, -1)
     depth = head[:, [trackers.TRACKED_POINTS.index(index) for index in trackers.LIP_POINTS], 2].mean()
-    maps = head_pose.face_to_image(points)
+    maps = head_pose.map_face_to_image(points)
     for turn, size, place, to_image in zip(turns, sizes, places, maps, strict=True):
         for x, y in ((0, 0), (-36, 48), (36, 104), (12, 70)):  # px of the region, y down
             seen = size * turn @ np.array([x / 90, -y / 90, depth]) + place
@@ -153,11 +153,11 @@ def test_a_face_straight_ahead_is_cut_out_as_by_its_eyes():
     head, *_ = nodding()
     points = (head * 75 + (120, -90, 0)) * (1, -1, -1)
     eyes = points[0][[trackers.TRACKED_POINTS.index(33), trackers.TRACKED_POINTS.index(263)], :2]
-    np.testing.assert_allclose(head_pose.face_to_image(points)[0], head_pose.eyes_to_image(eyes), atol=1e-9)
+    np.testing.assert_allclose(head_pose.map_face_to_image(points)[0], head_pose.map_eyes_to_image(eyes), atol=1e-9)
     image = np.random.default_rng(1).integers(0, 256, (220, 260, 3)).astype(np.uint8)
     crops = [
         head_pose.crop_mouth(image, to_image)
-        for to_image in (head_pose.face_to_image(points)[0], head_pose.eyes_to_image(eyes))
+        for to_image in (head_pose.map_face_to_image(points)[0], head_pose.map_eyes_to_image(eyes))
     ]
     assert np.abs(np.subtract(*crops, dtype=int)).max() <= 1
 
@@ -178,38 +178,38 @@ def picture(scale: int) -> np.ndarray:
 
 def test_a_scene_is_small_and_its_brightness_does_not_count():
     image = picture(20)
-    assert image_similarity.scene_thumbnail(image).shape == (24, 32, 3)
+    assert image_similarity.reduce_scene(image).shape == (24, 32, 3)
     np.testing.assert_allclose(
-        image_similarity.scene_thumbnail(image), image_similarity.scene_thumbnail(image + np.uint8(30)), atol=1
+        image_similarity.reduce_scene(image), image_similarity.reduce_scene(image + np.uint8(30)), atol=1
     )
-    assert abs(image_similarity.scene_thumbnail(image).mean()) < 1e-9
+    assert abs(image_similarity.reduce_scene(image).mean()) < 1e-9
 
 
 def test_a_face_looks_the_same_from_nearer_and_turned():
     far, near = picture(10), picture(30)
     eyes = np.array([[40.0, 40.0], [80.0, 40.0]])
-    upright = image_similarity.face_thumbnail(far, eyes)
-    assert image_similarity.image_correlation(upright, image_similarity.face_thumbnail(near, 3 * eyes)) > 0.95
-    turned = image_similarity.face_thumbnail(np.rot90(far), np.stack([eyes[:, 1], far.shape[1] - eyes[:, 0]], axis=1))
-    assert image_similarity.image_correlation(upright, turned) > 0.95
+    upright = image_similarity.reduce_face(far, eyes)
+    assert image_similarity.correlate_images(upright, image_similarity.reduce_face(near, 3 * eyes)) > 0.95
+    turned = image_similarity.reduce_face(np.rot90(far), np.stack([eyes[:, 1], far.shape[1] - eyes[:, 0]], axis=1))
+    assert image_similarity.correlate_images(upright, turned) > 0.95
     assert (
-        image_similarity.image_correlation(upright, image_similarity.face_thumbnail(far, eyes + np.array([20, 25])))
+        image_similarity.correlate_images(upright, image_similarity.reduce_face(far, eyes + np.array([20, 25])))
         < 0.6
     )
 
 
 def test_likeness_is_a_correlation_without_tint():
     one, other = DRAW.uniform(0, 255, (2, 6, 5, 3))
-    assert image_similarity.image_correlation(one, 0.5 * one + (10, 20, 30)) == pytest.approx(1)
-    assert image_similarity.image_correlation(one, 200 - one) == pytest.approx(-1)
-    assert image_similarity.image_correlation(one, np.full_like(one, 90)) == 0
-    assert image_similarity.image_correlation(np.stack([one, other])[:, None], np.stack([one, other])).shape == (2, 2)
+    assert image_similarity.correlate_images(one, 0.5 * one + (10, 20, 30)) == pytest.approx(1)
+    assert image_similarity.correlate_images(one, 200 - one) == pytest.approx(-1)
+    assert image_similarity.correlate_images(one, np.full_like(one, 90)) == 0
+    assert image_similarity.correlate_images(np.stack([one, other])[:, None], np.stack([one, other])).shape == (2, 2)
 
 
 def mouths(count: int = 40) -> np.ndarray:
     usual = np.kron(DRAW.uniform(60, 190, (7, 9, 3)), np.ones((8, 8, 1)))
     frames = usual + DRAW.normal(0, 8, (count, *usual.shape))
-    return np.stack([image_similarity.mouth_thumbnail(frame.clip(0, 255).astype(np.uint8)) for frame in frames])
+    return np.stack([image_similarity.reduce_mouth(frame.clip(0, 255).astype(np.uint8)) for frame in frames])
 
 
 def test_boxes_and_other_textures_are_strange_at_any_shift():

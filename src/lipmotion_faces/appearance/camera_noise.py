@@ -67,8 +67,8 @@ def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
         stillest = np.argsort(moved, kind="stable")[: max(1, round(STILL_SHARE * len(moved)))]
         still = steps[stillest + 1] - steps[stillest]  # second differences over time
         products += np.einsum("thwc,thwd->cd", still, still)
-        down += _neighbours(still, 1)
-        across += _neighbours(still, 2)
+        down += _sum_neighbours(still, 1)
+        across += _sum_neighbours(still, 2)
         pixels += still[..., 0].size
     if not pixels:
         raise InputError("no clip of at least three pictures; required at least one, to estimate the noise of a camera")
@@ -127,7 +127,7 @@ class NoiseSource:
         return np.pad(field @ mixing, ((0, height), (0, width), (0, 0)), mode="wrap")
 
 
-def camera_noise_arrays(noise: CameraNoise) -> dict[str, NDArray[Any]]:
+def camera_noise_to_arrays(noise: CameraNoise) -> dict[str, NDArray[Any]]:
     """Return the noise of a camera serialised as arrays (``NOISE_ARRAYS``)."""
     return {"noise_covariance": noise.covariance, "noise_spread_px": noise.spread_px}
 
@@ -152,7 +152,7 @@ NOISE_ARRAYS = {
 }
 
 
-def _neighbours(values: NDArray[np.float32], axis: int) -> Array:
+def _sum_neighbours(values: NDArray[np.float32], axis: int) -> Array:
     """Return the sum of products of neighbouring pixels along an axis, and that of squares of as many pixels."""
     count = values.shape[axis]
     before, after = (np.take(values, range(first, count - 1 + first), axis=axis) for first in (0, 1))

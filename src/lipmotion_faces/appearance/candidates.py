@@ -68,7 +68,7 @@ class Candidates:
         distances = []
         for number in range(len(COLOURS)):  # of a large face one colour of 500 details has 130 MB
             colour = self.details[..., number].reshape(len(self), -1).astype(np.float32)
-            distances.append(squared_distances(colour, colour))
+            distances.append(measure_squared_distances(colour, colour))
         return np.stack(distances)
 
 
@@ -102,12 +102,12 @@ def choose_candidates(coefficients: NDArray[np.floating[Any]], count: int = CAND
         chosen.append(furthest)
     centres = values[chosen]
     for _ in range(ROUNDS):
-        group = _nearest(values, centres)
+        group = _find_nearest(values, centres)
         order = np.argsort(group, kind="stable")
         present, first = np.unique(group[order], return_index=True)
         sums = np.add.reduceat(values[order].astype(np.float64), first, axis=0)
         centres[present] = sums / np.diff(np.append(first, len(values)))[:, None]
-    return np.unique(_nearest(centres, values))
+    return np.unique(_find_nearest(centres, values))
 
 
 def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Values | None = None) -> Candidates:
@@ -166,7 +166,7 @@ def draw_to_recorded(wanted: Values, recorded: Values) -> Values:
     result = np.empty(wanted.shape, np.float32)
     for start in range(0, len(wanted), BLOCK):
         some = wanted[start : start + BLOCK]
-        distances = squared_distances(some, recorded)
+        distances = measure_squared_distances(some, recorded)
         near = np.argpartition(distances, count - 1, axis=1)[:, :count]
         steps = recorded[near] - some[:, None]
         products = (steps @ steps.swapaxes(1, 2)).astype(np.float64)
@@ -181,7 +181,7 @@ def draw_to_recorded(wanted: Values, recorded: Values) -> Values:
     return result
 
 
-def squared_distances(some: Values, others: Values) -> Values:
+def measure_squared_distances(some: Values, others: Values) -> Values:
     """Return the squared distances between rows of two tables [shape=(M, D) and (N, D)]: float32 [shape=(M, N)]."""
     products = some @ others.T
     lengths = np.einsum("nd,nd->n", some, some)[:, None] + np.einsum("nd,nd->n", others, others)
@@ -192,18 +192,18 @@ LARGEST_COEFFICIENT = 1e6
 """No coefficient of a picture is larger: 255 · √D of D pixels, and pictures have at most 10⁷."""
 
 
-def _nearest(values: Values, others: Values) -> Index:
+def _find_nearest(values: Values, others: Values) -> Index:
     """Return for each row of ``values`` the nearest row of ``others`` [shape=(T,)]."""
     if len(others) > len(values):  # blocks of the longer table
         best, number = np.full(len(values), np.inf, np.float32), np.zeros(len(values), np.intp)
         for start in range(0, len(others), BLOCK):
-            distances = squared_distances(values, others[start : start + BLOCK])
+            distances = measure_squared_distances(values, others[start : start + BLOCK])
             least = distances.min(axis=1)
             nearer = least < best
             best[nearer], number[nearer] = least[nearer], distances.argmin(axis=1)[nearer] + start
         return number
     starts = range(0, len(values), BLOCK)
-    return np.concatenate([squared_distances(values[start : start + BLOCK], others).argmin(axis=1) for start in starts])
+    return np.concatenate([measure_squared_distances(values[start : start + BLOCK], others).argmin(axis=1) for start in starts])
 
 
 Levels = NDArray[np.floating[Any]]
@@ -257,14 +257,14 @@ def sharpen(pictures: Pictures, share: float, scale: int) -> Pictures:
         return pictures
     lightness = pictures.mean(axis=3, dtype=np.float32)
     detail = lightness - gaussian_filter(lightness, (0, RADIUS_PX * scale, RADIUS_PX * scale))
-    detail *= np.float32(share) * _more_at_the_lips(lightness.shape[1], lightness.shape[2], scale)
+    detail *= np.float32(share) * _weigh_lips(lightness.shape[1], lightness.shape[2], scale)
     levels = pictures + detail[..., None]
     np.rint(levels, out=levels)
     return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
 
 
 @cache
-def _more_at_the_lips(height: int, width: int, scale: int) -> NDArray[np.float32]:
+def _weigh_lips(height: int, width: int, scale: int) -> NDArray[np.float32]:
     """Return 1, and ``LIPS_SHARPENING`` at the lips [shape=(H, W)]."""
     rows, columns = np.mgrid[:height, :width]
     x, y = (columns + 0.5 - width / 2) / scale, (rows + 0.5 - height / 2) / scale
@@ -273,7 +273,7 @@ def _more_at_the_lips(height: int, width: int, scale: int) -> NDArray[np.float32
     return (1 + (LIPS_SHARPENING - 1) * share * share * (3 - 2 * share)).astype(np.float32)
 
 
-def moving_average(coefficients: Levels, frames: int = 3) -> NDArray[np.float64]:
+def smooth_curves(coefficients: Levels, frames: int = 3) -> NDArray[np.float64]:
     """Return curves [shape=(T, C)] smoothed by a moving average, narrower at the ends (Xie & Liu 2007, §6)."""
     count = len(coefficients)
     sums = np.concatenate([np.zeros((1, coefficients.shape[1])), np.cumsum(coefficients, axis=0, dtype=np.float64)])
@@ -319,7 +319,7 @@ class Refiner:
             changes = self.candidates.detail_distances
             if self.options.together:
                 changes = changes.sum(axis=0, keepdims=True)
-            path = best_sequence(costs, numbers, np.float32(self.options.steadiness) * changes)
+            path = find_best_sequence(costs, numbers, np.float32(self.options.steadiness) * changes)
         else:
             path = numbers[:, :, 0]
         return np.broadcast_to(path, (len(COLOURS), path.shape[1])).T.copy()
@@ -349,7 +349,7 @@ class Refiner:
         for start in range(0, frames, BLOCK):
             part = slice(start, start + BLOCK)
             pairs = zip(wanted[:, part], self.candidates.by_colour, strict=True)
-            distances = np.stack([squared_distances(frame, candidate) for frame, candidate in pairs])
+            distances = np.stack([measure_squared_distances(frame, candidate) for frame, candidate in pairs])
             if self.options.together:
                 distances = distances.sum(axis=0, keepdims=True)
             least = np.argpartition(distances, count - 1, axis=2)[:, :, :count]
@@ -359,7 +359,7 @@ class Refiner:
         return numbers, costs
 
 
-def best_sequence(costs: Costs, numbers: Index, changes: Costs) -> Index:
+def find_best_sequence(costs: Costs, numbers: Index, changes: Costs) -> Index:
     """Return the cheapest sequence of candidates, for each of some searches at once [shape=(C, T)].
 
     costs   : of every choice [shape=(C, T, n)]

@@ -114,7 +114,7 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
     return FrameDescriptors(shown.astype(np.float64), alike, eye_levels, place)
 
 
-def row_distances(rows: Array) -> Array:
+def measure_row_distances(rows: Array) -> Array:
     """Return the distance between every two rows, such as of ``FrameDescriptors.standardised`` [shape=(T, T)]."""
     rows = rows - rows.mean(axis=0)
     power = np.square(rows).sum(axis=1)
@@ -215,7 +215,7 @@ class LoopOrder:
         return zip(self.first.tolist(), self.second.tolist(), self.weight.tolist(), strict=True)
 
 
-def loop_order(
+def find_loop_order(
     descriptors: FrameDescriptors,
     count: int,
     rate_hz: float,
@@ -261,7 +261,7 @@ class _Plan:
     def __init__(
         self, descriptors: FrameDescriptors, rate_hz: float, allowed: NDArray[np.bool_], cuts: Sequence[int]
     ) -> None:
-        self.scenes = scenes_of(allowed, cuts)
+        self.scenes = list_scenes(allowed, cuts)
         self._scene_of = np.full(len(allowed), -1)
         for index, (start, stop) in enumerate(self.scenes):
             self._scene_of[start:stop] = index
@@ -288,13 +288,13 @@ class _Plan:
         self._least = max(1, round(LEAST_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
         self._repeat = REPEAT_S * rate_hz
-        self._fade = fade_frames(rate_hz)
+        self._fade = count_fade_frames(rate_hz)
         count = len(descriptors)
         if count > MOST_COMPARED_FRAMES:
             none = np.full((count, 1), -1), np.full((count, 1), np.inf)
             self._jumps = {1: none, -1: none}
         else:
-            distance = row_distances(descriptors.standardise(self.scenes, self._fade))
+            distance = measure_row_distances(descriptors.standardise(self.scenes, self._fade))
             self._jumps = {way: self._find_jumps(distance, way) for way in (1, -1)}
 
     def order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
@@ -371,12 +371,12 @@ class _Plan:
         return np.where(np.isfinite(least), best, -1), least
 
 
-def fade_frames(rate_hz: float) -> int:
+def count_fade_frames(rate_hz: float) -> int:
     """Return the number of frames over which a jump is cross-faded, even."""
     return max(2, 2 * round(FADE_S * rate_hz / 2))
 
 
-def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int, int]]:
+def list_scenes(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int, int]]:
     """Return the parts between cuts (first frame, end) of frames that may be shown [shape=(T,)]."""
     change = np.flatnonzero(np.diff(allowed.astype(int))) + 1
     ends = sorted({0, len(allowed), *change.tolist(), *(cut for cut in cuts if 0 < cut < len(allowed))})

@@ -51,18 +51,18 @@ class FaceShape:
     bottom_px: float
 
 
-def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
+def measure_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
     """Return the shape of the replaced part, by how far the chin is below the eyes in all frames [shape=(T,)]."""
     half = float(np.clip(JAW_SHARE * jaw_half_width * EYE_DISTANCE_PX, NARROWEST_PX, WIDEST_PX))
     highest = float(np.percentile(chin_px, 1))
     return FaceShape(half, float(np.clip(highest - MARGIN_PX, LEAST_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
 
 
-def region_map(face_to_frame: Array, scale: float) -> Array:
+def map_region(face_to_frame: Array, scale: float) -> Array:
     """Return the affine maps from a pixel of a picture of the lower face to its position in the frame.
 
     face_to_frame : maps from px of the face to those of the frame [shape=(..., 2, 3)], of
-                    ``tracking.head_pose.face_to_image``
+                    ``tracking.head_pose.map_face_to_image``
     scale         : samples a pixel
     Pixel (0, 0) is a centre. Returns an array of the same shape.
     """
@@ -71,35 +71,35 @@ def region_map(face_to_frame: Array, scale: float) -> Array:
     return np.concatenate([turn / scale, (face_to_frame[..., 2] - 0.5 + turn @ first)[..., None]], axis=-1)
 
 
-def best_scale(face_to_frame: Array) -> int:
+def choose_scale(face_to_frame: Array) -> int:
     """Return the samples a pixel, 1 to ``LARGEST_SCALE``, with which footage [maps: shape=(T, 2, 3)] loses nothing."""
     size = np.sqrt(np.abs(np.linalg.det(face_to_frame[:, :, :2])))
     return int(np.clip(np.floor(np.median(size) + 0.25), 1, LARGEST_SCALE))
 
 
-def mouth_part(scale: int) -> tuple[slice, slice]:
+def find_mouth_part(scale: int) -> tuple[slice, slice]:
     """Return the rows and columns of the mouth region in a picture of the lower face."""
     left, top = (round((near - far) * scale) for near, far in zip(mouth_region.CORNER, CORNER, strict=True))
     return slice(top, top + mouth_region.HEIGHT * scale), slice(left, left + mouth_region.WIDTH * scale)
 
 
-def replaced_part(shape: FaceShape, scale: int) -> Mask:
+def mark_replaced(shape: FaceShape, scale: int) -> Mask:
     """Return the part of the lower face that is replaced, jaw and mouth: bool array [shape=(H, W)]."""
     middle, half_height = (shape.bottom_px + TOP_PX) / 2, (shape.bottom_px - TOP_PX) / 2
-    x, y = _positions(scale)
+    x, y = _list_positions(scale)
     # wider than an ellipse under the nose, where cheeks and lip are one surface
     inside = (np.abs(x) / shape.half_width_px) ** 2.5 + (np.abs(y - middle) / half_height) ** 2.5
     return inside <= 1
 
 
-def mouth_ellipse(scale: int) -> Mask:
+def mark_mouth(scale: int) -> Mask:
     """Return the part in which the mouth is replaced, within the mouth region: bool array [shape=(H, W)]."""
     middle = mouth_region.CORNER[1] + mouth_region.HEIGHT / 2
-    x, y = _positions(scale)
+    x, y = _list_positions(scale)
     return (x / MOUTH_AXES_PX[0]) ** 2 + ((y - middle) / MOUTH_AXES_PX[1]) ** 2 <= 1
 
 
-def cheek_light(mouths: NDArray[Any]) -> Array:
+def measure_cheek_light(mouths: NDArray[Any]) -> Array:
     """Return the mean colours of the corners of mouth pictures [shape=(T, 3)]. Raises InputError: another size."""
     scale = mouths.shape[1] // mouth_region.HEIGHT if mouths.ndim == 4 else 0
     required = (mouth_region.HEIGHT * scale, mouth_region.WIDTH * scale, 3)
@@ -126,7 +126,7 @@ def relight(pictures: Pictures, gains: Array) -> Pictures:
     return result
 
 
-def _positions(scale: int) -> tuple[Array, Array]:
+def _list_positions(scale: int) -> tuple[Array, Array]:
     """Return x and y of every sample of a lower-face picture, px from the point between the eyes."""
     rows, columns = np.mgrid[: HEIGHT * scale, : WIDTH * scale]
     return (columns + 0.5) / scale + CORNER[0], (rows + 0.5) / scale + CORNER[1]
@@ -137,7 +137,7 @@ SAME_PERSON_LIKENESS = 0.78
 between those of different people up to 0.76, and 0.83 twice in 228 pairs: GRID, and three open talkers."""
 
 
-def face_signature(pictures: NDArray[Any]) -> NDArray[np.float32]:
+def compute_signature(pictures: NDArray[Any]) -> NDArray[np.float32]:
     """Return what is compared of the lower faces [shape=(N,)], from pictures [shape=(T, 128, 128, 3)] or their mean."""
     mean = pictures.reshape(-1, HEIGHT, WIDTH, 3).mean(axis=(0, 3), dtype=np.float64)
     part = mean[:110:3, 20:108:3].ravel()  # nose, cheeks and mouth, without neck and background
@@ -145,7 +145,7 @@ def face_signature(pictures: NDArray[Any]) -> NDArray[np.float32]:
     return (centred / max(float(np.linalg.norm(centred)), 1e-9)).astype(np.float32)
 
 
-def likeness(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+def compare_signatures(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
     """Return the correlation of two signatures, -1 to 1; below ``SAME_PERSON_LIKENESS`` probably of two people."""
     return float(one @ other)
 
@@ -170,9 +170,9 @@ A = -0.5
 """The parameter of cubic convolution (Keys 1981)."""
 
 
-def moved_part(scale: int) -> Mask:
+def mark_moved(scale: int) -> Mask:
     """Return where pictures of the lower face may differ from the footage: bool array [shape=(H, W)]."""
-    x, y = _positions(scale)
+    x, y = _list_positions(scale)
     top, bottom = CORNER[1] + 14.0, CORNER[1] + HEIGHT - 2.0
     middle = (top + bottom) / 2
     return (np.abs(x) / SIDE_PX[1]) ** 4 + (np.abs(y - middle) / (bottom - middle)) ** 4 <= 1
@@ -194,7 +194,7 @@ def move_chin(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pictures:
     highest = -np.minimum(LARGEST_PX, LARGEST_RISE_SHARE * room)
     drops = np.clip(drops_px, highest, np.minimum(LARGEST_PX, LARGEST_DROP_SHARE * room))
     across = (np.arange(WIDTH * scale) + 0.5) / scale + CORNER[0]
-    share = np.maximum(1 - (across / HINGE_PX) ** 2, 0) * (1 - _rise(np.abs(across), *SIDE_PX))
+    share = np.maximum(1 - (across / HINGE_PX) ** 2, 0) * (1 - _ease(np.abs(across), *SIDE_PX))
     columns = np.flatnonzero(share > 0)
     for frame in np.flatnonzero(np.abs(drops) >= LEAST_PX):
         by = float(drops[frame]) * share[columns]
@@ -208,8 +208,8 @@ def _move_columns(picture: Pictures, chin_px: float, drops: Array, scale: int) -
     down = (np.arange(len(picture)) + 0.5) / scale + CORNER[1]
     tip = chin_px + drops  # where the tip is afterwards
     moved = np.flatnonzero((down > STILL_PX) & (down < tip.max() + BELOW_PX + NECK_PX))
-    above = _rise(down[moved, None], STILL_PX, tip - ABOVE_PX)
-    below = 1 - _rise(down[moved, None], tip + BELOW_PX, tip + BELOW_PX + NECK_PX)
+    above = _ease(down[moved, None], STILL_PX, tip - ABOVE_PX)
+    below = 1 - _ease(down[moved, None], tip + BELOW_PX, tip + BELOW_PX + NECK_PX)
     position = moved[:, None] - scale * drops * above * below
     first = np.floor(position).astype(np.intp)
     part = (position - first).astype(np.float32)
@@ -227,6 +227,6 @@ def _move_columns(picture: Pictures, chin_px: float, drops: Array, scale: int) -
     return result
 
 
-def _rise(values: Array, start: Array | float, stop: Array | float) -> Array:
+def _ease(values: Array, start: Array | float, stop: Array | float) -> Array:
     """Return 0 up to ``start``, 1 from ``stop`` on, and a smooth rise between (3t² − 2t³)."""
     return smooth_step((values - start) / (np.asarray(stop) - start))

@@ -12,7 +12,7 @@ from lipmotion.errors import InputError
 from lipmotion.stats.trees import create_statistics, ridge
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
-from lipmotion_faces.appearance.candidates import choose_candidates, squared_distances
+from lipmotion_faces.appearance.candidates import choose_candidates, measure_squared_distances
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -60,16 +60,16 @@ class MotionMap:
 
     def predict(self, motion: Motion) -> Floats:
         """Return the values at every frame [shape=(T, V)]. Raises InputError: a channel is missing, or not finite."""
-        return self._regressors(channel_values(motion, self.names)) @ self.coefficients
+        return self._regressors(select_channels(motion, self.names)) @ self.coefficients
 
     def _regressors(self, values: Array) -> Floats:
         components = np.clip((values - self.mean) / self.scale @ self.basis, *self.limits).astype(np.float32)
         near = np.ascontiguousarray(components[:, : self.centres.shape[1]])
-        likeness = WEIGHT * np.exp(squared_distances(near, self.centres) / (-2 * WIDTH**2))
+        likeness = WEIGHT * np.exp(measure_squared_distances(near, self.centres) / (-2 * WIDTH**2))
         return np.concatenate([np.ones((len(values), 1), np.float32), components, likeness], axis=1)
 
 
-def channel_values(motion: Motion, names: tuple[str, ...]) -> Array:
+def select_channels(motion: Motion, names: tuple[str, ...]) -> Array:
     """Return some channels of a motion [shape=(T, len(names))]. Raises InputError: one is missing, or not finite."""
     missing = [name for name in names if name not in motion.names]
     if missing:
@@ -115,7 +115,7 @@ def fit_motion_map(values: Array, channels: tuple[Channel, ...], targets: NDArra
     return replace(unfitted, coefficients=ridge(moments, prior, strength).astype(np.float32))
 
 
-def motion_map_arrays(fitted: MotionMap) -> dict[str, NDArray[Any]]:
+def motion_map_to_arrays(fitted: MotionMap) -> dict[str, NDArray[Any]]:
     """Return a regression serialised as arrays (``MOTION_MAP``)."""
     return {name: np.asarray(getattr(fitted, name)) for name in MOTION_MAP}
 

@@ -31,7 +31,7 @@ from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance import candidates, lower_face, motion_map
 from lipmotion_faces.appearance.camera_noise import (
     CameraNoise,
-    camera_noise_arrays,
+    camera_noise_to_arrays,
     camera_noise_from_arrays,
     estimate_noise,
 )
@@ -167,7 +167,7 @@ class Appearance:
         if measured is None:
             return candidates.draw_to_recorded(predicted, self.mouth_codes)
         middle = measured.mean(axis=0)
-        wanted = middle + DISTANCE_GAINS * (motion_map.channel_values(motion, LIP_DISTANCES) - middle)
+        wanted = middle + DISTANCE_GAINS * (motion_map.select_channels(motion, LIP_DISTANCES) - middle)
         wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
         weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), motion_map.LEAST_DEVIATION)
         sought, recorded = (
@@ -181,7 +181,7 @@ class Appearance:
             if stop - first > max(1, LONGEST_CLOSURE_S * motion.rate_hz):
                 continue
             closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
-            apart = candidates.squared_distances(sought[first:stop], recorded).mean(axis=0)
+            apart = candidates.measure_squared_distances(sought[first:stop], recorded).mean(axis=0)
             pressed = self.mouth_codes[np.argmin(np.where(closed, apart, np.inf))]
             around = slice(max(first - 1, 0), stop + 1)
             mouths[around] += contact[around, None].astype(np.float32) * (pressed - mouths[around])
@@ -190,7 +190,7 @@ class Appearance:
     def measure_codes(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
         codes = self.mouth.project(
-            lower_face.relight(mouths, self.light / np.maximum(lower_face.cheek_light(mouths), 1.0))
+            lower_face.relight(mouths, self.light / np.maximum(lower_face.measure_cheek_light(mouths), 1.0))
         )
         values = codes @ self.from_mouth[1:] + self.from_mouth[0]
         return FaceCodes(codes, values[:, :-1], values[:, -1])
@@ -207,7 +207,7 @@ class Appearance:
 def learn_appearance(footage: FootagePictures) -> Appearance:
     """Return the appearance of a person, in 10 s for four minutes. Raises InputError: no pictures, or other motion."""
     pictures, light, reference = _equalise_light(footage)
-    mouths = pictures[(slice(None), *lower_face.mouth_part(1))]
+    mouths = pictures[(slice(None), *lower_face.find_mouth_part(1))]
     training = choose_evenly(TRAINING_PICTURES, len(pictures))
     mouth = fit_eigenlips(mouths[training], COMPONENTS)
     codes = mouth.project(mouths)
@@ -234,7 +234,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         footage.scale,
         reference,
         mouth,
-        np.ascontiguousarray(recorded(chosen)[(slice(None), *lower_face.mouth_part(footage.scale))]),
+        np.ascontiguousarray(recorded(chosen)[(slice(None), *lower_face.find_mouth_part(footage.scale))]),
         codes[chosen],
         footage.motion[chosen][:, [names.index(name) for name in LIP_DISTANCES]],
         jaw,
@@ -255,8 +255,8 @@ def _equalise_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
             f"{count} pictures, {len(footage.motion)} frames of motion and {len(footage.levels_db)} of sound; required "
             "as many of each"
         )
-    part = (slice(None), *lower_face.mouth_part(1))
-    light = np.maximum(np.concatenate([lower_face.cheek_light(clip[part]) for clip in footage.clips]), 1.0)
+    part = (slice(None), *lower_face.find_mouth_part(1))
+    light = np.maximum(np.concatenate([lower_face.measure_cheek_light(clip[part]) for clip in footage.clips]), 1.0)
     reference = np.median(light, axis=0)
     pictures, start = np.empty((count, *footage.clips[0].shape[1:]), np.uint8), 0
     for clip in footage.clips:
@@ -271,8 +271,8 @@ def _isolate_jaw(pictures: Pictures, mean: Floats, shape: lower_face.FaceShape) 
     from scipy.ndimage import binary_dilation
 
     scale = pictures.shape[1] // lower_face.HEIGHT
-    other = lower_face.mouth_ellipse(scale) | ~binary_dilation(
-        lower_face.replaced_part(shape, scale), iterations=EDGE_PX * scale
+    other = lower_face.mark_mouth(scale) | ~binary_dilation(
+        lower_face.mark_replaced(shape, scale), iterations=EDGE_PX * scale
     )
     result = pictures.copy()
     result[:, other] = np.rint(mean[other]).astype(np.uint8)
@@ -323,13 +323,13 @@ PARTS = ("mouth", "jaw", "from_motion", "noise")
 REMEDY = "build the face again"
 
 
-def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
+def appearance_to_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
     """Return the appearance of a person serialised as arrays (``APPEARANCE`` and those of ``PARTS``)."""
     parts = {
         "mouth": eigenlips_to_arrays(appearance.mouth),
         "jaw": eigenlips_to_arrays(appearance.jaw),
-        "from_motion": motion_map.motion_map_arrays(appearance.from_motion),
-        "noise": camera_noise_arrays(appearance.noise),
+        "from_motion": motion_map.motion_map_to_arrays(appearance.from_motion),
+        "noise": camera_noise_to_arrays(appearance.noise),
     }
     arrays = {f"{part}/{name}": array for part, inner in parts.items() for name, array in inner.items()}
     shape = appearance.shape

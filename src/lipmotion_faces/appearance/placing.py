@@ -45,7 +45,7 @@ def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int]) -> Flo
     return patch
 
 
-def inverse_map(to_source: Array) -> Array:
+def invert_map(to_source: Array) -> Array:
     """Return the inverse of an affine map [shape=(2, 3)]. Raises InputError: a map that cannot be inverted."""
     _check_map(to_source)
     turn = np.linalg.inv(to_source[:, :2])
@@ -80,7 +80,7 @@ def place(frame: NDArray[np.uint8], patch: Pictures, weight: Floats, to_frame: A
     _check_frame(frame)
     if patch.ndim != 3 or patch.shape[2] != 3 or weight.shape != patch.shape[:2]:
         raise InputError(f"weight of shape {weight.shape} for a patch of {patch.shape}; required (h, w) and (h, w, 3)")
-    to_patch = inverse_map(to_frame)
+    to_patch = invert_map(to_frame)
     height, width = weight.shape
     corners = to_frame[:, :2] @ np.array([[-1, width, -1, width], [-1, -1, height, height]]) + to_frame[:, 2:]
     left, top = (max(0, int(np.floor(values.min()))) for values in corners)

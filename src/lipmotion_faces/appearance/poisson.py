@@ -74,7 +74,7 @@ class NestedGrids:
         nodes = np.concatenate(self.nodes)
         basis = csr_array((np.ones(len(nodes)), (nodes, np.arange(len(nodes)))), shape=(count, len(nodes)))
         between = np.setdiff1d(np.flatnonzero(self.region), nodes)
-        spacing = 1 << _levels(self.region.shape, len(self.nodes) - 1).ravel()[between]
+        spacing = 1 << _find_levels(self.region.shape, len(self.nodes) - 1).ravel()[between]
         odd_row, odd_column = (between // width // spacing) % 2, (between % width // spacing) % 2
         weights = csr_array((count, count))
         for row, row_weight in TAPS:
@@ -126,25 +126,25 @@ class GridFiller:
         pairs = self._scratch[0, : prod(length)].reshape(length)
         length[axis] = count - 2
         outer = self._scratch[1, : prod(length)].reshape(length)
-        np.add(_part(values, axis, 0, count), _part(values, axis, 1, count + 1), out=pairs)
-        np.add(_part(pairs, axis, 0, count - 2), _part(pairs, axis, 2, count), out=outer)
+        np.add(_cut_part(values, axis, 0, count), _cut_part(values, axis, 1, count + 1), out=pairs)
+        np.add(_cut_part(pairs, axis, 0, count - 2), _cut_part(pairs, axis, 2, count), out=outer)
         outer *= np.float32(-1 / 16)  # both together have the weights of TAPS
         pairs *= np.float32(10 / 16)
-        np.add(outer, _part(pairs, axis, 1, count - 1), out=_part(out, axis, 1, count - 1))
+        np.add(outer, _cut_part(pairs, axis, 1, count - 1), out=_cut_part(out, axis, 1, count - 1))
 
 
-def nested_grids(region: NDArray[np.bool_]) -> NestedGrids:
+def nest_grids(region: NDArray[np.bool_]) -> NestedGrids:
     """Return the nodes of a region: bool array [shape=(H, W)] that is False on its outermost pixels."""
     from scipy.ndimage import distance_transform_cdt
 
     clearance = distance_transform_cdt(region, "chessboard")
     widest = max((level for level in range(1, LEVELS + 1) if clearance.max() > CLEARANCE << (level - 1)), default=0)
-    levels = _levels(region.shape, widest)
+    levels = _find_levels(region.shape, widest)
     node = region & ((levels == widest) | (clearance <= CLEARANCE << levels))
     return NestedGrids(region, tuple(np.flatnonzero(node & (levels == level)) for level in range(widest + 1)))
 
 
-def _levels(shape: tuple[int, ...], widest: int) -> Index:
+def _find_levels(shape: tuple[int, ...], widest: int) -> Index:
     """Return the widest grid that each pixel lies on, up to grid ``widest`` [shape=(H, W)]."""
     levels = np.zeros(shape, np.intp)
     for level in range(1, widest + 1):
@@ -152,7 +152,7 @@ def _levels(shape: tuple[int, ...], widest: int) -> Index:
     return levels
 
 
-def _part(values: Floats, axis: int, start: int, stop: int) -> Floats:
+def _cut_part(values: Floats, axis: int, start: int, stop: int) -> Floats:
     return values[(slice(None),) * axis + (slice(start, stop),)]
 
 
@@ -169,7 +169,7 @@ BATCH = 64
 
 @dataclass(frozen=True, eq=False)
 class CloningSystem:
-    """The Poisson equation of one region, solved for any pictures by one matrix product; made by ``cloning_system``.
+    """The Poisson equation of one region, solved for any pictures by one matrix product; made by ``build_cloning_system``.
 
     mask     : bool array [shape=(h, w)], the pixels that cloning replaces
     box      : the rows and the columns of the region and its edge
@@ -251,7 +251,7 @@ class CloningSystem:
             raise InputError(f"{len(source)} source and {len(background)} background pictures; give as many of each")
 
 
-def cloning_system(mask: Mask) -> CloningSystem:
+def build_cloning_system(mask: Mask) -> CloningSystem:
     """Return the equation of a region, solved once for all pictures.
 
     mask : bool array [shape=(h, w)], True in the region; any shape, in several parts, with holes
@@ -280,7 +280,7 @@ def cloning_system(mask: Mask) -> CloningSystem:
             f"region with {len(edge)} pixels on its edge, at most {LARGEST_EDGE} are possible; "
             "use a smaller or smoother mask"
         )
-    grids = nested_grids(region)
+    grids = nest_grids(region)
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import splu
 

@@ -98,7 +98,7 @@ def read_weights(path: Path) -> dict[int, dict[int, float]]:
     Raises InputError: no such file, other columns, a row that is damaged, or a vertex and point that occur twice.
     """
     paint: dict[int, dict[int, float]] = {}
-    for number, row in _rows(path, WEIGHT_COLUMNS, "table of weights"):
+    for number, row in _read_rows(path, WEIGHT_COLUMNS, "table of weights"):
         vertex, point = (parse_whole(text, f"{path}: line {number}: the number of a point is") for text in row[:2])
         weights = paint.setdefault(vertex, {})
         if point in weights:
@@ -125,7 +125,7 @@ def read_points(path: Path) -> dict[int, int]:
     Raises InputError: no such file, other columns, a row that is damaged, or a point that occurs twice.
     """
     named: dict[int, int] = {}
-    for number, row in _rows(path, POINT_COLUMNS, "table of lip points"):
+    for number, row in _read_rows(path, POINT_COLUMNS, "table of lip points"):
         point, vertex = (parse_whole(text, f"{path}: line {number}: the number of a point is") for text in row)
         if point in named:
             raise InputError(f"{path}: line {number}: the point {point} occurs twice; remove one")
@@ -133,7 +133,7 @@ def read_points(path: Path) -> dict[int, int]:
     return named
 
 
-def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:
+def _read_rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:
     """Yield the rows of a table with their line numbers; empty lines and lines that begin with # are left out."""
     names, rows = read_whole_table(path, kind, LARGEST_TABLE_BYTES, columns)
     if names != list(columns):

@@ -95,7 +95,7 @@ def calibrate_rows(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str
     return calibrated
 
 
-def pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
+def list_pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
     """Return the values of curves in ``POSES``: those of a character, or those that the rows of a rig follow.
 
     Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.

@@ -79,8 +79,8 @@ class _Surface:
                 self.names[self.here] = len(self.names)
             vertices, textures = len(self.vertices) // 3, len(self.textures) // 2
             split = [word.split(b"/", 2) for word in words]
-            corners = [_index(each[0], vertices) for each in split]
-            mapped = [_index(each[1], textures) if len(each) > 1 and each[1] else -1 for each in split]
+            corners = [_parse_index(each[0], vertices) for each in split]
+            mapped = [_parse_index(each[1], textures) if len(each) > 1 and each[1] else -1 for each in split]
             for n in range(1, len(words) - 1):
                 self.corners.extend((corners[0], corners[n], corners[n + 1]))
                 self.mapped.extend((mapped[0], mapped[n], mapped[n + 1]))
@@ -93,11 +93,11 @@ class _Surface:
             self.budget.spend("corners of textures", 1)
             self.textures.extend(map(float, [*words, b"0", b"0"][:2]))
         elif kind in {b"o", b"g"}:
-            self.here = (_text(words), self.here[1])
+            self.here = (_join_words(words), self.here[1])
         elif kind == b"usemtl":
-            self.here = (self.here[0], _text(words))
+            self.here = (self.here[0], _join_words(words))
         elif kind == b"mtllib":
-            self.library = _text(words)
+            self.library = _join_words(words)
 
 
 def read_obj(path: Path) -> Mesh:
@@ -111,14 +111,14 @@ def read_obj(path: Path) -> Mesh:
     budget = Budget()
     surface, number = _Surface(budget), 0
     try:
-        for line, words in _lines(budget.file_bytes(path, "mesh"), _STATEMENTS, budget):
+        for line, words in _list_lines(budget.file_bytes(path, "mesh"), _STATEMENTS, budget):
             number = line
             surface.add(words[0], words[1:])
         number = 0
         vertices, uv = _as_rows(surface.vertices, 3), _as_rows(surface.textures, 2)
         painted = _as_rows(surface.colours, 3, missing=True)
     except ValueError as error:
-        raise _damaged(path, error, number) from error
+        raise _explain_damage(path, error, number) from error
     if not surface.corners:
         raise InputError(f"{path}: there are no polygons in it, required a mesh; export the surface, not points alone")
     used = {material for _, material in surface.names}
@@ -168,7 +168,7 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
                 _add_vertex(places, line[1].split())
             vertices = _as_rows(places, 3)
         except ValueError as error:
-            raise _damaged(path, error) from error
+            raise _explain_damage(path, error) from error
         if vertices.shape != mesh.vertices.shape:
             raise InputError(
                 f"{path}: {len(vertices)} vertices, required {len(mesh.vertices)} as in {neutral[0].name}; "
@@ -179,7 +179,7 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
     return replace(mesh, shapes=tuple(shapes))
 
 
-def _damaged(path: Path, error: ValueError, number: int = 0) -> InputError:
+def _explain_damage(path: Path, error: ValueError, number: int = 0) -> InputError:
     """Return the error of a file, whose line is named where the number is not 0."""
     text = str(error)
     if text.startswith(str(path)):
@@ -187,7 +187,7 @@ def _damaged(path: Path, error: ValueError, number: int = 0) -> InputError:
     return InputError(f"{path}: {shorten(text)}{f' in line {number}' if number else ''}; export the mesh as OBJ again")
 
 
-def _lines(content: bytes, kinds: re.Pattern[bytes], budget: Budget) -> Iterator[tuple[int, list[bytes]]]:
+def _list_lines(content: bytes, kinds: re.Pattern[bytes], budget: Budget) -> Iterator[tuple[int, list[bytes]]]:
     """Yield the number of each line of some kinds, and its words; a backslash at the end of a line continues it."""
     budget.spend("lines", max(content.count(b"\n"), content.count(b"\r")))
     number, at = 1, 0
@@ -201,7 +201,7 @@ def _lines(content: bytes, kinds: re.Pattern[bytes], budget: Budget) -> Iterator
 
 def _add_vertex(vertices: array[float], words: list[bytes]) -> None:
     if len(words) < 3:
-        raise ValueError(f"{_text(words)!r} is no vertex of 3 numbers")
+        raise ValueError(f"{_join_words(words)!r} is no vertex of 3 numbers")
     vertices.extend(map(float, words[:3]))
 
 
@@ -212,15 +212,15 @@ def _as_rows(numbers: array[float], width: int, *, missing: bool = False) -> NDA
     return values
 
 
-def _index(word: bytes, count: int) -> int:
+def _parse_index(word: bytes, count: int) -> int:
     number = int(word)
     index = number - 1 if number > 0 else count + number
     if number == 0 or not 0 <= index < count:
-        raise ValueError(f"a polygon names vertex {shorten(_text([word]))} of {count}")
+        raise ValueError(f"a polygon names vertex {shorten(_join_words([word]))} of {count}")
     return index
 
 
-def _text(words: list[bytes]) -> str:
+def _join_words(words: list[bytes]) -> str:
     return b" ".join(words).decode("utf-8", "replace")
 
 
@@ -232,21 +232,21 @@ def _read_materials(folder: Path, library: str, used: Collection[str], budget: B
     materials: dict[str, Material] = {}
     pictures: dict[str, str] = {}
     name = ""
-    for _, (kind, *words) in _lines(budget.file_bytes(path, "material library"), _LOOKS, budget):
+    for _, (kind, *words) in _list_lines(budget.file_bytes(path, "material library"), _LOOKS, budget):
         if kind == b"newmtl":
-            name = _text(words)
+            name = _join_words(words)
             materials[name] = Material(name)
         elif name in materials and name in used and words:
             if kind == b"map_Kd":
-                pictures[name] = _text(words[-1:])
+                pictures[name] = _join_words(words[-1:])
             elif kind == b"Kd" and len(words) == 3:
-                red, green, blue = (min(max(_number(word), 0.0), 1.0) for word in words)
+                red, green, blue = (min(max(_parse_number(word), 0.0), 1.0) for word in words)
                 materials[name] = replace(materials[name], colour=(red, green, blue))
             elif kind == b"Ns" and len(words) == 1:
-                shininess = max(_number(words[0]), 0.0)
+                shininess = max(_parse_number(words[0]), 0.0)
                 materials[name] = replace(materials[name], gloss=shininess / (shininess + _SHININESS))
             elif kind in {b"d", b"Tf"}:  # Maya writes Tf as 1 less the transparency
-                materials[name] = replace(materials[name], opacity=min(max(_number(words[-1]), 0.0), 1.0))
+                materials[name] = replace(materials[name], opacity=min(max(_parse_number(words[-1]), 0.0), 1.0))
     textures = {picture: _read_texture(folder, picture, budget) for picture in dict.fromkeys(pictures.values())}
     for name, picture in pictures.items():
         texture = textures[picture]
@@ -278,7 +278,7 @@ def _find_sibling(folder: Path, name: str) -> Path | None:
     return folder / name if name and Path(name).name == name and is_file(folder / name) else None
 
 
-def _number(word: bytes) -> float:
+def _parse_number(word: bytes) -> float:
     try:
         value = float(word)
     except ValueError:

@@ -69,7 +69,7 @@ _VRM = {
 """What is used of VRM 0.x and of VRM 1.0."""
 
 
-def gltf_schema(json: Mapping[str, Any]) -> Schema:
+def build_schema(json: Mapping[str, Any]) -> Schema:
     """Return the schema of one document: its references must be to items that it has."""
     counts = {name: len(listed) for name in _LISTS if isinstance(listed := json.get(name), list)}
 
@@ -117,11 +117,11 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
     webp = members({"source": to("images")}, ["source"])
     lists = {
         "accessors": members(accessor, ["componentType", "count", "type"]),
-        "animations": if_fits(members(_animation(to("nodes"), to("accessors")))),
+        "animations": if_fits(members(_build_animation_schema(to("nodes"), to("accessors")))),
         "buffers": members({"uri": text(_LARGEST_INTEGER), "byteLength": _SIZE}),
-        "bufferViews": members(_view(to("buffers")), ["buffer", "byteLength"]),
+        "bufferViews": members(_build_view_schema(to("buffers")), ["buffer", "byteLength"]),
         "images": members({"uri": text(_LARGEST_INTEGER), "bufferView": to("bufferViews")}),
-        "materials": members(_material(to("textures"), vector)),
+        "materials": members(_build_material_schema(to("textures"), vector)),
         "meshes": members(mesh, ["primitives"]),
         "nodes": members(node),
         "scenes": members({"nodes": items(to("nodes"))}),
@@ -133,7 +133,7 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
     return members(table | others)
 
 
-def _animation(node: Schema, accessor: Schema) -> dict[str, Schema]:
+def _build_animation_schema(node: Schema, accessor: Schema) -> dict[str, Schema]:
     """Return what is used of an animation; channels of other kinds are left out."""
     pointer = members({"KHR_animation_pointer": members({"pointer": _WORD})})
     target = members({"node": node, "path": _WORD, "extensions": if_fits(pointer)})
@@ -145,7 +145,7 @@ def _animation(node: Schema, accessor: Schema) -> dict[str, Schema]:
     }
 
 
-def _view(buffer: Schema) -> dict[str, Schema]:
+def _build_view_schema(buffer: Schema) -> dict[str, Schema]:
     place = {"buffer": buffer, "byteOffset": _SIZE, "byteLength": _SIZE}
     packed = {
         **{**place, "byteStride": whole(1, 256), "count": _SIZE, "filter": _WORD},
@@ -158,7 +158,7 @@ def _view(buffer: Schema) -> dict[str, Schema]:
     }
 
 
-def _material(texture: Schema, vector: Any) -> dict[str, Schema]:
+def _build_material_schema(texture: Schema, vector: Any) -> dict[str, Schema]:
     moved = members({"offset": vector(2), "scale": vector(2), "rotation": _NUMBER})
     placed = {"index": texture, "extensions": members({"KHR_texture_transform": moved})}
     look = {
@@ -189,7 +189,7 @@ extensions are accepted as well."""
 class GltfDocument:
     """The JSON of a glTF file, and its buffers.
 
-    parts   : what is used of it, of the types and in the ranges of ``gltf_schema``
+    parts   : what is used of it, of the types and in the ranges of ``build_schema``
     budget  : what has been read so far
     buffers : by number; a buffer that only the extension for compression could use is missing
     """
@@ -243,7 +243,7 @@ def read_gltf_document(path: Path) -> GltfDocument:
     if version.split(".", maxsplit=1)[0] != str(VERSION):
         raise InputError(f"glTF version {version!r}, required 2.0; export it again")
     try:
-        document = GltfDocument(json, gltf_schema(json)(json), path.parent, budget)
+        document = GltfDocument(json, build_schema(json)(json), path.parent, budget)
     except SchemaError as error:
         raise InputError(f"{error}; export it again") from error
     for name in document.parts.get("extensionsRequired", []):
@@ -282,7 +282,7 @@ def _split_chunks(content: memoryview) -> tuple[memoryview, memoryview | None]:
     return chunks[JSON_CHUNK], chunks.get(BINARY_CHUNK)
 
 
-def plain_name(name: str) -> str:
+def clean_name(name: str) -> str:
     """Return a name, or its beginning, on one line, which UTF-8 can encode."""
     return " ".join(name[:LONGEST_NAME_CHARACTERS].encode("utf-8", "replace").decode().split())
 

@@ -35,7 +35,7 @@ from lipmotion_faces.characters.gltf_document import (
     GltfDocument,
     PlacedNode,
     place_nodes,
-    plain_name,
+    clean_name,
     read_gltf_document,
 )
 from lipmotion_faces.characters.textures import decode_srgb, encode_srgb, read_texture
@@ -83,7 +83,7 @@ class _Materials:
                 colour = colour if texture else np.array(UNKNOWN)
             red, green, blue = np.clip(colour, 0, 1).tolist()
             self._materials[number] = Material(
-                plain_name(stored.get("name", "")),
+                clean_name(stored.get("name", "")),
                 (red, green, blue),
                 1 - min(max(look.get("roughnessFactor", 1.0), 0.0), 1.0),
                 1.0 if alpha == OPAQUE else float(factor[3]),
@@ -241,7 +241,7 @@ class _SceneSurface:
             node = self._document.items("nodes")[number]
             if "mesh" in node:
                 mesh = self._document.items("meshes")[node["mesh"]]
-                name = plain_name(node.get("name") or mesh.get("name", "")) or f"mesh {node['mesh']}"
+                name = clean_name(node.get("name") or mesh.get("name", "")) or f"mesh {node['mesh']}"
                 self._budget.spend("parts", len(mesh["primitives"]))
                 for primitive in mesh["primitives"]:
                     if primitive.get("mode", TRIANGLES) == TRIANGLES and "POSITION" in primitive["attributes"]:
@@ -394,7 +394,7 @@ def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
     stored: list[str] = next((names for names in (*holders, arrays) if any(names)), [])
     names: list[str] = []
     for number in range(len(targets)):
-        name = plain_name(stored[number]) if number < len(stored) else ""
+        name = clean_name(stored[number]) if number < len(stored) else ""
         names.append(name if name and name not in names else f"target {number}")
     return names
 
@@ -412,15 +412,15 @@ def _build_expression_shapes(
     """Yield the expressions of a VRM as blendshapes, by the names of VRM 1.0; none for other files."""
     extensions, expressions = document.parts.get("extensions", {}), dict[str, list[Bind]]()
     for group in extensions.get("VRM", {}).get("blendShapeMaster", {}).get("blendShapeGroups", []):
-        preset = plain_name(group.get("presetName", "")).lower()
-        name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else plain_name(group.get("name", ""))
+        preset = clean_name(group.get("presetName", "")).lower()
+        name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else clean_name(group.get("name", ""))
         expressions[name] = [_read_bind(each["mesh"], each, FULL_WEIGHT) for each in group.get("binds", [])]
     kinds = extensions.get("VRMC_vrm", {}).get("expressions", {})
     meshes = dict(enumerate(node.get("mesh", -1) for node in document.items("nodes")))
     for kind in ("preset", "custom"):
         for name, expression in kinds.get(kind, {}).items():
             binds = expression.get("morphTargetBinds", [])
-            expressions[plain_name(name)] = [_read_bind(meshes.get(each["node"], -1), each, 1.0) for each in binds]
+            expressions[clean_name(name)] = [_read_bind(meshes.get(each["node"], -1), each, 1.0) for each in binds]
     by_name = {shape.name: shape for shape in shapes}
     for name, bound in expressions.items():
         used = [(by_name[targets[bind[:2]]], bind[2]) for bind in bound if bind[:2] in targets]

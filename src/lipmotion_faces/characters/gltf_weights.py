@@ -28,7 +28,7 @@ from lipmotion_faces.characters.gltf_document import (
     GltfArrays,
     GltfDocument,
     place_nodes,
-    plain_name,
+    clean_name,
     read_gltf_document,
 )
 from lipmotion_faces.characters.gltf_scene import name_mesh_targets
@@ -103,7 +103,7 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     document = read_gltf_document(path)
     arrays = GltfArrays(document)
     animations = [
-        (each, tracks) for each in document.items("animations") if (tracks := list(_tracks(document, arrays, each)))
+        (each, tracks) for each in document.items("animations") if (tracks := list(_read_tracks(document, arrays, each)))
     ]
     if not animations:
         raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
@@ -115,19 +115,19 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
     animation, tracks = next((each for each in animations if any(map(moves_mouth, each[1]))), animations[0])
     if len(animations) > 1:
-        named = [plain_name(each.get("name", "")) or "without a name" for each, _ in animations]
+        named = [clean_name(each.get("name", "")) or "without a name" for each, _ in animations]
         which = [each is animation for each, _ in animations].index(True)
         listed = ", ".join(named)
         LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(named), listed, named[which])
     turns: dict[str, tuple[int, _Track]] = {}  # of the first neck and the first head, with the numbers of their nodes
-    for number, target, sampler in _targets(document, animation):
+    for number, target, sampler in _list_targets(document, animation):
         kind = find_bone_kind(document.items("nodes")[number].get("name", ""))
         if target == "rotation" and kind in TURNING and kind not in turns:
             turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
     ordered = dict(turns[kind] for kind in TURNING if kind in turns)
     longest = max(tracks, key=lambda track: len(track.time_s))
     end_s = max(float(track.time_s[-1]) for track in tracks)
-    hertz = _rate(longest.time_s)
+    hertz = _find_rate(longest.time_s)
     count = int(np.floor(end_s * hertz + ROUNDING_FRAMES)) + 1
     document.budget.spend("numbers", count * sum(len(track.names) for track in tracks))
     time_s = np.arange(count) / hertz
@@ -163,7 +163,7 @@ def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Arra
     return np.asarray(np.broadcast_to(turned.as_quat(), (len(time_s), 4)))
 
 
-def _rate(time_s: Array) -> float:
+def _find_rate(time_s: Array) -> float:
     """Return the frames a second of even keys that begin at 0, else ``SAMPLED_HZ``."""
     steps = np.diff(time_s)
     if len(steps) < 2 or time_s[0] > steps[0] * EVEN_SHARE or np.ptp(steps) > EVEN_SHARE * steps.mean():
@@ -172,7 +172,7 @@ def _rate(time_s: Array) -> float:
     return exact_rate(round(hertz, 3), 1e-3) if hertz >= SLOWEST_HZ else SAMPLED_HZ
 
 
-def _targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator[tuple[int, str, dict[str, Any]]]:
+def _list_targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator[tuple[int, str, dict[str, Any]]]:
     """Yield the node, the path and the sampler of every channel of an animation that has keys."""
     samplers = animation.get("samplers", [])
     for channel in animation.get("channels", []):
@@ -191,16 +191,16 @@ def _targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator[tupl
             yield node, path, samplers[number]
 
 
-def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> Iterator[_Track]:
+def _read_tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> Iterator[_Track]:
     """Yield what moves a face in an animation. Raises InputError: its keys are damaged."""
     stored = document.parts.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions", {})
     expressions = {
-        each["node"]: plain_name(name)
+        each["node"]: clean_name(name)
         for kind in ("preset", "custom")
         for name, each in stored.get(kind, {}).items()
         if "node" in each
     }
-    for node, path, sampler in _targets(document, animation):
+    for node, path, sampler in _list_targets(document, animation):
         if path.startswith("weights"):
             owner, one = document.items("nodes")[node].get("mesh", -1), path.partition("/")[2]
             names = name_mesh_targets(document, document.items("meshes")[owner]) if owner >= 0 else ()

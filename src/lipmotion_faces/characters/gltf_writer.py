@@ -26,7 +26,7 @@ SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:|//")
 LATEST_S = 86_400.0
 
 
-def sound_extras(sound: str, start_s: float) -> dict[str, Any]:
+def describe_sound(sound: str, start_s: float) -> dict[str, Any]:
     """Return what a scene says of its sound: a URI, as those of buffers and pictures, and when the sound begins.
 
     sound   : a path from the folder of the file, with slashes
@@ -149,7 +149,7 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
         "materials": materials,
     }
     if scene.sound:
-        document["scenes"][0]["extras"] = sound_extras(scene.sound, scene.sound_s)
+        document["scenes"][0]["extras"] = describe_sound(scene.sound, scene.sound_s)
     if scene.turn is not None:
         _add_joints(document, buffer, scene.turn)
     if scene.weights is not None and len(scene.weights.values) and (mesh.shapes or scene.turn):
@@ -300,6 +300,6 @@ def write_animated_gltf(
     if sound:
         shown = json["scenes"][json.get("scene", 0)] if json.get("scenes") else json
         extras = shown.get("extras")
-        shown["extras"] = (extras if isinstance(extras, dict) else {}) | sound_extras(sound, sound_s)
+        shown["extras"] = (extras if isinstance(extras, dict) else {}) | describe_sound(sound, sound_s)
     write_container(path, json, b"".join(buffer.chunks))
     return True

@@ -108,7 +108,7 @@ def compute_shading_normals(mesh: Mesh, *, split: bool = True) -> ShadingNormals
     joined = build_surface(mesh).places if split else np.arange(len(mesh.vertices))
     triangles = joined[mesh.triangles].astype(np.int32)
     count = int(joined.max(initial=-1)) + 1
-    rest = _joined_normals(mesh.vertices, triangles, joined, count)
+    rest = _join_normals(mesh.vertices, triangles, joined, count)
     turned = []
     for shape in mesh.shapes:
         moved = mesh.vertices.copy()
@@ -119,13 +119,13 @@ def compute_shading_normals(mesh: Mesh, *, split: bool = True) -> ShadingNormals
         touched = np.zeros(count, bool)
         touched[around] = True
         wider = triangles[touched[triangles].any(axis=1)]
-        change = _joined_normals(moved, wider, joined, count) - rest
+        change = _join_normals(moved, wider, joined, count) - rest
         rows = np.flatnonzero(touched[joined] & (np.abs(change).max(axis=1) > LEAST_TURN))
         turned.append((rows.astype(np.int64), change[rows]))
     return ShadingNormals(rest, tuple(turned))
 
 
-def _joined_normals(vertices: Array, triangles: NDArray[np.int32], joined: NDArray[np.int64], count: int) -> Array:
+def _join_normals(vertices: Array, triangles: NDArray[np.int32], joined: NDArray[np.int64], count: int) -> Array:
     places = np.zeros((count, 3))
     places[joined] = vertices
     return np.asarray(compute_normals(places, triangles)[joined])

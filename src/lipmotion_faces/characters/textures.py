@@ -79,7 +79,7 @@ class TextureTable:
         return (first + np.clip(np.rint(halvings), 0, last - first)).astype(np.int32)
 
 
-def texture_table(textures: Sequence[Texture]) -> TextureTable:
+def build_texture_table(textures: Sequence[Texture]) -> TextureTable:
     """Return textures with their reductions; each pixel of a reduction is the mean of four, weighted by opacity."""
     texels: list[NDArray[np.uint16]] = []
     levels: list[tuple[int, int, int]] = []

@@ -24,16 +24,16 @@ INDENT = "    "
 _CONTROL = re.compile("[\x00-\x1f\x7f]")
 
 
-def prim(schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str) -> Iterator[str]:
+def write_prim(schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str) -> Iterator[str]:
     """Yield the lines of a prim.
 
     schema  : ``Mesh``, for instance
-    name    : as of ``prim_names``
+    name    : as of ``name_prims``
     inside  : the lines of its attributes and of its own prims
     schemas : API schemas that are applied to it
     about   : further metadata, as ``kind``
 
-    >>> print("\\n".join(prim("Scope", "Looks", ["token purpose"], kind="group")))
+    >>> print("\\n".join(write_prim("Scope", "Looks", ["token purpose"], kind="group")))
     def Scope "Looks" (
         kind = "group"
     )
@@ -43,7 +43,7 @@ def prim(schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str
     """
     lines = [f'{INDENT}{key} = "{value}"' for key, value in about.items()]
     if schemas:
-        lines.insert(0, f"{INDENT}prepend apiSchemas = {tokens(schemas)}")
+        lines.insert(0, f"{INDENT}prepend apiSchemas = {format_tokens(schemas)}")
     yield f'def {schema} "{name}"' + (" (" if lines else "")
     if lines:
         yield from (*lines, ")")
@@ -52,10 +52,10 @@ def prim(schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str
     yield "}"
 
 
-def prim_names(names: Iterable[str]) -> list[str]:
+def name_prims(names: Iterable[str]) -> list[str]:
     """Return names of letters, digits and low lines, as prims need them, none twice.
 
-    >>> prim_names(["mouthSmile_L", "head.mouthSmile_L", "head mouthSmile_L", "2"])
+    >>> name_prims(["mouthSmile_L", "head.mouthSmile_L", "head mouthSmile_L", "2"])
     ['mouthSmile_L', 'head_mouthSmile_L', 'head_mouthSmile_L_2', '_2']
     """
     taken: dict[str, None] = {}
@@ -70,10 +70,10 @@ def prim_names(names: Iterable[str]) -> list[str]:
     return list(taken)
 
 
-def tokens(names: Iterable[str]) -> str:
+def format_tokens(names: Iterable[str]) -> str:
     """Return names as an array of tokens; control characters are escaped, surrogates as in Python.
 
-    >>> print(tokens(['a"b', "c\\nd"]))
+    >>> print(format_tokens(['a"b', "c\\nd"]))
     ["a\\"b", "c\\x0ad"]
     """
     escaped = (as_text(name).replace("\\", "\\\\").replace('"', '\\"') for name in names)
@@ -81,12 +81,12 @@ def tokens(names: Iterable[str]) -> str:
     return "[" + ", ".join(f'"{name}"' for name in plain) + "]"
 
 
-def asset(path: str) -> str:
+def format_asset(path: str) -> str:
     """Return a path from the folder of the file, with slashes, as a reference to a file.
 
     Raises ExportError: a name with a line end or another control character, which USD cannot refer to.
 
-    >>> asset("welcome.flac"), asset("../a@b.wav"), asset("a@@@b.wav")
+    >>> format_asset("welcome.flac"), format_asset("../a@b.wav"), format_asset("a@@@b.wav")
     ('@./welcome.flac@', '@@@../a@b.wav@@@', '@@@./a\\\\@@@b.wav@@@')
     """
     if not is_line(path):
@@ -96,24 +96,24 @@ def asset(path: str) -> str:
     return mark + ("" if absolute else "./") + path.replace("@@@", "\\@@@") + mark
 
 
-def _whole(values: NDArray[np.integer]) -> str:
+def _format_integers(values: NDArray[np.integer]) -> str:
     return "[" + ", ".join(map(str, values.tolist())) + "]"
 
 
-def _numbers(values: NDArray[np.floating]) -> str:
+def _format_numbers(values: NDArray[np.floating]) -> str:
     """Return numbers as an array, or rows of three as an array of tuples, with the seven digits of single precision."""
     if values.ndim == 1:
         return "[" + ", ".join([f"{value:.7g}" for value in (values + 0.0).tolist()]) + "]"
     return "[" + ", ".join([f"({x:.7g}, {y:.7g}, {z:.7g})" for x, y, z in (values + 0.0).tolist()]) + "]"
 
 
-def _tuple(values: NDArray[np.floating]) -> str:
+def _format_tuple(values: NDArray[np.floating]) -> str:
     return "(" + ", ".join([f"{value:.7g}" for value in (values + 0.0).tolist()]) + ")"
 
 
-def _matrix(values: NDArray[np.floating]) -> str:
+def _format_matrix(values: NDArray[np.floating]) -> str:
     """Return a matrix [shape=(4, 4)], its rows one after another; USD multiplies rows from the left."""
-    return "( " + ", ".join(map(_tuple, values)) + " )"
+    return "( " + ", ".join(map(_format_tuple, values)) + " )"
 
 
 ROOT = "Character"
@@ -134,32 +134,32 @@ def write_usda(path: Path, scene: Scene) -> None:
     Raises ExportError: the file cannot be written.
     """
     normals = compute_shading_normals(scene.mesh, split=scene.split)
-    last_code = max(len(scene.weights.values) - 1, 0) * _codes_per_key(scene) if scene.weights else 0.0
-    rate, last, bound = f"{_codes_hz(scene):.9g}", f"{last_code:.9g}", ("SkelBindingAPI",)
-    places = [np.eye(4), np.eye(4)][: len(_joints(scene))]
+    last_code = max(len(scene.weights.values) - 1, 0) * _count_codes_per_key(scene) if scene.weights else 0.0
+    rate, last, bound = f"{_choose_codes_hz(scene):.9g}", f"{last_code:.9g}", ("SkelBindingAPI",)
+    places = [np.eye(4), np.eye(4)][: len(_list_joints(scene))]
     if scene.turn is not None:
         places[1][3, :3] = scene.turn.pivot
-    matrices = ", ".join(map(_matrix, places))
+    matrices = ", ".join(map(_format_matrix, places))
     skeleton = [
         f"uniform matrix4d[] bindTransforms = [{matrices}]",
-        f"uniform token[] joints = {tokens(_joints(scene))}",
+        f"uniform token[] joints = {format_tokens(_list_joints(scene))}",
         f"uniform matrix4d[] restTransforms = [{matrices}]",
         f"rel skel:animationSource = <{ANIMATION}>",
     ]
     sound = [
         'uniform token auralMode = "nonSpatial"',
         f"uniform timecode endTime = {last}",
-        f"uniform asset filePath = {asset(scene.sound)}" if scene.sound else "",
+        f"uniform asset filePath = {format_asset(scene.sound)}" if scene.sound else "",
         *([f"uniform double mediaOffset = {-scene.sound_s:.9g}"] if scene.sound_s < 0 else []),
         'uniform token playbackMode = "onceFromStart"',
-        f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _codes_hz(scene):.9g}",
+        f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _choose_codes_hz(scene):.9g}",
     ]
     character = chain(  # line by line: a long motion takes no memory for its text
-        prim("Skeleton", "Skeleton", skeleton, schemas=bound),
-        prim("SkelAnimation", "Animation", _list_animation(scene)),
-        prim("Mesh", "Face", _list_mesh(scene, normals), schemas=(*bound, "MaterialBindingAPI")),
-        prim("Scope", "Looks", _list_looks(scene.mesh)),
-        prim("SpatialAudio", "Sound", sound) if scene.sound else (),
+        write_prim("Skeleton", "Skeleton", skeleton, schemas=bound),
+        write_prim("SkelAnimation", "Animation", _list_animation(scene)),
+        write_prim("Mesh", "Face", _list_mesh(scene, normals), schemas=(*bound, "MaterialBindingAPI")),
+        write_prim("Scope", "Looks", _list_looks(scene.mesh)),
+        write_prim("SpatialAudio", "Sound", sound) if scene.sound else (),
     )
     head = [
         *("#usda 1.0", "(", f'    defaultPrim = "{ROOT}"', '    doc = "Written by lipmotion"'),
@@ -167,25 +167,25 @@ def write_usda(path: Path, scene: Scene) -> None:
         *("    startTimeCode = 0", f"    timeCodesPerSecond = {rate}", '    upAxis = "Y"', ")", ""),
     ]
     with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
-        root = prim("SkelRoot", ROOT, character, schemas=bound, kind="component")
+        root = write_prim("SkelRoot", ROOT, character, schemas=bound, kind="component")
         file.writelines(line + "\n" for line in chain(head, root))
 
 
 def _list_animation(scene: Scene) -> Iterator[str]:
-    joints, (time_s, table) = _joints(scene), scene.keys()
-    yield f"uniform token[] blendShapes = {tokens(scene.mesh.shape_names)}"
+    joints, (time_s, table) = _list_joints(scene), scene.keys()
+    yield f"uniform token[] blendShapes = {format_tokens(scene.mesh.shape_names)}"
     if len(table):
-        yield from _list_samples("float[] blendShapeWeights", map(_numbers, table), time_s * _codes_hz(scene))
+        yield from _list_samples("float[] blendShapeWeights", map(_format_numbers, table), time_s * _choose_codes_hz(scene))
     else:
-        yield f"float[] blendShapeWeights = {_numbers(np.zeros(len(scene.mesh.shapes)))}"
-    yield f"uniform token[] joints = {tokens(joints)}"
+        yield f"float[] blendShapeWeights = {_format_numbers(np.zeros(len(scene.mesh.shapes)))}"
+    yield f"uniform token[] joints = {format_tokens(joints)}"
     if scene.turn is not None:
         rotations = (
             f"[(1, 0, 0, 0), ({w:.7g}, {x:.7g}, {y:.7g}, {z:.7g})]" for x, y, z, w in scene.turn.rotations.tolist()
         )
-        codes = _codes_per_key(scene) * np.arange(len(scene.turn.rotations), dtype=np.float64)
+        codes = _count_codes_per_key(scene) * np.arange(len(scene.turn.rotations), dtype=np.float64)
         yield from _list_samples("quatf[] rotations", rotations, codes)
-        yield f"float3[] translations = [(0, 0, 0), {_tuple(scene.turn.pivot)}]"
+        yield f"float3[] translations = [(0, 0, 0), {_format_tuple(scene.turn.pivot)}]"
     else:
         yield "quatf[] rotations = [(1, 0, 0, 0)]"
         yield "float3[] translations = [(0, 0, 0)]"
@@ -201,25 +201,25 @@ def _list_samples(attribute: str, values: Iterable[str], codes: NDArray[np.float
 
 def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
     mesh = scene.mesh
-    names = prim_names(mesh.shape_names)
+    names = name_prims(mesh.shape_names)
     yield "uniform bool doubleSided = 1"
     yield 'uniform token subdivisionScheme = "none"'
-    yield f"float3[] extent = {_numbers(np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]))}"
-    yield f"int[] faceVertexCounts = {_whole(np.full(len(mesh.triangles), 3))}"
-    yield f"int[] faceVertexIndices = {_whole(mesh.triangles.reshape(-1))}"
-    yield f"normal3f[] normals = {_numbers(normals.rest)} ({PER_VERTEX})"
-    yield f"point3f[] points = {_numbers(mesh.vertices)}"
+    yield f"float3[] extent = {_format_numbers(np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]))}"
+    yield f"int[] faceVertexCounts = {_format_integers(np.full(len(mesh.triangles), 3))}"
+    yield f"int[] faceVertexIndices = {_format_integers(mesh.triangles.reshape(-1))}"
+    yield f"normal3f[] normals = {_format_numbers(normals.rest)} ({PER_VERTEX})"
+    yield f"point3f[] points = {_format_numbers(mesh.vertices)}"
     if mesh.colours is not None:
-        yield f"color3f[] primvars:displayColor = {_numbers(decode_srgb(mesh.colours))} ({PER_VERTEX})"
-    count, joints = len(mesh.vertices), len(_joints(scene))
+        yield f"color3f[] primvars:displayColor = {_format_numbers(decode_srgb(mesh.colours))} ({PER_VERTEX})"
+    count, joints = len(mesh.vertices), len(_list_joints(scene))
     share = np.zeros(count) if scene.turn is None else scene.turn.share
     weights = np.stack([1 - share, share], axis=1)[:, :joints]
     hints = f"(elementSize = {joints}\n            {PER_VERTEX})"
-    yield f"matrix4d primvars:skel:geomBindTransform = {_matrix(np.eye(4))}"
-    yield f"int[] primvars:skel:jointIndices = {_whole(np.tile(np.arange(joints), count))} {hints}"
-    yield f"float[] primvars:skel:jointWeights = {_numbers(weights.reshape(-1))} {hints}"
+    yield f"matrix4d primvars:skel:geomBindTransform = {_format_matrix(np.eye(4))}"
+    yield f"int[] primvars:skel:jointIndices = {_format_integers(np.tile(np.arange(joints), count))} {hints}"
+    yield f"float[] primvars:skel:jointWeights = {_format_numbers(weights.reshape(-1))} {hints}"
     if names:
-        yield f"uniform token[] skel:blendShapes = {tokens(mesh.shape_names)}"
+        yield f"uniform token[] skel:blendShapes = {format_tokens(mesh.shape_names)}"
         yield f"rel skel:blendShapeTargets = [{', '.join(f'<{FACE}/{name}>' for name in names)}]"
     yield f"rel skel:skeleton = <{SKELETON}>"
     yield 'uniform token subsetFamily:materialBind:familyType = "partition"'
@@ -228,22 +228,22 @@ def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
         offsets = np.zeros((2, len(rows), 3))
         for values, (of, added) in zip(offsets, ((shape.rows, shape.displacements), turned), strict=True):
             values[np.searchsorted(rows, of)] = added
-        moved = [f"uniform vector3f[] offsets = {_numbers(offsets[0])}", f"uniform int[] pointIndices = {_whole(rows)}"]
-        yield from prim("BlendShape", name, [f"uniform vector3f[] normalOffsets = {_numbers(offsets[1])}", *moved])
-    for name, part in _parts(mesh):
+        moved = [f"uniform vector3f[] offsets = {_format_numbers(offsets[0])}", f"uniform int[] pointIndices = {_format_integers(rows)}"]
+        yield from write_prim("BlendShape", name, [f"uniform vector3f[] normalOffsets = {_format_numbers(offsets[1])}", *moved])
+    for name, part in _list_parts(mesh):
         subset = [
             'uniform token elementType = "face"',
             'uniform token familyName = "materialBind"',
-            f"int[] indices = {_whole(np.arange(part.first, part.stop))}",
+            f"int[] indices = {_format_integers(np.arange(part.first, part.stop))}",
             f"rel material:binding = <{LOOKS}/{name}>",
         ]
-        yield from prim("GeomSubset", f"{name}_faces", subset, schemas=("MaterialBindingAPI",))
+        yield from write_prim("GeomSubset", f"{name}_faces", subset, schemas=("MaterialBindingAPI",))
 
 
 def _list_looks(mesh: Mesh) -> Iterator[str]:
-    for name, part in _parts(mesh):
+    for name, part in _list_parts(mesh):
         place, painted = f"{LOOKS}/{name}", mesh.colours is not None
-        colour = f" = {_tuple(decode_srgb(part.material.colour))}"
+        colour = f" = {_format_tuple(decode_srgb(part.material.colour))}"
         colour = f".connect = <{place}/Colour.outputs:result>" if painted else colour
         surface = [
             'uniform token info:id = "UsdPreviewSurface"',
@@ -255,26 +255,26 @@ def _list_looks(mesh: Mesh) -> Iterator[str]:
         reader = ['uniform token info:id = "UsdPrimvarReader_float3"', 'string inputs:varname = "displayColor"']
         shaders = [
             f"token outputs:surface.connect = <{place}/Surface.outputs:surface>",
-            *prim("Shader", "Surface", surface),
-            *(prim("Shader", "Colour", [*reader, "float3 outputs:result"]) if painted else ()),
+            *write_prim("Shader", "Surface", surface),
+            *(write_prim("Shader", "Colour", [*reader, "float3 outputs:result"]) if painted else ()),
         ]
-        yield from prim("Material", name, shaders)
+        yield from write_prim("Material", name, shaders)
 
 
-def _codes_hz(scene: Scene) -> float:
+def _choose_codes_hz(scene: Scene) -> float:
     return scene.weights.rate_hz if scene.weights and scene.weights.rate_hz <= FASTEST_HZ else USUAL_HZ
 
 
-def _codes_per_key(scene: Scene) -> float:
+def _count_codes_per_key(scene: Scene) -> float:
     """Return how many time codes a key is after the one before."""
-    return _codes_hz(scene) / scene.weights.rate_hz if scene.weights else 1.0
+    return _choose_codes_hz(scene) / scene.weights.rate_hz if scene.weights else 1.0
 
 
-def _joints(scene: Scene) -> Sequence[str]:
+def _list_joints(scene: Scene) -> Sequence[str]:
     return JOINTS[:1] if scene.turn is None else JOINTS
 
 
-def _parts(mesh: Mesh) -> list[tuple[str, MeshPart]]:
+def _list_parts(mesh: Mesh) -> list[tuple[str, MeshPart]]:
     """Return the parts that have triangles, with names that USD takes."""
     parts = [part for part in mesh.parts if part.stop > part.first]
-    return list(zip(prim_names(part.name or part.material.name for part in parts), parts, strict=True))
+    return list(zip(name_prims(part.name or part.material.name for part in parts), parts, strict=True))

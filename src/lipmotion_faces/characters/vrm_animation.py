@@ -22,7 +22,7 @@ from lipmotion.meshes.model.shape_names import VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.types import Generation, Motion
 from lipmotion_faces.characters.gltf_document import write_container
 from lipmotion_faces.characters.gltf_weights import read_gltf_motion
-from lipmotion_faces.characters.gltf_writer import GltfBuffer, sound_extras
+from lipmotion_faces.characters.gltf_writer import GltfBuffer, describe_sound
 
 Array = NDArray[np.float64]
 EXTENSION = "VRMC_vrm_animation"
@@ -72,7 +72,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     bones = {name: {"node": number} for number, name in enumerate(BONES)}
     scene: dict[str, Any] = {"nodes": [0, *range(len(BONES), len(nodes))]}
     if source.get("path"):
-        scene["extras"] = sound_extras(source["path"], float(source.get("start_s", 0.0)))
+        scene["extras"] = describe_sound(source["path"], float(source.get("start_s", 0.0)))
     document = {
         "asset": {"version": "2.0", "generator": "lipmotion"},
         "extensionsUsed": [EXTENSION],

@@ -71,14 +71,14 @@ class Coverage:
     unknown: int
 
 
-def coverage(corpus: Corpus, text: str | Path | None = None, *, lexicon: Lexicon | None = None) -> Coverage:
+def measure_coverage(corpus: Corpus, text: str | Path | None = None, *, lexicon: Lexicon | None = None) -> Coverage:
     """Return which phones, diphones and triphones of some sentences a corpus has, and what stands in for the others.
 
     corpus  : its labelled phones count, else the phones of its words (the first pronunciation of each)
     text    : a file with a sentence a line; None: the list in the package
     lexicon : pronunciations of words, ahead of those of the dictionary
     For a phone, the nearest one is that of ``find_similar_lips``, which the engines take; for sequences it is the one
-    with the least sum of distances of phones (``phone_distances``), the most recorded one of several.
+    with the least sum of distances of phones (``measure_phone_distances``), the most recorded one of several.
     Raises InputError: no such file, or no sentence that can be used. Raises CorpusError: no utterance has words or
     phones.
     """
@@ -98,7 +98,7 @@ def coverage(corpus: Corpus, text: str | Path | None = None, *, lexicon: Lexicon
     return Coverage(kinds, len(usable), left_out, len(utterances), sum(not each for each in utterances))
 
 
-def phone_distances() -> NDArray[np.float64]:
+def measure_phone_distances() -> NDArray[np.float64]:
     """Return how different any two phones of ``PHONES`` look, 0 for the same phone to 2.5 [shape=(47, 47)].
 
     1 for another viseme, 0.5 for a phone that is not among the similar ones, and the share of their classes of
@@ -115,7 +115,7 @@ def phone_distances() -> NDArray[np.float64]:
     return distances
 
 
-def coverage_lines(result: Coverage, lines: int) -> Iterator[str]:
+def format_coverage(result: Coverage, lines: int) -> Iterator[str]:
     """Yield the coverage as text: shares, then ``lines`` missing sequences of each kind, the most frequent first."""
     yield f"{result.utterances - result.unknown} of {result.utterances} utterances, {result.sentences} sentences"
     for each in result.kinds:
@@ -130,7 +130,7 @@ def coverage_lines(result: Coverage, lines: int) -> Iterator[str]:
             yield f"and {len(each.missing) - lines} more {each.kind}"
 
 
-def coverage_document(result: Coverage) -> dict[str, Any]:
+def coverage_to_json(result: Coverage) -> dict[str, Any]:
     """Return the coverage as an object of JSON, with all missing sequences."""
     document = asdict(result)
     document["left_out"] = {printable(text): word for text, word in result.left_out.items()}
@@ -165,7 +165,7 @@ def _find_nearest(missing: Sequence[Phones], recorded: Counter[Phones]) -> list[
     number = {phone: n for n, phone in enumerate(PHONES)}
     candidates = sorted(recorded, key=lambda unit: (-recorded[unit], unit))  # of equal distance, the most recorded
     columns = np.array([[number[phone] for phone in unit] for unit in candidates])
-    distances = phone_distances()
+    distances = measure_phone_distances()
     weights = (1.0, MIDDLE_WEIGHT, 1.0) if columns.shape[1] == len(KINDS) else (1.0, 1.0)
     chosen = []
     for unit in missing:

@@ -54,7 +54,7 @@ class SpokenPart:
         return self.end_s - self.start_s
 
 
-def utterance_spans(
+def find_utterances(
     stretches: Sequence[SpokenPart], cuts_s: Sequence[float], duration_s: float, quietest: Quietest
 ) -> list[SpokenPart]:
     """Return the utterances of a recording, in order, without overlap.
@@ -190,7 +190,7 @@ def find_transcript(video: Path) -> TimedTranscript | None:
     return other if other is not None and other.has_times else transcript
 
 
-def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
+def list_spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
     """Return the lines of a transcript as parts, in order; of a line whose words all have times, the words.
 
     A line without an end lasts to the next one that has a start; lines without a start are left out. Numbers
@@ -224,7 +224,7 @@ class VideoPart:
     person: tuple[NDArray[np.float64], ...]
 
 
-def single_video(path: Path) -> RecordingFolder:
+def wrap_video(path: Path) -> RecordingFolder:
     """Return the folder of recordings that one video is. Raises InputError: labels beside it cannot be read."""
     return RecordingFolder(VIDEO, (SourceRecording(path.stem, path, find_labels(path).words),))
 
@@ -295,7 +295,7 @@ def divide_video(
         audio = align_sound(separate, audio.duration_s)
     levels = measure_levels_db(audio)
     transcript = find_transcript(recording.file)
-    lines = [] if transcript is None else spoken_lines(transcript)
+    lines = [] if transcript is None else list_spoken_lines(transcript)
     if transcript is not None and not lines:
         LOG.warning(
             "%s: its transcript has no times, so it is not known what is said in which part; the parts have no "
@@ -305,7 +305,7 @@ def divide_video(
     parts = lines or [SpokenPart(*span) for span in list_spans(levels)]
     end_s = min(audio.duration_s, scan.end_s)
     parts = [replace(part, end_s=min(part.end_s, end_s)) for part in parts if part.start_s < end_s]
-    spans = utterance_spans(parts, scan.cuts_s.tolist(), end_s, partial(find_quietest, levels))
+    spans = find_utterances(parts, scan.cuts_s.tolist(), end_s, partial(find_quietest, levels))
     spans = [span for longer in spans if (span := _fit_to_pictures(longer, scan, end_s)).duration_s > 0]
     held_out = 0
     if splits_by_time and len(spans) >= LEAST_SPLIT_UTTERANCES:

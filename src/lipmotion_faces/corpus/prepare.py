@@ -29,7 +29,7 @@ from lipmotion.storage.sources import Source, check_apart, hash_file, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
 from lipmotion_faces.corpus import supplied
-from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, divide_long_videos, single_video
+from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, divide_long_videos, wrap_video
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import UNSEEN_LIMIT, track
@@ -133,7 +133,7 @@ def prepare(
     processes = process_count(workers)
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     if directory.is_file() and directory.suffix.lower() in VIDEO_SUFFIXES:
-        folder, place = single_video(directory), directory.parent
+        folder, place = wrap_video(directory), directory.parent
     else:
         folder, place = discover(directory), directory
     offset_s = None if offset_ms is None else offset_ms / 1000
@@ -190,7 +190,7 @@ def _make_job(
     part: VideoPart | None,
 ) -> _Job:
     name = make_portable(recording.name)
-    stored = _stored_source(corpus.folder(name))
+    stored = _read_stored_source(corpus.folder(name))
     if (  # speakers of GRID share file names
         stored is not None
         and stored.get("collection") != collection
@@ -221,7 +221,7 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
     """Log a warning if the corpus holds utterances of recordings that are gone, or that cannot be used any longer."""
     good = {outcome.name for outcome in outcomes if not outcome.problem}
     others = [name for name in corpus.names() if name not in good]
-    older = [name for name in others if (_stored_source(corpus.folder(name)) or {}).get("collection") == collection]
+    older = [name for name in others if (_read_stored_source(corpus.folder(name)) or {}).get("collection") == collection]
     if older:
         shown = ", ".join(older[:NAMED_UTTERANCES]) + (", ..." if len(older) > NAMED_UTTERANCES else "")
         LOG.warning(
@@ -233,7 +233,7 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
         )
 
 
-def _stored_source(folder: Path) -> dict[str, Any] | None:
+def _read_stored_source(folder: Path) -> dict[str, Any] | None:
     """Return the source of the utterance in a folder; None if there is none."""
     with suppress(CorpusError):
         return dict(read_entry(folder).get("source", {}))
@@ -246,7 +246,7 @@ def _process(job: _Job) -> _Outcome:
     try:
         sound = job.recording.file
         source = job.source | {"sha256": _digest(sound), "bytes": str(sound.stat().st_size)}
-        source |= supplied.source_digests(job.recording)
+        source |= supplied.digest_sources(job.recording)
         entry = _read_if_current(job, source)
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))

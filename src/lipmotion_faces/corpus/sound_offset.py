@@ -57,13 +57,13 @@ class SoundMark:
     hertz: float = 0.0
 
 
-def sound_marks(audio: Audio) -> tuple[SoundMark, ...]:
+def find_marks(audio: Audio) -> tuple[SoundMark, ...]:
     """Return the claps and beeps of a recording, by time; there may be none, or sounds that only resemble them."""
-    found = [*_claps(audio), *_beeps(audio)]
+    found = [*_find_claps(audio), *_find_beeps(audio)]
     return tuple(sorted(found, key=lambda mark: mark.time_s))
 
 
-def _claps(audio: Audio) -> list[SoundMark]:
+def _find_claps(audio: Audio) -> list[SoundMark]:
     from scipy.ndimage import maximum_filter1d
 
     sharp = np.diff(audio.samples, prepend=audio.samples[:1])  # claps are brighter than speech
@@ -85,11 +85,11 @@ def _claps(audio: Audio) -> list[SoundMark]:
     strength = np.minimum(rises, decays)
     return [
         SoundMark((frame + 1) * CLAP_STEP_S, CLAP, float(strength[frame]))
-        for frame in _strongest(np.flatnonzero(good), strength, APART_S / CLAP_STEP_S)
+        for frame in _select_strongest(np.flatnonzero(good), strength, APART_S / CLAP_STEP_S)
     ]
 
 
-def _beeps(audio: Audio) -> list[SoundMark]:
+def _find_beeps(audio: Audio) -> list[SoundMark]:
     size, step = round(BEEP_FRAME_S * audio.rate_hz), round(BEEP_STEP_S * audio.rate_hz)
     count = (len(audio.samples) - size) // step + 1
     if count < 1:
@@ -120,7 +120,7 @@ def _beeps(audio: Audio) -> list[SoundMark]:
     return sorted(marks, key=lambda mark: -mark.strength_db)[:MOST_MARKS]
 
 
-def _strongest(frames: NDArray[np.intp], strength: Array, apart: float) -> list[int]:
+def _select_strongest(frames: NDArray[np.intp], strength: Array, apart: float) -> list[int]:
     """Return the strongest of some frames, none nearer to a stronger one than ``apart`` frames."""
     kept: list[int] = []
     for frame in frames[np.argsort(-strength[frames], kind="stable")].tolist():
@@ -172,7 +172,7 @@ class SoundOffset:
     alike: float
 
 
-def sound_offset(first: Audio, second: Audio) -> SoundOffset:
+def measure_offset(first: Audio, second: Audio) -> SoundOffset:
     """Return by how much the second recording is later than the first.
 
     first, second : the same sounds, recorded by two machines that began at different times; at the same rate
@@ -182,9 +182,9 @@ def sound_offset(first: Audio, second: Audio) -> SoundOffset:
     """
     if first.rate_hz != second.rate_hz:
         raise InputError(f"sounds of {first.rate_hz} and {second.rate_hz} Hz, required one rate")
-    levels = _levels(first), _levels(second)
+    levels = _measure_levels(first), _measure_levels(second)
     likeness = _Likeness(*levels)
-    hypotheses = _mark(sound_marks(first), sound_marks(second))
+    hypotheses = _pair_marks(find_marks(first), find_marks(second))
     best_s, best, second_best = likeness.best()
     candidates = [
         (likeness.at(late_s) + MARK_SCORE * min(len(pairs), 2), late_s, pairs) for late_s, pairs in hypotheses
@@ -196,7 +196,7 @@ def sound_offset(first: Audio, second: Audio) -> SoundOffset:
         alone = len(candidates) == 1 or len(pairs) > 1
         if not (certain and best > score) and (alike >= LEAST_MARK_CORRELATION or alone):
             kind = pairs[0][0].kind
-            at_mark = _between_beeps if kind == BEEP else _between_claps
+            at_mark = _compare_beeps if kind == BEEP else _compare_claps
             fine_s = float(np.median([at_mark(first, second, *pair) for pair in pairs]))
             if kind == BEEP and alike >= WAVEFORM_CORRELATION:
                 fine_s = _refine(first, second, fine_s, FINE_BEEP_S)
@@ -241,7 +241,7 @@ class _Likeness:
         return (top - self.zero) * STEP_S, float(self.scores[top]), float(self.scores[away].max(initial=-1.0))
 
 
-def _levels(audio: Audio) -> Array:
+def _measure_levels(audio: Audio) -> Array:
     """Return the level of every 10 ms, without what is quieter than the quiet tenth [shape=(N,)]."""
     power = average_powers(audio.samples, round(STEP_S * audio.rate_hz))
     if not len(power):
@@ -251,7 +251,7 @@ def _levels(audio: Audio) -> Array:
     return levels - levels.mean()
 
 
-def _mark(
+def _pair_marks(
     first: tuple[SoundMark, ...], second: tuple[SoundMark, ...]
 ) -> list[tuple[float, list[tuple[SoundMark, SoundMark]]]]:
     """Return offsets at which marks of both fall together, each with the pairs of marks that do."""
@@ -272,18 +272,18 @@ def _mark(
     return [(float(np.median([b.time_s - a.time_s for a, b in group])), group) for group in groups]
 
 
-def _between_claps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
+def _compare_claps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
     """Return the offset of one clap in both recordings, by their waveforms around it."""
     span_s = (one.time_s - MARK_WINDOW_S[0], one.time_s + MARK_WINDOW_S[1])
     return _match(first, second, span_s, other.time_s - one.time_s, FINE_MARK_S)
 
 
-def _between_beeps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
+def _compare_beeps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
     """Return the offset of one beep in both recordings, by its beginnings; its waves are all alike."""
-    return _beginning_s(second, other) - _beginning_s(first, one)
+    return _find_beginning(second, other) - _find_beginning(first, one)
 
 
-def _beginning_s(audio: Audio, beep: SoundMark) -> float:
+def _find_beginning(audio: Audio, beep: SoundMark) -> float:
     """Return when a beep has first half of its loudness."""
     rate = audio.rate_hz
     begin = round((beep.time_s - MARK_WINDOW_S[1]) * rate)
@@ -340,15 +340,15 @@ FRAME_OFFSETS = tuple(range(-15, 16, 3))
 WEIGHTS = "lip-speed.json"
 
 
-def predicted_opening_speed(features: Features) -> Array:
+def predict_opening_speed(features: Features) -> Array:
     """Return the predicted opening speed of the lips [shape=(T,)], in arbitrary units.
 
     It is of no use as lip motion; the shift at which it correlates best with tracked lips is the offset of the video.
     """
-    return context_features(features) @ _weights()
+    return stack_context(features) @ _load_weights()
 
 
-def measured_opening_speed(opening: Array) -> Array:
+def measure_opening_speed(opening: Array) -> Array:
     """Return the opening speed of measured lips: the slope over ±2 frames [shape=(T,)].
 
     opening : of the lips, frame by frame [shape=(T,)]
@@ -356,7 +356,7 @@ def measured_opening_speed(opening: Array) -> Array:
     return compute_delta(opening.astype(np.float32)[:, None])[:, 0].astype(float)
 
 
-def context_features(features: Features) -> Array:
+def stack_context(features: Features) -> Array:
     """Return the static features of every frame and its context [shape=(T, 143)]; the ends are repeated."""
     static = features.values[:, :STATIC_FEATURES].astype(float)
     frames = np.arange(len(static))[:, None] + np.array(FRAME_OFFSETS)
@@ -364,7 +364,7 @@ def context_features(features: Features) -> Array:
 
 
 @cache
-def _weights() -> Array:
+def _load_weights() -> Array:
     """Return the shipped weights of the prediction [shape=(143,)]."""
     content = json.loads((resources.files("lipmotion") / "models" / WEIGHTS).read_text(encoding="utf-8"))
     return np.array(content["weights"])

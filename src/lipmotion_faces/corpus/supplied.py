@@ -21,7 +21,7 @@ from lipmotion.storage.sources import hash_file
 from lipmotion.types import Audio, Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
-from lipmotion_faces.corpus.sound_offset import sound_offset
+from lipmotion_faces.corpus.sound_offset import measure_offset
 
 DIGESTS = ("sha256", "motion_sha256", "phones_sha256", "recorder_sha256")
 """Keys of the digests in the source of an utterance; if a digest changes, the recording is prepared again."""
@@ -32,7 +32,7 @@ PHONES_MARGIN_S = 0.1
 """Seconds by which labels may end after the sound; labelling programs round times."""
 
 
-def source_digests(recording: SourceRecording) -> dict[str, str]:
+def digest_sources(recording: SourceRecording) -> dict[str, str]:
     """Return file names and digests of motion, phones and sound that are supplied with a recording, by key."""
     digests = {}
     if recording.motion_file is not None:
@@ -156,7 +156,7 @@ def separate_sound(recording: SourceRecording) -> SeparateSound | None:
     if recording.offset_s is not None:
         return SeparateSound(audio, recording.offset_s, GIVEN)
     try:
-        offset = sound_offset(read_audio(recording.file), audio)
+        offset = measure_offset(read_audio(recording.file), audio)
     except InputError as error:
         raise InputError(f"{recording.recorder}: {error}") from error
     return SeparateSound(audio, offset.late_s, offset.how)

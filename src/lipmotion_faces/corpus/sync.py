@@ -1,4 +1,4 @@
-"""Synchronisation of sound and motion: ``offsets(corpus)`` measures the offset, ``sync(corpus)`` removes it."""
+"""Synchronisation of sound and motion: ``measure_offsets(corpus)`` measures the offset, ``remove_offsets(corpus)`` removes it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.storage.locks import lock_folder
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Utterance
-from lipmotion_faces.corpus.sound_offset import measured_opening_speed, predicted_opening_speed
+from lipmotion_faces.corpus.sound_offset import measure_opening_speed, predict_opening_speed
 
 REACH_S = 0.4
 """Largest offset that is considered, in seconds, in both directions."""
@@ -61,10 +61,10 @@ class CorpusOffsets:
         return f"{together}; {len(late_ms)} tell alone: median {median_ms:+.0f} ms, furthest off: {furthest}"
 
 
-def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
+def score_shifts(utterance: Utterance) -> NDArray[np.float64]:
     """Return the agreement of sound and motion at every shift of up to ``REACH_S`` seconds [shape=(81,)]."""
     motion = utterance.track.motion
-    predicted = predicted_opening_speed(utterance.features)
+    predicted = predict_opening_speed(utterance.features)
     opening, valid = resample_to_model(
         np.asarray(motion[OPENING], float)[:, None],
         np.asarray(utterance.track.seen),
@@ -72,17 +72,17 @@ def clip_scores(utterance: Utterance) -> NDArray[np.float64]:
         len(predicted),
         FRAME_RATE_HZ,
     )
-    return shift_scores(predicted, measured_opening_speed(opening[:, 0]), valid, round(REACH_S * FRAME_RATE_HZ))
+    return shift_scores(predicted, measure_opening_speed(opening[:, 0]), valid, round(REACH_S * FRAME_RATE_HZ))
 
 
-def offsets(corpus: Corpus) -> CorpusOffsets:
+def measure_offsets(corpus: Corpus) -> CorpusOffsets:
     """Return the offsets of utterances and collections; zero is GRID's. Raises CorpusError: an utterance is damaged."""
     scores: dict[str, NDArray[np.float64]] = {}
     members: dict[str, list[str]] = {}
     for name in corpus.names():
         utterance = corpus.utterance(name)
         if OPENING in utterance.track.motion.names:
-            scores[name] = clip_scores(utterance)
+            scores[name] = score_shifts(utterance)
             collection = f"{utterance.source.get('collection', '')} {utterance.speaker}".strip()
             members.setdefault(collection, []).append(name)  # speakers are recorded separately, as a rule
     return CorpusOffsets(
@@ -96,7 +96,7 @@ def offsets(corpus: Corpus) -> CorpusOffsets:
 
 
 @limit_threads()
-def sync(corpus: Corpus) -> dict[str, float]:
+def remove_offsets(corpus: Corpus) -> dict[str, float]:
     """Move the sound of each collection by its offset, if it is known; return the offsets in seconds, by collection.
 
     The motion is not changed; features are computed again. Late sound loses its beginning, early sound is preceded by
@@ -105,7 +105,7 @@ def sync(corpus: Corpus) -> dict[str, float]:
     is changing the corpus.
     """
     with lock_folder(corpus.path):
-        measured = offsets(corpus)
+        measured = measure_offsets(corpus)
         moved = {name: pooled.late_s for name, pooled in measured.collections.items() if _is_worth_moving(pooled)}
         for collection, late_s in moved.items():
             for name in measured.members[collection]:

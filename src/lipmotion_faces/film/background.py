@@ -16,13 +16,13 @@ from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.stats.pca import choose_evenly
 from lipmotion_faces.appearance import looping, lower_face
 from lipmotion_faces.appearance.person import Appearance
-from lipmotion_faces.appearance.placing import cut, feather, inverse_map
+from lipmotion_faces.appearance.placing import cut, feather, invert_map
 from lipmotion_faces.coded_video import FrameGroups, encode_video
 from lipmotion_faces.filmed.face import StoredBackground
 from lipmotion_faces.filmed.renderer import Background
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, register_maps, steady_maps
-from lipmotion_faces.tracking.track import Footage, footage_frames, footage_groups, track_footage
+from lipmotion_faces.tracking.track import Footage, decode_footage, open_footage, track_footage
 
 LOG = logging.getLogger("lipmotion")
 
@@ -111,7 +111,7 @@ class BackgroundSequence:
             shown = np.minimum(np.arange(count), total - 1)
             return looping.LoopOrder(shown, shown, np.zeros(count), ())
         descriptors = looping.describe_frames((groups.frame(number) for number in range(total)), self.face_to_frame)
-        return looping.loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
+        return looping.find_loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
 
     def _frame(self, groups: FrameGroups, number: int) -> Background:
         frame = groups.frame(number)
@@ -120,7 +120,7 @@ class BackgroundSequence:
         return Background(frame[:height, :width], place, chin_px, bool(self.usable[number]))
 
 
-def best_background(footages: Sequence[Footage]) -> StoredBackground:
+def find_best_background(footages: Sequence[Footage]) -> StoredBackground:
     """Return the parts of some footage that can be shown one after the other with the least visible joins.
 
     ``MOST_PARTS`` parts of one size, spread evenly, are compared. They last at most ``MOST_PART_S``, show the face in
@@ -128,14 +128,14 @@ def best_background(footages: Sequence[Footage]) -> StoredBackground:
     first is the one that could best be shown alone for a minute; each next one has a frame that is most like one of
     those before, up to ``MOST_BACKGROUND_S`` and as long as jumps lead there.
     """
-    chosen = _chain_parts(choose_parts(footages))
+    chosen = _order_parts(choose_parts(footages))
     height, width = (length // 2 * 2 for length in chosen[0][0].size)
-    frames = (frame[:height, :width] for part in chosen for frame in footage_frames(*part))
+    frames = (frame[:height, :width] for part in chosen for frame in decode_footage(*part))
     video = encode_video(frames, chosen[0][0].rate_hz)
     maps, chins = (
-        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen]) for of in (steady_face, chin_px)
+        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen]) for of in (steady_face, measure_chin)
     )
-    return StoredBackground(video, maps, chins, tuple(start for start, _ in _spans(chosen)[1:]))
+    return StoredBackground(video, maps, chins, tuple(start for start, _ in _list_spans(chosen)[1:]))
 
 
 _Part = tuple[Footage, int, int]
@@ -147,40 +147,40 @@ def choose_parts(footages: Sequence[Footage]) -> list[_Part]:
     lengths: dict[tuple[tuple[int, int], float], float] = {}
     for part in parts:
         kind = part[0].size, part[0].rate_hz
-        lengths[kind] = lengths.get(kind, 0.0) + _duration_s(part)
+        lengths[kind] = lengths.get(kind, 0.0) + _measure_duration(part)
     most_common = max(lengths, key=lambda kind: lengths[kind])
     parts = [part for part in parts if (part[0].size, part[0].rate_hz) == most_common]
-    least_s = COMPARED_SHARE * min(SHORT_S, max(map(_duration_s, parts)))
-    parts = [part for part in parts if _duration_s(part) >= least_s]
+    least_s = COMPARED_SHARE * min(SHORT_S, max(map(_measure_duration, parts)))
+    parts = [part for part in parts if _measure_duration(part) >= least_s]
     return [parts[number] for number in choose_evenly(MOST_PARTS, len(parts))]
 
 
-def _spans(parts: Sequence[_Part]) -> list[tuple[int, int]]:
+def _list_spans(parts: Sequence[_Part]) -> list[tuple[int, int]]:
     """Return the first frame of each part, and the one after its last, where they follow one another."""
     return list(pairwise(np.cumsum([0, *(stop - start for _, start, stop in parts)]).tolist()))
 
 
-def _chain_parts(parts: Sequence[_Part]) -> list[_Part]:
+def _order_parts(parts: Sequence[_Part]) -> list[_Part]:
     """Return the parts that are shown, the best one first."""
-    rate_hz, scenes = parts[0][0].rate_hz, _spans(parts)
-    shown = chain.from_iterable(footage_frames(*part) for part in parts)
+    rate_hz, scenes = parts[0][0].rate_hz, _list_spans(parts)
+    shown = chain.from_iterable(decode_footage(*part) for part in parts)
     maps = np.concatenate([footage.face_to_image[start:stop] for footage, start, stop in parts])
     descriptors = looping.describe_frames(shown, maps)
     blemishes = []
     for scene in scenes:  # how visible the worst join is if a part is shown for a minute; short ones are worse
-        order = looping.loop_order(descriptors.part(*scene), round(SHOWN_S * rate_hz), rate_hz)
+        order = looping.find_loop_order(descriptors.part(*scene), round(SHOWN_S * rate_hz), rate_hz)
         missing = max(0.0, 1 - (scene[1] - scene[0]) / rate_hz / SHORT_S)
         blemishes.append(max((join.cost for join in order.joins), default=0.0) + SHORT_COST * missing)
     part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in scenes])[::COMPARED_STEP]
-    distances = looping.row_distances(descriptors.standardise(scenes, looping.fade_frames(rate_hz))[::COMPARED_STEP])
+    distances = looping.measure_row_distances(descriptors.standardise(scenes, looping.count_fade_frames(rate_hz))[::COMPARED_STEP])
     chosen = [int(np.argmin(blemishes))]
     while True:
         nearest = distances[np.isin(part_of, chosen)].min(axis=0)
-        left_s = MOST_BACKGROUND_S - sum(_duration_s(parts[number]) for number in chosen)
+        left_s = MOST_BACKGROUND_S - sum(_measure_duration(parts[number]) for number in chosen)
         apart = {
             number: float(nearest[part_of == number].min())
             for number in range(len(parts))
-            if number not in chosen and _duration_s(parts[number]) <= left_s
+            if number not in chosen and _measure_duration(parts[number]) <= left_s
         }
         best = min(apart, key=lambda number: apart[number], default=-1)
         if best < 0 or apart[best] > looping.JUMP_LIMIT:
@@ -192,22 +192,22 @@ def divide_footage(footage: Footage) -> list[_Part]:
     """Return the parts of some footage that show the face without a cut: first frame, and the one after the last."""
     longest = max(1, round(MOST_PART_S * footage.rate_hz))
     parts = []
-    for first, last in looping.scenes_of(_usable(footage), footage.cuts):
+    for first, last in looping.list_scenes(_mark_usable(footage), footage.cuts):
         count = -(-(last - first) // longest)
         ends = np.linspace(first, last, count + 1).astype(int).tolist()
         parts += [(footage, start, stop) for start, stop in pairwise(ends)]
     return parts
 
 
-def _duration_s(part: _Part) -> float:
+def _measure_duration(part: _Part) -> float:
     footage, start, stop = part
     return (stop - start) / footage.rate_hz
 
 
-def _usable(footage: Footage) -> NDArray[np.bool_]:
+def _mark_usable(footage: Footage) -> NDArray[np.bool_]:
     """Return the frames that show the face undamaged, and those of gaps up to ``LONGEST_GAP_S`` [shape=(T,)]."""
     usable = np.array(footage.track.seen)
-    for start, stop in looping.scenes_of(~usable, ()):
+    for start, stop in looping.list_scenes(~usable, ()):
         if start > 0 and stop < len(usable) and stop - start <= LONGEST_GAP_S * footage.rate_hz:
             usable[start:stop] = True
     return usable if footage.damaged is None else usable & ~footage.damaged
@@ -226,23 +226,23 @@ def open_background(path: Path, appearance: Appearance | None = None, *, in_time
     footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
     if appearance is not None:
         frame = int(np.flatnonzero(footage.track.seen)[0])
-        shown = next(footage_frames(footage, frame, frame + 1))
+        shown = next(decode_footage(footage, frame, frame + 1))
         picture = cut(
-            shown, lower_face.region_map(footage.face_to_image[frame], 1), (lower_face.HEIGHT, lower_face.WIDTH)
+            shown, lower_face.map_region(footage.face_to_image[frame], 1), (lower_face.HEIGHT, lower_face.WIDTH)
         )
         recorded = appearance.jaw.mean.T.reshape(lower_face.HEIGHT, lower_face.WIDTH, 3)
-        likely = lower_face.likeness(lower_face.face_signature(picture), lower_face.face_signature(recorded))
+        likely = lower_face.compare_signatures(lower_face.compute_signature(picture), lower_face.compute_signature(recorded))
         if likely < lower_face.SAME_PERSON_LIKENESS:
             warning = (
                 "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
             )
             warning += "footage of the same person"
             LOG.warning(warning, footage.path, likely, lower_face.SAME_PERSON_LIKENESS)
-    groups, maps = partial(footage_groups, footage), steady_face(footage)
-    return BackgroundSequence(groups, footage.rate_hz, maps, chin_px(footage), _usable(footage), footage.cuts, in_time)
+    groups, maps = partial(open_footage, footage), steady_face(footage)
+    return BackgroundSequence(groups, footage.rate_hz, maps, measure_chin(footage), _mark_usable(footage), footage.cuts, in_time)
 
 
-def chin_px(footage: Footage) -> NDArray[np.float64]:
+def measure_chin(footage: Footage) -> NDArray[np.float64]:
     """Return how far the tip of the chin is below the eyes in every frame, px of the face [shape=(T,)]."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -272,7 +272,7 @@ def mix_frames(one: Background, other: Background, weight: float) -> Background:
         )
         edge = edge[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
         corner = np.array([columns.start, rows.start]) + 0.5
-        back = inverse_map(between)
+        back = invert_map(between)
         heads = []
         for each in (one, other):
             turn = each.face_to_frame[:, :2] @ back[:, :2]

@@ -26,11 +26,11 @@ from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
-from lipmotion_faces.film.background import best_background, chin_px
+from lipmotion_faces.film.background import find_best_background, measure_chin
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
 from lipmotion_faces.tracking.frames import VideoSpan
-from lipmotion_faces.tracking.track import UNSEEN_LIMIT, Footage, footage_frames, track_footage
+from lipmotion_faces.tracking.track import UNSEEN_LIMIT, Footage, decode_footage, track_footage
 
 MOST_FOOTAGE_S = 240.0
 """Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""
@@ -81,7 +81,7 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
         takes = [_make_take(item, source) for item in [item for item in items if item.split == "train"] or items]
     if not takes:
         raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
-    durations_s = [_duration_s(takes[index]) for index in choose_evenly(MOST_MEASURED_RECORDINGS, len(takes))]
+    durations_s = [_read_duration(takes[index]) for index in choose_evenly(MOST_MEASURED_RECORDINGS, len(takes))]
     longest_s = left_s = MOST_FOOTAGE_S
     for number, duration_s in enumerate(sorted(durations_s)):
         share_s = left_s / (len(durations_s) - number)
@@ -150,7 +150,7 @@ def _make_take(
     return Take(item.name, item.file, span, named, item.speaker, rights)
 
 
-def _duration_s(take: Take) -> float:
+def _read_duration(take: Take) -> float:
     """Return the duration of a take, as the file states it; ``LONG_S`` if it states none, or cannot be read."""
     import av
 
@@ -236,7 +236,7 @@ def build_face(
     monitor(Progress("learning the face", 0, 1, 0.6))
     appearance = learn_appearance(_gather_pictures(filmed))
     monitor(Progress("choosing the background", 0, 1, 0.9))
-    background = best_background([take.footage for take in filmed])
+    background = find_best_background([take.footage for take in filmed])
     about = {
         "name": name or takes[0].speaker or source.stem,
         "corpus": sorted({take.collection for take in takes}),
@@ -265,7 +265,7 @@ def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Fi
                 filmed.append(result)
     if not filmed:
         raise InputError(f"none of {len(takes)} recordings can be used; the first: {problems[0]}")
-    signatures = np.stack([lower_face.face_signature(take.pictures) for take in filmed])
+    signatures = np.stack([lower_face.compute_signature(take.pictures) for take in filmed])
     alike = signatures @ signatures.T
     person = int((alike >= lower_face.SAME_PERSON_LIKENESS).sum(axis=1).argmax())
     of_person = []
@@ -285,7 +285,7 @@ def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Fi
 
 def _leave_out_damaged(filmed: Sequence[_Filmed], monitor: Monitor) -> list[_Filmed]:
     """Return takes without damaged pictures; those with too many are reported. Raises InputError: none is left."""
-    seen, (rows, columns) = [np.ones(len(take.used), bool) for take in filmed], lower_face.mouth_part(1)
+    seen, (rows, columns) = [np.ones(len(take.used), bool) for take in filmed], lower_face.find_mouth_part(1)
     mouths = [partial(np.asarray, take.pictures[:, rows, columns]) for take in filmed]
     result = []
     rates = [take.footage.rate_hz / _step(take.footage) for take in filmed]
@@ -340,13 +340,13 @@ def _step(footage: Footage) -> int:
 def _cut_lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDArray[np.uint8]:
     """Return pictures of the lower face in some frames, rising [shape=(n, 128 · scale, 128 · scale, 3)]."""
     size = lower_face.HEIGHT * scale, lower_face.WIDTH * scale
-    maps = lower_face.region_map(footage.face_to_image, scale)
+    maps = lower_face.map_region(footage.face_to_image, scale)
     result = np.empty((len(frames), *size, 3), np.uint8)
     if not len(frames):
         return result
     wanted, first = iter(enumerate(frames.tolist())), int(frames[0])
     row, number = next(wanted)
-    for n, image in enumerate(footage_frames(footage, first, int(frames[-1]) + 1), first):
+    for n, image in enumerate(decode_footage(footage, first, int(frames[-1]) + 1), first):
         if n == number:
             result[row] = np.clip(np.rint(cut(image, maps[n], size)), 0, 255)
             row, number = next(wanted, (row, -1))
@@ -359,9 +359,9 @@ def _gather_pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
     used = [n for n, channel in enumerate(channels) if not channel.name.startswith(UNUSED_AXIS)]
     names = [channel.name for channel in channels]
     right, left = (motion[:, names.index(name)] for name in JAW_ENDS)
-    chin = np.concatenate([chin_px(take.footage)[take.used] for take in filmed])
+    chin = np.concatenate([measure_chin(take.footage)[take.used] for take in filmed])
     maps = np.concatenate([take.footage.face_to_image[take.used] for take in filmed])
-    scale = lower_face.best_scale(maps)
+    scale = lower_face.choose_scale(maps)
     starts = np.cumsum([0, *(len(take.used) for take in filmed)])
     levels = [
         np.full(len(take.used), QUIETEST_DB)
@@ -384,7 +384,7 @@ def _gather_pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
         tuple(channels[n] for n in used),
         np.concatenate(levels),
         chin,
-        lower_face.face_shape(float(np.median(left - right)) / 2, chin),
+        lower_face.measure_shape(float(np.median(left - right)) / 2, chin),
         scale,
         read_finer,
     )

@@ -41,7 +41,7 @@ BORDER_SHARE = 0.006
 WHITE = 245
 
 
-def inset_box(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, int, int, int]:
+def place_inset(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, int, int, int]:
     """Return left, top, right and bottom, px, of the inset with its border; frame, picture: height and width."""
     height, width = frame
     shorter = min(height, width)
@@ -59,7 +59,7 @@ def add_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Fr
     """
     for frame, picture in zip(frames, pictures, strict=False):
         size = (frame.shape[0], frame.shape[1])
-        left, top, right, bottom = inset_box(size, (picture.shape[0], picture.shape[1]))
+        left, top, right, bottom = place_inset(size, (picture.shape[0], picture.shape[1]))
         border = max(1, round(BORDER_SHARE * min(size)))
         rows, columns = bottom - top - 2 * border, right - left - 2 * border
         steps = picture.shape[1] / columns, picture.shape[0] / rows
@@ -134,7 +134,7 @@ def make_film(  # noqa: PLR0913
             raise InputError(f"{speech}: holds no pictures; give a video as speech")
         height, width = (length // 2 * 2 for length in first.shape[:2])  # a last row or column would make sizes odd
         frames = (frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2] for frame in chain([first], frames))
-        covered = inset_box((height, width), face.appearance.mouths.shape[1:3])
+        covered = place_inset((height, width), face.appearance.mouths.shape[1:3])
         return Film(add_inset(frames, mouths), len(codes), rate_hz, covered)
     if options.overlay is not None and speech is not None:
         background = open_background(speech, in_time=True).enlarge(ZOOM)
@@ -163,7 +163,7 @@ def _make_codes(
         raise InputError(f"the frame rate is {rate_hz}, required more than 0")
     motion, units = timed
     count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
-    codes = face_codes(face, motion, units, count, rate_hz, eigenlips)
+    codes = predict_codes(face, motion, units, count, rate_hz, eigenlips)
     if options.jaw == "energy":
         if sound is None:
             raise InputError("a jaw that follows the energy needs the sound; give the recording")
@@ -172,7 +172,7 @@ def _make_codes(
     return codes
 
 
-def face_codes(
+def predict_codes(
     face: FilmedFace,
     motion: Motion,
     units: Timeline[Unit],
@@ -202,7 +202,7 @@ def face_codes(
     return replace(face.appearance.predict_codes(shown), mouth=mouth)  # points tell the jaw better
 
 
-def person_shown(model: Model, face: FilmedFace, speaker: str = "") -> FilmedFace | None:
+def find_other_person(model: Model, face: FilmedFace, speaker: str = "") -> FilmedFace | None:
     """Return a face if it is of another person than the motion of a model, so that it must be mapped onto it.
 
     speaker : of the people of the model whose motion is generated

@@ -15,7 +15,7 @@ from lipmotion.storage import schema
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive
 from lipmotion.storage.sources import check_source
 from lipmotion.types import Audio, Channel, Motion
-from lipmotion_faces.appearance.person import Appearance, appearance_arrays, appearance_from_arrays
+from lipmotion_faces.appearance.person import Appearance, appearance_to_arrays, appearance_from_arrays
 from lipmotion_faces.coded_video import STORED_VIDEO, StoredVideo, stored_video_from_arrays, stored_video_to_arrays
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ def save_face(face: FilmedFace, path: str | Path) -> None:
     """
     background, takes = face.background, face.takes
     channels = takes[0].motion.channels if takes else ()
-    arrays = {f"appearance/{name}": array for name, array in appearance_arrays(face.appearance).items()}
+    arrays = {f"appearance/{name}": array for name, array in appearance_to_arrays(face.appearance).items()}
     arrays |= {f"background/{name}": array for name, array in stored_video_to_arrays(background.video).items()}
     arrays |= {"background/face_to_frame": background.face_to_frame, "background/chin_px": background.chin_px}
     arrays |= {"background/cuts": np.array(background.cuts, np.intp)}
@@ -145,7 +145,7 @@ def load_face(path: str | Path) -> FilmedFace:
             if not isinstance(about, dict):
                 raise TypeError("about is no table")
             return FilmedFace(
-                appearance_from_arrays(inner["appearance"]), _background(inner["background"]), takes, about
+                appearance_from_arrays(inner["appearance"]), _read_background(inner["background"]), takes, about
             )
     except (ModelFormatError, InputError) as error:
         raise ModelFormatError(f"{path}: {error}") from error
@@ -173,7 +173,7 @@ TAKE = {
 }
 
 
-def _background(arrays: schema.Arrays) -> StoredBackground:
+def _read_background(arrays: schema.Arrays) -> StoredBackground:
     schema.refuse_undeclared(arrays, BACKGROUND, STORED_VIDEO)
     video = stored_video_from_arrays({name: array for name, array in arrays.items() if name not in BACKGROUND})
     stored = schema.check_arrays(arrays, BACKGROUND, T=len(video))

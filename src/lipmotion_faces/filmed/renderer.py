@@ -15,7 +15,7 @@ from lipmotion_faces.appearance import candidates, lower_face
 from lipmotion_faces.appearance.camera_noise import NoiseSource
 from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes, enlarge
 from lipmotion_faces.appearance.placing import cut, feather, place
-from lipmotion_faces.appearance.poisson import CloningSystem, cloning_system
+from lipmotion_faces.appearance.poisson import CloningSystem, build_cloning_system
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -94,7 +94,7 @@ class Stitcher:
                 count = first + len(batch)
                 raise InputError(f"{count} frames of background, required {len(codes)}; give longer footage")
             mouths = self._draw_mouths(codes.mouth[part], mouth_chosen[part], first)
-            maps = lower_face.region_map(np.stack([each.face_to_frame for each in batch]), scale)
+            maps = lower_face.map_region(np.stack([each.face_to_frame for each in batch]), scale)
             aligned = [
                 cut(each.frame, to, (lower_face.HEIGHT * scale, lower_face.WIDTH * scale))
                 for each, to in zip(batch, maps, strict=True)
@@ -107,7 +107,7 @@ class Stitcher:
                 behind = self._lower_face.clone(
                     lower_face.relight(jaws, self._gains(behind)), behind, LARGEST_DIFFERENCE
                 )
-            source, mouth = behind.copy(), (slice(None), *lower_face.mouth_part(scale))
+            source, mouth = behind.copy(), (slice(None), *lower_face.find_mouth_part(scale))
             source[mouth] = candidates.sharpen(
                 lower_face.relight(mouths, self._gains(behind)), self.options.sharpening, scale
             )
@@ -130,7 +130,7 @@ class Stitcher:
         """Return codes whose mouth is the mean of some pictures."""
         if self.options.average == 1:
             return codes
-        return replace(codes, mouth=candidates.moving_average(codes.mouth, self.options.average).astype(np.float32))
+        return replace(codes, mouth=candidates.smooth_curves(codes.mouth, self.options.average).astype(np.float32))
 
     def _draw_mouths(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
         if self.options.mouth is None:
@@ -141,8 +141,8 @@ class Stitcher:
 
     def _gains(self, behind: Pictures) -> Array:
         """Return how much lighter the footage is than the pictures of the person, in each colour [shape=(T, 3)]."""
-        part = (slice(None), *lower_face.mouth_part(self.appearance.scale))
-        return np.maximum(lower_face.cheek_light(behind[part]), 1.0) / self.appearance.light
+        part = (slice(None), *lower_face.find_mouth_part(self.appearance.scale))
+        return np.maximum(lower_face.measure_cheek_light(behind[part]), 1.0) / self.appearance.light
 
     @cached_property
     def _mouths(self) -> candidates.Refiner:
@@ -160,14 +160,14 @@ class Stitcher:
 
     @cached_property
     def _lower_face(self) -> CloningSystem:
-        return cloning_system(lower_face.replaced_part(self.appearance.shape, self.appearance.scale))
+        return build_cloning_system(lower_face.mark_replaced(self.appearance.shape, self.appearance.scale))
 
     @cached_property
     def _mouth_alone(self) -> CloningSystem:
-        return cloning_system(lower_face.mouth_ellipse(self.appearance.scale))
+        return build_cloning_system(lower_face.mark_mouth(self.appearance.scale))
 
     @cached_property
     def _weight(self) -> Floats:
         scale = self.appearance.scale
-        mask = lower_face.moved_part(scale) if self.options.jaw else lower_face.mouth_ellipse(scale)
+        mask = lower_face.mark_moved(scale) if self.options.jaw else lower_face.mark_mouth(scale)
         return feather(mask, FEATHER_PX * scale)

@@ -1,7 +1,7 @@
 """A three-dimensional head: a friendly character made by this code, drawn without a graphics card.
 
 The spoken mouth and what moves beside it (``articulation``) become poses (``pose``); a pose moves the surfaces
-(``skin`` with ``lips``, ``inside``, ``eyes``), which ``figure`` puts together, lights and gives to the rasteriser. The
+(``skin`` with ``lips``, ``inside``, ``eyes``), which ``make_figure`` puts together, lights and gives to the rasteriser. The
 forms are made once.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, Face, Picture, Staging
-from lipmotion_faces.head.pose import CharacterPose, head_poses
+from lipmotion_faces.head.pose import CharacterPose, list_head_poses
 
 __all__ = ["Head"]
 
@@ -47,19 +47,19 @@ class Head(Face):
         return iter(self.draw(motion, units, fps=fps))
 
     def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[CharacterPose]:  # noqa: D102
-        poses = head_poses(motion, units, fps, self.staging, self.prosody)
+        poses = list_head_poses(motion, units, fps, self.staging, self.prosody)
         if self._size != SIZE:
-            from lipmotion_faces.head.stage import camera_for
+            from lipmotion_faces.head.stage import make_camera
 
-            camera_for(*self._size)  # refuses sizes before the first picture is asked for
+            make_camera(*self._size)  # refuses sizes before the first picture is asked for
         return DrawnMotion(poses, lambda: self._painter, FRAMES_AHEAD)
 
     @cached_property
     def _painter(self) -> Callable[[CharacterPose], Picture]:
-        from lipmotion_faces.head.stage import Stage, camera_for
+        from lipmotion_faces.head.stage import Stage, make_camera
 
         width, height = self._size
         if self.staging.size:
             width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST_PX), self.staging.size
-        stage = Stage(camera_for(width, height), self.staging.colour)
+        stage = Stage(make_camera(width, height), self.staging.colour)
         return stage.cut_out if self.staging.background == TRANSPARENT else stage.picture

@@ -46,7 +46,7 @@ class Eyelids:
         self._x = np.linspace(part.EYE[0] - 0.3, part.EYE[0] + 0.3, 61)
         self._y = np.linspace(-0.28, 0.3, 59)
         grid = np.meshgrid(self._x, self._y, indexing="ij")
-        depth = part.seen_from_front(part.head, grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
+        depth = part.find_front(part.measure_head, grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
         self._depth = spline_filter(depth, order=3)
 
     def edge(self) -> Real:
@@ -99,7 +99,7 @@ LASHES = 33
 """Columns of the lashes: those of the upper lid."""
 
 
-def eyeball() -> part.Part:
+def make_eyeball() -> part.Part:
     """Return the left eyeball, its middle at (0, 0, 0), looking along +z."""
     inner = [0, 0.022, PUPIL - 0.004, PUPIL, 0.068, 0.083, 0.098, IRIS - 0.006, IRIS, IRIS + 0.006, 0.138]
     radii = np.array([*inner, 0.162, 0.19, 0.215])
@@ -127,11 +127,11 @@ def eyeball() -> part.Part:
             colours[n] = palette.IRIS_RIM
         else:
             colours[n] = palette.EYE_WHITE
-    triangles = part.grid_triangles(len(angle), _SIDES, closed=True)
-    return part.part("eye", places, triangles, colours.reshape(-1, 3), palette.EYE_FINISH)
+    triangles = part.list_grid_triangles(len(angle), _SIDES, closed=True)
+    return part.make_part("eye", places, triangles, colours.reshape(-1, 3), palette.EYE_FINISH)
 
 
-def catchlights() -> part.Part:
+def make_catchlights() -> part.Part:
     """Return the reflections of lamp and window in the left eye, its middle at (0, 0, 0)."""
     discs = []
     for (x, y), radius, white in (((-0.045, 0.05), 0.026, 1.0), ((0.038, -0.045), 0.012, 0.8)):
@@ -140,18 +140,18 @@ def catchlights() -> part.Part:
         away = part.EYEBALL_RADIUS + 0.010
         z = np.sqrt(away**2 - (flat**2).sum(axis=1))
         fan = np.stack([np.zeros(16, int), 1 + np.arange(16), 1 + (np.arange(16) + 1) % 16], axis=1).astype(np.int32)
-        discs.append(part.part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))
+        discs.append(part.make_part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))
     lights = part.join_parts("catchlights", discs)
     return replace(lights, colours=CATCHLIGHT * lights.colours)
 
 
-def lash_triangles() -> NDArray[np.int32]:
+def list_lash_triangles() -> NDArray[np.int32]:
     """Return the triangles of the lashes, two rows of ``LASHES`` vertices, seen from both sides [shape=(F, 3)]."""
-    front = part.grid_triangles(3, LASHES)
+    front = part.list_grid_triangles(3, LASHES)
     return np.concatenate([front, front[:, ::-1]])
 
 
-def lashes(edge: Real, shut: float) -> Real:
+def place_lashes(edge: Real, shut: float) -> Real:
     """Return the left lashes [shape=(3 * LASHES, 3)], a wedge along the lid's edge [shape=(LASHES, 3)]."""
     share = np.linspace(0, 1, LASHES)
     thick = 0.004 + 0.018 * np.sin(np.pi * (0.12 + 0.8 * share)) ** 0.7 * share**0.4
@@ -166,16 +166,16 @@ def lashes(edge: Real, shut: float) -> Real:
     return np.concatenate([tip, 0.5 * (upper + edge) + 0.012 * out, below])
 
 
-def brow() -> part.Part:
+def make_brow() -> part.Part:
     """Return the left brow."""
     share = np.linspace(0, 1, 30)
     x = 0.135 + 0.40 * share
     y = 0.279 + 0.006 * share + 0.026 * np.sin(np.pi * share**1.3)
-    path = np.stack([x, y, part.seen_from_front(part.head, x, y) + 0.004], axis=1)
+    path = np.stack([x, y, part.find_front(part.measure_head, x, y) + 0.004], axis=1)
     wide = 0.033 * np.clip(1.02 - share, 0.01, 1) ** 0.6 * np.clip(share / 0.4, 0.02, 1) ** 0.6
     upward = np.broadcast_to([0.25, 0.1, 1.0], path.shape)
-    places, triangles, strands = part.tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)
-    return part.part("brow", places, triangles, palette.BROW, palette.BROW_FINISH, strands)
+    places, triangles, strands = part.make_tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)
+    return part.make_part("brow", places, triangles, palette.BROW, palette.BROW_FINISH, strands)
 
 
 INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.12, 0.1, (0.1, 0.03), 0.055

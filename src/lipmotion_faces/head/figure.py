@@ -14,12 +14,12 @@ from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.base import rotate_head
 from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.eyes import LASHES, LID_SIDE, brow, catchlights, eyeball, lash_triangles, lashes, shift_brow
-from lipmotion_faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
-from lipmotion_faces.head.part import EYE, MIDDLE, Part, grid_triangles, head, join_parts, part, seen_from_middle, tube
+from lipmotion_faces.head.eyes import LASHES, LID_SIDE, make_brow, make_catchlights, make_eyeball, list_lash_triangles, place_lashes, shift_brow
+from lipmotion_faces.head.inside import measure_drop, make_lower_teeth, place_tongue, list_tongue_triangles, make_upper_teeth
+from lipmotion_faces.head.part import EYE, MIDDLE, Part, list_grid_triangles, measure_head, join_parts, make_part, find_from_middle, make_tube
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, closed_share, move_jaw
-from lipmotion_faces.rendering.lighting import Finish, Lighting, reaches, unit
+from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, measure_closure, move_jaw
+from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach, normalise
 
 BUN = np.array([0.0, 1.40, -0.98])
 """Middle of the bun."""
@@ -42,9 +42,9 @@ _STRAND = (
 _COLUMNS, _ROWS = 270, 30
 
 
-def hair() -> Part:
+def make_hair() -> Part:
     """Return all the hair."""
-    locks = [_lock(_STRAND, 0.034, 0.02, 0.1), _lock([(-x, *rest) for x, *rest in _STRAND], 0.034, 0.02, 0.1)]
+    locks = [_make_lock(_STRAND, 0.034, 0.02, 0.1), _make_lock([(-x, *rest) for x, *rest in _STRAND], 0.034, 0.02, 0.1)]
     fringe = []
     for n, (x, y, z, wide) in enumerate(_FRINGE):
         start = 0.24 + 0.015 * n
@@ -55,21 +55,21 @@ def hair() -> Part:
             (0.97 * x, y + 0.20, z + 0.08, 0.08),
             (1.02 * x, y - 0.06, z - 0.06, 0.035),
         ]
-        fringe.append(_lock(points, wide, 0.05, 0.22 * (-1) ** n))
-    return join_parts("hair", [_cap(), _bun(), *fringe, *locks])
+        fringe.append(_make_lock(points, wide, 0.05, 0.22 * (-1) ** n))
+    return join_parts("hair", [_make_cap(), _make_bun(), *fringe, *locks])
 
 
-def _cap() -> Part:
+def _make_cap() -> Part:
     half_loop = np.array(_LINE)
     loop = np.concatenate([half_loop, half_loop[-2:0:-1] * [-1, 1, 1], half_loop[:1]])
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))])
     curve = CubicSpline(length, loop, bc_type="periodic")(np.arange(_COLUMNS) / _COLUMNS * length[-1])
-    line = seen_from_middle(head, unit(curve - MIDDLE))  # where the hair begins, clockwise from above
-    start, pole = unit(line - MIDDLE), unit(BUN - MIDDLE)
+    line = find_from_middle(measure_head, normalise(curve - MIDDLE))  # where the hair begins, clockwise from above
+    start, pole = normalise(line - MIDDLE), normalise(BUN - MIDDLE)
     share = np.linspace(0, 1, _ROWS)[:, None, None] ** 1.15
     angle = np.arccos(np.clip(start @ pole, -1, 1))[None, :, None]
     ways = (np.sin((1 - share) * angle) * start + np.sin(share * angle) * pole) / np.sin(angle)
-    skin = seen_from_middle(head, ways.reshape(-1, 3)).reshape(ways.shape)
+    skin = find_from_middle(measure_head, ways.reshape(-1, 3)).reshape(ways.shape)
     phase = 2 * np.pi * np.arange(_COLUMNS) / _COLUMNS
     share = share[..., 0]
     wave = 0.5 * np.sin(23 * phase + 2 * np.sin(3 * phase)) + 0.3 * np.sin(41 * phase + 1.3) + 0.2 * np.sin(67 * phase)
@@ -77,43 +77,43 @@ def _cap() -> Part:
     rise = 0.085 * np.clip(share / 0.16, 0, 1) ** 0.5 + 0.02 * np.sin(np.pi * share)
     rise = rise + 0.026 * ridge * np.clip(share / 0.1, 0, 1) * np.clip((1 - share) / 0.1, 0.3, 1)
     places = skin + rise[..., None] * ways - 0.015 * (1 - np.clip(share / 0.05, 0, 1))[..., None] * ways
-    along = unit(np.gradient(places, axis=0).reshape(-1, 3))
-    colours = _streaks(np.broadcast_to(ridge, rise.shape).ravel())
-    triangles = grid_triangles(_ROWS, _COLUMNS, closed=True)[:, ::-1]
-    return part("cap", places.reshape(-1, 3), triangles, colours, palette.HAIR_FINISH, along)
+    along = normalise(np.gradient(places, axis=0).reshape(-1, 3))
+    colours = _draw_streaks(np.broadcast_to(ridge, rise.shape).ravel())
+    triangles = list_grid_triangles(_ROWS, _COLUMNS, closed=True)[:, ::-1]
+    return make_part("cap", places.reshape(-1, 3), triangles, colours, palette.HAIR_FINISH, along)
 
 
-def _streaks(height: Real) -> Real:
+def _draw_streaks(height: Real) -> Real:
     light = np.clip(0.5 + 0.5 * height, 0, 1)[:, None]
     deep, middle, bright = (np.array(c) for c in (palette.HAIR_DEEP, palette.HAIR, palette.HAIR_LIGHT))
     shaded, lit = deep + 2 * light * (middle - deep), middle + (2 * light - 1) * 0.55 * (bright - middle)
     return np.where(light < 0.5, shaded, lit)
 
 
-def _bun() -> Part:
+def _make_bun() -> Part:
     down, around = np.meshgrid(np.linspace(0.02, np.pi - 0.02, 36), 2 * np.pi * np.arange(128) / 128, indexing="ij")
     twist = around + 1.5 * down
     height = np.cos(8 * twist + 1.4 * np.sin(2 * down))
     radius = 1 + 0.04 * height * np.sin(down)
     x, z = 0.40 * radius * np.sin(down) * np.cos(around), 0.38 * radius * np.sin(down) * np.sin(around)
     places = np.stack([x, 0.33 * radius * np.cos(down), z], axis=-1)
-    strands = unit(np.stack([-np.sin(around), 0.6 * np.ones_like(around), np.cos(around)], axis=-1).reshape(-1, 3))
-    triangles = grid_triangles(36, 128, closed=True)[:, ::-1]
-    return part("bun", places.reshape(-1, 3) + BUN, triangles, _streaks(height.ravel()), palette.HAIR_FINISH, strands)
+    strands = normalise(np.stack([-np.sin(around), 0.6 * np.ones_like(around), np.cos(around)], axis=-1).reshape(-1, 3))
+    triangles = list_grid_triangles(36, 128, closed=True)[:, ::-1]
+    return make_part("bun", places.reshape(-1, 3) + BUN, triangles, _draw_streaks(height.ravel()), palette.HAIR_FINISH, strands)
 
 
-def _lock(points: Sequence[Sequence[float]], wide: float, thick: float, shade: float) -> Part:
+def _make_lock(points: Sequence[Sequence[float]], wide: float, thick: float, shade: float) -> Part:
     """Return a lock along places (x, y, z, and the distance from the skin below)."""
     knots = np.array(points)
     share = np.linspace(0, 1, 36)
     curve = CubicSpline(np.linspace(0, 1, len(knots)), knots)(share)
-    ways = unit(curve[:, :3] - MIDDLE)
-    path = seen_from_middle(head, ways) + curve[:, 3:] * ways
+    ways = normalise(curve[:, :3] - MIDDLE)
+    path = find_from_middle(measure_head, ways) + curve[:, 3:] * ways
     taper = np.clip(1.15 * np.sin(np.pi * np.clip(0.12 + 0.87 * share, 0, 1)), 0.015, 1) ** 0.7
-    places, triangles, strands = tube(path, wide * taper, thick * taper, ways, sides=16)
+    places, triangles, strands = make_tube(path, wide * taper, thick * taper, ways, sides=16)
     across = np.tile(np.cos(2 * np.pi * np.arange(16) / 16), 36)
-    colours = _streaks(shade + 0.35 * np.cos(9 * across))
-    return part("lock", places, triangles, colours, palette.HAIR_FINISH, strands)
+    colours = _draw_streaks(shade + 0.35 * np.cos(9 * across))
+    return make_part("lock", places, triangles, colours, palette.HAIR_FINISH, strands)
 
 
 Real = NDArray[np.float64]
@@ -121,7 +121,7 @@ Real = NDArray[np.float64]
 _SIDES = 64
 
 
-def ear() -> Part:
+def make_ear() -> Part:
     """Return the left ear."""
     around = 2 * np.pi * np.arange(48) / 48
     ring = np.array([0.0, 0.22, 0.42, 0.58, 0.70, 0.79, 0.87, 0.94, 1.0, 1.0, 0.93, 0.75])
@@ -139,19 +139,19 @@ def ear() -> Part:
     colours = np.broadcast_to(np.array(palette.SKIN), places.shape).copy()
     warm = np.exp(-(((ring - 0.4) / 0.3) ** 2))[:, None, None] * 0.35 + 0.15
     colours = (1 - warm) * colours + warm * np.array(palette.BLUSH)
-    triangles = grid_triangles(len(ring), 48, closed=True)
-    return part("ear", places.reshape(-1, 3), triangles, colours.reshape(-1, 3), palette.SKIN_FINISH)
+    triangles = list_grid_triangles(len(ring), 48, closed=True)
+    return make_part("ear", places.reshape(-1, 3), triangles, colours.reshape(-1, 3), palette.SKIN_FINISH)
 
 
-def earring() -> Part:
+def make_earring() -> Part:
     """Return the left ear's ring, a small ball."""
     down, around = np.meshgrid(np.linspace(0, np.pi, 12), 2 * np.pi * np.arange(20) / 20, indexing="ij")
     ball = np.stack([np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)], axis=-1)
     places = 0.035 * ball.reshape(-1, 3) + np.array([0.835, -0.455, -0.74])
-    return part("earring", places, grid_triangles(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH)
+    return make_part("earring", places, list_grid_triangles(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH)
 
 
-def _rings(name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish) -> Part:
+def _make_rings(name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish) -> Part:
     """Return a part of rings about the body from rows (height, half width, half depth, middle z, squareness)."""
     at = np.linspace(0, len(table) - 1, count)
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
@@ -160,44 +160,44 @@ def _rings(name: str, table: Sequence[Sequence[float]], count: int, colour: pale
     for y, wide, deep, z, square in PchipInterpolator(np.arange(len(table)), np.array(table))(at).tolist():
         x, forward = np.sign(c) * np.abs(c) ** (2 / square), np.sign(s) * np.abs(s) ** (2 / square)
         rows.append(np.stack([wide * x, np.full(_SIDES, y), z + deep * forward], axis=1))
-    triangles = grid_triangles(count, _SIDES, closed=True)[:, ::-1]
-    return part(name, np.concatenate(rows), triangles, colour, finish)
+    triangles = list_grid_triangles(count, _SIDES, closed=True)[:, ::-1]
+    return make_part(name, np.concatenate(rows), triangles, colour, finish)
 
 
-def neck() -> Part:
+def make_neck() -> Part:
     """Return the neck, from under the hair to under the collar."""
     table = [
         (-0.55, 0.33, 0.30, -0.98, 2), (-1.0, 0.355, 0.34, -0.96, 2), (-1.45, 0.375, 0.36, -0.98, 2),
         (-1.75, 0.47, 0.40, -1.0, 2), (-1.95, 0.75, 0.45, -1.0, 2),
     ]  # fmt: skip
-    return _rings("neck", table, 26, palette.SKIN, palette.SKIN_FINISH)
+    return _make_rings("neck", table, 26, palette.SKIN, palette.SKIN_FINISH)
 
 
-def clothing() -> Part:
+def make_clothing() -> Part:
     """Return the pullover: shoulders and chest."""
     table = [
         (-1.60, 0.47, 0.44, -0.98, 2.0), (-1.66, 0.56, 0.50, -0.99, 2.0), (-1.78, 0.86, 0.56, -1.0, 2.05),
         (-1.92, 1.28, 0.60, -1.02, 2.1), (-2.08, 1.58, 0.62, -1.03, 2.15), (-2.35, 1.74, 0.66, -1.03, 2.2),
         (-2.8, 1.80, 0.72, -1.03, 2.2), (-3.4, 1.80, 0.75, -1.03, 2.2),
     ]  # fmt: skip
-    return _rings("clothing", table, 28, palette.CLOTH, palette.CLOTH_FINISH)
+    return _make_rings("clothing", table, 28, palette.CLOTH, palette.CLOTH_FINISH)
 
 
-def collar() -> Part:
+def make_collar() -> Part:
     """Return the ribbed collar."""
     around = 2 * np.pi * np.arange(121) / 120
     path = np.stack([0.475 * np.cos(around), -1.60 - 0.09 * np.sin(around), -0.98 + 0.44 * np.sin(around)], axis=1)
     upward = np.stack([np.cos(around), np.full(121, 0.35), np.sin(around)], axis=1)
     rib = 1 + 0.04 * np.cos(30 * around)
-    places, triangles, _ = tube(path, 0.075 * np.ones(121), 0.05 * rib, upward, sides=10)
-    return part("collar", places, triangles, palette.CLOTH_RIB, palette.CLOTH_FINISH)
+    places, triangles, _ = make_tube(path, 0.075 * np.ones(121), 0.05 * rib, upward, sides=10)
+    return make_part("collar", places, triangles, palette.CLOTH_RIB, palette.CLOTH_FINISH)
 
 
 CORNER_FADE_SHARE = 0.4
 """How far the colour of the lips fades to that of the skin towards the corners."""
 
 
-def skin_colours(skin: Skin) -> Real:
+def paint_skin(skin: Skin) -> Real:
     """Return the diffuse reflection of all vertices of the skin, decode_srgb [shape=(V, 3)]."""
     x, y, z = np.abs(skin.rest[:, 0]), skin.rest[:, 1], skin.rest[:, 2]
     colour = np.broadcast_to(np.array(palette.SKIN), skin.rest.shape).copy()
@@ -268,19 +268,19 @@ class Figure:
 
     def __init__(self) -> None:
         self.skin = skin = Skin()
-        self._eye, self._light = eyeball(), catchlights()
-        left_brow, left_ear, ring, tongue_at_rest = brow(), ear(), earring(), tongue(REST)
+        self._eye, self._light = make_eyeball(), make_catchlights()
+        left_brow, left_ear, ring, tongue_at_rest = make_brow(), make_ear(), make_earring(), place_tongue(REST)
         lash = np.zeros((3 * LASHES, 3))
         parts = [
-            Part("skin", skin.rest, skin.triangles, skin_colours(skin), palette.SKIN_FINISH, skin.normals),
-            part("tongue", tongue_at_rest, tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
-            lower_teeth(), upper_teeth(),
+            Part("skin", skin.rest, skin.triangles, paint_skin(skin), palette.SKIN_FINISH, skin.normals),
+            make_part("tongue", tongue_at_rest, list_tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
+            make_lower_teeth(), make_upper_teeth(),
             self._eye, self._eye.mirror("right eye"), self._light, replace(self._light, name="right catchlights"),
-            part("lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
-            part("right lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
+            make_part("lashes", lash, list_lash_triangles(), palette.LASH, palette.BROW_FINISH),
+            make_part("right lashes", lash, list_lash_triangles(), palette.LASH, palette.BROW_FINISH),
             left_brow, left_brow.mirror("right brow"),
-            hair(), left_ear, left_ear.mirror("right ear"), ring, ring.mirror("right earring"),
-            neck(), clothing(), collar(),
+            make_hair(), left_ear, left_ear.mirror("right ear"), ring, ring.mirror("right earring"),
+            make_neck(), make_clothing(), make_collar(),
         ]  # fmt: skip
         self.parts = tuple(parts)
         names = [each.name for each in parts]
@@ -309,7 +309,7 @@ class Figure:
         hiding = np.ones(len(places), bool)
         for rows in (*fully_lit, self.rows["eye"], self.rows["right eye"]):
             hiding[rows] = False
-        lit = reaches(places, normals, self.triangles, hiding)
+        lit = measure_reach(places, normals, self.triangles, hiding)
         for rows in fully_lit:
             lit[rows] = 1
         lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15
@@ -321,9 +321,9 @@ class Figure:
         """Return places and normals of all vertices in a pose, the head not turned [shape=(V, 3), both]."""
         places, normals = self._places.copy(), self._normals.copy()
         places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.pose(pose)
-        places[self.rows["tongue"]] = tongue(pose)
-        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], tongue_triangles())
-        places[self.rows["teeth"]] = move_jaw(places[self.rows["teeth"]], lower_drop(pose))
+        places[self.rows["tongue"]] = place_tongue(pose)
+        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], list_tongue_triangles())
+        places[self.rows["teeth"]] = move_jaw(places[self.rows["teeth"]], measure_drop(pose))
         for name in ("brow", "right brow"):
             places[self.rows[name]] += shift_brow(places[self.rows[name]], pose)
             places[self.rows[name], 1] += pose.brows
@@ -335,7 +335,7 @@ class Figure:
             places[eye] = places[eye] @ look.T + EYE * flip
             normals[eye] = normals[eye] @ look.T
             places[self.rows[name + "catchlights"]] = self._light.places @ half.T + EYE * flip
-            places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
+            places[self.rows[name + "lashes"]] = place_lashes(lid, pose.shut) * flip
             normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
         return places, normals
 
@@ -384,7 +384,7 @@ class Figure:
             arrives[rows] = lit[:, None]
         licked = TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
         arrives[self.rows["tongue"]] = np.minimum(1.0, licked)
-        lips, closed = self.skin.lip_rows(), closed_share(pose)
+        lips, closed = self.skin.lip_rows(), measure_closure(pose)
         for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE_RINGS - len(SEAM_LIGHT)):
             shaded = np.maximum(closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER)
             arrives[lips[ring]] *= 1 - (1 - part_of) * shaded

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.part import MOUTH_Y, Part, grid_triangles, join_parts, part
+from lipmotion_faces.head.part import MOUTH_Y, Part, list_grid_triangles, join_parts, make_part
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import ARCH, TEETH_EDGE, TEETH_Z, move_jaw
 
@@ -26,31 +26,31 @@ TIP_ON_LIP, TIP_HEIGHTS = 0.02, (TEETH_EDGE - 0.028, TEETH_EDGE - 0.013)
 _TONGUE_RINGS, _TONGUE_SIDES = 24, 32
 
 
-def upper_teeth() -> Part:
+def make_upper_teeth() -> Part:
     """Return the upper teeth with a strip of gum."""
-    return _row("upper teeth", _UPPER_EDGES, TEETH_EDGE, 0.115, 1.0, TEETH_Z)
+    return _make_row("upper teeth", _UPPER_EDGES, TEETH_EDGE, 0.115, 1.0, TEETH_Z)
 
 
-def lower_teeth() -> Part:
+def make_lower_teeth() -> Part:
     """Return the lower teeth with a strip of gum, the jaw closed."""
-    return _row("teeth", _LOWER_EDGES, LOWER_EDGE, 0.095, -1.0, TEETH_Z - 0.045)
+    return _make_row("teeth", _LOWER_EDGES, LOWER_EDGE, 0.095, -1.0, TEETH_Z - 0.045)
 
 
-def _row(name: str, edges: tuple[float, ...], edge_y: float, height: float, up: float, front: float) -> Part:
+def _make_row(name: str, edges: tuple[float, ...], edge_y: float, height: float, up: float, front: float) -> Part:
     teeth = []
     for number, (near, far) in enumerate(pairwise(edges)):
         for side in (1, -1):
-            teeth.append(_tooth(side * near, side * far, number, edge_y, height, up, front))
+            teeth.append(_make_tooth(side * near, side * far, number, edge_y, height, up, front))
     x = np.linspace(-0.28, 0.28, 41)
     y = edge_y + up * height * np.array([0.72, 0.86, 1.3, 1.9])
     depth = np.array([-0.02, 0.004, 0.008, 0.0])
     grid = np.stack([np.tile(x, 4), np.repeat(y, 41), np.concatenate([front - ARCH * x**2 + d for d in depth])], axis=1)
-    triangles = grid_triangles(4, 41)
-    gum = part("gum", grid, triangles[:, ::-1] if up > 0 else triangles, palette.GUM, palette.TOOTH_FINISH)
+    triangles = list_grid_triangles(4, 41)
+    gum = make_part("gum", grid, triangles[:, ::-1] if up > 0 else triangles, palette.GUM, palette.TOOTH_FINISH)
     return join_parts(name, [*teeth, gum])
 
 
-def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: float, front: float) -> Part:
+def _make_tooth(a: float, b: float, number: int, edge_y: float, height: float, up: float, front: float) -> Part:
     """Return one tooth between two columns: a rounded plate that is bent over its edge."""
     across, down = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(0, 1, 9))
     half, middle = abs(b - a) / 2, (a + b) / 2
@@ -69,23 +69,23 @@ def _tooth(a: float, b: float, number: int, edge_y: float, height: float, up: fl
     root = (0.25 * level**3)[..., None]
     colours = (1 - shade) * colour + shade * np.array(palette.TOOTH_GAP)
     colours = (1 - root) * colours + root * np.array(palette.TOOTH_GAP)
-    triangles = grid_triangles(9, 9)
-    return part(
+    triangles = list_grid_triangles(9, 9)
+    return make_part(
         "tooth", places, triangles if up > 0 else triangles[:, ::-1], colours.reshape(-1, 3), palette.TOOTH_FINISH
     )
 
 
-def lower_drop(pose: CharacterPose) -> float:
+def measure_drop(pose: CharacterPose) -> float:
     """Return how far the lower teeth drop with the jaw, a length; bitten together they touch the upper ones."""
     return pose.jaw + PARTED_TEETH * (1 - pose.bite) * (1 + max(pose.roundness, 1.4 * pose.oval))
 
 
-def tongue_triangles() -> NDArray[np.int32]:
+def list_tongue_triangles() -> NDArray[np.int32]:
     """Return the triangles of the tongue [shape=(F, 3)]."""
-    return grid_triangles(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
+    return list_grid_triangles(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
 
 
-def tongue(pose: CharacterPose) -> Real:
+def place_tongue(pose: CharacterPose) -> Real:
     """Return the places of the tongue from root to tip [shape=(V, 3)], the head not turned."""
     floor = LOWER_EDGE - 0.075
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.060, -0.36])

@@ -74,7 +74,7 @@ class CharacterPose(NamedTuple):
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def head_poses(
+def list_head_poses(
     motion: Motion, units: Timeline[Unit], fps: float, staging: Staging | None = None, prosody: Prosody | None = None
 ) -> list[CharacterPose]:
     """Return the pose at ``n / fps`` seconds, to the end of the motion. Raises InputError: as ``find_mouth``."""

@@ -18,9 +18,9 @@ from scipy.spatial import Delaunay, cKDTree
 from lipmotion.articulation.contact import LEAST_GAP, smooth_step
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
-from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
+from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, measure_head, find_outward, find_front, find_from_middle
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.rendering.lighting import unit
+from lipmotion_faces.rendering.lighting import normalise
 
 Real = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ _ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
 _FULL = np.where(SIDE > 0, _BOW, _LOWER_BOW)
 
 
-def section_points(pose: CharacterPose, base_z: Real) -> Real:
+def place_sections(pose: CharacterPose, base_z: Real) -> Real:
     """Return the eight points of the cross-section of every column [shape=(8, COLUMNS, 3); stacked: (T, 8, ...)].
 
     pose   : one, or several of ``pose.stacked``
@@ -93,14 +93,14 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     x = half * ACROSS
     rise = pose.upper_rise
     drop = pose.gap - rise
-    middle = _between(pose)
+    middle = _find_between(pose)
     # how much nearer to the middle than the corners the inner edge of the lips lies
     hole_share = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
-    as_ring = np.maximum(1 - hole_share, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * closed_share(pose, RING_GAP))
+    as_ring = np.maximum(1 - hole_share, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * measure_closure(pose, RING_GAP))
     squeeze = as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
     rounded = _ENVELOPE ** (1 + np.minimum(2 * pose.roundness, 1.0))
     belly = rounded + squeeze * (1 - rounded)
-    hole, contour = _opening(pose)
+    hole, contour = _shape_opening(pose)
     inner_y = middle + np.where(upper, rise, -drop) * hole
     full = _FULL + 0.85 * pose.roundness * (_ENVELOPE - _FULL)
     full = full + 0.4 * pose.spread * (_ENVELOPE - full)
@@ -113,18 +113,18 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     back = np.where(upper, 0.0, 0.22 * drop + 0.05 * pose.tuck) * _ENVELOPE
     outer_z = base_z + 0.85 * forward + arch - back
     lower_back = np.where(upper, 0.0, 0.25 * drop) * contour
-    meet = _meeting(pose, base_z, 1 - squeeze) - lower_back
+    meet = _find_meeting(pose, base_z, 1 - squeeze) - lower_back
     bulge = (0.056 - 0.006 * SIDE * _ENVELOPE) * belly * pose.fullness * (1 - 0.3 * pose.press)
     inner_x = x * (1 - squeeze)
     teeth = TEETH_Z - ARCH * inner_x**2
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
-    contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * closed_share(pose)
+    contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * measure_closure(pose)
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
     below_upper = np.minimum(BITTEN_EDGE_Y - middle, rise - LEAST_GAP)  # the teeth part the lips
     on_teeth = np.minimum(middle + below_upper * hole, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
-    crest = _meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
+    crest = _find_meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
     behind = np.maximum(teeth + 0.022, contact_z - 0.10)
     y = outer_y
     broad = inner_y + pose.roundness * (middle + np.where(upper, rise, -drop) * contour - inner_y)
@@ -143,7 +143,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-3)
 
 
-def _meeting(pose: CharacterPose, base_z: Real, inwards: Any) -> Real:
+def _find_meeting(pose: CharacterPose, base_z: Real, inwards: Any) -> Real:
     """Return how far forward the lips meet, at places that much nearer to the middle [shape=(..., COLUMNS)]."""
     across = inwards * ACROSS
     lower_z = np.concatenate([base_z[:1], base_z[: _UPPER_COLUMNS - 1 : -1], base_z[_UPPER_COLUMNS - 1 :][:1]])
@@ -152,23 +152,23 @@ def _meeting(pose: CharacterPose, base_z: Real, inwards: Any) -> Real:
     return np.asarray(between + pose.protrusion - (0.45 * pose.protrusion + curved) * across**2)
 
 
-def closed_share(pose: CharacterPose, apart: float = SEAM_GAP) -> Any:
+def measure_closure(pose: CharacterPose, apart: float = SEAM_GAP) -> Any:
     """Return how nearly the lips are closed: 1 where they touch, 0 from a gap of ``apart`` on [shape of the gap]."""
     return smooth_step(np.asarray(1 - pose.gap / apart))
 
 
-def _between(pose: CharacterPose) -> Real:
+def _find_between(pose: CharacterPose) -> Real:
     """Return the height of the line between the lips, closed, at every column [shape=(..., COLUMNS)]."""
     line = (1 - pose.roundness - 0.6 * pose.spread) * _LINE
     lowered = 0.22 * pose.gap * (1 - 0.6 * pose.spread) * (1 - 0.75 * pose.roundness)
-    still = np.maximum(closed_share(pose, SMILE_GAP), pose.tuck)
+    still = np.maximum(measure_closure(pose, SMILE_GAP), pose.tuck)
     at_rest = REST_SMILE * still * (1 - pose.press) * (1 - pose.roundness)
     raised = (pose.smile + at_rest - lowered) * ACROSS**2
     bowed = ROUND_BOW * (1 - ACROSS**2) - ROUND_DROP - 0.2 * pose.gap
     return np.asarray(MOUTH_Y + line + raised + bowed * pose.roundness)
 
 
-def _opening(pose: CharacterPose) -> tuple[Real, Real]:
+def _shape_opening(pose: CharacterPose) -> tuple[Real, Real]:
     """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(..., COLUMNS), both]."""
     reach = 1 - 0.10 * pose.oval - 0.30 * pose.tuck
     power = 2 + 1.2 * pose.spread
@@ -179,8 +179,8 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
     return hole, contour
 
 
-def lip_surface(points: Real) -> Real:
-    """Return the places of lips and wall of the mouth [shape=(..., RINGS, COLUMNS, 3)] from ``section_points``."""
+def place_lips(points: Real) -> Real:
+    """Return the places of lips and wall of the mouth [shape=(..., RINGS, COLUMNS, 3)] from ``place_sections``."""
     front = np.einsum("rp,...pcx->...rcx", _SECTION, points)
     last = front[..., -1, :, :]
     middle = last.mean(axis=-2, keepdims=True)
@@ -271,18 +271,18 @@ class Skin:
 
     def __init__(self) -> None:
         self.lids_of_eye = Eyelids()
-        contour = section_points(REST, np.zeros(COLUMNS))[0]
-        self.base_z = seen_from_front(head, contour[:, 0], contour[:, 1])
+        contour = place_sections(REST, np.zeros(COLUMNS))[0]
+        self.base_z = find_front(measure_head, contour[:, 0], contour[:, 1])
         contour[:, 2] = self.base_z
         edge = self.lids_of_eye.edge()
         edges = np.concatenate([edge, edge * [-1, 1, 1]])
         fill = _fill(contour, edges)
         self.face = np.concatenate([contour, edges, fill])
-        triangles = _triangles(self.face, len(contour), len(edges) // 2)
+        triangles = _list_triangles(self.face, len(contour), len(edges) // 2)
         self._first_lip = len(self.face)
         self._first_lid = self._first_lip + (RINGS - 1) * COLUMNS
-        grids = [_closed_grid(self.lip_rows())]
-        grids += [_closed_grid(self.lid_rows(0)[::-1]), _closed_grid(self.lid_rows(1))]
+        grids = [_close_grid(self.lip_rows())]
+        grids += [_close_grid(self.lid_rows(0)[::-1]), _close_grid(self.lid_rows(1))]
         self.triangles = np.concatenate([triangles, *grids]).astype(np.int32)
         front = 2 * VISIBLE_RINGS * COLUMNS
         wall, lids = len(grids[0]) - front, len(grids[1]) + len(grids[2])
@@ -293,8 +293,8 @@ class Skin:
         self.rest = self.places(REST)
         self._meshed_rest = compute_normals(self.rest, self.triangles)
         self.normals = self._meshed_rest.copy()
-        self.normals[len(contour) + len(edges) : len(self.face)] = outward(head, fill)
-        self._before_lips = outward(head, contour)
+        self.normals[len(contour) + len(edges) : len(self.face)] = find_outward(measure_head, fill)
+        self._before_lips = find_outward(measure_head, contour)
         corners = self.rest[[0, _LEFT_CORNER]]
         beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
         self._calm = np.ones((len(self.rest), 1))
@@ -317,7 +317,7 @@ class Skin:
         places = self.places(pose)
         change = compute_normals(places, self.triangles) - self._meshed_rest
         normals = self.normals + self._calm * change
-        rows, closed = self.lip_rows(), closed_share(pose)
+        rows, closed = self.lip_rows(), measure_closure(pose)
         normals[rows[VISIBLE_RINGS - 1]] += closed * (
             normals[rows[VISIBLE_RINGS - 2]] - normals[rows[VISIBLE_RINGS - 1]]
         )
@@ -349,7 +349,7 @@ class Skin:
         out = np.stack([(np.abs(fill[:, 0]) - 0.40) / 0.15, (fill[:, 1] + 0.47) / 0.15], axis=1)
         share = np.exp(-np.sum(out**2, axis=1)) * (fill[:, 2] > -0.75)
         cheeks, nose = np.zeros_like(face), np.zeros_like(face)
-        cheeks[len(face) - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
+        cheeks[len(face) - len(fill) :] = share[:, None] * (find_outward(measure_head, fill) + np.array([0.0, 0.4, 0.0]))
         out = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
         nose[:, 1] = np.exp(-out) * (face[:, 2] > -0.5)
         jaw = smooth_step((-0.47 - face[:, 1]) / 0.40) * smooth_step((face[:, 2] + 0.98) / 0.45)
@@ -367,7 +367,7 @@ class Skin:
         pose    : one, or several of ``pose.stacked``
         binding : of the vertices beside the lips [shape of their places=(..., N, 3)]
         """
-        lips = lip_surface(section_points(pose, self.base_z))
+        lips = place_lips(place_sections(pose, self.base_z))
         return lips, binding.move(pose, lips[..., 0, :, :], self._columns)
 
 
@@ -387,7 +387,7 @@ def _fill(contour: Real, edges: Real) -> Real:
         step = 1 if away < 0.05 else 2
         rings.append(np.stack([x, y], axis=1)[::step])
     near = np.concatenate(rings)
-    near3 = np.column_stack([near, seen_from_front(head, near[:, 0], near[:, 1])])
+    near3 = np.column_stack([near, find_front(measure_head, near[:, 0], near[:, 1])])
     count = int(1.75 / SPACING)
     i, j = np.meshgrid(np.arange(-count, count + 1), np.arange(-int(count * 1.2), int(count * 1.2) + 1))
     u, v = SPACING * (i + 0.5 * (j % 2)).ravel(), SPACING * 0.866 * j.ravel()
@@ -396,28 +396,28 @@ def _fill(contour: Real, edges: Real) -> Real:
     radius = np.hypot(u, v)
     angle = radius + 0.11 * radius**3  # on the map of the head, whose middle is the front; its rim is stretched
     flat = np.sin(angle) / np.maximum(radius, 1e-9)
-    places = seen_from_middle(head, np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
+    places = find_from_middle(measure_head, np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
     close = cKDTree(near3).query(places)[0] < 0.024
-    inside = (np.abs(places[:, 0]) < 0.36) & _within(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
+    inside = (np.abs(places[:, 0]) < 0.36) & _mark_within(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
     at_eye = cKDTree(edges).query(places)[0] < 0.02
     for side in (1, -1):
         ring = edges[: len(edges) // 2, :2] * [side, 1]
-        at_eye |= _within(places[:, :2], ring) & (places[:, 2] > -0.6)
+        at_eye |= _mark_within(places[:, :2], ring) & (places[:, 2] > -0.6)
     return np.concatenate([near3, places[~(close | inside | at_eye)]])
 
 
-def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
+def _list_triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
     """Return the triangles between the vertices of the face, none in mouth and eyes [shape=(F, 3)]."""
-    away = unit(face - MIDDLE)  # on the map of the head, without the stretching of its rim
+    away = normalise(face - MIDDLE)  # on the map of the head, without the stretching of its rim
     across = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
     flat = away[:, :2] / across[:, None] * np.arccos(np.clip(away[:, 2], -1, 1))[:, None]
     triangles = Delaunay(flat).simplices
     middle = flat[triangles].mean(axis=1)
     x, y, z = face[triangles].mean(axis=1).T
     under_hair = (y > 1.0 - 0.6 * np.maximum(np.abs(x) - 0.2, 0)) | ((y > 0.1) & (z < -0.75)) | (z < -1.2)
-    hole = _within(middle, flat[:contour]) | under_hair
+    hole = _mark_within(middle, flat[:contour]) | under_hair
     for eye in range(2):
-        hole |= _within(middle, flat[contour + eye * edge : contour + (eye + 1) * edge])
+        hole |= _mark_within(middle, flat[contour + eye * edge : contour + (eye + 1) * edge])
     triangles = triangles[~hole]
     a, b, c = (flat[triangles[:, n]] for n in range(3))
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
@@ -425,7 +425,7 @@ def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
     return triangles.astype(np.int32)
 
 
-def _within(points: Real, polygon: Real) -> NDArray[np.bool_]:
+def _mark_within(points: Real, polygon: Real) -> NDArray[np.bool_]:
     following = np.roll(polygon, -1, axis=0)
     inside = np.zeros(len(points), bool)
     for (xa, ya), (xb, yb) in zip(polygon.tolist(), following.tolist(), strict=True):
@@ -435,7 +435,7 @@ def _within(points: Real, polygon: Real) -> NDArray[np.bool_]:
     return inside
 
 
-def _closed_grid(rows: Index) -> NDArray[np.int32]:
+def _close_grid(rows: Index) -> NDArray[np.int32]:
     """Return the triangles between successive closed rings of vertices [shape=(rings, columns)]; (F, 3)."""
     a, b = rows[:-1], rows[1:]
     c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)

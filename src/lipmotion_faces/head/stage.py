@@ -17,7 +17,7 @@ from lipmotion_faces.characters.textures import encode_srgb
 from lipmotion_faces.head.figure import Figure
 from lipmotion_faces.head.pose import CharacterPose, stack_poses
 from lipmotion_faces.head.skin import COLUMNS, REST, VISIBLE_RINGS
-from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, flat
+from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, fill_background
 
 Real = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ _HALF_WIDTH = 0.12
 """Half the width of the strip in the middle in which both sides move."""
 
 
-def head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
+def build_head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     """Return the character at rest, its parts named, with a blendshape for each of ``POSES`` and ``SIDED_POSES``, and
     those that turn the eyes.
 
@@ -102,18 +102,18 @@ PICTURE_HEIGHT = 3.35
 
 
 @cache
-def figure() -> Figure:
+def make_figure() -> Figure:
     """Return the character, made once in a process."""
     return Figure()
 
 
 @cache
-def mesh_of_figure(*, moods: bool = False) -> Mesh:
-    """Return the character as a mesh with blendshapes, of ``head_mesh``, made once in a process."""
-    return head_mesh(figure(), moods=moods)
+def make_figure_mesh(*, moods: bool = False) -> Mesh:
+    """Return the character as a mesh with blendshapes, of ``build_head_mesh``, made once in a process."""
+    return build_head_mesh(make_figure(), moods=moods)
 
 
-def camera_for(width: int, height: int) -> Camera:
+def make_camera(width: int, height: int) -> Camera:
     """Return the camera for a size of pictures. Raises InputError: a size that is odd or under 64."""
     return Camera(width, height, (0.0, -0.03), PICTURE_HEIGHT)
 
@@ -122,9 +122,9 @@ class Stage:
     """Character, light and camera, for several threads; colour: of the background, 0 to 255 (None: a gradient)."""
 
     def __init__(self, camera: Camera, colour: tuple[int, int, int] | None = None) -> None:
-        self.figure = figure()
-        self.canvas = Canvas(camera, None if colour is None else flat(camera, colour))
-        self._dark = Canvas(camera, flat(camera, (0, 0, 0)))
+        self.figure = make_figure()
+        self.canvas = Canvas(camera, None if colour is None else fill_background(camera, colour))
+        self._dark = Canvas(camera, fill_background(camera, (0, 0, 0)))
         still = self.figure.frame(CharacterPose(), camera.place)
         first = self.figure.first_still_triangle
         self._still = self.canvas.picture(still.places, still.light, self.figure.triangles[first:])
@@ -153,7 +153,7 @@ AT_ONCE = 256
 COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 
 
-def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) -> dict[str, Real]:
+def fit_mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) -> dict[str, Real]:
     """Return the weights of the shapes of lips, jaw and tongue in every pose, 0 to 1 [each shape=(T,)]."""
     return _cached_fit(figure, mesh).weights(poses)
 
@@ -167,17 +167,17 @@ class _MouthFit:
         moved = mesh.displacements(np.arange(len(figure.skin.rest)))
         around = np.flatnonzero(figure.skin.lip_weight > 0)[::3]
         self._around, rings = figure.skin.binding.select(around), figure.skin.lip_rows()
-        every = _rows(moved[:, rings], moved[:, around])
+        every = _stack_rows(moved[:, rings], moved[:, around])
         rows = {name: every[mesh.shape_names.index(name)] for name in (*names, *FROM_POSE)}
         # of targets only what the shapes span counts, so they are projected at once: (T, S) numbers, not (T, vertices)
         self._spanned, self._triangle = np.linalg.qr(np.stack([rows[name] for name in names]).T)
         self._fixed = {name: rows[name] @ self._spanned for name in FROM_POSE}
         self._rest = figure.skin.lips_and_face(REST, self._around)
-        parting = lip_gap(moved[:, rings])[[mesh.shape_names.index(name) for name in names]]
+        parting = measure_lip_gap(moved[:, rings])[[mesh.shape_names.index(name) for name in names]]
         self._shapes = FaceShapes(tuple(names), tuple(names), np.zeros((len(names), 0, 3)), parting, "arkit")
 
     def weights(self, poses: Sequence[CharacterPose]) -> dict[str, Real]:
-        """Return the weights of ``mouth_weights``."""
+        """Return the weights of ``fit_mouth_weights``."""
         names = self._shapes.names
         fixed = {name: np.array([getattr(pose, field) for pose in poses], float) for name, field in FROM_POSE.items()}
         parts = [self._wanted(poses[first : first + AT_ONCE]) for first in range(0, len(poses), AT_ONCE)]
@@ -198,28 +198,28 @@ class _MouthFit:
             places - rest
             for places, rest in zip(self._skin.lips_and_face(stack_poses(poses), self._around), self._rest, strict=True)
         )
-        return _rows(lips, around) @ self._spanned, lip_gap(lips)
+        return _stack_rows(lips, around) @ self._spanned, measure_lip_gap(lips)
 
 
 _cached_fit = lru_cache(maxsize=2)(_MouthFit)
 
 
-def lip_gap(moved: Real) -> Real:
+def measure_lip_gap(moved: Real) -> Real:
     """Return by how much displacements [shape=(..., RINGS, COLUMNS, 3)] part the lips' middle [shape=(...,)]."""
-    upper, lower = _edges(moved)
+    upper, lower = _list_edges(moved)
     middle = upper.shape[-1] // 2
     return np.asarray(upper[..., middle] - lower[..., middle])
 
 
-def _edges(moved: Real) -> tuple[Real, Real]:
+def _list_edges(moved: Real) -> tuple[Real, Real]:
     """Return the upward displacements of the edges of the upper and the lower lip that meet [shape=(..., N), both]."""
     edge, half = moved[..., VISIBLE_RINGS - 1, :, 1], COLUMNS // 2
     return edge[..., 1:half], edge[..., :half:-1]
 
 
-def _rows(lips: Real, around: Real) -> Real:
+def _stack_rows(lips: Real, around: Real) -> Real:
     """Return displacements of lips and of the skin around them as rows of a least squares problem, with gaps."""
-    upper, lower = _edges(lips)
+    upper, lower = _list_edges(lips)
     shape = (*lips.shape[:-3], -1)
     visible = lips[..., :VISIBLE_RINGS, :, :].reshape(shape)
     return np.concatenate([visible, 0.5 * around.reshape(shape), GAP_WEIGHT * (upper - lower)], axis=-1)

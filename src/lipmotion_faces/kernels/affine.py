@@ -31,8 +31,8 @@ def resample(pictures: Pictures, to_source: Array, size: tuple[int, int]) -> Flo
     size      : h and w
     """
     new = np.empty((len(pictures), *size, COLOURS), np.float32)
-    to_source = _plain(to_source, np.float64)
-    for picture, made in zip(_plain(pictures), new, strict=True):
+    to_source = _make_contiguous(to_source, np.float64)
+    for picture, made in zip(_make_contiguous(pictures), new, strict=True):
         _resample(picture, to_source, made)
     return new
 
@@ -50,10 +50,10 @@ def blend(
     weight   : [shape=(h, w)], interpolated bilinearly
     to_patch : affine map [shape=(2, 3)] from the centre of a pixel of the part to its position in the patch
     """
-    _blend(frame, *corner, size, _plain(patch), _plain(weight, np.float32), _plain(to_patch, np.float64))
+    _blend(frame, *corner, size, _make_contiguous(patch), _make_contiguous(weight, np.float32), _make_contiguous(to_patch, np.float64))
 
 
-def _plain(values: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
+def _make_contiguous(values: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
     """Return an array that is contiguous and may be written to: for other ones numba would compile everything again."""
     return np.require(values, dtype or (None if values.dtype == np.uint8 else np.float32), ["C", "W"])
 
@@ -155,10 +155,10 @@ def _sum_at_edge(
     picture: Pictures, row: int, column: int, k: int, e: np.float32, f: np.float32, g: np.float32, h: np.float32
 ) -> np.float32:
     """Return the weighted sum of four pixels of a column around ``row``; outermost pixels repeat."""
-    height, column = len(picture), _near(column, picture.shape[1])
-    upper = e * Number(picture[_near(row - 1, height), column, k]) + f * Number(picture[_near(row, height), column, k])
-    lower = g * Number(picture[_near(row + 1, height), column, k])
-    return upper + lower + h * Number(picture[_near(row + 2, height), column, k])
+    height, column = len(picture), _clamp(column, picture.shape[1])
+    upper = e * Number(picture[_clamp(row - 1, height), column, k]) + f * Number(picture[_clamp(row, height), column, k])
+    lower = g * Number(picture[_clamp(row + 1, height), column, k])
+    return upper + lower + h * Number(picture[_clamp(row + 2, height), column, k])
 
 
 @compiled
@@ -167,8 +167,8 @@ def _share(weight: Floats, whole: Index, fractions: Floats, share: Floats) -> No
     height, width = weight.shape
     for c in range(len(share)):
         x, y = fractions[0, c], fractions[1, c]
-        above, below = _near(whole[1, c], height), _near(whole[1, c] + 1, height)
-        left, right = _near(whole[0, c], width), _near(whole[0, c] + 1, width)
+        above, below = _clamp(whole[1, c], height), _clamp(whole[1, c] + 1, height)
+        left, right = _clamp(whole[0, c], width), _clamp(whole[0, c] + 1, width)
         before = (ONE - y) * weight[above, left] + y * weight[below, left]
         share[c] = (ONE - x) * before + x * ((ONE - y) * weight[above, right] + y * weight[below, right])
 
@@ -183,5 +183,5 @@ def _mix(row: NDArray[np.uint8], new: Floats, share: Floats) -> None:
 
 
 @compiled
-def _near(index: int, length: int) -> int:
+def _clamp(index: int, length: int) -> int:
     return min(max(index, 0), length - 1)

@@ -23,7 +23,7 @@ ONE = 1 << 16
 """A pixel, in whole numbers."""
 
 
-def source_places(shift: Floats, step: int, shape: tuple[int, ...], axis: int, length: int) -> Floats:
+def find_source_places(shift: Floats, step: int, shape: tuple[int, ...], axis: int, length: int) -> Floats:
     """Return where each pixel of a target of a shape lies along an axis of its source, which is so long."""
     row, column = np.arange(shape[0]) / step, np.arange(shape[1]) / step
     r, c = np.minimum(row.astype(int), len(shift) - 2), column.astype(int)
@@ -34,7 +34,7 @@ def source_places(shift: Floats, step: int, shape: tuple[int, ...], axis: int, l
 
 def warp_arrays(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
     """Fill a picture as ``warp``, all pixels at once."""
-    y, x = (source_places(s, step, target.shape, k, source.shape[k]) for k, s in enumerate((shift_y, shift_x)))
+    y, x = (find_source_places(s, step, target.shape, k, source.shape[k]) for k, s in enumerate((shift_y, shift_x)))
     y0, x0 = np.minimum(y.astype(int), source.shape[0] - 2), np.minimum(x.astype(int), source.shape[1] - 2)
     fx, fy = (x - x0).astype(np.float32)[..., None], (y - y0).astype(np.float32)[..., None]
     above = source[y0, x0] + fx * (source[y0, x0 + 1] - source[y0, x0])
@@ -116,7 +116,7 @@ def warp(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Lay
     last_x, last_y = source.shape[1] - 1.0, source.shape[0] - 1.0
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
     for row in range(height):
-        row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        fill_grid_row(shift_x, shift_y, row / step, row_x, row_y)
         for cell in range((width + step - 1) // step):
             cell_x, more_x = row_x[cell], row_x[cell + 1] - row_x[cell]
             cell_y, more_y = row_y[cell], row_y[cell + 1] - row_y[cell]
@@ -172,7 +172,7 @@ def _warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, ta
     one, two, half = np.uint64(1), np.uint64(8), np.uint64(0x0080008000800080)
     share, byte = np.uint64(256), np.uint64(255)
     for row in range(height):
-        row_of_grids(shift_x, shift_y, row / step, row_x, row_y)
+        fill_grid_row(shift_x, shift_y, row / step, row_x, row_y)
         for cell in range((width + step - 1) // step):
             x, more_x = int(np.floor(row_x[cell] * ONE)), int(np.floor((row_x[cell + 1] - row_x[cell]) * ONE / step))
             y, more_y = int(np.floor(row_y[cell] * ONE)), int(np.floor((row_y[cell + 1] - row_y[cell]) * ONE / step))
@@ -193,7 +193,7 @@ def _warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, ta
 
 
 @compiled
-def row_of_grids(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, row_y: Floats) -> None:
+def fill_grid_row(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, row_y: Floats) -> None:
     """Fill in the values of two grids in one row of pixels."""
     r = min(int(down), shift_x.shape[0] - 2)
     share = down - r

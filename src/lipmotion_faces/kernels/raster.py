@@ -34,7 +34,7 @@ def draw(
     x, y, z = np.rint(2 * GRID * points[:, 0]) / GRID, np.rint(2 * GRID * points[:, 1]) / GRID, points[:, 2].copy()
     left, top, right, bottom = area
     bands = (bottom - top + BAND - 1) // BAND
-    faces, starts = by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
+    faces, starts = sort_by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
     width = right - left
     depth = np.empty((2 * BAND, 2 * width), np.float32)
     colour = np.empty((2 * BAND, 2 * width, 3), np.float32)
@@ -44,12 +44,12 @@ def draw(
         depth[:] = FAR
         for n in range(starts[band], starts[band + 1]):
             a, b, c = triangles[faces[n]]
-            _triangle(x, y, z, colours, a, b, c, 2 * left, 2 * right, 2 * first, 2 * last, depth, colour)
+            _draw_triangle(x, y, z, colours, a, b, c, 2 * left, 2 * right, 2 * first, 2 * last, depth, colour)
         _resolve(depth, colour, background, tone, picture, left, right, first, last)
 
 
 @compiled
-def by_band(
+def sort_by_band(
     x: Real, y: Real, triangles: NDArray[np.int32], left: int, right: int, top: int, bands: int
 ) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
     """Return the triangles that face the viewer, band after band, and where the triangles of each band begin."""
@@ -77,7 +77,7 @@ def by_band(
 
 
 @compiled
-def _triangle(
+def _draw_triangle(
     x: Real, y: Real, z: Real, colours: Colours, a: int, b: int, c: int, left: int, right: int, top: int, bottom: int,
     depth: Colours, colour: Colours,
 ) -> None:  # fmt: skip
@@ -89,7 +89,7 @@ def _triangle(
     if x0 >= x1 or y0 >= y1:
         return  # between the middles of samples
     inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
-    bias_a, bias_b, bias_c = bias(xb, yb, xc, yc), bias(xc, yc, xa, ya), bias(xa, ya, xb, yb)
+    bias_a, bias_b, bias_c = compute_bias(xb, yb, xc, yc), compute_bias(xc, yc, xa, ya), compute_bias(xa, ya, xb, yb)
     za, zb, zc = np.float32(z[a]), np.float32(z[b] - z[a]), np.float32(z[c] - z[a])
     red, green, blue = colours[a]
     red_b, green_b, blue_b = colours[b, 0] - red, colours[b, 1] - green, colours[b, 2] - blue
@@ -120,7 +120,7 @@ def _triangle(
 
 
 @compiled
-def bias(xa: float, ya: float, xb: float, yb: float) -> float:
+def compute_bias(xa: float, ya: float, xb: float, yb: float) -> float:
     """Return the least edge function of samples inside: samples on an edge belong to the triangle on one side of it."""
     owned = ya > yb or (ya == yb and xa < xb)
     return 0.0 if owned else 1e-6

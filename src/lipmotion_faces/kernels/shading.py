@@ -61,7 +61,7 @@ def shade(
                 hx, hy, hz = ex + lx, ey + ly, ez + lz
                 length = np.sqrt(hx * hx + hy * hy + hz * hz)
                 along = (strands[v, 0] * hx + strands[v, 1] * hy + strands[v, 2] * hz) / length
-                glint = _highlight(finish, (nx * hx + ny * hy + nz * hz) / length, along, facing) * arrives
+                glint = _compute_highlight(finish, (nx * hx + ny * hy + nz * hz) / length, along, facing) * arrives
                 if finish[6] > 0.0:
                     shine_r += glint * lamps[n, 3] * (4.0 * cr)
                     shine_g += glint * lamps[n, 4] * (4.0 * cg)
@@ -86,7 +86,7 @@ def shade(
 
 
 @compiled
-def _highlight(finish: Real, normal: float, along: float, facing: float) -> float:
+def _compute_highlight(finish: Real, normal: float, along: float, facing: float) -> float:
     across = np.sqrt(max(1.0 - along * along, 0.0)) if finish[6] > 0.0 else max(normal, 0.0)
     for _ in range(int(finish[4])):
         across = across * across

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.kernels.compiler import compiled
-from lipmotion_faces.kernels.raster import BAND, FAR, GRID, bias, by_band
+from lipmotion_faces.kernels.raster import BAND, FAR, GRID, compute_bias, sort_by_band
 
 Real = NDArray[np.float64]
 Light = NDArray[np.float32]
@@ -70,7 +70,7 @@ def draw_textured(
     triangles, uv, looks, alphas, texels, levels = surface
     left, top, right, bottom = area
     bands = (bottom - top + BAND - 1) // BAND
-    faces, starts = by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
+    faces, starts = sort_by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)
     planes = np.empty((len(triangles), PLANES))
     _fill_planes(faces, x, y, z, light, shine, triangles, uv, planes)
     size = (2 * BAND, 2 * (right - left))
@@ -149,7 +149,7 @@ def _mark(
     if x0 >= x1 or y0 >= y1:
         return  # between the middles of samples
     inverse = 1.0 / ((xb - xa) * (yc - ya) - (xc - xa) * (yb - ya))
-    bias_a, bias_b, bias_c = bias(xb, yb, xc, yc), bias(xc, yc, xa, ya), bias(xa, ya, xb, yb)
+    bias_a, bias_b, bias_c = compute_bias(xb, yb, xc, yc), compute_bias(xc, yc, xa, ya), compute_bias(xa, ya, xb, yb)
     to_b, to_c = zb - za, zc - za
     step_a, step_b, step_c = yc - yb, ya - yc, yb - ya
     for row in range(y0, y1):
@@ -174,7 +174,7 @@ def _mark(
                 if (
                     away < depth[i, j]
                     and away <= solid[i, j]
-                    and (not holes or _alpha(t, j + left + 0.5, py, planes, level, texels, levels) >= least)
+                    and (not holes or _sample_alpha(t, j + left + 0.5, py, planes, level, texels, levels) >= least)
                 ):
                     depth[i, j] = away
                     marks[i, j] = t
@@ -196,23 +196,23 @@ def _narrow(start: int, stop: int, px: float, inside: float, step: float) -> tup
 
 
 @compiled
-def _alpha(
+def _sample_alpha(
     t: int, px: float, py: float, planes: Real, level: int, texels: NDArray[np.uint16], levels: NDArray[np.int64]
 ) -> float:
     if level < 0:
         return 1.0
-    one, two, three, four, right, low = _texels_at(t, px, py, planes, level, levels)
-    return _between(texels, one, two, three, four, 3, right, low)
+    one, two, three, four, right, low = _find_texels(t, px, py, planes, level, levels)
+    return _blend_texels(texels, one, two, three, four, 3, right, low)
 
 
 @compiled
-def _texels_at(
+def _find_texels(
     t: int, px: float, py: float, planes: Real, level: int, levels: NDArray[np.int64]
 ) -> tuple[int, int, int, int, float, float]:
     """Return the four texels around a place of a triangle, and how far it is to the right and down between them."""
-    near = 1.0 / _on_plane(planes, t, 18, px, py)
-    x = _on_plane(planes, t, 21, px, py) * near * levels[level, 1] - 0.5
-    y = _on_plane(planes, t, 24, px, py) * near * levels[level, 2] - 0.5
+    near = 1.0 / _evaluate_plane(planes, t, 18, px, py)
+    x = _evaluate_plane(planes, t, 21, px, py) * near * levels[level, 1] - 0.5
+    y = _evaluate_plane(planes, t, 24, px, py) * near * levels[level, 2] - 0.5
     first, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
     left, top = np.floor(x), np.floor(y)
     column, line = int(left) % width, int(top) % height
@@ -223,12 +223,12 @@ def _texels_at(
 
 
 @compiled
-def _on_plane(planes: Real, t: int, at: int, px: float, py: float) -> float:
+def _evaluate_plane(planes: Real, t: int, at: int, px: float, py: float) -> float:
     return planes[t, at] + (planes[t, at + 1] * px + planes[t, at + 2] * py)
 
 
 @compiled
-def _between(
+def _blend_texels(
     texels: NDArray[np.uint16], one: int, two: int, three: int, four: int, channel: int, right: float, low: float
 ) -> float:
     a, b = np.float64(texels[one, channel]), np.float64(texels[two, channel])
@@ -245,14 +245,14 @@ def _shade(
     """Return the light of a triangle at a place on the screen, and the opacity of its texture."""
     red, green, blue, alpha = 1.0, 1.0, 1.0, 1.0
     if level >= 0:
-        one, two, three, four, right, low = _texels_at(t, px, py, planes, level, levels)
-        red = _between(texels, one, two, three, four, 0, right, low)
-        green = _between(texels, one, two, three, four, 1, right, low)
-        blue = _between(texels, one, two, three, four, 2, right, low)
-        alpha = _between(texels, one, two, three, four, 3, right, low)
-    red = red * _on_plane(planes, t, 0, px, py) + _on_plane(planes, t, 9, px, py)
-    green = green * _on_plane(planes, t, 3, px, py) + _on_plane(planes, t, 12, px, py)
-    blue = blue * _on_plane(planes, t, 6, px, py) + _on_plane(planes, t, 15, px, py)
+        one, two, three, four, right, low = _find_texels(t, px, py, planes, level, levels)
+        red = _blend_texels(texels, one, two, three, four, 0, right, low)
+        green = _blend_texels(texels, one, two, three, four, 1, right, low)
+        blue = _blend_texels(texels, one, two, three, four, 2, right, low)
+        alpha = _blend_texels(texels, one, two, three, four, 3, right, low)
+    red = red * _evaluate_plane(planes, t, 0, px, py) + _evaluate_plane(planes, t, 9, px, py)
+    green = green * _evaluate_plane(planes, t, 3, px, py) + _evaluate_plane(planes, t, 12, px, py)
+    blue = blue * _evaluate_plane(planes, t, 6, px, py) + _evaluate_plane(planes, t, 15, px, py)
     return red, green, blue, alpha
 
 
@@ -276,21 +276,21 @@ def _resolve(
                 whole = whole and before[i + 1, j] == NO_TRIANGLE and before[i + 1, j + 1] == NO_TRIANGLE
             if whole and t == NO_TRIANGLE:
                 for channel in range(3):
-                    picture[row, column, channel] = tone[_level(np.float64(background[row, column, channel]), most)]
+                    picture[row, column, channel] = tone[_choose_level(np.float64(background[row, column, channel]), most)]
                 opacity[row, column] = 0
                 continue
             if whole:
                 red, green, blue, _ = _shade(t, 2 * column + 1.0, 2 * row + 1.0, planes, looks[t, 0], texels, levels)
-                picture[row, column, 0] = tone[_level(red, most)]
-                picture[row, column, 1] = tone[_level(green, most)]
-                picture[row, column, 2] = tone[_level(blue, most)]
+                picture[row, column, 0] = tone[_choose_level(red, most)]
+                picture[row, column, 1] = tone[_choose_level(green, most)]
+                picture[row, column, 2] = tone[_choose_level(blue, most)]
                 opacity[row, column] = 255
                 continue
             _mix(shown, before, layered, i, j, row, column, planes, looks, alphas, texels, levels, background, colours,
                  covered, ids)  # fmt: skip
             for channel in range(3):
                 total = (colours[0, channel] + colours[1, channel]) + (colours[2, channel] + colours[3, channel])
-                picture[row, column, channel] = tone[_level(0.25 * total, most)]
+                picture[row, column, channel] = tone[_choose_level(0.25 * total, most)]
             hidden = (covered[0] + covered[1]) + (covered[2] + covered[3])
             opacity[row, column] = np.uint8(63.75 * hidden + 0.5)
 
@@ -313,9 +313,9 @@ def _mix(
             ids[k] = marks[i + k // 2, j + k % 2]
         for k in range(4):
             t = ids[k]
-            if t == NO_TRIANGLE or _earlier(ids, k) != k:
+            if t == NO_TRIANGLE or _find_earlier(ids, k) != k:
                 continue
-            px, py = _middle(ids, k, row, column)
+            px, py = _find_middle(ids, k, row, column)
             red, green, blue, alpha = _shade(t, px, py, planes, looks[t, 0], texels, levels)
             alpha = alpha * alphas[t, 1] if layer else 1.0
             for other in range(k, 4):
@@ -327,12 +327,12 @@ def _mix(
 
 
 @compiled
-def _level(light: float, most: float) -> int:
+def _choose_level(light: float, most: float) -> int:
     return int(min(max(light, 0.0), 1.0) * most)
 
 
 @compiled
-def _earlier(ids: Whole, k: int) -> int:
+def _find_earlier(ids: Whole, k: int) -> int:
     """Return the first of the samples that show the same triangle as sample k."""
     for other in range(k):
         if ids[other] == ids[k]:
@@ -341,7 +341,7 @@ def _earlier(ids: Whole, k: int) -> int:
 
 
 @compiled
-def _middle(ids: Whole, k: int, row: int, column: int) -> tuple[float, float]:
+def _find_middle(ids: Whole, k: int, row: int, column: int) -> tuple[float, float]:
     """Return the middle of the samples of a pixel that show the same triangle as sample k."""
     px, py, count = 0.0, 0.0, 0.0
     for other in range(4):

@@ -75,7 +75,7 @@ class PicturesOutput(VideoOutput):
         return is_picture_sequence(path)
 
 
-def sound_track(performance: Performance) -> Audio:
+def read_sound_track(performance: Performance) -> Audio:
     """Return the sound of videos. Raises InputError: the recording cannot be read."""
     return read_sound(performance.sound or performance.settings.recording)
 
@@ -123,10 +123,10 @@ def write_drawn_face(  # noqa: PLR0913
     """
     staged = stage_face(face, staging, prosody or measure_prosody(sound))
     drawn = staged.render(generation.motion, generation.units, fps=fps)
-    write_frames(path, with_reports(drawn, frame_count(generation, fps), RENDERING, monitor), fps, sound)
+    write_frames(path, with_reports(drawn, count_frames(generation, fps), RENDERING, monitor), fps, sound)
 
 
-def frame_count(generation: Generation, fps: float) -> int:
+def count_frames(generation: Generation, fps: float) -> int:
     """Return the number of pictures of a motion."""
     return int(generation.motion.time_s[-1] * fps + 1e-9) + 1
 

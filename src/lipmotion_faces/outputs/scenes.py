@@ -31,7 +31,7 @@ from lipmotion_faces.base import Staging, stage_liveliness
 from lipmotion_faces.characters.fbx import convert_to_fbx, find_blender
 from lipmotion_faces.characters.gltf_writer import write_animated_gltf, write_gltf_scene
 from lipmotion_faces.characters.scene import HeadTurn, Scene
-from lipmotion_faces.characters.usd_writer import asset, write_usda
+from lipmotion_faces.characters.usd_writer import format_asset, write_usda
 from lipmotion_faces.outputs.drawn_video import check_drawable
 
 GLTF, USD, FBX = ".glb", ".usda", ".fbx"
@@ -58,14 +58,14 @@ class SceneOutput(Output):
         if self.path.suffix.lower() == FBX:
             find_blender()
         if sound is not None and self.path.suffix.lower() == USD:
-            asset(sound_reference(sound, self.path))  # refuses names that such a file cannot hold
+            format_asset(sound_reference(sound, self.path))  # refuses names that such a file cannot hold
 
     def prepare(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         check_drawable(self.path, performance.generation.motion)
-        return lambda: write_scene(self.path, performance.cached(delivered_scene), sound=performance.sound_file)
+        return lambda: write_scene(self.path, performance.cached(build_scene), sound=performance.sound_file)
 
 
-def delivered_scene(performance: Performance, frames: slice | None = None) -> Scene:
+def build_scene(performance: Performance, frames: slice | None = None) -> Scene:
     """Return the scene of a face as it is delivered; held poses are those of the mouth.
 
     frames : of the motion, at its rate: the only ones that it is to have, which differ by less than 0.01 from those of
@@ -110,7 +110,7 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     write_gltf_scene(path, with_sound)
 
 
-def head_scene(
+def build_head_scene(
     generation: Generation,
     rate_hz: float | None = None,
     *,
@@ -122,28 +122,28 @@ def head_scene(
 
     rate_hz : keys a second; None: those of the motion
     staging, prosody : as of videos; size and background do not count
-    frames  : as of ``delivered_scene``
+    frames  : as of ``build_scene``
     The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
     """
     from lipmotion_faces.head.figure import PIVOT
     from lipmotion_faces.head.pose import pose_head
-    from lipmotion_faces.head.stage import figure, mesh_of_figure, mouth_weights
+    from lipmotion_faces.head.stage import make_figure, make_figure_mesh, fit_mouth_weights
 
     motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
-    around, wanted = _around(frames, MARGIN)
+    around, wanted = _select_around(frames, MARGIN)
     if frames is None:
         mouth = find_mouth(motion, units, hertz)
     else:  # made of the frames around those that are wanted
-        wider, inner = _around(around, MOUTH_MARGIN)
+        wider, inner = _select_around(around, MOUTH_MARGIN)
         part = replace(motion, values=motion.values[wider])
         there = units.between(wider.start / motion.rate_hz, (wider.start + len(part.values)) / motion.rate_hz)
         mouth = find_mouth(part, there, at_rest=measure_mouth_at_rest(motion, units)).within(inner)
     moved = stage_liveliness(times_s[around], motion, units, staging, prosody)
     poses = pose_head(mouth, moved)
     has_mood = any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)
-    character, mesh = figure(), mesh_of_figure(moods=has_mood)
-    curves = mouth_weights(character, mesh, poses) | eye_and_brow_weights(moved)
+    character, mesh = make_figure(), make_figure_mesh(moods=has_mood)
+    curves = fit_mouth_weights(character, mesh, poses) | eye_and_brow_weights(moved)
     names = [name for name in mesh.shape_names if name in curves]
     table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
     table[around] = np.stack([curves[name] for name in names], axis=1)
@@ -155,7 +155,7 @@ def head_scene(
     return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.turning(), turns), split=False)
 
 
-def _around(frames: slice | None, margin: int) -> tuple[slice, slice]:
+def _select_around(frames: slice | None, margin: int) -> tuple[slice, slice]:
     """Return the frames that are computed for some, None: all; and which of them these are."""
     if frames is None:
         return slice(None), slice(None)
@@ -163,7 +163,7 @@ def _around(frames: slice | None, margin: int) -> tuple[slice, slice]:
     return slice(first, frames.stop + margin), slice(frames.start - first, frames.stop - first)
 
 
-def character_scene(
+def build_character_scene(
     generation: Generation,
     character: DrivenCharacter,
     rate_hz: float | None = None,
@@ -176,11 +176,11 @@ def character_scene(
 
     rate_hz : keys a second; None: those of the motion. A closure between two keys is at the nearer one
     staging, prosody : seed, and what moves on its own
-    frames  : as of ``delivered_scene``
+    frames  : as of ``build_scene``
     Raises InputError: the character has no blendshapes, or the motion has no channel ``opening``.
     """
     motion, units, rate = generation.motion, generation.units, generation.motion.rate_hz
-    around, wanted = _around(frames, MOUTH_MARGIN)
+    around, wanted = _select_around(frames, MOUTH_MARGIN)
     is_part = frames is not None and (around.start > 0 or around.stop < len(motion.values))
     part, phones, there = add_rest(motion, units, around) if is_part else (motion, units, slice(None))
     solved, mouth = character.weights(part, phones), find_mouth(with_mouth(part), phones)

@@ -1,6 +1,6 @@
 """Drawn characters: flat portraits whose mouths are drawn from the motion. They need numpy and Pillow only.
 
-The stages of a frame: ``face_poses`` (motion, phones and voice → numbers) → ``geometry`` (numbers → outlines) →
+The stages of a frame: ``list_face_poses`` (motion, phones and voice → numbers) → ``geometry`` (numbers → outlines) →
 ``mouth_painting`` (outlines → pixels) → ``portrait_rasteriser`` (pixels → picture, moved by ``movement``). The still
 parts are painted once, by ``parts`` on a ``layer``.
 A character is a ``design``: ``woman``, ``man``, ``cartoon``.
@@ -47,9 +47,9 @@ class DrawnFace(Face):
         return iter(self.draw(motion, units, fps=fps))
 
     def draw(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[FacePose]:  # noqa: D102
-        from lipmotion_faces.portrait.portrait_rasteriser import face_poses
+        from lipmotion_faces.portrait.portrait_rasteriser import list_face_poses
 
-        poses = face_poses(motion, units, fps, self.staging, self.prosody)
+        poses = list_face_poses(motion, units, fps, self.staging, self.prosody)
         return DrawnMotion(poses, lambda: self._rasteriser.paint)
 
     @cached_property

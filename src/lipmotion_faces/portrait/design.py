@@ -19,31 +19,31 @@ STEPS = 16
 """Points drawn for each Bézier curve."""
 
 
-def path_points(path: Path) -> Points:
+def list_path_points(path: Path) -> Points:
     """Return the points of a path [shape=(N, 2)]: the corners of a polygon."""
     pairs = [pair.split() for pair in path.split(",")] if isinstance(path, str) else path
     return np.array(pairs, dtype=np.float64)
 
 
-def closed_curve(path: Path) -> Points:
+def close_curve(path: Path) -> Points:
     """Return the smooth closed curve through the points of a path."""
-    start = path_points(path)
+    start = list_path_points(path)
     before, end, beyond = (np.roll(start, shift, axis=0) for shift in (1, -1, -2))
-    return _chain(start, before, end, beyond)
+    return _chain_curves(start, before, end, beyond)
 
 
 def open_curve(path: Path) -> Points:
     """Return the smooth curve through the points of a path, from the first to the last."""
-    points = path_points(path)
+    points = list_path_points(path)
     before = np.vstack([2 * points[0] - points[1], points[:-2]])
     beyond = np.vstack([points[2:], 2 * points[-1] - points[-2]])
-    return np.vstack([_chain(points[:-1], before, points[1:], beyond), points[-1:]])
+    return np.vstack([_chain_curves(points[:-1], before, points[1:], beyond), points[-1:]])
 
 
 def mirror_curve(path: Path) -> Points:
     """Return the smooth closed curve through a path down the right side, from x = 0 to x = 0, and its mirror image."""
-    right = path_points(path)
-    return closed_curve([(x, y) for x, y in np.vstack([right, both_sides(right)[1][-2:0:-1]]).tolist()])
+    right = list_path_points(path)
+    return close_curve([(x, y) for x, y in np.vstack([right, mirror_outline(right)[1][-2:0:-1]]).tolist()])
 
 
 def stroke(line: Points, widths: Sequence[float]) -> Points:
@@ -55,13 +55,13 @@ def stroke(line: Points, widths: Sequence[float]) -> Points:
     return np.vstack([line + half * normal, (line - half * normal)[::-1]])
 
 
-def ellipse(x: float, y: float, radius_x: float, radius_y: float) -> Points:
+def make_ellipse(x: float, y: float, radius_x: float, radius_y: float) -> Points:
     """Return an ellipse about (x, y)."""
     angle = np.linspace(0, 2 * np.pi, 64, endpoint=False)
     return np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
 
 
-def both_sides(right: Points) -> tuple[Points, Points]:
+def mirror_outline(right: Points) -> tuple[Points, Points]:
     """Return an outline and its mirror image on the other side of the face."""
     return right, right * np.array([-1.0, 1.0])
 
@@ -71,7 +71,7 @@ def move_down(points: Points, distance: float) -> Points:
     return points + np.array([0.0, distance])
 
 
-def _chain(start: Points, before: Points, end: Points, beyond: Points) -> Points:
+def _chain_curves(start: Points, before: Points, end: Points, beyond: Points) -> Points:
     """Return Bézier curves from every ``start`` to its ``end``, with the tangents of Catmull and Rom 1974."""
     t = np.linspace(0, 1, STEPS, endpoint=False)[None, :, None]
     first, second = start + (end - before) / 6, end - (beyond - start) / 6

@@ -98,9 +98,9 @@ class MouthInterior:
     tongue_bottom: Heights
 
 
-def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
+def outline_lips(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     """Return the outlines of the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
-    half_width = drawn_half_width(lips, pose)
+    half_width = compute_half_width(lips, pose)
     u = np.minimum(np.abs(x) / half_width, 1)
     out, wide = pose.protrusion, pose.spread
     rise = float(weigh_upper(pose.gap))
@@ -129,8 +129,8 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     free = wide * (1 - pose.tuck)
     upper_power = 0.7 - 0.22 * open_share * max(out, 1 - wide) - 0.26 * free
     lower_power = 0.6 - 0.12 * max(out, pose.oval) - 0.26 * free
-    upper_inner = line - rise * _arch(inner, upper_power + pose.tuck * (0.85 - upper_power))
-    lower_inner = line + drop * _arch(inner, lower_power + pose.tuck * (0.85 - lower_power))
+    upper_inner = line - rise * _compute_arch(inner, upper_power + pose.tuck * (0.85 - upper_power))
+    lower_inner = line + drop * _compute_arch(inner, lower_power + pose.tuck * (0.85 - lower_power))
     thin = 1 - 0.28 * pose.press * (1 - out)
     upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck + 0.2 * out - 0.14 * wide)
     lower = lips.lower * pose.fullness * thin * (1 - 0.5 * pose.tuck + 0.16 * out - 0.16 * wide * (1 - pose.tuck))
@@ -143,20 +143,20 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
         half_width=half_width,
         inner_half_width=half_width * inner_share,
         corner_y=float(middle + (1 - 0.7 * out) * _LINE[-1][1] + smile + sag),
-        upper_outer=np.minimum(line - rise * _arch(u, follow) - upper * _thickness("upper", u, out), upper_inner),
+        upper_outer=np.minimum(line - rise * _compute_arch(u, follow) - upper * _compute_thickness("upper", u, out), upper_inner),
         upper_inner=upper_inner,
         lower_inner=lower_inner,
         lower_outer=np.maximum(
-            line + drop * _arch(u, 0.62 - 0.15 * wide) + lower * _thickness("lower", u, out), lower_inner
+            line + drop * _compute_arch(u, 0.62 - 0.15 * wide) + lower * _compute_thickness("lower", u, out), lower_inner
         ),
         seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press) * thick,
     )
 
 
-def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOutlines) -> MouthInterior:
+def outline_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOutlines) -> MouthInterior:
     """Return teeth and tongue of a pose between the lips' outlines, over the columns ``x`` [shape=(C, ...)]."""
     edge = lips.line_y + TEETH_EDGE
-    upper_edge = edge - 0.06 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
+    upper_edge = edge - 0.06 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - measure_far_open(pose))
     upper = upper_edge - 0.35 * x * x
     reveal = min(max(2.8 * pose.teeth - 1.4, 0), 1) * (1 - pose.tuck)
     low_lip = float(outlines.lower_inner.max())
@@ -164,8 +164,8 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     met = upper_edge + 0.004 + 0.05 * pose.jaw + 0.6 * max(pose.gap - 0.14, 0)
     met += max(0.86 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
-    top, bottom = _tongue(pose, x, edge, low_lip)
-    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.009 * _arch(x / min(0.09, 0.9 * outlines.inner_half_width), 0.5)
+    top, bottom = _outline_tongue(pose, x, edge, low_lip)
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.009 * _compute_arch(x / min(0.09, 0.9 * outlines.inner_half_width), 0.5)
     cut = outlines.upper_inner, outlines.lower_inner
     return MouthInterior(
         np.clip(upper, cut[0], cut[1]),
@@ -175,7 +175,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     )
 
 
-def drawn_half_width(lips: LipDesign, pose: MouthPose) -> float:
+def compute_half_width(lips: LipDesign, pose: MouthPose) -> float:
     """Return half the width of the drawn lips: protruded lips draw their corners in, closed ones less."""
     flat = lips.half_width * pose.width
     ring = min(LARGEST_RING_SHARE * flat, _round_hole(pose) + LIP_RING_SHARE * (lips.upper + lips.lower))
@@ -186,23 +186,23 @@ def _round_hole(pose: MouthPose) -> float:
     return ROUND_HOLE[0] + ROUND_HOLE[1] * pose.gap
 
 
-def far_open(pose: MouthPose) -> float:
+def measure_far_open(pose: MouthPose) -> float:
     """Return how far a mouth is open so wide that its upper teeth are seen whatever the sound, 0..1."""
     return min(max((pose.gap - 0.06 - 0.05 * pose.protrusion) / 0.05, 0), 1)
 
 
-def _thickness(lip: str, u: Heights, out: float) -> Heights:
+def _compute_thickness(lip: str, u: Heights, out: float) -> Heights:
     """Return the thickness of a lip along its half width; rounded lips stay thick towards their corners."""
     round_ = min(1.15 * out, 1)
-    return (1 - round_) * np.interp(u, *_CURVES[lip]) + round_ * _arch(u, 0.5)
+    return (1 - round_) * np.interp(u, *_CURVES[lip]) + round_ * _compute_arch(u, 0.5)
 
 
-def _arch(u: Heights, power: float) -> Heights:
+def _compute_arch(u: Heights, power: float) -> Heights:
     """Return an arch over -1 <= u <= 1: 1 in the middle, 0 at the ends and beyond."""
     return np.maximum(1 - u * u, 0) ** power
 
 
-def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:
+def _outline_tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:
     """Return top and bottom of the visible tongue: low, its tip behind the upper teeth, or between the teeth."""
     up, out = min(pose.tongue / 0.6, 1), max(pose.tongue - 0.6, 0) / 0.4
     rest = max(low_lip - (0.3 * pose.gap + 0.012) * (1 - pose.protrusion) + 0.02 * pose.protrusion, edge - 0.01)
@@ -252,7 +252,7 @@ class SkinField:
     """Shifts of the skin below the eyes by a pose of the mouth, over a window."""
 
     def __init__(self, window: Window, lips: LipDesign) -> None:
-        x, y = grid(window)
+        x, y = list_grid(window)
         self._scale = window.view.scale
         low = y - lips.line_y
         self._jaw = smooth_step((low - JAW_TOP) / (CHIN - JAW_TOP))
@@ -284,7 +284,7 @@ class BrowPose(NamedTuple):
     lowered: int = 0
 
 
-def brow_pose(raised: float, mood: UpperFace, scale: float) -> BrowPose:
+def pose_brows(raised: float, mood: UpperFace, scale: float) -> BrowPose:
     """Return the nearest pose of brows that are raised by a length in eye distances; ``scale``: pixels in one."""
     of_mood = (round(share * MOOD_STEPS) for share in (mood.inner, mood.outer, mood.lowered))
     return BrowPose(round(raised * BROW_STEPS * scale), *of_mood)
@@ -294,7 +294,7 @@ class BrowField:
     """Shifts of the skin of the forehead by raised or lowered brows, over a window."""
 
     def __init__(self, window: Window) -> None:
-        x, y = grid(window)
+        x, y = list_grid(window)
         self._scale = window.view.scale
         fade = np.clip((-0.1 - y) / 0.07, 0, 1) * np.clip((y + 0.62) / 0.2, 0, 1)
         bump = fade * np.exp(-(((np.abs(x) - 0.36) / 0.34) ** 4))
@@ -318,7 +318,7 @@ class HeadField:
     """Shifts of the whole picture by a pose of the head, over a window."""
 
     def __init__(self, window: Window) -> None:
-        x, y = grid(window)
+        x, y = list_grid(window)
         self._scale, self._x, self._y = window.view.scale, x, y
         self._with_head = smooth_step((NECK_END - y) / (NECK_END - NECK_TOP))
         self._features = np.exp(-((x / 0.62) ** 2) - (((y - 0.35) / 0.85) ** 2)) * self._with_head
@@ -330,7 +330,7 @@ class HeadField:
         return -x * self._scale, -y * self._scale
 
 
-def grid(window: Window) -> tuple[Floats, Floats]:
+def list_grid(window: Window) -> tuple[Floats, Floats]:
     """Return x and y of every ``STEP``-th pixel of a window, in eye distances [shapes=(h, w)]."""
     columns = np.arange(0, window.x1 - window.x0 + STEP, STEP) + window.x0 + 0.5
     rows = np.arange(0, window.y1 - window.y0 + STEP, STEP) + window.y0 + 0.5

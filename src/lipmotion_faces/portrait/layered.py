@@ -17,7 +17,7 @@ from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion_faces.kernels.painting import warp_bytes
 from lipmotion_faces.portrait.geometry import PIVOT_Y, MouthPose
 from lipmotion_faces.portrait.layer import lay_over
-from lipmotion_faces.portrait.portrait_rasteriser import FacePose, face_poses
+from lipmotion_faces.portrait.portrait_rasteriser import FacePose, list_face_poses
 from lipmotion_faces.portrait.svg_document import Drawing, Shape, read_drawing
 
 Pixels = NDArray[np.float32]
@@ -59,7 +59,7 @@ def _lay(
     if not lines:
         return
     height, width = layer.shape[:2]
-    left, top, right, bottom = _window(np.vstack([points for points, _ in lines]), margin, width, height)
+    left, top, right, bottom = _cut_window(np.vstack([points for points, _ in lines]), margin, width, height)
     if left < right and top < bottom:
         part = layer[top:bottom, left:right]
         inside = [(points - (left, top), closed) for points, closed in lines]
@@ -67,7 +67,7 @@ def _lay(
         part += share * (np.array([*colour, 1], np.float32) - part)
 
 
-def _window(points: NDArray[np.float64], margin: float, width: int, height: int) -> tuple[int, int, int, int]:
+def _cut_window(points: NDArray[np.float64], margin: float, width: int, height: int) -> tuple[int, int, int, int]:
     """Return the whole pixels around points that are in a picture: left, top, right, bottom."""
     left, top = np.floor(points.min(axis=0) - margin - 1)
     right, bottom = np.ceil(points.max(axis=0) + margin + 1)
@@ -80,7 +80,7 @@ def _cover_inside(lines: Lines, width: int, height: int, *, even_odd: bool) -> P
 
     winding = np.zeros((height * SUPERSAMPLING, width * SUPERSAMPLING), np.int16)
     for points, _ in lines:
-        left, top, right, bottom = _window(points, 0.0, width, height)
+        left, top, right, bottom = _cut_window(points, 0.0, width, height)
         if len(points) > 2 and left < right and top < bottom:
             large = Image.new("L", ((right - left) * SUPERSAMPLING, (bottom - top) * SUPERSAMPLING))
             corners = ((points - (left, top)) * SUPERSAMPLING - 0.5).tolist()
@@ -184,7 +184,7 @@ class LayeredFace(Face):
     def draw(  # noqa: D102
         self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
     ) -> DrawnMotion[tuple[FacePose, str]]:
-        poses = face_poses(motion, units, fps, self.staging, self.prosody)
+        poses = list_face_poses(motion, units, fps, self.staging, self.prosody)
         shown = choose_mouths([pose.mouth for pose in poses], self.mouths, fps)
         return DrawnMotion(list(zip(poses, shown, strict=True)), lambda: self._painter)
 

@@ -21,12 +21,12 @@ from lipmotion_faces.portrait.design import (
     Design,
     Knots,
     Points,
-    both_sides,
-    closed_curve,
-    ellipse,
+    mirror_outline,
+    close_curve,
+    make_ellipse,
     move_down,
     open_curve,
-    path_points,
+    list_path_points,
     stroke,
 )
 from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, View, Window, lay_over
@@ -68,15 +68,15 @@ class EyePainter:
         y, r = eyes.y, eyes.iris
         for x in (eyes.x, -eyes.x):
             if design.flat:
-                layer.fill(ellipse(x, y, r, r), colours.iris)
-                layer.fill(ellipse(x, y, 0.6 * r, 0.6 * r), colours.pupil)
-                layer.fill(ellipse(x - 0.3 * r, y - 0.35 * r, 0.28 * r, 0.28 * r), WHITE)
+                layer.fill(make_ellipse(x, y, r, r), colours.iris)
+                layer.fill(make_ellipse(x, y, 0.6 * r, 0.6 * r), colours.pupil)
+                layer.fill(make_ellipse(x - 0.3 * r, y - 0.35 * r, 0.28 * r, 0.28 * r), WHITE)
                 continue
             light = Glow(x, y + 0.5 * r, 0.6 * r, 0.4 * r, colours.iris_light, 0.9)
-            layer.fill(ellipse(x, y, r, r), colours.iris, Rim(0.16 * r, colours.iris_dark, 1.0), light)
-            layer.fill(ellipse(x, y, 0.46 * r, 0.46 * r), colours.pupil)
-            layer.fill(ellipse(x - 0.3 * r, y - 0.32 * r, 0.22 * r, 0.22 * r), WHITE, opacity=0.95)
-            layer.fill(ellipse(x + 0.32 * r, y + 0.34 * r, 0.11 * r, 0.11 * r), WHITE, opacity=0.6)
+            layer.fill(make_ellipse(x, y, r, r), colours.iris, Rim(0.16 * r, colours.iris_dark, 1.0), light)
+            layer.fill(make_ellipse(x, y, 0.46 * r, 0.46 * r), colours.pupil)
+            layer.fill(make_ellipse(x - 0.3 * r, y - 0.32 * r, 0.22 * r, 0.22 * r), WHITE, opacity=0.95)
+            layer.fill(make_ellipse(x + 0.32 * r, y + 0.34 * r, 0.11 * r, 0.11 * r), WHITE, opacity=0.6)
         self.iris = layer.pixels
         self.lids = lru_cache(maxsize=2 * LID_POSITIONS)(self._paint_lids)
         self._cached = lru_cache(maxsize=128)(self._paint)
@@ -102,7 +102,7 @@ class EyePainter:
         """Return what is under the irises, the openings between the lids, and what is over the irises."""
         shut, design = lids.shut / LID_POSITIONS, self._design
         colours, eyes, flat = design.palette, design.eyes, design.flat
-        upper, lower = _lid_edges(design, lids)
+        upper, lower = _place_lid_edges(design, lids)
         highest = tuple(min(pair, key=lambda knot: knot[1]) for pair in zip(eyes.upper, upper, strict=True))
         under, almond, over = Layer(self._window), Layer(self._window), Layer(self._window)
         for side in (1, -1):
@@ -120,9 +120,9 @@ class EyePainter:
                 under.fill(opening, colours.eye_white, *ball)
                 almond.fill(opening, WHITE)
                 if not flat:
-                    corner = ellipse(side * 0.2, 0.028, 0.022, 0.016)
+                    corner = make_ellipse(side * 0.2, 0.028, 0.022, 0.016)
                     under.fill(corner, colours.eye_corner, within=opening, blur=0.004)
-                    over.fill(ellipse(x, -0.12, 0.12, 0.05), colours.pupil, opacity=0.3, blur=0.02, within=opening)
+                    over.fill(make_ellipse(x, -0.12, 0.12, 0.05), colours.pupil, opacity=0.3, blur=0.02, within=opening)
             if not flat:
                 over.fill(stroke(bottom, [0.004, 0.01, 0.014, 0.012]), colours.skin_deep, opacity=0.5, blur=0.004)
                 ends = (*eyes.upper[1:-1], (eyes.upper[-1][0] + 0.02, -0.01))
@@ -153,7 +153,7 @@ class EyePainter:
                 layer.fill(line * flip, colour, opacity=0.65 * lids.sneer / MOOD_LIDS, blur=soft)
 
 
-def _lid_edges(design: Design, lids: LidPose) -> tuple[Knots, Knots]:
+def _place_lid_edges(design: Design, lids: LidPose) -> tuple[Knots, Knots]:
     shut, (wide, squint, slant, *_) = lids.shut / LID_POSITIONS, (steps / MOOD_LIDS for steps in lids[1:])
     upper, lower = design.eyes.upper, design.eyes.lower
     if lids[1:] != (0,) * len(lids[1:]):  # the corners stay
@@ -190,7 +190,7 @@ def paint_still_layers(whole: Window, design: Design, background: Colour | str |
     colours, flat, wall = design.palette, design.flat, Layer(whole)
     if background == SCENE:
         lit = () if flat else (Glow(-0.5, -0.5, 1.5, 1.6, colours.wall_light, 0.9),)
-        wall.fill(path_points("-9 -9, 9 -9, 9 9, -9 9"), colours.wall, *lit)
+        wall.fill(list_path_points("-9 -9, 9 -9, 9 9, -9 9"), colours.wall, *lit)
     elif background is not None:
         wall.pixels[...] = (*background, 1)
     below = lay_over(paint_behind_head(whole, design).pixels, wall.pixels)
@@ -219,11 +219,11 @@ def paint_behind_head(window: Window, design: Design) -> Layer:
         )
         for inward in () if flat else (0.05, 0.13, 0.2):
             line = [(0.9 - inward, 0.5), (0.93 - inward, 0.95), (1 - 1.3 * inward, 1.35), (0.95 - 1.6 * inward, 1.7)]
-            for strand in both_sides(stroke(open_curve(line), [0, 0.014, 0.018, 0])):
+            for strand in mirror_outline(stroke(open_curve(line), [0, 0.014, 0.018, 0])):
                 layer.fill(strand, colours.hair_light, opacity=0.22, blur=0.006)
     _fill_outlined(layer, design, design.neck, colours.skin, Rim(0.1, colours.skin_shade, 0.7))
     if design.collarbones:
-        for bone in both_sides(stroke(open_curve("0.1 1.93, 0.35 1.86, 0.62 1.84"), [0, 0.02, 0])):
+        for bone in mirror_outline(stroke(open_curve("0.1 1.93, 0.35 1.86, 0.62 1.84"), [0, 0.02, 0])):
             layer.fill(bone, colours.skin_shade, opacity=0.6, blur=0.01)
     if not flat:
         shadow = move_down(design.shoulders, -0.02)
@@ -241,12 +241,12 @@ def paint_behind_head(window: Window, design: Design) -> Layer:
 
 def _paint_ears(layer: Layer, design: Design) -> None:
     colours = design.palette
-    for ear in both_sides(closed_curve(design.ear)):
+    for ear in mirror_outline(close_curve(design.ear)):
         _fill_outlined(layer, design, ear, colours.skin, Rim(0.05, colours.skin_shade, 0.8))
-    for hollow in both_sides(closed_curve(design.ear_hollow)):
+    for hollow in mirror_outline(close_curve(design.ear_hollow)):
         layer.fill(hollow, colours.skin_deep, opacity=0.5, blur=0 if design.flat else 0.012)
     if design.earrings:
-        for ring in both_sides(closed_curve("0.775 0.42, 0.8 0.445, 0.775 0.47, 0.75 0.445")):
+        for ring in mirror_outline(close_curve("0.775 0.42, 0.8 0.445, 0.775 0.47, 0.75 0.445")):
             layer.fill(ring, colours.gold, Glow(0, 0.43, 9, 0.015, WHITE, 0.6))
 
 
@@ -264,8 +264,8 @@ def paint_head(window: Window, design: Design) -> Layer:
         layer.fill(skull, colours.skin)
         layer.fill(unlit, colours.skin_shade, opacity=0.5, within=skull)
         for cheek in (-1, 1):
-            layer.fill(ellipse(cheek * 0.46, 0.5, 0.13, 0.08), colours.blush, opacity=design.blush)
-        layer.fill(ellipse(0.03, 0.52, 0.1, 0.06), colours.skin_shade, opacity=0.55)
+            layer.fill(make_ellipse(cheek * 0.46, 0.5, 0.13, 0.08), colours.blush, opacity=design.blush)
+        layer.fill(make_ellipse(0.03, 0.52, 0.1, 0.06), colours.skin_shade, opacity=0.55)
         nose = open_curve("-0.1 0.5, -0.075 0.565, 0.0 0.585, 0.075 0.565, 0.1 0.5")
         layer.fill(stroke(nose, [0.0, 0.024, 0.026, 0.024, 0.0]), colours.line)
         layer.contour(skull, design.line, colours.line)
@@ -282,33 +282,33 @@ def paint_head(window: Window, design: Design) -> Layer:
         if design.beard:
             y = design.lips.line_y
             for x, at, wide, high in ((0, y + 0.28, 0.46, 0.26), (-0.5, y - 0.02, 0.2, 0.3), (0.5, y - 0.02, 0.2, 0.3)):
-                spot = ellipse(x, at, wide, high)
+                spot = make_ellipse(x, at, wide, high)
                 layer.fill(spot, colours.beard, opacity=design.beard, blur=0.09, within=skull)
-            layer.fill(ellipse(0, y - 0.15, 0.26, 0.07), colours.beard, opacity=0.8 * design.beard, blur=0.05)
+            layer.fill(make_ellipse(0, y - 0.15, 0.26, 0.07), colours.beard, opacity=0.8 * design.beard, blur=0.05)
         _paint_nose(layer, design)
     brow_colour, strength, soft = (colours.hair_dark, 1.0, 0.0) if design.flat else (colours.hair, 0.92, 0.007)
-    for brow in both_sides(stroke(open_curve(design.eyes.brow), design.eyes.brow_widths)):
+    for brow in mirror_outline(stroke(open_curve(design.eyes.brow), design.eyes.brow_widths)):
         layer.fill(brow, brow_colour, opacity=strength, blur=soft)
     return layer
 
 
 def _paint_nose(layer: Layer, design: Design) -> None:
     colours, wide = design.palette, (design.nose_width, 1.0)
-    layer.fill(ellipse(0, 0.61, 0.19, 0.06) * wide, colours.skin_shade, opacity=0.75, blur=0.03)
-    layer.fill(ellipse(0, 0.545, 0.13, 0.075) * wide, colours.skin_light, opacity=0.7, blur=0.04)
-    sides = both_sides(stroke(open_curve("0.125 -0.1, 0.085 0.12, 0.1 0.36"), [0.03, 0.05, 0.02]) * wide)
+    layer.fill(make_ellipse(0, 0.61, 0.19, 0.06) * wide, colours.skin_shade, opacity=0.75, blur=0.03)
+    layer.fill(make_ellipse(0, 0.545, 0.13, 0.075) * wide, colours.skin_light, opacity=0.7, blur=0.04)
+    sides = mirror_outline(stroke(open_curve("0.125 -0.1, 0.085 0.12, 0.1 0.36"), [0.03, 0.05, 0.02]) * wide)
     for bridge, opacity in zip(sides, (0.45, 0.25), strict=True):
         layer.fill(bridge, colours.skin_shade, opacity=opacity, blur=0.025)
-    for wing in both_sides(stroke(open_curve("0.155 0.5, 0.195 0.57, 0.165 0.635"), [0, 0.022, 0]) * wide):
+    for wing in mirror_outline(stroke(open_curve("0.155 0.5, 0.195 0.57, 0.165 0.635"), [0, 0.022, 0]) * wide):
         layer.fill(wing, colours.skin_deep, opacity=0.6, blur=0.008)
-    for nostril in both_sides(stroke(open_curve("0.035 0.632, 0.085 0.615, 0.135 0.632"), [0, 0.034, 0]) * wide):
+    for nostril in mirror_outline(stroke(open_curve("0.035 0.632, 0.085 0.615, 0.135 0.632"), [0, 0.034, 0]) * wide):
         layer.fill(nostril, colours.skin_deep, opacity=0.9, blur=0.005)
     base = stroke(open_curve("-0.04 0.645, 0 0.655, 0.04 0.645"), [0, 0.012, 0])
     layer.fill(base, colours.skin_deep, opacity=0.5, blur=0.006)
-    layer.fill(ellipse(-0.02, 0.3, 0.03, 0.2) * wide, colours.skin_light, opacity=0.6, blur=0.03)
-    layer.fill(ellipse(-0.02, 0.545, 0.035, 0.022), WHITE, opacity=0.45, blur=0.015)
-    layer.fill(ellipse(0, 0.745, 0.028, 0.06), colours.skin_shade, opacity=0.4, blur=0.02)
-    for ridge in both_sides(ellipse(0.052, 0.76, 0.014, 0.05)):
+    layer.fill(make_ellipse(-0.02, 0.3, 0.03, 0.2) * wide, colours.skin_light, opacity=0.6, blur=0.03)
+    layer.fill(make_ellipse(-0.02, 0.545, 0.035, 0.022), WHITE, opacity=0.45, blur=0.015)
+    layer.fill(make_ellipse(0, 0.745, 0.028, 0.06), colours.skin_shade, opacity=0.4, blur=0.02)
+    for ridge in mirror_outline(make_ellipse(0.052, 0.76, 0.014, 0.05)):
         layer.fill(ridge, colours.skin_light, opacity=0.5, blur=0.016)
 
 
@@ -356,7 +356,7 @@ class FacePose(NamedTuple):
     mood: UpperFace = CALM
 
 
-def face_poses(
+def list_face_poses(
     motion: Motion, units: Timeline[Unit], fps: float, staging: Staging, prosody: Prosody | None = None
 ) -> list[FacePose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds. Raises InputError: as ``find_mouth``."""
@@ -419,7 +419,7 @@ class Rasteriser:
         skin = self._move_skin(self._jaw, self._skin_field.shifts(pose.mouth, pose.mood))
         self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])
-        canvas[self._brow.area] = self._brows(geometry.brow_pose(pose.brows, pose.mood, self._brow.view.scale))
+        canvas[self._brow.area] = self._brows(geometry.pose_brows(pose.brows, pose.mood, self._brow.view.scale))
         canvas[self._below_brows.area] = self._still[self._below_brows.area]
         eyes = self._eye_painter.paint(pose.lids, pose.gaze_x, pose.gaze_y, pose.mood)
         mixed = eyes * np.array([1, 1, 1, 255], np.float32)

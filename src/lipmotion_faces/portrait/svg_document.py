@@ -50,7 +50,7 @@ def flatten_path(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]
             lines.append((np.array(current), closed))
         current.clear()
 
-    for letter, numbers in _commands(text):
+    for letter, numbers in _read_commands(text):
         kind, relative = letter.upper(), letter.islower()
         most -= _POINTS.get(kind, 1)
         check_points(most)
@@ -76,12 +76,12 @@ def flatten_path(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]
             current.append(end)
             start = end if kind == "M" else start
         elif kind == "A":
-            current.extend(_arc(at, end, *numbers[:5]))
+            current.extend(_follow_arc(at, end, *numbers[:5]))
         else:
             smooth = 2 * at - control if before in ("CS" if kind == "S" else "QT") else at
             points = [at, *([smooth] if kind in "ST" else []), *values.reshape(-1, 2)]
             control = points[-2]
-            current.extend(_bezier(points))
+            current.extend(_follow_bezier(points))
         if kind not in "CSQT":
             control = end
         at, before = end, kind
@@ -95,7 +95,7 @@ def check_points(left: int) -> None:
         raise InputError(f"more than {MOST_POINTS} points in all its lines; simplify the paths")
 
 
-def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
+def _read_commands(text: str) -> Iterator[tuple[str, list[float]]]:
     """Yield the commands of a path with their numbers; a repeated one has its letter again."""
     letter, place = "", _end_of_blanks(text, 0)
     while place < len(text):
@@ -128,7 +128,7 @@ def _end_of_blanks(text: str, place: int) -> int:
     return match.end() if match else place
 
 
-def _bezier(points: list[Points]) -> list[Points]:
+def _follow_bezier(points: list[Points]) -> list[Points]:
     """Return points along a quadratic or cubic Bézier curve, without its first one."""
     t = np.linspace(0, 1, STEPS + 1)[1:, None]
     levels = [points[k][None] + 0 * t for k in range(len(points))]
@@ -137,7 +137,7 @@ def _bezier(points: list[Points]) -> list[Points]:
     return list(levels[0])
 
 
-def _arc(at: Points, end: Points, rx: float, ry: float, turned: float, large: float, sweep: float) -> list[Points]:
+def _follow_arc(at: Points, end: Points, rx: float, ry: float, turned: float, large: float, sweep: float) -> list[Points]:
     """Return points along an elliptic arc, without its first one (SVG 1.1, F.6.5)."""
     rx, ry = abs(rx), abs(ry)
     if rx < 1e-9 or ry < 1e-9 or np.allclose(at, end):
@@ -188,13 +188,13 @@ def read_points(text: str, most: int = MOST_POINTS) -> Points:
     return np.array(numbers).reshape(-1, 2)
 
 
-def circle(x: float, y: float, radius_x: float, radius_y: float) -> Points:
+def make_circle(x: float, y: float, radius_x: float, radius_y: float) -> Points:
     """Return an ellipse [shape=(N, 2)]."""
     angle = np.linspace(0, 2 * np.pi, 4 * STEPS, endpoint=False)
     return np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
 
 
-def rectangle(x: float, y: float, width: float, height: float, radius: float) -> Points:
+def make_rectangle(x: float, y: float, width: float, height: float, radius: float) -> Points:
     """Return a rectangle with round corners [shape=(N, 2)]."""
     radius = min(max(radius, 0), width / 2, height / 2)
     if radius <= 0:
@@ -375,7 +375,7 @@ class _DrawingReader:
         if self.box is None:
             if tag != "svg":
                 raise InputError(f"not an SVG: its root is {shorten(tag)!r}")
-            self.box = _box(attributes)
+            self.box = _read_box(attributes)
             self.groups.append(_group(attributes, _Group((), np.eye(3), {}, 1.0)))
         elif tag in _PASSED_OVER:
             self.passed = self.depth
@@ -397,25 +397,25 @@ class _DrawingReader:
 
     def _add(self, tag: str, attributes: Mapping[str, str]) -> None:
         group = _group(attributes, self.groups[-1])
-        lines = _lines(attributes, tag, MOST_POINTS - self.points)
+        lines = _read_lines(attributes, tag, MOST_POINTS - self.points)
         self.points += sum(len(points) for points, _ in lines)
         check_points(MOST_POINTS - self.points)
         style, matrix = group.style, group.matrix
-        opacities = [_number(style.get(f"{kind}-opacity", "1"), "opacity") for kind in ("fill", "stroke")]
+        opacities = [_read_number(style.get(f"{kind}-opacity", "1"), "opacity") for kind in ("fill", "stroke")]
         placed = tuple(Line(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in lines)
         if not all(np.abs(line.points).max(initial=0) <= 1e3 * LARGEST_NUMBER for line in placed):
             raise InputError(f"a shape is {1e3 * LARGEST_NUMBER:g} units away; check the transforms")
-        fill = _colour(style.get("fill", "black"), "fill")
+        fill = _read_colour(style.get("fill", "black"), "fill")
         scale = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2]))))
         shape = Shape(
             placed,
             None if tag == "line" else fill,
-            _colour(style.get("stroke", "none"), "stroke"),
-            scale * _number(style.get("stroke-width", "1"), "stroke-width"),
+            _read_colour(style.get("stroke", "none"), "stroke"),
+            scale * _read_number(style.get("stroke-width", "1"), "stroke-width"),
             (float(np.clip(group.opacity * opacities[0], 0, 1)), float(np.clip(group.opacity * opacities[1], 0, 1))),
             style.get("fill-rule") == "evenodd",
         )
-        self.covered += _covered(shape, self.box or (0, 0, 1, 1))
+        self.covered += _measure_cover(shape, self.box or (0, 0, 1, 1))
         if self.covered > MOST_COVERED_PICTURES:
             raise InputError(f"its shapes cover more than {MOST_COVERED_PICTURES:g} times the picture; leave some out")
         self.shapes.append((self.groups[-1].layers, shape))
@@ -436,11 +436,11 @@ def _refuse_style_sheet(target: str, _: str) -> None:
         raise InputError("a style sheet is not read; convert it to plain colours")
 
 
-def _box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
+def _read_box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
     text = root.get("viewBox", "")
     numbers = read_numbers(text, 4, "viewBox")
     if not numbers:
-        numbers = [0, 0, *(_number(root.get(name, "0"), name) for name in ("width", "height"))]
+        numbers = [0, 0, *(_read_number(root.get(name, "0"), name) for name in ("width", "height"))]
     if len(numbers) != 4 or not (1e-3 <= numbers[2] < 1e6 and 1e-3 <= numbers[3] < 1e6):
         raise InputError(f"the view box is {shorten(text)!r}, required four numbers, the last two 0.001 or more")
     if not 1 / LARGEST_SIDE_RATIO <= numbers[2] / numbers[3] <= LARGEST_SIDE_RATIO:
@@ -451,7 +451,7 @@ def _box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
     return numbers[0], numbers[1], numbers[2], numbers[3]
 
 
-def _number(text: str, name: str) -> float:
+def _read_number(text: str, name: str) -> float:
     match = _UNIT.fullmatch(text.strip())
     numbers = read_numbers(match[1] if match else text, 1, name)
     if not numbers:
@@ -476,7 +476,7 @@ def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
     for name, value in style.items():
         if len(value) > LONGEST_VALUE_CHARACTERS:
             raise InputError(f"{name} is {shorten(value)!r}, required a number or a plain colour")
-    opacity = around.opacity * float(np.clip(_number(style.pop("opacity", "1"), "opacity"), 0, 1))
+    opacity = around.opacity * float(np.clip(_read_number(style.pop("opacity", "1"), "opacity"), 0, 1))
     matrix = around.matrix
     if "transform" in attributes:
         matrix = check_matrix(matrix @ read_transform(attributes["transform"]))
@@ -485,7 +485,7 @@ def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
     return _Group(layers, matrix, {**around.style, **style}, opacity)
 
 
-def _covered(shape: Shape, box: tuple[float, float, float, float]) -> float:
+def _measure_cover(shape: Shape, box: tuple[float, float, float, float]) -> float:
     """Return what a shape takes to paint, in pictures as large as the view box that are filled once."""
     first, size = np.array(box[:2]), np.array(box[2:])
     stroked = shape.stroke is not None and shape.width > 0
@@ -500,9 +500,9 @@ def _covered(shape: Shape, box: tuple[float, float, float, float]) -> float:
     return covered
 
 
-def _lines(attributes: Mapping[str, str], tag: str, most: int) -> list[tuple[Points, bool]]:
+def _read_lines(attributes: Mapping[str, str], tag: str, most: int) -> list[tuple[Points, bool]]:
     def number(name: str, default: str = "0") -> float:
-        return _number(attributes.get(name, default), name)
+        return _read_number(attributes.get(name, default), name)
 
     if tag == "path":
         return flatten_path(attributes.get("d", ""), most)
@@ -512,12 +512,12 @@ def _lines(attributes: Mapping[str, str], tag: str, most: int) -> list[tuple[Poi
         return [(np.array([[number("x1"), number("y1")], [number("x2"), number("y2")]]), False)]
     if tag == "rect":
         radius = number("rx", attributes.get("ry", "0"))
-        return [(rectangle(number("x"), number("y"), number("width"), number("height"), radius), True)]
+        return [(make_rectangle(number("x"), number("y"), number("width"), number("height"), radius), True)]
     radii = (number("r"),) * 2 if tag == "circle" else (number("rx"), number("ry"))
-    return [(circle(number("cx"), number("cy"), *radii), True)]
+    return [(make_circle(number("cx"), number("cy"), *radii), True)]
 
 
-def _colour(text: str, name: str) -> Colour | None:
+def _read_colour(text: str, name: str) -> Colour | None:
     from PIL import ImageColor
 
     if text.strip() in ("none", "transparent"):

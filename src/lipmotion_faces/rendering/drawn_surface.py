@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh, Texture
-from lipmotion_faces.characters.textures import TextureTable, decode_srgb, texture_table
+from lipmotion_faces.characters.textures import TextureTable, decode_srgb, build_texture_table
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.kernels.textured import (
     CLEAR,
@@ -20,7 +20,7 @@ from lipmotion_faces.kernels.textured import (
     TexturedTriangles,
     draw_textured,
 )
-from lipmotion_faces.rendering.lighting import LEVELS, WHITE, Finish, Lighting, tone_table
+from lipmotion_faces.rendering.lighting import LEVELS, WHITE, Finish, Lighting, make_tone_table
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
@@ -78,8 +78,8 @@ class Canvas:
 
     def __init__(self, camera: Camera, background: Colours | None = None) -> None:
         self.camera = camera
-        self.background = gradient(camera) if background is None else background
-        self._tone = tone_table()
+        self.background = shade_background(camera) if background is None else background
+        self._tone = make_tone_table()
         level = np.clip(self.background, 0, 1) * np.float32(LEVELS - 1)
         self.empty: NDArray[np.uint8] = self._tone[level.astype(int)]
         """The picture of the background alone [shape=(H, W, 3)]."""
@@ -140,13 +140,13 @@ def add_alpha(picture: NDArray[np.uint8], alpha: NDArray[np.uint8], tone: NDArra
     return np.concatenate([picture, alpha[..., None]], axis=2)
 
 
-def flat(camera: Camera, colour: tuple[int, int, int]) -> Colours:
+def fill_background(camera: Camera, colour: tuple[int, int, int]) -> Colours:
     """Return a background of one colour (sRGB, 0 to 255), as parts of ``WHITE`` [shape=(H, W, 3)]."""
-    level = np.searchsorted(tone_table(), np.array(colour)) / (LEVELS - 1)
+    level = np.searchsorted(make_tone_table(), np.array(colour)) / (LEVELS - 1)
     return np.broadcast_to(np.asarray(level, np.float32), (camera.height, camera.width, 3)).copy()
 
 
-def gradient(
+def shade_background(
     camera: Camera,
     middle: tuple[float, float, float] = (0.86, 0.89, 0.9),
     edge: tuple[float, float, float] = (0.56, 0.65, 0.7),
@@ -169,8 +169,8 @@ class TexturedCanvas:
         self.camera, self.surface = camera, surface
         canvas = Canvas(camera, background)
         self._background, self.empty = canvas.background, canvas.empty
-        self._black = flat(camera, (0, 0, 0))
-        self._tone = tone_table()
+        self._black = fill_background(camera, (0, 0, 0))
+        self._tone = make_tone_table()
 
     def picture(
         self, places: Real, light: Colours, shine: Colours, *, onto: Picture | None = None, moving: Real | None = None
@@ -238,7 +238,7 @@ class DrawnSurface:
     triangles: TexturedTriangles
 
 
-def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) -> DrawnSurface:
+def prepare_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) -> DrawnSurface:
     """Return what is drawn of a mesh, with textures reduced to its size, in pixels for the mesh's unit."""
     materials = [part.material for part in mesh.parts]
     part_of = np.repeat(np.arange(len(mesh.parts)), [part.stop - part.first for part in mesh.parts])
@@ -257,7 +257,7 @@ def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) 
     for material in materials:
         if material.texture is not None:
             textures.setdefault(material.texture, len(textures))
-    looks = _looks(mesh, numbers, part_of[numbers], uv, texture_table(list(textures)), textures, pixels_per_unit)
+    looks = _prepare_triangles(mesh, numbers, part_of[numbers], uv, build_texture_table(list(textures)), textures, pixels_per_unit)
     visible = looks.looks[:, 1] != EMPTY
     looks = looks._replace(uv=looks.uv[visible], looks=looks.looks[visible], alphas=looks.alphas[visible])
     numbers, corners, behind = numbers[visible], corners[visible], behind[visible]
@@ -270,12 +270,12 @@ def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) 
         np.where(unique % 2 == 1, -1.0, 1.0),
         kinds,
         Lighting(finishes),
-        _colours(mesh, materials, rows, kinds),
+        _list_colours(mesh, materials, rows, kinds),
         looks._replace(triangles=inverse.reshape(corners.shape).astype(np.int32)),
     )
 
 
-def _looks(
+def _prepare_triangles(
     mesh: Mesh,
     numbers: Rows,
     parts: Rows,
@@ -322,7 +322,7 @@ def _looks(
     return TexturedTriangles(np.zeros((0, 3), np.int32), downwards, looks, alphas, table.texels, table.levels)
 
 
-def _colours(mesh: Mesh, materials: list[Material], rows: Rows, kinds: Rows) -> Array:
+def _list_colours(mesh: Mesh, materials: list[Material], rows: Rows, kinds: Rows) -> Array:
     """Return the reflection of drawn vertices; those of textures have the colour of the material alone."""
     of_material = np.array([decode_srgb(material.colour) for material in materials])[kinds]
     textured = np.array([material.texture is not None for material in materials])[kinds]

@@ -61,7 +61,7 @@ class Lighting:
         self._finishes = np.array(rows, dtype=float)
         lamps = np.zeros((6, 6))
         for row, lamp in zip(lamps, (KEY, FILL, *RIMS), strict=False):
-            row[:3] = unit(np.array(lamp.towards))
+            row[:3] = normalise(np.array(lamp.towards))
             row[3:] = np.array(lamp.light) / WHITE
         lamps[4:, :3] = np.array([SKY, GROUND]) / WHITE
         self._lamps = lamps
@@ -91,7 +91,7 @@ class Lighting:
         return shade(normals, places, viewer, colours, open_sky, along, kinds, self._finishes, self._lamps)
 
 
-def tone_table() -> NDArray[np.uint8]:
+def make_tone_table() -> NDArray[np.uint8]:
     """Return the grey level, 0 to 255, of light in even steps from 0 to ``WHITE`` [shape=(LEVELS,)]."""
     light = np.linspace(0, WHITE, LEVELS)
     knee = 0.7
@@ -100,7 +100,7 @@ def tone_table() -> NDArray[np.uint8]:
     return np.rint(255 * encode_srgb(light / light[-1])).astype(np.uint8)
 
 
-def unit(vectors: Real) -> Real:
+def normalise(vectors: Real) -> Real:
     """Return vectors along the last axis at length 1; the shape stays."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
@@ -115,7 +115,7 @@ DIRECTIONS, LAMPS = 72, 20
 """Directions of the sky from which light comes, and places on the key light, which is large and soft."""
 
 
-def reaches(places: Real, normals: Real, triangles: NDArray[np.int32], hiding: NDArray[np.bool_]) -> Real:
+def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hiding: NDArray[np.bool_]) -> Real:
     """Return the parts of the sky and of the key light that reach the vertices, 0 to 1 [shape=(V, 2)].
 
     places, normals : of the vertices, which must be dense: no further apart than ``CELL`` [shape=(V, 3)]
@@ -130,15 +130,15 @@ def reaches(places: Real, normals: Real, triangles: NDArray[np.int32], hiding: N
     for way in towards:
         weight = np.maximum(normals @ way + 0.1, 0) * (1.2 + way[1])
         total += weight
-        seen += weight * _visible(places, hiding, way)
+        seen += weight * _measure_visibility(places, hiding, way)
     sky = seen / np.maximum(total, 1e-9)
-    key = unit(np.array(KEY.towards))
+    key = normalise(np.array(KEY.towards))
     around = np.cross(key, [0.0, 1.0, 0.0])
     above = np.cross(around, key)
     direct = np.zeros(len(places))
     for n in range(LAMPS):
         radius, turn = 0.22 * np.sqrt((n + 0.5) / LAMPS), 2.39996 * n
-        direct += _visible(places, hiding, unit(key + radius * (np.cos(turn) * around + np.sin(turn) * above)))
+        direct += _measure_visibility(places, hiding, normalise(key + radius * (np.cos(turn) * around + np.sin(turn) * above)))
     return _smooth(np.stack([sky, direct / LAMPS], axis=1), triangles)
 
 
@@ -155,9 +155,9 @@ def _smooth(values: Real, triangles: NDArray[np.int32], times: int = 4) -> Real:
     return values
 
 
-def _visible(places: Real, hiding: NDArray[np.bool_], way: Real) -> Real:
+def _measure_visibility(places: Real, hiding: NDArray[np.bool_], way: Real) -> Real:
     """Return how far every vertex can be seen from a direction, 0 to 1 [shape=(V,)]."""
-    side = unit(np.cross(way, [0.31, 0.9, 0.27]))
+    side = normalise(np.cross(way, [0.31, 0.9, 0.27]))
     flat = np.stack([places @ side, places @ np.cross(side, way)], axis=1) / CELL
     flat -= flat.min(axis=0) - 1
     height = places @ way

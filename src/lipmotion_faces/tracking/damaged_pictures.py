@@ -104,12 +104,12 @@ def find_damaged(
     unlike = []
     for number, (clip, rate) in enumerate(zip(clips, rate_hz, strict=True)):
         own = np.where(places[:, 0] == number, places[:, 1], -(10**9))
-        unlike.append(_unlikeness(_describe(clip())[2], np.concatenate(bank), own, APART_S * rate))
-    usual = max(_median(unlike, seen), LEAST_USUAL)
+        unlike.append(_measure_unlikeness(_describe(clip())[2], np.concatenate(bank), own, APART_S * rate))
+    usual = max(_find_median(unlike, seen), LEAST_USUAL)
     result = []
     for number, (mask, values) in enumerate(zip(seen, unlike, strict=True)):
         others = slice(None) if is_one else slice(number, number + 1)
-        light, sharpness = (_median([look[part] for look in looks[others]], seen[others]) for part in (0, 1))
+        light, sharpness = (_find_median([look[part] for look in looks[others]], seen[others]) for part in (0, 1))
         lights, sharp = looks[number]
         padded = np.pad(sharp, BLUR_FRAMES // 2, "edge")
         steady = np.median(np.lib.stride_tricks.sliding_window_view(padded, BLUR_FRAMES), axis=-1)
@@ -119,7 +119,7 @@ def find_damaged(
     return result
 
 
-def _median(values: Sequence[Floats], masks: Sequence[Mask]) -> float:
+def _find_median(values: Sequence[Floats], masks: Sequence[Mask]) -> float:
     some = np.concatenate([each[mask] for each, mask in zip(values, masks, strict=True)])
     return float(np.median(some)) if len(some) else 0.0
 
@@ -133,7 +133,7 @@ def _find_smeared(unlike: Floats) -> Mask:
     return result
 
 
-def _unlikeness(mouths: Floats, bank: Floats, frames: NDArray[np.intp], apart: float) -> Floats:
+def _measure_unlikeness(mouths: Floats, bank: Floats, frames: NDArray[np.intp], apart: float) -> Floats:
     """Return one less the best correlation of each mouth with those of a bank not near it in its own clip; 0: few."""
     is_near = np.abs(np.arange(len(mouths))[:, None] - frames) < apart
     if not len(mouths) or (~is_near).sum(axis=1).min() < LEAST_COMPARED:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.tracking import trackers
-from lipmotion_faces.tracking.image_similarity import face_thumbnail, image_correlation, is_cut, scene_thumbnail
+from lipmotion_faces.tracking.image_similarity import reduce_face, correlate_images, is_cut, reduce_scene
 from lipmotion_faces.tracking.packages import import_opencv
 
 Image = NDArray[np.uint8]
@@ -134,7 +134,7 @@ class FaceFollower:
         Of several faces it is the one followed so far; where a scene begins, one that was followed before, else the
         largest and most central.
         """
-        before, self._picture = self._picture, scene_thumbnail(image)
+        before, self._picture = self._picture, reduce_scene(image)
         if is_cut(before, self._picture) or self._scenes[-1].missing_frames > LOST_FRAMES:
             self._begin_scene()
         face = self._scenes[-1].next_face(image)
@@ -187,7 +187,7 @@ class FaceFollower:
             more = {
                 index
                 for index, scene in enumerate(self._scenes)
-                if _best_correlation(scene.thumbnails, known) > SAME_PERSON_CORRELATION
+                if _find_best_correlation(scene.thumbnails, known) > SAME_PERSON_CORRELATION
             } - of_person
             if not more:
                 return of_person
@@ -227,16 +227,16 @@ class _Scene:
             last = self._last
             near = [face for face in faces if self._could_be(face, last)]
             self.is_lost = not near and not self._is_crowd
-            face = min(near, key=lambda face: _distance(face, last), default=None)
+            face = min(near, key=lambda face: _measure_distance(face, last), default=None)
         else:
             face = self._search(image, self._last)
         if face is None:
             self.missing_frames += self._last is not None
             return None
         if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MOST_LOOKS:
-            look = face_thumbnail(image, face[_EYES, :2])
+            look = reduce_face(image, face[_EYES, :2])
             is_early = len(self.thumbnails) < MOST_THUMBNAILS
-            if is_early or _best_correlation([look], self.thumbnails) < NEW_LOOK_CORRELATION:
+            if is_early or _find_best_correlation([look], self.thumbnails) < NEW_LOOK_CORRELATION:
                 self.thumbnails.append(look)
         self._frames += 1
         self._last, self.missing_frames = face, 0
@@ -278,8 +278,8 @@ class _Scene:
         return face
 
     def _could_be(self, face: Array, last: Array) -> bool:
-        growth = _size(face) / _size(last)
-        return _distance(face, last) < JUMP * (1 + self.missing_frames) and 1 / GROWTH < growth < GROWTH
+        growth = _measure_size(face) / _measure_size(last)
+        return _measure_distance(face, last) < JUMP * (1 + self.missing_frames) and 1 / GROWTH < growth < GROWTH
 
     def _faces(self, image: Image) -> list[Array]:
         if self._mesh is None:
@@ -288,27 +288,27 @@ class _Scene:
 
     def _priority(self, image: Image, face: Array) -> tuple[bool, float]:
         """Return whether a face was followed before, and its size, which counts half at the edge of the picture."""
-        is_known = _best_correlation([face_thumbnail(image, face[_EYES, :2])], self._known) > SAME_PERSON_CORRELATION
-        return is_known, _size(face) * (1 - abs(float(_middle(face)[0]) / image.shape[1] - 0.5))
+        is_known = _find_best_correlation([reduce_face(image, face[_EYES, :2])], self._known) > SAME_PERSON_CORRELATION
+        return is_known, _measure_size(face) * (1 - abs(float(_find_middle(face)[0]) / image.shape[1] - 0.5))
 
 
-def _best_correlation(thumbnails: Sequence[Array], others: Sequence[Array]) -> float:
+def _find_best_correlation(thumbnails: Sequence[Array], others: Sequence[Array]) -> float:
     """Return the highest correlation of a thumbnail with one of the others, 0 where there is none."""
     if not thumbnails or not others:
         return 0.0
-    return float(image_correlation(np.stack(thumbnails)[:, None], np.stack(others)).max())
+    return float(correlate_images(np.stack(thumbnails)[:, None], np.stack(others)).max())
 
 
-def _distance(face: Array, other: Array) -> float:
+def _measure_distance(face: Array, other: Array) -> float:
     """Return the distance between the middles of two faces, in eye distances of the second."""
-    return float(np.linalg.norm(_middle(face) - _middle(other))) / _size(other)
+    return float(np.linalg.norm(_find_middle(face) - _find_middle(other))) / _measure_size(other)
 
 
-def _middle(face: Array) -> Array:
+def _find_middle(face: Array) -> Array:
     """Return the point between the outer eye corners, px [shape=(2,)]."""
     return face[_EYES, :2].mean(axis=0)
 
 
-def _size(face: Array) -> float:
+def _measure_size(face: Array) -> float:
     """Return the distance between the outer eye corners, px."""
     return float(np.linalg.norm(face[_EYES[1], :2] - face[_EYES[0], :2]))

@@ -93,7 +93,7 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
             stated_s = max(min(stated_s, span.end_s) - span.start_s, 0.0)
         if longest_px is not None:
             stream.thread_type = "AUTO"
-        frames = _frames(container, stream, path, span, longest_px, damage)
+        frames = _decode_frames(container, stream, path, span, longest_px, damage)
         with closing(frames):  # decoding from a closed container would crash
             yield OpenVideo(frames, tuple(rates), stated_s, damage)
 
@@ -110,36 +110,36 @@ def damage_notes(video: OpenVideo, times_s: NDArray[np.float64], rate_hz: float)
     return notes
 
 
-def _frames(
+def _decode_frames(
     container: Any, stream: Any, path: Path, span: VideoSpan, longest_px: int | None, damage: list[str]
 ) -> Generator[VideoFrame, None, None]:
     start_s = (container.start_time or 0) / 1e6
     pixel_shape = float(stream.sample_aspect_ratio or 1)
     last_s = float("-inf")
-    for picture in _pictures_from(container, stream, start_s + span.start_s - ROUNDING_S, damage):
+    for picture in _decode_pictures_from(container, stream, start_s + span.start_s - ROUNDING_S, damage):
         if picture.time is None or max(picture.time - start_s, span.start_s) <= last_s:
             continue  # it has no time, or one that another picture has
         last_s = max(picture.time - start_s, span.start_s)
         if last_s >= span.end_s - ROUNDING_S:
             break
         _check_size(path, picture.width, picture.height, pixel_shape)
-        yield VideoFrame(last_s - span.start_s, _upright(picture, pixel_shape, longest_px))
+        yield VideoFrame(last_s - span.start_s, _turn_upright(picture, pixel_shape, longest_px))
     if last_s == float("-inf") and span == WHOLE:
         raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
 
 
-def _pictures_from(container: Any, stream: Any, first_s: float, damage: list[str]) -> Iterator[Any]:
+def _decode_pictures_from(container: Any, stream: Any, first_s: float, damage: list[str]) -> Iterator[Any]:
     """Yield the pictures from a time of the container's clock on; ``damage`` lists what is damaged from there on."""
     start_s = (container.start_time or 0) / 1e6
     if first_s <= start_s:
-        yield from _pictures(container, stream, damage)
+        yield from _decode_pictures(container, stream, damage)
         return
     container.seek(int(max(first_s - SEEK_MARGIN_S, start_s) / stream.time_base), stream=stream)
-    pictures = _pictures(container, stream, damage)
+    pictures = _decode_pictures(container, stream, damage)
     picture = next(pictures, None)
     if picture is None or picture.time is None or picture.time > first_s:
         container.seek(int(start_s / stream.time_base), stream=stream)
-        pictures = _pictures(container, stream, damage)
+        pictures = _decode_pictures(container, stream, damage)
         picture = next(pictures, None)
     while picture is not None and (picture.time is None or picture.time < first_s):
         picture = next(pictures, None)
@@ -149,7 +149,7 @@ def _pictures_from(container: Any, stream: Any, first_s: float, damage: list[str
         yield from pictures
 
 
-def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
+def _decode_pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
     import av
 
     packets = container.demux(stream)
@@ -179,7 +179,7 @@ def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None
         raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {most}; scale the video")
 
 
-def _upright(picture: Any, pixel_shape: float, longest_px: int | None = None) -> NDArray[np.uint8]:
+def _turn_upright(picture: Any, pixel_shape: float, longest_px: int | None = None) -> NDArray[np.uint8]:
     """Return a picture as RGB [shape=(H, W, 3)], upright, with square pixels, at most ``longest_px``."""
     width, height = round(picture.width * pixel_shape), picture.height
     if longest_px is not None and max(width, height) > longest_px:
@@ -207,7 +207,7 @@ LOWEST_HZ, HIGHEST_HZ = 1.0, 1000.0
 """Lowest and highest frame rate: lip motion needs more than the lowest, no camera is faster than the highest."""
 
 
-def nominal_rate_hz(times_s: Array, stated_rates_hz: Sequence[float]) -> float:
+def find_nominal_rate(times_s: Array, stated_rates_hz: Sequence[float]) -> float:
     """Return the constant rate of time stamps, though frames were dropped: the stated one that fits, or the median."""
     if len(times_s) < 2:
         return stated_rates_hz[0] if stated_rates_hz else RATE_WHEN_UNKNOWN_HZ
@@ -224,12 +224,12 @@ def check_rate(rate_hz: float, path: Path) -> None:
         )
 
 
-def frame_count(times_s: Array, rate_hz: float) -> int:
+def count_frames(times_s: Array, rate_hz: float) -> int:
     """Return how many frames at a constant rate, the first at 0 s, there are up to the last time."""
     return round(float(times_s[-1]) * rate_hz) + 1
 
 
-def nearest_indices(times_s: Array, wanted_s: Array) -> NDArray[np.intp]:
+def find_nearest(times_s: Array, wanted_s: Array) -> NDArray[np.intp]:
     """Return the index of the time nearest to each wanted time [shape=(len(wanted_s),)]."""
     after = np.clip(np.searchsorted(times_s, wanted_s), 1, max(len(times_s) - 1, 1))
     before = after - 1
@@ -249,7 +249,7 @@ def resample_to_constant_rate(times_s: Array, values: Array, rate_hz: float, cou
     from scipy.interpolate import CubicSpline
 
     wanted_s = np.clip(np.arange(count) / rate_hz, times_s[0], times_s[-1])
-    index = nearest_indices(times_s, wanted_s)
+    index = find_nearest(times_s, wanted_s)
     result: Array = values[index].copy()
     after = np.clip(np.searchsorted(times_s, wanted_s), 1, max(len(times_s) - 1, 1))
     moved = np.abs(times_s[index] - wanted_s) * rate_hz > TIME_TOLERANCE

@@ -106,14 +106,14 @@ def crop_mouth(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
     """Return the mouth picture of one frame: uint8 array [shape=(56, 72, 3)].
 
     image    : uint8 array [shape=(H, W, 3)]
-    to_image : affine map [shape=(2, 3)] of ``face_to_image`` or ``eyes_to_image``
+    to_image : affine map [shape=(2, 3)] of ``map_face_to_image`` or ``map_eyes_to_image``
     Pixels outside the image repeat its edge.
     """
     cv2 = import_opencv()
     shrink = max(1, int(np.sqrt(abs(np.linalg.det(to_image[:, :2]))) + 1e-9))
     crop: NDArray[np.uint8] = cv2.warpAffine(
         image,
-        region_to_image(to_image, shrink),
+        map_region_to_image(to_image, shrink),
         (WIDTH * shrink, HEIGHT * shrink),
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
@@ -123,7 +123,7 @@ def crop_mouth(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
     return crop
 
 
-def region_to_image(to_image: Array, samples: int = 1) -> Array:
+def map_region_to_image(to_image: Array, samples: int = 1) -> Array:
     """Return the affine map from a pixel of the mouth region to its position in the image [shape=(2, 3)].
 
     to_image : as in ``crop_mouth``
@@ -135,7 +135,7 @@ def region_to_image(to_image: Array, samples: int = 1) -> Array:
     return np.concatenate([turn / samples, (to_image[:, 2] - 0.5 + turn @ first)[:, None]], axis=1)
 
 
-def face_to_image(points: Array) -> Array:
+def map_face_to_image(points: Array) -> Array:
     """Return the affine maps of every frame from the plane of the lips, without head motion, to the image.
 
     points : array [shape=(T, len(TRACKED_POINTS), 3)] of one person, px, x to the right, y down, z away from the camera
@@ -155,8 +155,8 @@ def face_to_image(points: Array) -> Array:
     return maps
 
 
-def eyes_to_image(eyes: Array) -> Array:
-    """Return the affine map of ``face_to_image`` for one frame [shape=(2, 3)], as if the face turned in its plane only.
+def map_eyes_to_image(eyes: Array) -> Array:
+    """Return the affine map of ``map_face_to_image`` for one frame [shape=(2, 3)], as if the face turned in its plane only.
 
     eyes : array [shape=(2, 2)], x and y of the right and left outer eye corner in the image, px, y down
     """

@@ -33,7 +33,7 @@ FLAT_LEVELS = 1.0
 """A region with a smaller standard deviation, in grey levels, has no texture to compare."""
 
 
-def scene_thumbnail(image: Image) -> Array:
+def reduce_scene(image: Image) -> Array:
     """Return a thumbnail of the whole picture, less its mean [shape=(24, 32, 3)]; of a large one, from some pixels."""
     cv2 = import_opencv()
     step = max(1, max(image.shape[:2]) // SCENE_SAMPLES)
@@ -46,7 +46,7 @@ def is_cut(before: Array | None, after: Array) -> bool:
     return before is not None and bool(np.abs(after - before).mean() > CUT_LEVELS)
 
 
-def face_thumbnail(image: Image, eyes: Array) -> Array:
+def reduce_face(image: Image, eyes: Array) -> Array:
     """Return a thumbnail of the upper face, upright [shape=(24, 36, 3)]."""
     cv2 = import_opencv()
     across = eyes[1] - eyes[0]
@@ -64,13 +64,13 @@ def face_thumbnail(image: Image, eyes: Array) -> Array:
     return np.asarray(region, float)
 
 
-def mouth_thumbnail(crop: Image) -> NDArray[np.uint8]:
+def reduce_mouth(crop: Image) -> NDArray[np.uint8]:
     """Return a thumbnail of a mouth picture [shape=(14, 18, 3)]."""
     cv2 = import_opencv()
     return cv2.resize(crop, MOUTH_SIZE, interpolation=cv2.INTER_AREA)
 
 
-def image_correlation(first: Array, other: Array) -> Array:
+def correlate_images(first: Array, other: Array) -> Array:
     """Return the correlation of pictures [shape=(..., H, W, 3)] less their mean colours; 0 if one has no texture."""
     a, b = (x - x.mean(axis=(-3, -2), keepdims=True) for x in (first, other))
     a_power, b_power = np.square(a).mean(axis=(-3, -2, -1)), np.square(b).mean(axis=(-3, -2, -1))
@@ -84,13 +84,13 @@ def find_occluded_mouths(mouths: NDArray[np.uint8]) -> NDArray[np.bool_]:
     if np.square(median - median.mean(axis=(0, 1))).mean() < FLAT_LEVELS**2:
         return np.zeros(len(mouths), bool)
     values = mouths.astype(float)
-    unlike = (image_correlation(values, median) < OCCLUDED_CORRELATION) & (
+    unlike = (correlate_images(values, median) < OCCLUDED_CORRELATION) & (
         np.abs(values - median).mean(axis=(1, 2, 3)) > OCCLUDED_DIFFERENCE
     )
     suspects, best = values[unlike], np.full(unlike.sum(), -1.0)
     for shift in range(1, NOD_ROWS + 1):
-        up = image_correlation(suspects[:, :-shift], median[shift:])
-        down = image_correlation(suspects[:, shift:], median[:-shift])
+        up = correlate_images(suspects[:, :-shift], median[shift:])
+        down = correlate_images(suspects[:, shift:], median[:-shift])
         best = np.maximum(best, np.maximum(up, down))
     unlike[unlike] = best < SHIFTED_CORRELATION
     return unlike

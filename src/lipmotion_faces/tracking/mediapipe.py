@@ -13,7 +13,7 @@ from typing import Any, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_faces.tracking.packages import import_opencv, import_solution, missing
+from lipmotion_faces.tracking.packages import import_opencv, import_solution, explain_missing
 from lipmotion_faces.tracking.trackers import MEDIAPIPE, TRACKED_POINTS, FaceBox, LandmarkTracker
 
 GraphT = TypeVar("GraphT", bound="_Graph")
@@ -79,7 +79,7 @@ class FaceFinder(_Graph):
     def boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
         """Return the faces in a picture, those with the highest score first, as ``BoxFinder.boxes``.
 
-        thorough : where the whole picture shows none, search the parts of ``parts`` too, which takes four times as long
+        thorough : where the whole picture shows none, search the parts of ``list_parts`` too, which takes four times as long
         A face needs an eye distance of a fortieth of the picture's longer side; in a part, of the shorter side.
         """
         scale = max(max(image.shape[:2]) / LONGEST_PX, 1.0)
@@ -89,7 +89,7 @@ class FaceFinder(_Graph):
             image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
         boxes = self._find(image)
         if not boxes and thorough and min(image.shape[:2]) >= LEAST_PART_PX:
-            for left, top, side in parts(*image.shape[:2]):
+            for left, top, side in list_parts(*image.shape[:2]):
                 part = np.ascontiguousarray(image[top : top + side, left : left + side])
                 boxes += [FaceBox(box.x + left, box.y + top, box.side, box.score) for box in self._find(part)]
         distinct: list[FaceBox] = []
@@ -108,7 +108,7 @@ class FaceFinder(_Graph):
         return boxes
 
 
-def parts(height: int, width: int) -> Iterator[tuple[int, int, int]]:
+def list_parts(height: int, width: int) -> Iterator[tuple[int, int, int]]:
     """Yield left, top and side of three squares that cover a picture along its longer side and overlap, px."""
     side = min(height, width)
     for third in (1, 0, 2):  # the middle first
@@ -143,7 +143,7 @@ class MediaPipe(LandmarkTracker):
         try:
             mediapipe = metadata.version("mediapipe")
         except metadata.PackageNotFoundError as error:
-            raise missing("MediaPipe", error) from error
+            raise explain_missing("MediaPipe", error) from error
         return {MEDIAPIPE: mediapipe, "opencv": str(import_opencv().__version__), "av": metadata.version("av")}
 
     def points(self, most: int = 1) -> FaceMesh:  # noqa: D102

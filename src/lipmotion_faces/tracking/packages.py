@@ -15,7 +15,7 @@ def import_opencv() -> Any:
     try:
         import cv2
     except ImportError as error:
-        raise missing("OpenCV", error) from error
+        raise explain_missing("OpenCV", error) from error
     return cv2
 
 
@@ -32,11 +32,11 @@ def import_solution(name: str) -> Any:
     try:
         solutions = import_module("mediapipe.python.solutions")  # all of them
     except ImportError as error:
-        raise missing("MediaPipe", error) from error
+        raise explain_missing("MediaPipe", error) from error
     return getattr(solutions, name)
 
 
-def missing(package: str, error: ImportError) -> MissingDependencyError:
+def explain_missing(package: str, error: ImportError) -> MissingDependencyError:
     """Return the error that a package cannot be imported, which says how to install it."""
     return MissingDependencyError(
         f"face tracking needs {package}, which cannot be imported ({error}); "

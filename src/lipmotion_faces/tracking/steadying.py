@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX
 from lipmotion_faces.tracking.packages import import_opencv
-from lipmotion_faces.tracking.track import Footage, footage_frames
+from lipmotion_faces.tracking.track import Footage, decode_footage
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -94,8 +94,8 @@ def register_maps(footage: Footage) -> Array:
     samples = min(scale, MOST_SAMPLES)
     steps = np.zeros((len(footage), 2))
     before: list[Floats] = []
-    for n, (frame, to_image) in enumerate(zip(footage_frames(footage), maps, strict=True)):
-        region = _blurred_region(frame, to_image, samples)
+    for n, (frame, to_image) in enumerate(zip(decode_footage(footage), maps, strict=True)):
+        region = _blur_region(frame, to_image, samples)
         if n and n not in footage.cuts and footage.track.seen[n - 1 : n + 1].all():
             steps[n] = _step(before, region) / samples
         before = region
@@ -122,7 +122,7 @@ def _smooth(rows: Array, sigma: float, mode: str = "nearest") -> Array:
     return gaussian_filter1d(rows, sigma, axis=0, mode=mode)
 
 
-def _blurred_region(frame: NDArray[np.uint8], to_image: Array, samples: float) -> list[Floats]:
+def _blur_region(frame: NDArray[np.uint8], to_image: Array, samples: float) -> list[Floats]:
     """Return nose and cheeks of a frame in grey, aligned, at each of ``BLURS_PX``."""
     cv2 = import_opencv()
     left, top, right, bottom = REGION
@@ -146,11 +146,11 @@ def _step(before: Sequence[Floats], after: Sequence[Floats]) -> Array:
     for reference, moved in zip(before, after, strict=True):
         step = _register(reference, moved, step)
     reference, moved = before[-1], after[-1]
-    is_better = _correlation(reference, _shift(moved, step)) >= _correlation(reference, moved)
+    is_better = _correlate(reference, _shift(moved, step)) >= _correlate(reference, moved)
     return step if is_better else np.zeros(2)
 
 
-def _correlation(first: Floats, other: Floats) -> float:
+def _correlate(first: Floats, other: Floats) -> float:
     a, b = first - first.mean(), other - other.mean()
     return float((a * b).mean() / max(a.std() * b.std(), 1e-9))
 

@@ -21,14 +21,14 @@ from lipmotion_faces.tracking.frames import (
     VideoSpan,
     check_rate,
     damage_notes,
-    frame_count,
-    nearest_indices,
-    nominal_rate_hz,
+    count_frames,
+    find_nearest,
+    find_nominal_rate,
     open_video,
     resample_to_constant_rate,
 )
-from lipmotion_faces.tracking.head_pose import crop_mouth, eyes_to_image, face_to_image, remove_head_motion
-from lipmotion_faces.tracking.image_similarity import find_occluded_mouths, is_cut, mouth_thumbnail, scene_thumbnail
+from lipmotion_faces.tracking.head_pose import crop_mouth, map_eyes_to_image, map_face_to_image, remove_head_motion
+from lipmotion_faces.tracking.image_similarity import find_occluded_mouths, is_cut, reduce_mouth, reduce_scene
 from lipmotion_faces.tracking.trackers import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, MEDIAPIPE, TRACKED_POINTS
 
 Array = NDArray[np.float64]
@@ -84,14 +84,14 @@ def make_track(path: Path, span: VideoSpan, frames: TrackedFrames, *, crops: boo
     """Return the motion of lips and jaw in tracked frames of a video, as ``track`` does."""
     mouths = None
     if crops:  # decoded once more: the head pose depends on all frames, and the frames do not fit into memory
-        maps = iter(face_to_image(frames.points))
+        maps = iter(map_face_to_image(frames.points))
         with open_video(path, span) as video:
             shown = zip(frames.seen, video.frames, strict=False)
             mouths = np.stack([crop_mouth(frame.image, next(maps)) for seen, frame in shown if seen])
     times_s = frames.seen_s
     values = resample_to_constant_rate(times_s, measure_motion(frames.points), frames.rate_hz, frames.count)
     wanted_s = np.arange(frames.count) / frames.rate_hz
-    index = nearest_indices(times_s, wanted_s)
+    index = find_nearest(times_s, wanted_s)
     seen = np.abs(times_s[index] - wanted_s) * frames.rate_hz <= 0.5
     nearest = None if mouths is None else mouths[index]
     return Track(Motion(values, frames.rate_hz, CHANNELS), seen, nearest, frames.notes)
@@ -99,8 +99,8 @@ def make_track(path: Path, span: VideoSpan, frames: TrackedFrames, *, crops: boo
 
 def measure_motion(points: Array) -> Array:
     """Return ``CHANNELS`` [shape=(T, len(CHANNELS))] of points in px, y down, z away [shape=(T, N, 3)]."""
-    unit = distance_px(points, EYE_CORNERS)
-    distances = np.stack([distance_px(points, pair) / unit for pair in DISTANCES.values()], axis=1)
+    unit = measure_distance(points, EYE_CORNERS)
+    distances = np.stack([measure_distance(points, pair) / unit for pair in DISTANCES.values()], axis=1)
     head = remove_head_motion(points * (1, -1, -1), TRACKED_POINTS)
     moving = head[:, [COLUMN[index] for index in (*LIP_POINTS, *JAW_POINTS)]]
     return np.concatenate([distances, moving.reshape(len(points), -1)], axis=1)
@@ -136,7 +136,7 @@ class TrackedFrames:
     @property
     def count(self) -> int:
         """The number T of frames at the constant rate, frame n at n / rate_hz seconds."""
-        return frame_count(self.times_s, self.rate_hz)
+        return count_frames(self.times_s, self.rate_hz)
 
 
 @dataclass(eq=False)
@@ -161,7 +161,7 @@ class _Pictures:
         self.before = now
         if points is not None:
             self.points.append(points)
-            self.mouths.append(mouth_thumbnail(crop_mouth(image, eyes_to_image(points[_EYES, :2]))))
+            self.mouths.append(reduce_mouth(crop_mouth(image, map_eyes_to_image(points[_EYES, :2]))))
 
     def mark_unseen(self, wrong: NDArray[np.bool_]) -> int:
         """Mark some of the frames that show a face as if they did not [shape=(number of them,)]; return how many."""
@@ -184,7 +184,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
     others = pictures.mark_unseen(~follower.person()[pictures.seen])
     covered = pictures.mark_unseen(find_occluded_mouths(np.stack(pictures.mouths))) if pictures.mouths else 0
     times_s, cuts = np.array(pictures.times_s), tuple(follower.cuts())
-    rate_hz = nominal_rate_hz(times_s, video.stated_rates_hz)
+    rate_hz = find_nominal_rate(times_s, video.stated_rates_hz)
     repeated, frozen = damaged_pictures.find_repeated(pictures.changes, rate_hz)
     found = np.array(pictures.seen)
     pictures.mark_unseen(repeated[found])
@@ -197,7 +197,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
         *([f"{doubled} pictures are doubled"] if (doubled := int((repeated & ~frozen).sum())) > 1 else []),
     )
     if pictures.points:
-        unit_px = float(np.median(distance_px(np.stack(pictures.points), EYE_CORNERS)))
+        unit_px = float(np.median(measure_distance(np.stack(pictures.points), EYE_CORNERS)))
         if unit_px < SMALL_EYES_PX:
             wanted = f"{SMALL_EYES_PX:.0f} give a good track; film closer"
             notes = (*notes, f"the face is small: {unit_px:.0f} px between the eyes, {wanted}")
@@ -207,7 +207,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
     )
 
 
-def distance_px(points: Array, pair: tuple[int, int]) -> Array:
+def measure_distance(points: Array, pair: tuple[int, int]) -> Array:
     """Return the distance in the image between two face-mesh points in every frame, px [shape=(T,)]."""
     between = points[:, COLUMN[pair[0]], :2] - points[:, COLUMN[pair[1]], :2]
     return np.linalg.norm(between, axis=1)
@@ -217,7 +217,7 @@ def _check(
     path: Path, times_s: Array, seen: NDArray[np.bool_], video: OpenVideo, rate_hz: float, notes: tuple[str, ...]
 ) -> None:
     check_rate(rate_hz, path)
-    count = frame_count(times_s, rate_hz)
+    count = count_frames(times_s, rate_hz)
     noted = f" ({'; '.join(notes)})" if notes else ""
     if count < USABLE_SHARE * video.stated_s * rate_hz:
         raise InputError(
@@ -279,7 +279,7 @@ def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tr
     before = None
     with open_video(path, longest_px=LOOK_PX) as video, FaceFollower(tracker=tracker) as follower:
         for frame in video.frames:
-            picture = scene_thumbnail(frame.image)
+            picture = reduce_scene(frame.image)
             if is_cut(before, picture):
                 cuts_s.append(frame.time_s)
             if int(frame.time_s / FACE_STEP_S) != (int(times_s[-1] / FACE_STEP_S) if times_s else -1):
@@ -288,7 +288,7 @@ def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tr
             times_s.append(frame.time_s)
             if len(times_s) % REPORT_STEP == 0 and video.stated_s:
                 reached(min(frame.time_s / video.stated_s, 1.0))
-        rate_hz = nominal_rate_hz(np.array(times_s), video.stated_rates_hz)
+        rate_hz = find_nominal_rate(np.array(times_s), video.stated_rates_hz)
         damage = tuple(damage_notes(video, np.array(times_s), rate_hz))
     check_rate(rate_hz, path)
     return VideoScan(
@@ -314,7 +314,7 @@ class Footage:
     path          : the video
     span          : the part of the video that was tracked
     track         : motion of the lips and jaw, T frames, and which of them are seen; as ``track.track`` finds it
-    face_to_image : affine maps of ``head_pose.face_to_image``, from px of the face that looks ahead to
+    face_to_image : affine maps of ``head_pose.map_face_to_image``, from px of the face that looks ahead to
                     px of the frame [shape=(T, 2, 3)]; in frames that are not seen, interpolated within their scene
     pictures_s    : time of the picture that frame n shows, the one nearest to its time, s since the start of ``span``
                     [shape=(T,)]; equal times in a row are a picture shown again
@@ -352,9 +352,9 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -
         raise InputError(f"{path}: pictures of {several} pixels in one video; export the video in one size")
     wanted_s = np.arange(frames.count) / frames.rate_hz
     times_s, rate_hz, count = frames.seen_s, frames.rate_hz, frames.count
-    maps = face_to_image(frames.points).reshape(-1, 6)
-    result = maps[nearest_indices(times_s, np.arange(count) / rate_hz)]  # in scenes in which the person is not seen
-    ends = [0, *_frames_of_cuts(frames), count]
+    maps = map_face_to_image(frames.points).reshape(-1, 6)
+    result = maps[find_nearest(times_s, np.arange(count) / rate_hz)]  # in scenes in which the person is not seen
+    ends = [0, *_list_cut_frames(frames), count]
     for start, stop in pairwise(ends):
         inside = (times_s * rate_hz >= start - 0.5) & (times_s * rate_hz < stop - 0.5)
         if inside.any():
@@ -365,14 +365,14 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -
         span,
         make_track(path, span, frames, crops=crops),
         result.reshape(-1, 2, 3),
-        frames.times_s[nearest_indices(frames.times_s, wanted_s)],
-        tuple(_frames_of_cuts(frames)),
+        frames.times_s[find_nearest(frames.times_s, wanted_s)],
+        tuple(_list_cut_frames(frames)),
         next(iter(frames.sizes)),
         frames.rate_hz,
     )
 
 
-def footage_frames(footage: Footage, start: int = 0, stop: int | None = None) -> Iterator[NDArray[np.uint8]]:
+def decode_footage(footage: Footage, start: int = 0, stop: int | None = None) -> Iterator[NDArray[np.uint8]]:
     """Yield frames of a tracked video, from ``start`` (included) to ``stop`` (excluded; None: to the last one).
 
     Each is a uint8 array [shape=(H, W, 3)], RGB: the picture whose time is nearest to that of the frame, which is shown
@@ -383,10 +383,10 @@ def footage_frames(footage: Footage, start: int = 0, stop: int | None = None) ->
     stop = len(footage) if stop is None else stop
     if not 0 <= start <= stop <= len(footage):
         raise InputError(f"frames {start} to {stop} of {footage.path}, required within 0 to {len(footage)}")
-    return _frames_between(footage, start, stop)
+    return _decode_between(footage, start, stop)
 
 
-def footage_groups(footage: Footage, most_bytes: int = MAX_DECODED_BYTES) -> FrameGroups:
+def open_footage(footage: Footage, most_bytes: int = MAX_DECODED_BYTES) -> FrameGroups:
     """Return access to the frames of a tracked video in any order, also backwards, in bounded memory.
 
     most_bytes : decoded frames that are kept
@@ -409,12 +409,12 @@ class _SequentialReader:
 
     def __call__(self, start: int, stop: int) -> list[NDArray[np.uint8]]:
         if start != self._next:
-            self._frames = footage_frames(self._footage, start)
+            self._frames = decode_footage(self._footage, start)
         self._next = stop
         return list(islice(self._frames, stop - start))
 
 
-def _frames_between(footage: Footage, start: int, stop: int) -> Iterator[NDArray[np.uint8]]:
+def _decode_between(footage: Footage, start: int, stop: int) -> Iterator[NDArray[np.uint8]]:
     if start == stop:
         return
     path, times_s = footage.path, footage.pictures_s
@@ -439,7 +439,7 @@ def _frames_between(footage: Footage, start: int, stop: int) -> Iterator[NDArray
         yield image
 
 
-def _frames_of_cuts(frames: TrackedFrames) -> list[int]:
+def _list_cut_frames(frames: TrackedFrames) -> list[int]:
     """Return the frames at the constant rate before which there is a cut, rising, without repetition."""
     at = {int(np.ceil(frames.times_s[cut] * frames.rate_hz - 0.5)) for cut in frames.cuts}
     return sorted(n for n in at if 0 < n < frames.count)

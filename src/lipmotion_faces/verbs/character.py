@@ -96,9 +96,9 @@ def _write_table(
 ) -> None:
     """Write a table with the gains and offsets by which its controls have the stated values; print those."""
     from lipmotion.meshes.model.rig_tables import write_rig_table
-    from lipmotion_faces.characters.calibration import calibrate_rows, pose_sources
+    from lipmotion_faces.characters.calibration import calibrate_rows, list_pose_sources
 
-    changed = calibrate_rows(rows, pose_sources(curves, rows), stated) if stated else rows
+    changed = calibrate_rows(rows, list_pose_sources(curves, rows), stated) if stated else rows
     for row in changed:
         if row not in rows:
             print_line(f"{shorten(row.control):14} {row.source}: gain {row.gain:.3g}, offset {row.offset:.3g}")

@@ -82,10 +82,10 @@ def run_prepare(options: argparse.Namespace) -> None:
 def run_info(options: argparse.Namespace) -> None:
     """Print the summary of ``lipmotion.Corpus``, and by how much its sound is late."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion_faces.corpus.sync import offsets
+    from lipmotion_faces.corpus.sync import measure_offsets
 
     corpus = Corpus.open(options.corpus)
-    for name, value in (*corpus.summary().items(), *(("offset", line) for line in offsets(corpus).lines())):
+    for name, value in (*corpus.summary().items(), *(("offset", line) for line in measure_offsets(corpus).lines())):
         print_line(f"{name:12} {value}")
 
 
@@ -110,12 +110,12 @@ def run_motion(options: argparse.Namespace) -> None:
 
 
 def run_sync(options: argparse.Namespace) -> None:
-    """Call ``lipmotion_faces.corpus.sync.sync``; print by how much the sound was moved."""
+    """Call ``lipmotion_faces.corpus.sync.remove_offsets``; print by how much the sound was moved."""
     from lipmotion.corpora.store import Corpus
-    from lipmotion_faces.corpus.sync import sync
+    from lipmotion_faces.corpus.sync import remove_offsets
 
     corpus = Corpus.open(options.corpus)
-    moved = sync(corpus)
+    moved = remove_offsets(corpus)
     for collection, late_s in moved.items():
         print_line(f"{collection or corpus.path}: sound moved by {-1000 * late_s:+.0f} ms")
     if not moved:
@@ -123,11 +123,11 @@ def run_sync(options: argparse.Namespace) -> None:
 
 
 def run_offset(options: argparse.Namespace) -> None:
-    """Call ``sound_offset``; print the offset and how it was found."""
+    """Call ``measure_offset``; print the offset and how it was found."""
     from lipmotion.speech.sound.audio_files import read_audio
-    from lipmotion_faces.corpus.sound_offset import sound_offset
+    from lipmotion_faces.corpus.sound_offset import measure_offset
 
-    offset = sound_offset(read_audio(options.camera), read_audio(options.recorder))
+    offset = measure_offset(read_audio(options.camera), read_audio(options.recorder))
     print_line(f"--offset-ms {offset.late_s * 1000:.1f}  (by {offset.how}; levels correlate by {offset.alike:.2f})")
 
 
@@ -153,17 +153,17 @@ def run_prompts(options: argparse.Namespace) -> None:
 
 
 def run_coverage(options: argparse.Namespace) -> None:
-    """Call ``coverage`` and print it."""
+    """Call ``measure_coverage`` and print it."""
     from lipmotion.corpora.store import Corpus
     from lipmotion.units import Lexicon
-    from lipmotion_faces.corpus.coverage import coverage, coverage_document, coverage_lines
+    from lipmotion_faces.corpus.coverage import measure_coverage, coverage_to_json, format_coverage
 
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    result = coverage(Corpus.open(options.corpus), options.text, lexicon=lexicon)
+    result = measure_coverage(Corpus.open(options.corpus), options.text, lexicon=lexicon)
     if options.json:
-        print_json(coverage_document(result))
+        print_json(coverage_to_json(result))
     else:
-        for line in coverage_lines(result, max(options.count, 0)):
+        for line in format_coverage(result, max(options.count, 0)):
             print_line(line)
     if result.left_out and not options.json:
         print_error(f"warning: left out {len(result.left_out)} sentences for their words (--json has them)")

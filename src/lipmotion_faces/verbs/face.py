@@ -49,16 +49,16 @@ def run_build(options: argparse.Namespace) -> None:
             monitor=report.receive,
         )
         save_face(face, options.output)
-        report.finish(_described(face.summary | {"file": str(options.output)}), file=str(options.output))
+        report.finish(_format_summary(face.summary | {"file": str(options.output)}), file=str(options.output))
 
 
 def run_info(options: argparse.Namespace) -> None:
     """Print a description of a face."""
     from lipmotion_faces.filmed.face import load_face
 
-    for line in _described(load_face(options.face).summary).splitlines():
+    for line in _format_summary(load_face(options.face).summary).splitlines():
         print_line(line)
 
 
-def _described(summary: dict[str, str]) -> str:
+def _format_summary(summary: dict[str, str]) -> str:
     return "\n".join(f"{key:12} {value}" for key, value in summary.items())

@@ -36,7 +36,7 @@ def append_xmp(path: Path, packet: str) -> None:
     if len(content) > LARGEST_PACKET_BYTES:
         raise ExportError(f"{path}: XMP metadata of {len(content)} bytes, at most {LARGEST_PACKET_BYTES} are possible")
     with path.open("r+b") as file:
-        ends = list(_ends(file))
+        ends = list(_list_ends(file))
         if not ends or ends[-1] != file.seek(0, os.SEEK_END):
             raise ExportError(
                 f"{path}: {file.tell()} bytes that are not whole boxes of an mp4 file; write the video again"
@@ -44,7 +44,7 @@ def append_xmp(path: Path, packet: str) -> None:
         file.write(struct.pack(">I4s", 24 + len(content), b"uuid") + XMP_UUID + content)
 
 
-def _ends(file: IO[bytes]) -> Iterator[int]:
+def _list_ends(file: IO[bytes]) -> Iterator[int]:
     """Yield where each of the outermost boxes ends."""
     size, start = file.seek(0, os.SEEK_END), 0
     while start + 8 <= size:
@@ -110,10 +110,10 @@ def check_rate(path: Path, fps: float, audio: Audio) -> Fraction:
         raise ExportError(f"{path}: the frame rate is {fps}, required more than 0")
     if not len(audio.samples):
         raise ExportError(f"{path}: the sound has no samples")
-    return frame_rate(fps)
+    return find_frame_rate(fps)
 
 
-def frame_rate(fps: float) -> Fraction:
+def find_frame_rate(fps: float) -> Fraction:
     """Return the exact frame rate that a decimal number stands for: 29.97 is 30000/1001."""
     for whole in (24, 30, 48, 60, 120):
         if abs(fps - whole / 1.001) < 0.005:
@@ -158,7 +158,7 @@ def _encode(
             picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
             return converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
 
-        mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, sound_parts(audio))
+        mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, cut_sound(audio))
 
 
 @contextmanager
@@ -192,7 +192,7 @@ def mux_streams(
         container.mux(stream.encode(None))
 
 
-def sound_parts(audio: Audio) -> Iterator[Any]:
+def cut_sound(audio: Audio) -> Iterator[Any]:
     """Yield the sound in parts of a tenth of a second, so that it is stored in the file near its frames."""
     from av import AudioFrame
 
@@ -273,5 +273,5 @@ def _encode_alpha(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fr
             picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgba" if has_alpha else "rgb24")
             return picture.reformat(format=pixels, dst_colorspace="itu709")
 
-        parts = (part for sound_part in chain(sound_parts(audio), [None]) for part in resampler.resample(sound_part))
+        parts = (part for sound_part in chain(cut_sound(audio), [None]) for part in resampler.resample(sound_part))
         mux_streams(container, video, map(convert, chain([first], frames)), rate, sound, parts)

@@ -74,7 +74,7 @@ def mark_frames(frames: Iterable[Frame], face: Box | None = None, label: str = L
         raise InputError(f"face {face}, required: {required}")
     drawn: _DrawnLabel | None = None
     for frame in frames:
-        drawn = drawn or _place(frame.shape[0], frame.shape[1], face, label)
+        drawn = drawn or _place_label(frame.shape[0], frame.shape[1], face, label)
         height, width = drawn.ground.shape
         marked = frame.copy()
         part = marked[drawn.top : drawn.top + height, drawn.left : drawn.left + width]
@@ -92,7 +92,7 @@ class _DrawnLabel:
     letters: NDArray[np.float32]
 
 
-def _place(height: int, width: int, face: Box | None, label: str) -> _DrawnLabel:
+def _place_label(height: int, width: int, face: Box | None, label: str) -> _DrawnLabel:
     """Return the label in the first free corner, as large as possible. Raises ExportError: no corner is free."""
     largest = max(SMALLEST_LETTERS_PX, round(LETTER_SHARE * min(height, width)))
     for size in range(largest, SMALLEST_LETTERS_PX - 1, -1):

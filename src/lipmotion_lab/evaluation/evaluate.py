@@ -44,7 +44,7 @@ class Compared(Protocol):
         """Names of the channels that are eigenlips."""
 
 
-def figures_of(clips: Sequence[held_out.ComparedClip], recordings: Compared, seed: int) -> dict[str, Any]:
+def measure_clips(clips: Sequence[held_out.ComparedClip], recordings: Compared, seed: int) -> dict[str, Any]:
     """Return the figures of one condition, by name; figures that cannot be computed are NaN.
 
     Eigenlips have figures of their own, ``eigenlips``; without other channels, these are also the overall figures.
@@ -86,10 +86,10 @@ def figures_of(clips: Sequence[held_out.ComparedClip], recordings: Compared, see
         figures["eigenlips"] = means | {"amse": distance(is_eigenlips), "channels": eigenlips}
     if threshold is None:
         return figures
-    return figures | _opening_figures(clips, compared.index(held_out.OPENING), threshold, rate_hz, seed)
+    return figures | _measure_opening(clips, compared.index(held_out.OPENING), threshold, rate_hz, seed)
 
 
-def _opening_figures(
+def _measure_opening(
     clips: Sequence[held_out.ComparedClip], column: int, threshold: float, rate_hz: float, seed: int
 ) -> dict[str, Any]:
     """Return the figures of the channel ``opening``: its interval, closures, and silence."""
@@ -108,11 +108,11 @@ def _opening_figures(
         "opening_acc_95": compute_interval(acc, generated, original, seed),
         "closures": asdict(measure_closures(generated, original, threshold, rate_hz)),
         "closures_p_b_m": asdict(measure_phones(generated, original, bilabial, other_s, threshold, rate_hz)),
-        "silence": {"generated": _silence(clips, generated), "original": _silence(clips, original)},
+        "silence": {"generated": _measure_silence(clips, generated), "original": _measure_silence(clips, original)},
     }
 
 
-def _silence(clips: Sequence[held_out.ComparedClip], values: curves.Clips) -> dict[str, float]:
+def _measure_silence(clips: Sequence[held_out.ComparedClip], values: curves.Clips) -> dict[str, float]:
     """Return mean and standard deviation of the opening in silence away from speech, and the number of its frames."""
     away = (is_away_from_speech(each.time_s, [span[:2] for span in each.spoken], SILENCE_MARGIN_S) for each in clips)
     quiet = np.concatenate([curve[frames] for curve, frames in zip(values, away, strict=True)])
@@ -175,10 +175,10 @@ def evaluate(
     without = engine.without_closures()
     for name in recordings.conditions:
         speech = held_out.make_speech(recordings, name, engine, model.learned)
-        row = figures_of(held_out.generate_compared(recordings, speech, engine, model.learned), recordings, seed)
+        row = measure_clips(held_out.generate_compared(recordings, speech, engine, model.learned), recordings, seed)
         if without != engine and recordings.closed_under is not None:
             clips = held_out.generate_compared(recordings, speech, without, model.learned)
-            row["unpinned"] = figures_of(clips, recordings, seed)
+            row["unpinned"] = measure_clips(clips, recordings, seed)
         conditions[name] = row
     figures = {
         "split": "given names" if selection.names is not None else selection.split or "all",
@@ -239,12 +239,12 @@ class ClipStatistic:
         return self.from_total(np.sum(sums, axis=0))
 
 
-def ratio(total: Array) -> float:
+def divide_sums(total: Array) -> float:
     """Return the first of two sums by the second; NaN where there is none."""
     return float(total[0] / total[1]) if total[1] else float("nan")
 
 
-def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
+def sum_correlations(generated: Clips, original: Clips) -> ClipStatistic:
     """Return the mean over channels of ``curves.correlate_pooled`` of clips [each shape=(T_i, P)]."""
     middle, everything = np.concatenate(original).mean(axis=0), np.concatenate(generated)
     still = ~varies(everything)
@@ -262,20 +262,20 @@ def correlation_statistic(generated: Clips, original: Clips) -> ClipStatistic:
     return ClipStatistic([moments(g, o) for g, o in zip(generated, original, strict=True)], mean_correlation)
 
 
-def distance_statistic(generated: Clips, original: Clips) -> ClipStatistic:
+def sum_distances(generated: Clips, original: Clips) -> ClipStatistic:
     """Return ``curves.measure_mean_distance`` of clips [each shape=(T_i, P)]."""
     errors = [np.linalg.norm(g - o, axis=1) for g, o in zip(generated, original, strict=True)]
     sums = [np.array([error.sum(), len(error)]) for error in errors]
-    return ClipStatistic(sums, ratio)
+    return ClipStatistic(sums, divide_sums)
 
 
-def closing_score_statistic(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
+def sum_closings(generated: Clips, original: Clips, threshold: float) -> ClipStatistic:
     """Return the share, in %, of original closings found in generated openings; NaN where there are none."""
     hits, count = clip_closure_counts(generated, original, threshold)
-    return ClipStatistic([np.concatenate([100 * hit, of]) for hit, of in zip(hits, count, strict=True)], ratio)
+    return ClipStatistic([np.concatenate([100 * hit, of]) for hit, of in zip(hits, count, strict=True)], divide_sums)
 
 
-def opening_curves(
+def pair_curves(
     recordings: Compared, made: Sequence[held_out.ComparedClip], channel: str = held_out.OPENING
 ) -> tuple[list[Array], list[Array]]:
     """Return the generated and the original opening, or another channel, of every clip [each shape=(T, 1)]."""
@@ -283,7 +283,7 @@ def opening_curves(
     return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
 
 
-def clip_statistics(recordings: Compared, made: Sequence[held_out.ComparedClip]) -> dict[str, ClipStatistic]:
+def list_statistics(recordings: Compared, made: Sequence[held_out.ComparedClip]) -> dict[str, ClipStatistic]:
     """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; ACC and score of the opening."""
     pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
     parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
@@ -291,15 +291,15 @@ def clip_statistics(recordings: Compared, made: Sequence[held_out.ComparedClip])
     for part, columns in parts.items():
         if columns.any():
             both = [clip.generated[:, columns] for clip in made], [clip.original[:, columns] for clip in made]
-            statistics |= {f"{part}amse": distance_statistic(*both), f"{part}acc": correlation_statistic(*both)}
+            statistics |= {f"{part}amse": sum_distances(*both), f"{part}acc": sum_correlations(*both)}
     if recordings.closed_under is not None:
-        opening = opening_curves(recordings, made)
-        statistics["opening_acc"] = correlation_statistic(*opening)
-        statistics["score"] = closing_score_statistic(*opening, recordings.closed_under)
+        opening = pair_curves(recordings, made)
+        statistics["opening_acc"] = sum_correlations(*opening)
+        statistics["score"] = sum_closings(*opening, recordings.closed_under)
     return statistics
 
 
-def sign_of_difference(interval: Sequence[float | None]) -> int:
+def find_sign(interval: Sequence[float | None]) -> int:
     """Return 1 or -1 for a difference whose interval leaves out 0, by ``LEAST_DIFFERENCE`` for rounding, else 0."""
     low, high = interval
     if low is None or high is None:
@@ -307,6 +307,6 @@ def sign_of_difference(interval: Sequence[float | None]) -> int:
     return int(low > LEAST_DIFFERENCE) - int(high < -LEAST_DIFFERENCE)
 
 
-def significance_mark(gain: Sequence[float | None]) -> str:
+def mark_significance(gain: Sequence[float | None]) -> str:
     """Return ``*`` if the interval of a difference does not contain 0, else an empty text."""
-    return "*" if sign_of_difference(gain) else ""
+    return "*" if find_sign(gain) else ""

@@ -60,15 +60,15 @@ def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
     scale, height = _Scale.of(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 10
     parts, bottom = [], height - AXIS - 2
     for tick in scale.ticks():
-        parts.append(_line(scale(tick), 0, scale(tick), bottom, "level"))
-        parts.append(_text(scale(tick), bottom + 13, f"{tick:g}", "middle"))
-    parts.append(_text(WIDTH - RIGHT, height - 4, unit, "end"))
+        parts.append(_draw_line(scale(tick), 0, scale(tick), bottom, "level"))
+        parts.append(_draw_text(scale(tick), bottom + 13, f"{tick:g}", "middle"))
+    parts.append(_draw_text(WIDTH - RIGHT, height - 4, unit, "end"))
     for number, row in enumerate(rows):
         y = ROW * number + 26
-        parts.append(_text(LEFT, y - 11, row.name, class_="name"))
+        parts.append(_draw_text(LEFT, y - 11, row.name, class_="name"))
         low, high = row.interval or (None, None)
         if low is not None and high is not None:
-            parts.append(_line(scale(low), y, scale(high), y, "interval"))
+            parts.append(_draw_line(scale(low), y, scale(high), y, "interval"))
         if row.value is not None:
             parts.append(element("circle", cx=f"{scale(row.value):.1f}", cy=str(y), r="4.5", class_="here"))
         if row.paper is not None:
@@ -79,7 +79,7 @@ def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
     legend = "Dot and line: here, with its 95 % interval."
     if any(row.paper is not None for row in rows):
         legend += " Diamond: the paper's own figure, of another speaker and other recordings."
-    return _figure(title, f"{title}: {spoken}", height, parts, legend)
+    return _draw_figure(title, f"{title}: {spoken}", height, parts, legend)
 
 
 def draw_curve(
@@ -94,16 +94,16 @@ def draw_curve(
         left, right = (across(min(max(time, across.low), across.high)) for time in (start_s, end_s))
         shade = {"x": f"{left:.1f}", "width": f"{max(right - left, 1):.1f}"}
         parts.append(element("rect", y=str(CURVE_TOP), height=str(bottom - CURVE_TOP), class_="marked", **shade))
-        parts.append(_text((left + right) / 2, CURVE_TOP - 3, name, "middle"))
+        parts.append(_draw_text((left + right) / 2, CURVE_TOP - 3, name, "middle"))
     for tick in up.ticks(3):
-        parts.append(_line(CURVE_LEFT, up(tick), WIDTH - 4, up(tick), "level"))
-        parts.append(_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
-    parts += [_text(across(tick), CURVE_HEIGHT - 4, f"{tick:g} s", "middle") for tick in across.ticks(4)]
+        parts.append(_draw_line(CURVE_LEFT, up(tick), WIDTH - 4, up(tick), "level"))
+        parts.append(_draw_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
+    parts += [_draw_text(across(tick), CURVE_HEIGHT - 4, f"{tick:g} s", "middle") for tick in across.ticks(4)]
     for values, kind in ((recorded, "recorded"), (generated, "generated")):
         points = " ".join(f"{across(t):.1f},{up(v):.1f}" for t, v in zip(time_s, values, strict=True))
         parts.append(element("polyline", points=points, class_=kind))
     spoken = f"{title}: recorded and generated opening of the mouth over {time_s[-1] - time_s[0]:.1f} s"
-    return _figure(title, spoken, CURVE_HEIGHT, parts, title)
+    return _draw_figure(title, spoken, CURVE_HEIGHT, parts, title)
 
 
 def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]]]) -> Html:
@@ -114,11 +114,11 @@ def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float,
     across = _Scale.of([float(np.log(n)) for n, _ in points], CURVE_LEFT + 4, WIDTH - RIGHT)
     parts = []
     for tick in up.ticks():
-        parts.append(_line(CURVE_LEFT, up(tick), WIDTH - RIGHT, up(tick), "level"))
-        parts.append(_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
+        parts.append(_draw_line(CURVE_LEFT, up(tick), WIDTH - RIGHT, up(tick), "level"))
+        parts.append(_draw_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
     numbers = sorted({number for number, _ in points})
-    parts += [_text(across(float(np.log(n))), bottom + 16, f"{n:g}", "middle") for n in numbers]
-    parts.append(_text(WIDTH - RIGHT, height - 5, unit, "end"))
+    parts += [_draw_text(across(float(np.log(n))), bottom + 16, f"{n:g}", "middle") for n in numbers]
+    parts.append(_draw_text(WIDTH - RIGHT, height - 5, unit, "end"))
     for order, line in enumerate(lines.values()):
         kind = ("generated", "second")[order % 2]
         known = [(across(float(np.log(n))), dot) for n, dot in line if dot.value is not None]
@@ -127,17 +127,17 @@ def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float,
         for x, dot in known:
             low, high = dot.interval or (None, None)
             if low is not None and high is not None:
-                parts.append(_line(x + 2 * order, up(low), x + 2 * order, up(high), kind))
+                parts.append(_draw_line(x + 2 * order, up(low), x + 2 * order, up(high), kind))
             parts.append(element("circle", cx=f"{x:.1f}", cy=f"{up(dot.value or 0):.1f}", r="3", class_=kind))
     looks = ("line", "dashed line")
     legend = "; ".join(f"{looks[order % 2]}: {name}" for order, name in enumerate(lines))
     spoken = "; ".join(
         f"{name}: {', '.join(f'{n:g} {_spell(dot.value)}' for n, dot in line)}" for name, line in lines.items()
     )
-    return _figure(title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
+    return _draw_figure(title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
 
 
-def _figure(title: str, spoken: str, height: int, parts: Sequence[Html], caption: str) -> Html:
+def _draw_figure(title: str, spoken: str, height: int, parts: Sequence[Html], caption: str) -> Html:
     drawing = element(
         "svg",
         element("title", title),
@@ -147,20 +147,20 @@ def _figure(title: str, spoken: str, height: int, parts: Sequence[Html], caption
         aria_label=spoken,
         class_="chart",
     )
-    return captioned(drawing, caption)
+    return add_caption(drawing, caption)
 
 
-def captioned(content: Html, caption: str) -> Html:
+def add_caption(content: Html, caption: str) -> Html:
     """Return a figure with its caption."""
     return element("figure", content, element("figcaption", caption))
 
 
-def _line(x1: float, y1: float, x2: float, y2: float, kind: str) -> Html:
+def _draw_line(x1: float, y1: float, x2: float, y2: float, kind: str) -> Html:
     ends = {"x1": x1, "y1": y1, "x2": x2, "y2": y2}
     return element("line", class_=kind, **{name: f"{value:.1f}" for name, value in ends.items()})
 
 
-def _text(x: float, y: float, text: str, anchor: str = "start", class_: str | None = None) -> Html:
+def _draw_text(x: float, y: float, text: str, anchor: str = "start", class_: str | None = None) -> Html:
     return element("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor, class_=class_)
 
 

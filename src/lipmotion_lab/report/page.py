@@ -22,7 +22,7 @@ from lipmotion_faces import Staging, stage_face
 from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
-from lipmotion_lab.report.charts import captioned, draw_curve
+from lipmotion_lab.report.charts import add_caption, draw_curve
 from lipmotion_lab.report.section import Section, write_text
 
 FPS = 25.0
@@ -171,7 +171,7 @@ class FinishedPart:
     section: Section
 
 
-def report_html(  # noqa: PLR0913
+def write_html(  # noqa: PLR0913
     title: str,
     about: Mapping[str, str],
     finished: Sequence[FinishedPart],
@@ -193,12 +193,12 @@ def report_html(  # noqa: PLR0913
         entries += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
     warning = [element("p", QUICK_WARNING, class_="warning")] if quick else []
     overview = element("ul", *entries, class_="overview")
-    main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_section, finished))
+    main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_write_section, finished))
     footer = element("footer", element("h2", "The corpus and the run"), _list(about))
     return build_page(title, style, header, main, footer, script=SCRIPT)
 
 
-def _section(part: FinishedPart) -> Html:
+def _write_section(part: FinishedPart) -> Html:
     section, heading = part.section, f"{part.name}-heading"
     words = [
         joined(element("h3", title), element("ul", *(element("li", sentence) for sentence in sentences)))
@@ -212,7 +212,7 @@ def _section(part: FinishedPart) -> Html:
     if len(more) > FOLDED:
         more = [element("details", element("summary", f"{len(more)} more tables"), *more)]
     pictures = [
-        captioned(
+        add_caption(
             element("img", src=f"{part.name}/{each['file']}", alt=each["caption"], loading="lazy"), each["caption"]
         )
         for each in part.record["pictures"]
@@ -232,7 +232,7 @@ def _section(part: FinishedPart) -> Html:
         element("div", element("div", *words), element("div", *section.charts), class_="beside"),
         section.table.as_html(part.name),
         *more,
-        *_clip(part),
+        *_write_clip(part),
         *([element("h3", "Pictures"), element("div", *pictures, class_="pictures")] if pictures else []),
         element(
             "details",
@@ -247,7 +247,7 @@ def _section(part: FinishedPart) -> Html:
     )
 
 
-def _clip(part: FinishedPart) -> list[Html]:
+def _write_clip(part: FinishedPart) -> list[Html]:
     """Return the recording that is shown: its videos and its curves."""
     if not part.motion:
         return []
@@ -256,7 +256,7 @@ def _clip(part: FinishedPart) -> list[Html]:
     for each in part.record["videos"]:
         about = {"src": f"{part.name}/{each['file']}", "aria_label": f"{name}: {each['caption']}"}
         video = element("video", controls=True, preload="metadata", playsinline=True, **about)
-        videos.append(captioned(video, each["caption"]))
+        videos.append(add_caption(video, each["caption"]))
     together = [element("button", "Play all together", type="button", class_="together", hidden=True)] if videos else []
     said = f", “{words}”" if words else ""
     return [

@@ -24,19 +24,19 @@ from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, sub_monitor
 from lipmotion.units import Lexicon
 from lipmotion_lab import hofer2008
-from lipmotion_lab.engine_comparison import engines
-from lipmotion_lab.folds import FOLDS, folds
-from lipmotion_lab.learning_curve import learning_curve
-from lipmotion_lab.minnis2000 import minnis2000
-from lipmotion_lab.report.page import ClipKeeper, FinishedPart, report_html, write_videos
+from lipmotion_lab.engine_comparison import compare_engines
+from lipmotion_lab.folds import FOLDS, cross_validate
+from lipmotion_lab.learning_curve import run_learning_curve
+from lipmotion_lab.minnis2000 import run_minnis2000
+from lipmotion_lab.report.page import ClipKeeper, FinishedPart, write_html, write_videos
 from lipmotion_lab.report.section import Section, write_text
 from lipmotion_lab.report.sections import (
-    engines_section,
-    folds_section,
-    hofer_section,
-    learning_section,
-    minnis_section,
-    xie_liu_section,
+    build_engines_section,
+    build_folds_section,
+    build_hofer_section,
+    build_learning_section,
+    build_minnis_section,
+    build_xie_liu_section,
 )
 from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, Stamp, check_opening, share_out, take_quick_part
 from lipmotion_lab.xie_liu2007 import six_systems
@@ -80,44 +80,44 @@ def _run_xie_liu(run: PartRun) -> dict[str, Any]:
     if not run.corpus.names("val"):  # nothing to choose settings with
         printed = [name for name in select_systems(options.systems) if not COMPARED_SYSTEMS[name].splits]
         options = replace(options, systems=printed)
-    return six_systems.xieliu2007(run.corpus, options, plots=run.plots, work=run.work, settings=run.settings)
+    return six_systems.run_xieliu2007(run.corpus, options, plots=run.plots, work=run.work, settings=run.settings)
 
 
 def _run_learning_curve(run: PartRun) -> dict[str, Any]:
     count = len(run.corpus.names("train"))
     sizes = [(count + 1) // 2, count] if run.quick else None
-    return learning_curve(run.corpus, sizes=sizes, work=run.work, settings=run.settings)
+    return run_learning_curve(run.corpus, sizes=sizes, work=run.work, settings=run.settings)
 
 
 def _run_folds(run: PartRun) -> dict[str, Any]:
     count = min(QUICK_FOLDS if run.quick else FOLDS, len(run.corpus.names("train")))
-    return folds(run.corpus, count=count, work=run.work, settings=run.settings)
+    return cross_validate(run.corpus, count=count, work=run.work, settings=run.settings)
 
 
 PARTS: dict[str, ReportPart] = {
     "hofer2008": ReportPart(
         ("train", "val", TEST),
         4,
-        lambda run: hofer2008.hofer2008(
+        lambda run: hofer2008.run_hofer2008(
             run.corpus, hofer2008.QUICK if run.quick else hofer2008.FULL, work=run.work, settings=run.settings
         ),
-        hofer_section,
+        build_hofer_section,
     ),
-    "xieliu2007": ReportPart(("train", TEST), 8, _run_xie_liu, xie_liu_section, draws=True),
+    "xieliu2007": ReportPart(("train", TEST), 8, _run_xie_liu, build_xie_liu_section, draws=True),
     "minnis2000": ReportPart(
         ("train", TEST),
         2,
-        lambda run: minnis2000(run.corpus, models=run.models, quick=run.quick, work=run.work, settings=run.settings),
-        minnis_section,
+        lambda run: run_minnis2000(run.corpus, models=run.models, quick=run.quick, work=run.work, settings=run.settings),
+        build_minnis_section,
     ),
     "engines": ReportPart(
         ("train", TEST),
         4,
-        lambda run: engines(run.corpus, split=TEST, models=run.models, settings=run.settings),
-        engines_section,
+        lambda run: compare_engines(run.corpus, split=TEST, models=run.models, settings=run.settings),
+        build_engines_section,
     ),
-    "learning-curve": ReportPart(("train", TEST), 2, _run_learning_curve, learning_section),
-    "folds": ReportPart(("train",), 4, _run_folds, folds_section),
+    "learning-curve": ReportPart(("train", TEST), 2, _run_learning_curve, build_learning_section),
+    "folds": ReportPart(("train",), 4, _run_folds, build_folds_section),
 }
 """All experiments by name, in the order of the report: the papers' first."""
 
@@ -147,7 +147,7 @@ class WrittenReport:
     made: Sequence[str]
 
 
-def experiment_report(
+def write_report(
     corpus: Corpus,
     folder: Path,
     *,
@@ -263,7 +263,7 @@ class _Writer:
         failed = {name: f"{FAILED}{describe_error(error)}; {AGAIN}" for name, error in self.failed.items()}
         corpus = self.corpus.path.resolve().name
         about = self.corpus.summary() | {"corpus": corpus, "made with": shlex.join(self._command(wanted))}
-        text = report_html(f"Experiments on {corpus}", about, finished, left_open, failed, quick=self.quick)
+        text = write_html(f"Experiments on {corpus}", about, finished, left_open, failed, quick=self.quick)
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
             write_text(page, text)

@@ -15,7 +15,7 @@ from lipmotion.printable import printable
 from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.text_table import as_field
-from lipmotion_lab.evaluation.evaluate import sign_of_difference, significance_mark
+from lipmotion_lab.evaluation.evaluate import find_sign, mark_significance
 
 INTERVAL, DIFFERENCE = "_95", "_gain_95"
 """Endings of the keys under which a row has the interval of a figure, and that of its difference from a reference."""
@@ -94,7 +94,7 @@ class Table:
         """Return the table as lines of text; intervals are in brackets."""
         texts = [[self.head, *(column.title for column in self.columns)]]
         for name, row in self.rows.items():
-            cells = (_cell(column, row) for column in self.columns)
+            cells = (_format_cell(column, row) for column in self.columns)
             texts.append([name, *(f"{figure} ({interval})" if interval else figure for figure, interval in cells)])
         widths = [max(map(len, column)) for column in zip(*texts, strict=True)]
         return ["  ".join(map(str.ljust, line, widths)).rstrip() for line in texts]
@@ -106,7 +106,7 @@ class Table:
             *(element("th", each.title, scope="col", class_="number" if each.form else None) for each in self.columns),
         ]
         lines = [
-            element("tr", element("th", name, scope="row"), *(_html_cell(column, row) for column in self.columns))
+            element("tr", element("th", name, scope="row"), *(_write_cell(column, row) for column in self.columns))
             for name, row in self.rows.items()
         ]
         table = element(
@@ -125,20 +125,20 @@ class Table:
         return joined(scrolls, about)
 
 
-def _cell(column: Column, row: Row) -> tuple[str, str]:
+def _format_cell(column: Column, row: Row) -> tuple[str, str]:
     """Return a figure with its star, and its interval; empty texts where there is none."""
     value = row.get(column.key)
     if not column.form:
         return "–" if value is None else str(value), ""
-    mark = significance_mark(row.get(column.key + DIFFERENCE) or (None, None))
+    mark = mark_significance(row.get(column.key + DIFFERENCE) or (None, None))
     low, high = row.get(column.key + INTERVAL) or (None, None)
     form = column.form.replace("+", "")
     interval = "" if low is None or high is None else f"{low:{form}}–{high:{form}}"
     return format_figure(value, column.form).strip() + mark, interval
 
 
-def _html_cell(column: Column, row: Row) -> Html:
-    figure, interval = _cell(column, row)
+def _write_cell(column: Column, row: Row) -> Html:
+    figure, interval = _format_cell(column, row)
     beside = (" ", element("small", interval)) if interval else ()
     return element("td", figure, *beside, class_="number" if column.form else None)
 
@@ -226,7 +226,7 @@ class PaperPair:
     @property
     def sign(self) -> int:
         """1: it holds here; -1: it is reversed; 0: the interval contains 0, so these recordings leave it open."""
-        return sign_of_difference(self.interval)
+        return find_sign(self.interval)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 
 from lipmotion.formats.web_page import Html
 from lipmotion.measures.evaluation_table import format_figure
-from lipmotion_lab.evaluation.evaluate import sign_of_difference
+from lipmotion_lab.evaluation.evaluate import find_sign
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES
 from lipmotion_lab.hofer2008 import PAPER_SCORES, PINS, REFERENCE_SET
 from lipmotion_lab.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
@@ -45,12 +45,12 @@ HOFER_COLUMNS = (
 )
 
 
-def difference(one: float | None, other: float | None) -> float | None:
+def subtract(one: float | None, other: float | None) -> float | None:
     """Return by how much a figure is above another one; None where one of them is not defined."""
     return None if one is None or other is None else one - other
 
 
-def _tables(
+def _make_tables(
     name: str,
     caption: str,
     columns: Sequence[Column],
@@ -71,44 +71,44 @@ def _draw_acc(title: str, table: Table) -> Html:
     return draw_dots(title, "ACC", dots)
 
 
-def hofer_section(figures: Mapping[str, Any]) -> Section:
+def build_hofer_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``hofer2008`` say; the paper's own case is audio alone, as printed, most states."""
     blocks = list(figures["tables"])
     most = max(block["states"] for block in blocks)
     case = (most, AUDIO_ONLY, AS_PRINTED)
     main = next(each for each in blocks if (each["states"], each["condition"], each["pins"]) == case)
-    table, rows = _hofer_table(main), main["rows"]
-    order = _hofer_order(main)
+    table, rows = _build_hofer_table(main), main["rows"]
+    order = _build_hofer_order(main)
     ranked = sorted(table.rows.items(), key=lambda item: -item[1]["paper"])
     dots = [Dot(name, row["score"], row["score_95"], row["paper"]) for name, row in ranked]
     charts = [draw_dots("Score of closings", "% of the recording's closings", dots)]
     about = (
         f"Which set of units predicts closings of the mouth best: the system of the paper, trained on "
         f"{figures['trained_on']} recordings with each of {len(rows)} sets, compared on {figures['clips']} of "
-        f"{figures['split']}.{_closings(figures, next(iter(rows.values())))} "
+        f"{figures['split']}.{_describe_closings(figures, next(iter(rows.values())))} "
         f"Channels of motion: {figures['channels'] or 'all'}. Shown first: sound alone, {AS_PRINTED}, {most} states."
     )
     words = warn_of_few(figures["clips"]) | {"The paper's order": order.sentences()}
     more = [
-        replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_hofer_order(block).verdict()}")
-        for block, other in [(block, _hofer_table(block)) for block in blocks if block is not main]
+        replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).verdict()}")
+        for block, other in [(block, _build_hofer_table(block)) for block in blocks if block is not main]
     ]
     shown = [f"{units}, {most} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
     return Section(title, about, order.verdict(), words, charts, table, more, shown)
 
 
-def _hofer_order(block: Mapping[str, Any]) -> PaperOrder:
+def _build_hofer_order(block: Mapping[str, Any]) -> PaperOrder:
     pairs = []
     for pair in block["paper_order"]:
         better, worse = pair["better"], pair["worse"]
-        gain = difference(block["rows"][better]["score"], block["rows"][worse]["score"])
+        gain = subtract(block["rows"][better]["score"], block["rows"][worse]["score"])
         pairs.append(PaperPair(better, worse, gain, pair["score_gain_95"]))
     here = {name: row["score"] for name, row in block["rows"].items()}
     return PaperOrder("Score of closings", {name: PAPER_SCORES[name] for name in here}, here, pairs, "+.1f")
 
 
-def _closings(figures: Mapping[str, Any], row: Row) -> str:
+def _describe_closings(figures: Mapping[str, Any], row: Row) -> str:
     """Return a sentence on the closings of the recordings, of which there is a row; empty: no opening is compared."""
     if figures["closed_under"] is None:
         return ""
@@ -118,7 +118,7 @@ def _closings(figures: Mapping[str, Any], row: Row) -> str:
     )
 
 
-def _hofer_table(block: Mapping[str, Any]) -> Table:
+def _build_hofer_table(block: Mapping[str, Any]) -> Table:
     case = f"{block['states']} states, {block['condition']}, {block['pins']}"
     name = f"hofer2008-{block['states']}-states-{block['condition']}-{block['pins']}".replace(" ", "-")
     return Table(name, f"{SETS}{case}", HOFER_COLUMNS, block["rows"], REFERENCE_SET, "unit set")
@@ -149,7 +149,7 @@ MINNIS_COLUMNS = (
 )
 
 
-def minnis_section(figures: Mapping[str, Any]) -> Section:
+def build_minnis_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``minnis2000`` say, on the last of its lists, which is ``test``."""
     tables: dict[tuple[str, str], Table] = {}
     for split, found in figures["lists"].items():
@@ -169,8 +169,8 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
     main = tables[split, AUDIO_ONLY]
     rows, everything = main.rows, main.rows.get(EVERYTHING, main.rows[PRINTED])
     acc = format_figure(rows[PRINTED]["acc"], ".3f"), format_figure(everything["acc"], ".3f")
-    gained = difference(everything["acc"], rows[PRINTED]["acc"])
-    effect = ("leave open whether they change", "raise", "lower")[sign_of_difference(everything["acc_gain_95"])]
+    gained = subtract(everything["acc"], rows[PRINTED]["acc"])
+    effect = ("leave open whether they change", "raise", "lower")[find_sign(everything["acc_gain_95"])]
     gain, (low, high) = format_figure(gained, "+.3f"), everything["acc_gain_95"]
     gain += "" if low is None else f", 95 % interval {low:+.3f} to {high:+.3f}"
     closed = [
@@ -183,8 +183,8 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
     if EVERYTHING not in rows:
         verdict = f"The paper prints no figures. As printed, the correlation of the opening is {acc[0]}."
     words = warn_of_few(last["clips"]) | {
-        "Each addition alone": _effects(rows, ADDITIONS),
-        "Other readings of the print": _effects(rows, VARIANTS),
+        "Each addition alone": _list_effects(rows, ADDITIONS),
+        "Other readings of the print": _list_effects(rows, VARIANTS),
         "Lips in p, b and m": [
             f"As printed, the lips close in {closed[0]} of {rows[PRINTED]['p_b_m']} p, b and m"
             f"{f'; with all additions in {closed[1]}' if EVERYTHING in rows else ''}; nothing is pinned."
@@ -202,16 +202,16 @@ def minnis_section(figures: Mapping[str, Any]) -> Section:
     return Section(title, about, verdict, words, charts, main, more, compared)
 
 
-def _effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
+def _list_effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
     """Return which of some rows are better than the system as printed, worse, and neither for sure."""
-    signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names if name in rows}
+    signs = {name: find_sign(rows[name]["acc_gain_95"]) for name in names if name in rows}
     printed = rows[PRINTED]["acc"]
-    described = {name: f"{name} ({format_figure(difference(rows[name]['acc'], printed), '+.3f')})" for name in signs}
+    described = {name: f"{name} ({format_figure(subtract(rows[name]['acc'], printed), '+.3f')})" for name in signs}
     outcomes = ("ACC is higher", "ACC is lower", "The interval of the difference contains 0")
-    return _by_sign(signs, described, outcomes)
+    return _group_by_sign(signs, described, outcomes)
 
 
-def _by_sign(signs: Mapping[str, int], described: Mapping[str, str], outcomes: Sequence[str]) -> list[str]:
+def _group_by_sign(signs: Mapping[str, int], described: Mapping[str, str], outcomes: Sequence[str]) -> list[str]:
     """Return which differences are positive, negative, and neither for sure, each in a sentence."""
     return [
         f"{what}: {', '.join(described[name] for name, each in signs.items() if each == sign) or 'none'}."
@@ -238,13 +238,13 @@ XIELIU_COLUMNS = (
 MEASURES = (("acc", "ACC", "+.3f"), ("amse", "AMSE", "+.4f"))
 
 
-def xie_liu_section(figures: Mapping[str, Any]) -> Section:
+def build_xie_liu_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``xieliu2007`` say, of the largest number of recordings."""
     *smaller, size = figures["rows"]
     cases = [(condition, rows, size) for condition, rows in size["conditions"].items()]
     for each in smaller:
         cases += [(f"{name}, {each['names']} recordings", rows, each) for name, rows in each["conditions"].items()]
-    main, *others = (_systems_table(*case) for case in cases)
+    main, *others = (_build_systems_table(*case) for case in cases)
     more = [replace(table, heading=case) for table, (case, *_) in zip(others, cases[1:], strict=True)]
     words, verdict, by_amse = warn_of_few(figures["clips"]), "", []
     for ending, called in (("", "as printed"), (SPLIT, "with Gaussians chosen on val")):
@@ -256,7 +256,7 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
             by_amse.append(f"Systems {called}: {by_error.verdict()}")
             verdict = verdict or by_acc.verdict()
     words["By AMSE"] = by_amse
-    if changed := [_chosen(name, row["options"]) for name, row in size["training"].items() if row["tried"]]:
+    if changed := [_describe_options(name, row["options"]) for name, row in size["training"].items() if row["tried"]]:
         words["Settings, the best on val"] = changed
     if size["pairs"]:
         rows = {f"{pair['better']} over {pair['worse']}": pair for pair in size["pairs"]}
@@ -267,7 +267,7 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
         f"Which structure of chains predicts lips best: {len(main.rows)} systems trained on {size['used']} recordings, "
         f"compared on {figures['clips']} of {figures['split']}, by {len(channels)} channels "
         f"({', '.join(channels[:3])}{', …' if len(channels) > 3 else ''})."
-        f"{_closings(figures, next(iter(main.rows.values())))}"
+        f"{_describe_closings(figures, next(iter(main.rows.values())))}"
     )
     if changed:
         about += " K on val: with the number of Gaussians that was best there; nothing was chosen on test."
@@ -278,7 +278,7 @@ def xie_liu_section(figures: Mapping[str, Any]) -> Section:
     )
 
 
-def _systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) -> Table:
+def _build_systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) -> Table:
     """Return the table of all systems in one case, with the paper's figures, the opening and the training."""
     full_rows = {}
     for name, row in rows.items():
@@ -294,7 +294,7 @@ def _systems_table(case: str, rows: Mapping[str, Row], size: Mapping[str, Any]) 
     return Table(name, f"Structures of chains, {case}", columns, full_rows, REFERENCE_SYSTEM)
 
 
-def _chosen(name: str, options: Mapping[str, Any]) -> str:
+def _describe_options(name: str, options: Mapping[str, Any]) -> str:
     texts = [f"{key}={value}" for key, value in options.items() if key not in ("structure", "chains")]
     return f"{name}: {', '.join(texts) or 'as printed'}."
 
@@ -329,7 +329,7 @@ ENGINES_COLUMNS = (
 ENGINES_OUTCOMES = ("Higher than that", "Lower than that", "Not different for sure from that")
 
 
-def engines_section(figures: Mapping[str, Any]) -> Section:
+def build_engines_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``engines`` say."""
     reference = figures["reference"]
     conditions = {
@@ -340,24 +340,24 @@ def engines_section(figures: Mapping[str, Any]) -> Section:
         }
         for condition, found in figures["conditions"].items()
     }
-    main, *more = _tables("engines", "Engines", ENGINES_COLUMNS, conditions, reference)
-    signs = {name: sign_of_difference(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}
+    main, *more = _make_tables("engines", "Engines", ENGINES_COLUMNS, conditions, reference)
+    signs = {name: find_sign(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}
     best = max(main.rows, key=lambda name: main.rows[name]["acc"] or 0.0)
     acc = format_figure(main.rows[best]["acc"], ".3f")
     verdict = f"Most alike to the recordings: {best} (ACC {acc}); nothing is in print to compare."
     outcomes = [f"{what} of the engine {reference}" for what in ENGINES_OUTCOMES]
-    words = warn_of_few(figures["clips"]) | {"ACC of the opening": _by_sign(signs, {n: n for n in signs}, outcomes)}
+    words = warn_of_few(figures["clips"]) | {"ACC of the opening": _group_by_sign(signs, {n: n for n in signs}, outcomes)}
     minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
     about = (
         f"All engines with their defaults, trained on {minutes} minutes, on {figures['clips']} "
         f"recordings of {figures['split']}, with closed lips forced in p, b and m."
-        f"{_closings(figures, main.rows[best])}"
+        f"{_describe_closings(figures, main.rows[best])}"
     )
     charts = [_draw_acc("ACC of the opening", main)]
     return Section("The engines of this project", about, verdict, words, charts, main, more, list(main.rows))
 
 
-def learning_section(figures: Mapping[str, Any]) -> Section:
+def build_learning_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``learning_curve`` say."""
     sizes = {str(row["names"]): row for row in figures["rows"]}
     columns = (
@@ -371,13 +371,13 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
         condition: {size: {**row, **row["conditions"][condition]} for size, row in sizes.items()}
         for condition in figures["rows"][0]["conditions"]
     }
-    main, *more = _tables("learning-curve", "Learning curve", columns, conditions, head="recordings")
+    main, *more = _make_tables("learning-curve", "Learning curve", columns, conditions, head="recordings")
     first, last = next(iter(main.rows)), list(main.rows)[-1]
     low, high = (format_figure(main.rows[size]["acc"], ".3f") for size in (first, last))
     steps = [
         size
         for before, size in pairwise(main.rows)
-        if (difference(main.rows[size]["acc"], main.rows[before]["acc"]) or 0) < 0
+        if (subtract(main.rows[size]["acc"], main.rows[before]["acc"]) or 0) < 0
     ]
     words = warn_of_few(figures["clips"]) | {
         "More recordings": [
@@ -400,7 +400,7 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
     return Section("Learning curve", about, verdict, words, charts, main, more, shown)
 
 
-def folds_section(figures: Mapping[str, Any]) -> Section:
+def build_folds_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``folds`` say."""
     rows = figures["conditions"]
     original = Column("original_per_minute", "recorded elsewhere", ".1f", "the same of the recordings")
@@ -410,7 +410,7 @@ def folds_section(figures: Mapping[str, Any]) -> Section:
     verdict = f"ACC {acc} on {clips} recordings, each generated by a model of the others."
     about = (
         f"The training list in {figures['folds']} parts: each is generated by a model of the others, "
-        f"{min(figures['trained_on'])} to {max(figures['trained_on'])} recordings.{_closings(figures, row)}"
+        f"{min(figures['trained_on'])} to {max(figures['trained_on'])} recordings.{_describe_closings(figures, row)}"
     )
     words = warn_of_few(figures["clips"]) | {
         "More closings than a test list has": [
@@ -426,8 +426,8 @@ def folds_section(figures: Mapping[str, Any]) -> Section:
     return Section("Cross-validation", about, verdict, words, [], table)
 
 
-def blocks_section(figures: Mapping[str, Any]) -> Section:
-    """Return what the figures of ``folds.in_blocks`` say: of sound alone, systems by their mean correlation."""
+def build_blocks_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``folds.cross_validate_blocks`` say: of sound alone, systems by their mean correlation."""
     rows = {name: {**(row.get("opening") or {}), **row} for name, row in figures["conditions"][AUDIO_ONLY].items()}
     columns = (Column("acc", "ACC, mean", ".3f", "correlation, mean over channels"), SCORE, PRECISION, RECALL, VARIANCE)
     best = max(rows, key=lambda name: rows[name]["acc"])

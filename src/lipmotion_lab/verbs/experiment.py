@@ -72,15 +72,15 @@ def run_experiment(
     """
     from lipmotion.corpora.store import Corpus
     from lipmotion.storage.locks import keep_unfinished
-    from lipmotion_lab.folds import in_blocks
+    from lipmotion_lab.folds import cross_validate_blocks
     from lipmotion_lab.report.report import PARTS
-    from lipmotion_lab.report.sections import blocks_section
+    from lipmotion_lab.report.sections import build_blocks_section
     from lipmotion_lab.runner import ExperimentSettings, Stamp, take_quick_part
 
     blocks = getattr(options, "blocks", None)
     if blocks is not None:
         words = " ".join(map(str, options.words))
-        experiment = partial(in_blocks, experiment, references=references, count=blocks, key=words)
+        experiment = partial(cross_validate_blocks, experiment, references=references, count=blocks, key=words)
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
         stamp = Stamp()
@@ -92,7 +92,7 @@ def run_experiment(
             figures = experiment(corpus, work=work, settings=settings)
         return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
 
-    section = PARTS[name].section if blocks is None else blocks_section
+    section = PARTS[name].section if blocks is None else build_blocks_section
     report_figures(options, compute, lambda figures: section(figures).as_text())
 
 
@@ -110,12 +110,12 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
 
 
 def _run_hofer2008(options: argparse.Namespace) -> None:
-    from lipmotion_lab.hofer2008 import FULL, QUICK, REFERENCE_SET, hofer2008
+    from lipmotion_lab.hofer2008 import FULL, QUICK, REFERENCE_SET, run_hofer2008
 
     usual = QUICK if options.quick else FULL
     chosen = replace(usual, channels=options.channels.replace(",", " "), states=options.states or usual.states)
     references = [f"{REFERENCE_SET}, {states} states" for states in chosen.states]
-    experiment = partial(hofer2008, options=chosen, split=list_or_all(options.split))
+    experiment = partial(run_hofer2008, options=chosen, split=list_or_all(options.split))
     run_experiment(options, experiment, "hofer2008", references=references)
 
 
@@ -134,12 +134,12 @@ def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentPar
 
 def _run_learning_curve(options: argparse.Namespace) -> None:
     from lipmotion.corpora.source_recordings import read_names
-    from lipmotion_lab.learning_curve import learning_curve
+    from lipmotion_lab.learning_curve import run_learning_curve
 
     def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
         order = read_names(options.order) if options.order else None
         split, rival = list_or_all(options.split), options.rival
-        return learning_curve(corpus, order=order, sizes=options.sizes, split=split, rival=rival, **others)
+        return run_learning_curve(corpus, order=order, sizes=options.sizes, split=split, rival=rival, **others)
 
     run_experiment(options, experiment, "learning-curve")
 
@@ -156,9 +156,9 @@ def _add_folds(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 
 def _run_folds(options: argparse.Namespace) -> None:
-    from lipmotion_lab.folds import folds
+    from lipmotion_lab.folds import cross_validate
 
-    run_experiment(options, partial(folds, count=options.folds, by_speaker=options.by_speaker), "folds")
+    run_experiment(options, partial(cross_validate, count=options.folds, by_speaker=options.by_speaker), "folds")
 
 
 def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -191,7 +191,7 @@ def _run_xieliu2007(options: argparse.Namespace) -> None:
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
     from lipmotion.pipeline.training.other_speakers import synthesise_others
-    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
+    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, run_xieliu2007
     from lipmotion_lab.xie_liu2007.systems import BLSTM, REFERENCE_SYSTEM
 
     if options.quick and options.order:
@@ -210,7 +210,7 @@ def _run_xieliu2007(options: argparse.Namespace) -> None:
         )
         order = read_names(options.order) if options.order else None
         split, sizes, plots = list_or_all(options.split), options.sizes, options.plots
-        return xieliu2007(corpus, compared, split=split, order=order, sizes=sizes, plots=plots, **others)
+        return run_xieliu2007(corpus, compared, split=split, order=order, sizes=sizes, plots=plots, **others)
 
     run_experiment(options, experiment, "xieliu2007", references=(REFERENCE_SYSTEM, "ph-HMM", BLSTM))
 
@@ -229,10 +229,10 @@ def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def _run_minnis2000(options: argparse.Namespace) -> None:
-    from lipmotion_lab.minnis2000 import PRINTED, minnis2000
+    from lipmotion_lab.minnis2000 import PRINTED, run_minnis2000
 
     chosen = {"models": options.models, "quick": options.quick, "guided": options.guided}
-    run_experiment(options, partial(minnis2000, **chosen), "minnis2000", references=(PRINTED,))
+    run_experiment(options, partial(run_minnis2000, **chosen), "minnis2000", references=(PRINTED,))
 
 
 def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -245,10 +245,10 @@ def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -
 
 
 def _run_engines(options: argparse.Namespace) -> None:
-    from lipmotion_lab.engine_comparison import engines
+    from lipmotion_lab.engine_comparison import compare_engines
 
     def experiment(corpus: Corpus, *, settings: ExperimentSettings, work: None) -> dict[str, Any]:  # noqa: ARG001
-        return engines(corpus, split=list_or_all(options.split), models=options.models, settings=settings)
+        return compare_engines(corpus, split=list_or_all(options.split), models=options.models, settings=settings)
 
     run_experiment(options, experiment, "engines", has_parts=False)
 
@@ -267,17 +267,17 @@ def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 
 
 def run_all(options: argparse.Namespace) -> None:
-    """Call ``experiment_report``; print what was found, and the page. Raises the error of an experiment that failed."""
+    """Call ``write_report``; print what was found, and the page. Raises the error of an experiment that failed."""
     from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora.store import Corpus
     from lipmotion.units import Lexicon
-    from lipmotion_lab.report.report import describe_error, experiment_report
+    from lipmotion_lab.report.report import describe_error, write_report
     from lipmotion_lab.runner import ExperimentSettings
 
     with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         settings = ExperimentSettings(lexicon=lexicon, workers=count_workers(options), monitor=report.receive)
-        found = experiment_report(
+        found = write_report(
             Corpus.open(options.corpus), options.output, only=options.only, quick=options.quick, settings=settings
         )
         lines = [f"{name}: {verdict}" for name, verdict in found.verdicts.items()]

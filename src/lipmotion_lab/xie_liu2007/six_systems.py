@@ -43,7 +43,7 @@ from lipmotion_lab.xie_liu2007.systems import (
     TWO_STAGES,
     TrainedSystem,
     as_row,
-    best_trial,
+    find_best_trial,
     list_changed_options,
     select_systems,
     system_from_arrays,
@@ -164,7 +164,7 @@ QUICK = ComparisonOptions(
 
 
 @limit_threads()
-def xieliu2007(  # noqa: PLR0913
+def run_xieliu2007(  # noqa: PLR0913
     corpus: Corpus,
     options: ComparisonOptions = DEFAULT_OPTIONS,
     *,
@@ -188,7 +188,7 @@ def xieliu2007(  # noqa: PLR0913
     if not options.voices and (without := [name for name in names if COMPARED_SYSTEMS[name].second_stage]):
         raise InputError(f"{without[0]} needs speech of others; give it by --recordings or --voices")
     check_visual(options.visual)
-    listed = tuple(order) if order is not None else runner.shuffled(corpus.required("train"), seed)
+    listed = tuple(order) if order is not None else runner.shuffle(corpus.required("train"), seed)
     chosen_on_val = any(COMPARED_SYSTEMS[name].splits for name in names)
     held_out, validation = corpus.required(split), corpus.required("val") if chosen_on_val else ()
     check_training_names(corpus, listed, (*held_out, *validation))
@@ -204,7 +204,7 @@ def xieliu2007(  # noqa: PLR0913
     for count, part in zip(steps, parts, strict=True):
         trained = setup.train(names, listed[:count], part.monitor)
         kept = setup.checkpoint(listed[:count], held_out)
-        rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
+        rows.append({"names": count} | _measure_size(trained, options.transcripts, settings, kept))
     recordings = trained.recordings
     if plots is not None:
         draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
@@ -280,7 +280,7 @@ class _TrainingSetup:
         return runner.open_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
 
-def _size(
+def _measure_size(
     trained: _TrainedSystems, transcripts: bool, settings: runner.ExperimentSettings, kept: Checkpoint
 ) -> dict[str, Any]:
     """Return the figures of all systems trained on one number of utterances."""
@@ -295,15 +295,15 @@ def _size(
         row: dict[str, Any] = {"seconds": system.seconds, "parameters": None, "options": None}
         row["tried"] = [*map(as_row, system.tried)]
         if name == BLSTM and system.tried:
-            row |= {key: getattr(best_trial(system.tried), key) for key in ("parameters", "options")}
+            row |= {key: getattr(find_best_trial(system.tried), key) for key in ("parameters", "options")}
         if isinstance(system.model, CoupledModel):
             row |= {"parameters": system.model.chains.parameters, "options": list_changed_options(system.engine.config)}
         training[name] = row
     return {
         "used": len(trained.used),
         "training": training,
-        "conditions": {condition: _system_rows(recordings, clips, seed) for condition, clips in generated.items()},
-        "pairs": _paper_pairs(recordings, generated[AUDIO_ONLY], seed),
+        "conditions": {condition: _make_system_rows(recordings, clips, seed) for condition, clips in generated.items()},
+        "pairs": _compare_paper_pairs(recordings, generated[AUDIO_ONLY], seed),
     }
 
 
@@ -321,7 +321,7 @@ def _generate(
     return made
 
 
-def _paper_pairs(
+def _compare_paper_pairs(
     recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int
 ) -> list[dict[str, Any]]:
     """Return how much better each system of the paper is than each that is worse in print, on the same clips."""
@@ -335,7 +335,7 @@ def _paper_pairs(
             pairs += combinations([name + ALL_PATHS for name in by_acc], 2)
             pairs += [(name, name.replace(TWO_STAGES, "")) for name in made if TWO_STAGES in name]
         pairs = [pair for pair in pairs if {*pair} <= made.keys()]
-        statistics = {name: evaluate.clip_statistics(recordings, made[name]) for pair in pairs for name in pair}
+        statistics = {name: evaluate.list_statistics(recordings, made[name]) for pair in pairs for name in pair}
         for better, worse in pairs:
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
@@ -345,19 +345,19 @@ def _paper_pairs(
     return rows
 
 
-def _system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
+def _make_system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
-    reference, rows = evaluate.clip_statistics(recordings, made[REFERENCE_SYSTEM]), {}
+    reference, rows = evaluate.list_statistics(recordings, made[REFERENCE_SYSTEM]), {}
     for system, clips in made.items():
-        figures = evaluate.figures_of(clips, recordings, seed)
+        figures = evaluate.measure_clips(clips, recordings, seed)
         row: dict[str, Any] = {}
-        for name, statistic in evaluate.clip_statistics(recordings, clips).items():
+        for name, statistic in evaluate.list_statistics(recordings, clips).items():
             row[name], row[f"{name}_95"] = statistic.value, statistic.interval(seed)
             row[f"{name}_gain_95"] = statistic.gain(reference[name], seed)
         still = not varies(np.concatenate([clip.generated for clip in clips])).any()
         row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
         if OPENING in recordings.channels:
-            rmse = float(curves.rmse(*evaluate.opening_curves(recordings, clips))[0])
-            row["opening"] = runner.opening_row(figures) | {"rmse": rmse}
+            rmse = float(curves.rmse(*evaluate.pair_curves(recordings, clips))[0])
+            row["opening"] = runner.make_opening_row(figures) | {"rmse": rmse}
         rows[system] = row
     return rows

@@ -23,7 +23,7 @@ from lipmotion.pipeline.training.channels import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
 from lipmotion_lab.baselines import BlstmBaseline, ContextRidge, MeanPose
 from lipmotion_lab.evaluation import held_out
-from lipmotion_lab.evaluation.evaluate import correlation_statistic, distance_statistic
+from lipmotion_lab.evaluation.evaluate import sum_correlations, sum_distances
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings
 
 Options = Mapping[str, Any]
@@ -58,7 +58,7 @@ class TrainedSystem:
     tried: Sequence[Trial] = field(default_factory=tuple)
 
 
-def best_trial(trials: Sequence[Trial]) -> Trial:
+def find_best_trial(trials: Sequence[Trial]) -> Trial:
     """Return the trial of the highest ACC; of equals the first."""
     return max(trials, key=lambda trial: trial.acc)
 
@@ -88,7 +88,7 @@ def judge_systems(
 def measure_clips(made: Sequence[ComparedClip]) -> tuple[float, float]:
     """Return ACC and AMSE of what a system makes of recordings."""
     both = [clip.generated for clip in made], [clip.original for clip in made]
-    return correlation_statistic(*both).value, distance_statistic(*both).value
+    return sum_correlations(*both).value, sum_distances(*both).value
 
 
 def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, monitor: Monitor) -> TrainedSystem:
@@ -96,7 +96,7 @@ def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, mon
     hearing: Animator[Any] = BlstmBaseline()
     speech, found = held_out.make_speech(validation, AUDIO_ONLY, hearing, None), list[tuple[Trial, TrainedSystem]]()
     for kind in NETWORK_SETTINGS:
-        best = best_trial([trial for trial, _ in found]).options if found else {}
+        best = find_best_trial([trial for trial, _ in found]).options if found else {}
         for change in kind:
             options = {**best, **change}
             start_s, engine = process_time(), BlstmBaseline(**options)
@@ -182,7 +182,7 @@ class ComparedSystem:
         return self.make is None and not self.same_model_as
 
 
-def _engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
+def _find_engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
     return lambda: engine_named(name, options)
 
 
@@ -193,13 +193,13 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     **{f"{name}, together": ComparedSystem(options=SYSTEMS[name] | TOGETHER) for name in ("ph-CHMM", "ph-vi-CHMM")},
     **{name + ALL_PATHS: ComparedSystem(options=SOFT, same_model_as=name) for name in PAPER_FIGURES},
     BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
-    "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
+    "trajectory CHMM, own means": ComparedSystem(_find_engine("coupled", acoustic_regression=False), when_named=True),
     REFERENCE_SYSTEM + TWO_STAGES: ComparedSystem(
         options=SYSTEMS[REFERENCE_SYSTEM], second_stage=True, when_named=True
     ),
-    "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
-    "trajectory CHMM" + TWO_STAGES: ComparedSystem(_engine("coupled"), second_stage=True, when_named=True),
-    "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
+    "trajectory CHMM": ComparedSystem(_find_engine("coupled"), when_named=True),
+    "trajectory CHMM" + TWO_STAGES: ComparedSystem(_find_engine("coupled"), second_stage=True, when_named=True),
+    "trajectory HMM": ComparedSystem(_find_engine("trajectory"), when_named=True),
     BLSTM: ComparedSystem(BlstmBaseline, splits=True, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),
     "mean pose": ComparedSystem(MeanPose),

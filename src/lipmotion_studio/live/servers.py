@@ -78,7 +78,7 @@ class Server:
         """Serve at a socket until the end of the block."""
         host, port = place.getsockname()[:2]
         self.address = f"{f'[{host}]' if ':' in host else host}:{port}"
-        with in_background(self._run(place)) as self._loop:
+        with run_in_background(self._run(place)) as self._loop:
             yield
 
     async def _run(self, place: socket.socket) -> None:
@@ -170,7 +170,7 @@ def open_server(to: str, port: int, server: Server | None = None) -> Iterator[Se
 
 
 @contextmanager
-def in_background(work: Coroutine[Any, Any, None]) -> Iterator[asyncio.AbstractEventLoop]:
+def run_in_background(work: Coroutine[Any, Any, None]) -> Iterator[asyncio.AbstractEventLoop]:
     """Let a coroutine work in a thread of its own, until the end of the block, where it is cancelled."""
     loop = asyncio.new_event_loop()
     task = loop.create_task(work)
@@ -205,6 +205,6 @@ def check_installed(to: str) -> None:
         ) from error
 
 
-def pcm_16(samples: Any) -> bytes:
+def to_pcm_16(samples: Any) -> bytes:
     """Return samples as ``Stream.push`` takes them as integers of 16 bits, little-endian, of one channel."""
     return np.rint(np.clip(mono_samples(samples), -1, 1) * 32767).astype("<i2").tobytes()

@@ -22,7 +22,7 @@ from lipmotion.live.consumers import Consumer, LiveSound
 from lipmotion.live.face import LiveFrame
 from lipmotion.live.network import STEP_S
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
-from lipmotion_studio.live.servers import Server, open_server, pcm_16
+from lipmotion_studio.live.servers import Server, open_server, to_pcm_16
 
 PORT = 8766
 RATES_HZ = (8_000, 96_000)
@@ -54,7 +54,7 @@ class TalkingHead:
 
     def hear(self, samples: Any) -> None:
         """Take sound; it is sent with its frames."""
-        self._sound += pcm_16(samples)
+        self._sound += to_pcm_16(samples)
         self._match()
 
     def __call__(self, frame: LiveFrame) -> None:

@@ -24,7 +24,7 @@ from lipmotion.live.face import LiveFrame
 from lipmotion.meshes.model.mesh import ANGLES
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import catch_errors, from_json
-from lipmotion_studio.live.servers import CLOSE_S, check_installed, in_background
+from lipmotion_studio.live.servers import CLOSE_S, check_installed, run_in_background
 
 PORT = 8001
 PLUGIN = {"pluginName": "lipmotion", "pluginDeveloper": "lipmotion"}
@@ -44,7 +44,7 @@ REPLY = "a reply of VTube Studio"
 LOG = logging.getLogger("lipmotion")
 
 
-def face_parameters(frame: LiveFrame) -> dict[str, float]:
+def list_parameters(frame: LiveFrame) -> dict[str, float]:
     """Return the parameters of the mouth, and of lids and head, where the frame moves them."""
 
     def both(name: str) -> float:
@@ -91,7 +91,7 @@ class VTubeStudio:
     @contextmanager
     def connected(self) -> Iterator[None]:
         """Send frames until the end of the block."""
-        with in_background(self.work()) as self._loop:
+        with run_in_background(self.work()) as self._loop:
             yield
 
     async def work(self) -> None:
@@ -153,7 +153,7 @@ class VTubeStudio:
             await self._is_new.wait()
             self._is_new.clear()
             if self._frame is not None:
-                values = {name: value for name, value in face_parameters(self._frame).items() if name in names}
+                values = {name: value for name, value in list_parameters(self._frame).items() if name in names}
                 listed = [{"id": name, "value": value} for name, value in values.items()]
                 about = {"faceFound": True, "mode": "set", "parameterValues": listed}
                 await self._ask(connection, "InjectParameterDataRequest", **about)
@@ -178,12 +178,12 @@ def open_vtube(to: str, sound: LiveSound) -> Iterator[Consumer]:  # noqa: ARG001
     """
     check_installed(to)
     host, port = read_address(to, PORT)
-    studio = VTubeStudio(f"ws://{f'[{host}]' if ':' in host else host}:{port}", cache_folder() / "vtube-studio.token")
+    studio = VTubeStudio(f"ws://{f'[{host}]' if ':' in host else host}:{port}", find_cache_folder() / "vtube-studio.token")
     with studio.connected():
         yield studio
 
 
-def cache_folder() -> Path:
+def find_cache_folder() -> Path:
     """Return the folder of what this user's programs keep, for lipmotion."""
     home = Path.home()
     if sys.platform == "win32":

@@ -26,7 +26,7 @@ from lipmotion.cli.terminal.progress import print_error
 from lipmotion.live.consumers import Consumer, LiveSound, json_line
 from lipmotion.live.face import LiveFrame
 from lipmotion.meshes.model.mesh import ANGLES, turn_head
-from lipmotion_studio.live.servers import Server, open_server, pcm_16
+from lipmotion_studio.live.servers import Server, open_server, to_pcm_16
 from lipmotion_studio.web.listening import read_page
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class LiveWindow:
 
     def hear(self, samples: Any) -> None:
         """Take sound."""
-        sound = pcm_16(samples)
+        sound = to_pcm_16(samples)
         self._server.send(struct.pack("<d", self._heard / self._rate_hz) + sound)
         self._heard += len(sound) // 2
 

@@ -24,9 +24,9 @@ from lipmotion.types.values import items, members, number, text, whole
 from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED, POSSIBLE, is_possible
 from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, list_questions, order_trials
 from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
-from lipmotion_studio.study.store import AnswerSheet, StudyStore, rater_name
+from lipmotion_studio.study.store import AnswerSheet, StudyStore, name_rater
 from lipmotion_studio.web.listening import read_page
-from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, foreign_refusal, json_reply, read_json
+from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, find_foreign_refusal, reply_json, read_json
 
 
 class RateLimit:
@@ -99,7 +99,7 @@ JOIN_HZ, JOIN_BURST = 5.0, 200
 WELL_KEPT = {"cache-control": "private, max-age=86400, immutable"}
 
 
-def study_application(
+def create_application(
     study: Study, videos: Mapping[str, Path], store: StudyStore, names: Collection[str] = ()
 ) -> Starlette:
     """Return the application.
@@ -119,7 +119,7 @@ def study_application(
             return False
 
     def refusal(_method: str, path: str, _query: bytes, headers: Mapping[str, str]) -> tuple[int, str] | None:
-        return foreign_refusal(path, headers, is_own, names)
+        return find_foreign_refusal(path, headers, is_own, names)
 
     replies = _Replies(study, store)
     page = dict(read_page(files("lipmotion_studio.study") / "page"))
@@ -161,7 +161,7 @@ class _Replies:
         """What raters read before they begin; nothing of conditions."""
         study = self._study
         document = {"kind": study.kind, "title": study.title, "consent": study.consent.split("\n")}
-        return json_reply(document | {"instructions": study.instructions.split("\n"), "asks": ASKED[study.kind]})
+        return reply_json(document | {"instructions": study.instructions.split("\n"), "asks": ASKED[study.kind]})
 
     async def join(self, request: Request) -> Response:
         """A new rater, who has agreed to take part."""
@@ -170,12 +170,12 @@ class _Replies:
         if not self._joins.allows():
             raise HTTPException(429, "too many raters join at the same time; try again", {"retry-after": "2"})
         number, token = await asyncio.wrap_future(self._store.add_rater())
-        return json_reply({"token": token, **self._place(number, 0)}, 201)
+        return reply_json({"token": token, **self._place(number, 0)}, 201)
 
     async def state(self, request: Request) -> Response:
         """The trial that a rater is at."""
         rater = self._rater(request)
-        return json_reply(self._place(rater, self._store.next_trial(rater)))
+        return reply_json(self._place(rater, self._store.next_trial(rater)))
 
     async def answer(self, request: Request) -> Response:
         """The answers to the next trial, or again those to one that was answered; replied to once they are stored."""
@@ -188,7 +188,7 @@ class _Replies:
             if not await asyncio.wrap_future(self._store.record(sheet)):
                 raise HTTPException(401, "the rater has been forgotten")
             following += 1
-        return json_reply({"stored": sheet.trial, **self._place(rater, following)})
+        return reply_json({"stored": sheet.trial, **self._place(rater, following)})
 
     def _rater(self, request: Request) -> int:
         """Return the rater of a request. Raises HTTPException: unknown, or too many requests."""
@@ -203,7 +203,7 @@ class _Replies:
     def _place(self, rater: int, number: int) -> dict[str, Any]:
         """Return what the page shows: a trial of a rater, and the videos of the one after it."""
         trials = self._trials(rater)
-        place = {"rater": rater_name(rater), "trial": number, "trials": len(trials)}
+        place = {"rater": name_rater(rater), "trial": number, "trials": len(trials)}
         if number >= len(trials):
             return place
         study, trial = self._study, trials[number]

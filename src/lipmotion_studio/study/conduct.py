@@ -9,7 +9,7 @@ from pathlib import Path
 from lipmotion.errors import InputError
 from lipmotion_studio.study.answers import Answer, write_answers
 from lipmotion_studio.study.manifest import check_videos, list_questions, order_trials, read_study
-from lipmotion_studio.study.store import StudyStore, rater_name, rater_number
+from lipmotion_studio.study.store import StudyStore, name_rater, parse_rater
 from lipmotion_studio.web.listening import HOST, check_installed, open_socket, serve
 
 PORT = 8000
@@ -34,12 +34,12 @@ def serve_study(
     Raises MissingDependencyError: a package of the extra ``study`` is not installed.
     """
     check_installed("serving a study", "study")
-    from lipmotion_studio.study.application import study_application
+    from lipmotion_studio.study.application import create_application
 
     study = read_study(folder)
     videos = check_videos(study, folder)
     with open_socket(host, port) as place, closing(StudyStore(folder)) as store:
-        serve(study_application(study, videos, store, names), place, host=host, started=started)
+        serve(create_application(study, videos, store, names), place, host=host, started=started)
 
 
 def collect_answers(folder: Path) -> list[Answer]:
@@ -51,7 +51,7 @@ def collect_answers(folder: Path) -> list[Answer]:
     answers = []
     for sheet in sheets:
         trial = orders[sheet.rater][sheet.trial]
-        rater, sentence = rater_name(sheet.rater), study.shown(trial)[0].sentence
+        rater, sentence = name_rater(sheet.rater), study.shown(trial)[0].sentence
         for (question, condition, other), value in zip(list_questions(study, trial), sheet.values, strict=True):
             judged = (question, condition, other, value, sheet.seconds, sheet.plays, trial.practice, trial.expected)
             answers.append(Answer(rater, study.kind, sheet.trial, sentence, *judged))
@@ -67,7 +67,7 @@ def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
     """
     answers = collect_answers(folder)
     if rater is not None:
-        name = rater_name(rater_number(rater))
+        name = name_rater(parse_rater(rater))
         answers = [answer for answer in answers if answer.rater == name]
         if not answers:
             raise InputError(f"{folder}: no answers of the rater {name}; the names are in the exported answers")
@@ -79,4 +79,4 @@ def forget_rater(folder: Path, name: str) -> int:
     """Delete a rater and all answers; return how many. Raises InputError: no study, no such rater."""
     read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:
-        return store.forget(rater_number(name))
+        return store.forget(parse_rater(name))

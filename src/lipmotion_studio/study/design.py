@@ -107,19 +107,19 @@ def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) 
                 )
         return lambda sentence, target: MadeVideo(sentence.recording, {"made": "recording"})  # noqa: ARG005
     if path.is_dir():
-        return _finished(path, sentences, drawn)
+        return _collect_finished(path, sentences, drawn)
     if source != SHIPPED and not path.is_file():
         raise InputError(f"{source}: no such model, job file or folder; give one, or {SHIPPED!r}: the model that ships")
     if path.suffix.lower() == JOB_SUFFIX:
         job = Job.from_file(path)
-        return _animated(job, {"job": str(path), "job_sha256": hash_file(path)})
+        return _animate_sentences(job, {"job": str(path), "job_sha256": hash_file(path)})
     if source != SHIPPED and path.suffix.lower() != MODEL_SUFFIX:
         raise InputError(f"{source}: required a model ({MODEL_SUFFIX}), a job file ({JOB_SUFFIX}) or a folder")
     model = None if source == SHIPPED else path
-    return _animated(replace(drawn, request=replace(drawn.request, model=model)), {})
+    return _animate_sentences(replace(drawn, request=replace(drawn.request, model=model)), {})
 
 
-def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
+def _collect_finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
     """Return a condition of finished videos or of motion to draw. Raises InputError: none or several of a sentence."""
     files: dict[str, Path] = {}
     for name in (sentence.name for sentence in sentences):
@@ -147,7 +147,7 @@ def _finished(folder: Path, sentences: Sequence[StudySentence], drawn: Job) -> C
     return condition
 
 
-def _animated(job: Job, made: dict[str, str]) -> Condition:
+def _animate_sentences(job: Job, made: dict[str, str]) -> Condition:
     """Return a condition whose videos are animated from the sound of the sentences."""
     model_path = job.request.model or find_shipped()
     made = made | {"made": "animated", "model": model_path.name, "model_sha256": hash_file(model_path)}
@@ -221,7 +221,7 @@ def design_study(
     makers = {name: make_condition(source, spoken, drawn) for name, source in sources.items()}
     base = RECORDING if RECORDING in sources else next(iter(sources))
     names, seed = [sentence.name for sentence in spoken], settings.seed
-    late = manifest.shuffled(names, "anchor", seed)[: settings.anchors]  # the sentences that have an anchor
+    late = manifest.shuffle(names, "anchor", seed)[: settings.anchors]  # the sentences that have an anchor
     if kind == RANKING:  # every page has one, if any has
         late = names if settings.anchors else []
     texts = {"consent": CONSENT, "instructions": INSTRUCTIONS[kind]}
@@ -240,11 +240,11 @@ def design_study(
                 videos.append(_encode(made, sentence, ANCHOR, folder, settings))
             (folder / _UNFINISHED).unlink(missing_ok=True)
         numbers = {(video.sentence, video.condition): n for n, video in enumerate(videos)}
-        trials = manifest.main_trials(kind, list(sources), names, numbers)
+        trials = manifest.make_main_trials(kind, list(sources), names, numbers)
         with_anchor = [name for name in names if (name, ANCHOR) in numbers]
-        anchored = manifest.anchor_trials(base, with_anchor, numbers) if kind == PAIRED else []
-        checks = manifest.attention_trials(kind, trials, settings.checks, seed)
-        practice = manifest.practice_trials([*trials, *anchored], settings.practice, seed)
+        anchored = manifest.make_anchor_trials(base, with_anchor, numbers) if kind == PAIRED else []
+        checks = manifest.make_attention_trials(kind, trials, settings.checks, seed)
+        practice = manifest.make_practice_trials([*trials, *anchored], settings.practice, seed)
         study = manifest.Study(
             kind=kind,
             title=settings.title,

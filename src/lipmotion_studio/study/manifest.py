@@ -161,10 +161,10 @@ VideoNumbers = Mapping[tuple[str, str], int]
 """The number of the video of a sentence and a condition."""
 
 
-def shuffled(items: Iterable[PlaceT], *key: object) -> list[PlaceT]:
+def shuffle(items: Iterable[PlaceT], *key: object) -> list[PlaceT]:
     """Return items in an order that depends on a key, every order being equally likely.
 
-    >>> shuffled("abcd", 1), shuffled("abcd", 2)
+    >>> shuffle("abcd", 1), shuffle("abcd", 2)
     (['d', 'a', 'b', 'c'], ['b', 'd', 'c', 'a'])
     """
 
@@ -174,7 +174,7 @@ def shuffled(items: Iterable[PlaceT], *key: object) -> list[PlaceT]:
     return [item for _, item in sorted(enumerate(items), key=place)]
 
 
-def main_trials(
+def make_main_trials(
     kind: str, conditions: Sequence[str], sentences: Sequence[str], videos: VideoNumbers
 ) -> list[StudyTrial]:
     """Return the trials that count.
@@ -197,7 +197,7 @@ def main_trials(
     return trials
 
 
-def anchor_trials(base: str, sentences: Sequence[str], videos: VideoNumbers) -> list[StudyTrial]:
+def make_anchor_trials(base: str, sentences: Sequence[str], videos: VideoNumbers) -> list[StudyTrial]:
     """Return, for each sentence, a condition beside itself out of step, which is second and first in turn."""
     trials = []
     for n, sentence in enumerate(sentences):
@@ -213,19 +213,19 @@ _ANSWERS = {
 }
 
 
-def attention_trials(kind: str, trials: Sequence[StudyTrial], count: int, seed: int) -> list[StudyTrial]:
+def make_attention_trials(kind: str, trials: Sequence[StudyTrial], count: int, seed: int) -> list[StudyTrial]:
     """Return trials whose page states what to answer, made from some of the trials that count."""
     checks = []
-    for n, trial in enumerate(shuffled(trials, "check", seed)[:count]):
+    for n, trial in enumerate(shuffle(trials, "check", seed)[:count]):
         value, words = _ANSWERS[kind][n % 2]
         note = f"This page checks that you read it: after the videos, please answer {words}, whatever you saw."
         checks.append(replace(trial, expected=value, note=note))
     return checks
 
 
-def practice_trials(trials: Sequence[StudyTrial], count: int, seed: int) -> list[StudyTrial]:
+def make_practice_trials(trials: Sequence[StudyTrial], count: int, seed: int) -> list[StudyTrial]:
     """Return trials for practice, made of some of those that count."""
-    return [replace(trial, practice=True, expected="") for trial in shuffled(trials, "practice", seed)[:count]]
+    return [replace(trial, practice=True, expected="") for trial in shuffle(trials, "practice", seed)[:count]]
 
 
 def order_trials(study: Study, rater: int) -> list[StudyTrial]:
@@ -236,11 +236,11 @@ def order_trials(study: Study, rater: int) -> list[StudyTrial]:
     """
     practice = [trial for trial in study.trials if trial.practice]
     counted = [trial for trial in study.trials if not trial.practice]
-    ordered = practice + shuffled(counted, study.seed, rater)
+    ordered = practice + shuffle(counted, study.seed, rater)
     if study.kind in (PAIRED, MOS):
         return ordered
     return [
-        replace(trial, videos=tuple(shuffled(trial.videos, study.seed, rater, n))) for n, trial in enumerate(ordered)
+        replace(trial, videos=tuple(shuffle(trial.videos, study.seed, rater, n))) for n, trial in enumerate(ordered)
     ]
 
 

@@ -155,7 +155,7 @@ class StudyStore:
 
         count = self._submit(work).result()
         if count is None:
-            raise InputError(f"{self.path}: no rater {rater_name(rater)}; the names are in the exported answers")
+            raise InputError(f"{self.path}: no rater {name_rater(rater)}; the names are in the exported answers")
         self._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # the log would hold the answers for a while
         return int(count)
 
@@ -217,16 +217,16 @@ class StudyStore:
                     future.set_result(result)
 
 
-def rater_name(number: int) -> str:
+def name_rater(number: int) -> str:
     """Return the name of a rater, who is known by a number alone.
 
-    >>> rater_name(7)
+    >>> name_rater(7)
     'r007'
     """
     return f"r{number:03d}"
 
 
-def rater_number(name: str) -> int:
+def parse_rater(name: str) -> int:
     """Return the number of a rater's name. Raises InputError: not such a name."""
     digits = name.strip().lower().removeprefix("r")
     if not (digits.isascii() and digits.isdecimal() and len(digits) <= 9):

@@ -111,14 +111,14 @@ def run_export(options: argparse.Namespace) -> None:
 
 def run_analyse(options: argparse.Namespace) -> None:
     """Call ``analyse_study`` and print its tables."""
-    from lipmotion_studio.study.analysis.analyse import analyse_study, analysis_table
+    from lipmotion_studio.study.analysis.analyse import analyse_study, format_analysis
 
     report_figures(
         options,
         lambda *_: analyse_study(
             options.answers, baseline=options.baseline, power=options.power, sentences=options.sentences
         ),
-        analysis_table,
+        format_analysis,
     )
 
 

@@ -83,7 +83,7 @@ class Guard:
         await self._application(scope, receive, send)
 
 
-def foreign_refusal(
+def find_foreign_refusal(
     path: str, headers: Mapping[str, str], is_own: Callable[[str], bool], names: Container[str] = ()
 ) -> tuple[int, str] | None:
     """Return why a request is refused that another site's page sends, or that came by a foreign name; None: it is not.
@@ -101,12 +101,12 @@ def foreign_refusal(
     return None
 
 
-async def _refused(_: Request, error: Exception) -> Response:
+async def _reply_refused(_: Request, error: Exception) -> Response:
     status, headers = getattr(error, "status_code", 400), getattr(error, "headers", None)
     return JSONResponse({"error": str(getattr(error, "detail", ""))}, status, {**FRESH, **(headers or {})})
 
 
-async def failed(status: int, _: Request, error: Exception) -> Response:
+async def reply_failed(status: int, _: Request, error: Exception) -> Response:
     """Return the reply to an error that was raised on purpose."""
     if status == UNAVAILABLE:
         LOG.warning("%s", error)
@@ -116,14 +116,14 @@ async def failed(status: int, _: Request, error: Exception) -> Response:
 
 UNAVAILABLE = 503
 ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
-    HTTPException: _refused,
-    LipMotionError: partial(failed, 422),
-    **dict.fromkeys((ExportError, OSError, MemoryError, sqlite3.Error), partial(failed, UNAVAILABLE)),
+    HTTPException: _reply_refused,
+    LipMotionError: partial(reply_failed, 422),
+    **dict.fromkeys((ExportError, OSError, MemoryError, sqlite3.Error), partial(reply_failed, UNAVAILABLE)),
 }
 """What is replied to errors that are raised on purpose, and to a full disk or memory: JSON, ``{"error": text}``."""
 
 
-def json_reply(content: Any, status: int = 200) -> Response:
+def reply_json(content: Any, status: int = 200) -> Response:
     """Return content as a reply of JSON."""
     return JSONResponse(content, status, FRESH)
 

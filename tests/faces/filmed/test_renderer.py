@@ -56,8 +56,8 @@ def closed(motion: Motion) -> Motion:
 
 def codes_in(appearance: Appearance, backgrounds: list[Background]) -> FaceCodes:
     """What the lower face is like in the footage itself."""
-    faces = [placing.cut(each.frame, lower_face.region_map(each.face_to_frame, 1), (128, 128)) for each in backgrounds]
-    mouths = np.clip(np.rint(np.stack(faces)), 0, 255).astype(np.uint8)[(slice(None), *lower_face.mouth_part(1))]
+    faces = [placing.cut(each.frame, lower_face.map_region(each.face_to_frame, 1), (128, 128)) for each in backgrounds]
+    mouths = np.clip(np.rint(np.stack(faces)), 0, 255).astype(np.uint8)[(slice(None), *lower_face.find_mouth_part(1))]
     chins = np.array([each.chin_px for each in backgrounds], np.float32)
     return replace(appearance.measure_codes(mouths), chin_px=chins)
 
@@ -65,7 +65,7 @@ def codes_in(appearance: Appearance, backgrounds: list[Background]) -> FaceCodes
 def part_in_frame(part: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return which pixels of the frame look at a part of the lower face, or have a neighbour that does."""
     rows, columns = np.mgrid[:FRAME_HEIGHT, :FRAME_WIDTH]
-    to_frame = lower_face.region_map(place, 1)
+    to_frame = lower_face.map_region(place, 1)
     position = np.linalg.solve(to_frame[:, :2], np.stack([columns.ravel(), rows.ravel()]) - to_frame[:, 2:])
     x, y = (np.floor(each).astype(int) for each in position)
     found = np.zeros(rows.size, bool)
@@ -88,7 +88,7 @@ def test_a_face_in_its_own_footage_is_that_footage(
 ) -> None:
     made = stitched(appearance, codes_in(appearance, backgrounds), backgrounds, jaw=jaw)
     footage = np.stack([each.frame for each in backgrounds]).astype("i4")
-    part = lower_face.moved_part(1) if jaw else lower_face.mouth_ellipse(1)
+    part = lower_face.mark_moved(1) if jaw else lower_face.mark_mouth(1)
     inside = np.stack([part_in_frame(part, each.face_to_frame) for each in backgrounds])
     difference = np.abs(made - footage)[inside]
     assert difference.mean() < 3
@@ -106,7 +106,7 @@ def test_outside_nothing_changes_and_a_frame_without_a_face_stays_as_it_is(
     assert np.array_equal(np.stack([each.frame for each in backgrounds]), footage)
     for n, each in enumerate(hidden):
         assert np.array_equal(alone[n], each.frame) == (not each.has_face)
-    for frames, part in ((made, lower_face.moved_part(1)), (alone, lower_face.mouth_ellipse(1))):
+    for frames, part in ((made, lower_face.mark_moved(1)), (alone, lower_face.mark_mouth(1))):
         outside = ~np.stack([part_in_frame(part, each.face_to_frame) for each in backgrounds])
         assert np.array_equal(frames[outside], footage[outside])
         assert (frames[~outside] != footage[~outside]).mean() > 0.3
@@ -121,7 +121,7 @@ def test_a_silent_mouth_onto_a_talking_one(
     made = stitched(appearance, appearance.predict_codes(silent), backgrounds)
     wanted = np.stack([each.frame for each in footage_of(silent, noise=0.0)]).astype("i4")
     footage = np.stack([each.frame for each in backgrounds]).astype("i4")
-    inside = np.stack([part_in_frame(lower_face.moved_part(1), each.face_to_frame) for each in backgrounds])
+    inside = np.stack([part_in_frame(lower_face.mark_moved(1), each.face_to_frame) for each in backgrounds])
     talks = spoken["opening"] > 0.12
     assert talks.sum() >= 4
     errors = [np.square((each - wanted)[talks][inside[talks]]).mean() for each in (made, footage)]
@@ -134,7 +134,7 @@ def test_a_silent_mouth_onto_a_talking_one(
 def test_a_talking_mouth_onto_a_silent_one(appearance: Appearance, spoken: Motion) -> None:
     backgrounds = footage_of(closed(spoken))
     made = stitched(appearance, appearance.predict_codes(spoken), backgrounds)
-    inside = np.stack([part_in_frame(lower_face.mouth_ellipse(1), each.face_to_frame) for each in backgrounds])
+    inside = np.stack([part_in_frame(lower_face.mark_mouth(1), each.face_to_frame) for each in backgrounds])
     dark = ((made < 90).all(axis=3) & inside).sum(axis=(1, 2))
     assert np.corrcoef(dark, spoken["opening"])[0, 1] > 0.85
 

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from faces.head.motions import mouth_rows
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.base import rotate_head
-from lipmotion_faces.head.inside import LOWER_EDGE, lower_drop, lower_teeth, upper_teeth
-from lipmotion_faces.head.part import MOUTH_Y, head
+from lipmotion_faces.head.inside import LOWER_EDGE, measure_drop, make_lower_teeth, make_upper_teeth
+from lipmotion_faces.head.part import MOUTH_Y, measure_head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import (
     ARCH,
@@ -16,27 +16,27 @@ from lipmotion_faces.head.skin import (
     TEETH_EDGE,
     TEETH_Z,
     VISIBLE_RINGS,
-    lip_surface,
+    place_lips,
     move_jaw,
-    section_points,
+    place_sections,
 )
-from lipmotion_faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh, mouth_weights
+from lipmotion_faces.head.stage import POSES, SIDED_POSES, make_camera, make_figure, build_head_mesh, fit_mouth_weights
 from meshes.heads import shaped
 
-VIEWER = camera_for(640, 360).place
+VIEWER = make_camera(640, 360).place
 OPEN = CharacterPose(gap=0.25, upper_rise=0.04, jaw=0.18)
 
 
 def rows(name: str) -> np.ndarray:
-    return figure().place(REST)[0][figure().rows[name]]
+    return make_figure().place(REST)[0][make_figure().rows[name]]
 
 
 def test_eyes_are_one_eye_distance_apart_at_their_outer_corners_and_normals_of_length_one():
-    corners = [figure().place(REST)[0][figure().skin.lid_rows(eye)[1]] for eye in (0, 1)]
+    corners = [make_figure().place(REST)[0][make_figure().skin.lid_rows(eye)[1]] for eye in (0, 1)]
     assert corners[0][:, 0].max() - corners[1][:, 0].min() == pytest.approx(1.0, abs=0.02)
-    places, normals = figure().place(OPEN)
+    places, normals = make_figure().place(OPEN)
     assert np.isfinite(places).all()
-    used = np.unique(figure().triangles)
+    used = np.unique(make_figure().triangles)
     assert np.linalg.norm(normals[used], axis=1) == pytest.approx(np.ones(len(used)), abs=0.01)
 
 
@@ -48,13 +48,13 @@ def test_the_head_is_the_same_on_both_sides():
 
 
 def test_the_skin_at_rest_lies_on_its_form():
-    skin = figure().skin
+    skin = make_figure().skin
     fill = skin.face[(skin.face[:, 1] > MOUTH_Y + 0.4) & (np.abs(skin.face[:, 0]) > 0.02)]
-    assert np.abs(head(fill)).max() < 2e-3
+    assert np.abs(measure_head(fill)).max() < 2e-3
 
 
 def test_opening_moves_chin_and_lips_but_neither_forehead_nor_eyes():
-    rest, wide = figure().skin.pose(REST)[0], figure().skin.pose(OPEN)[0]
+    rest, wide = make_figure().skin.pose(REST)[0], make_figure().skin.pose(OPEN)[0]
     moved = np.linalg.norm(wide - rest, axis=1)
     assert moved[rest[:, 1] > -0.4].max() < 0.01
     chin = np.argmin(np.linalg.norm(rest - [0, -1.05, -0.02], axis=1))
@@ -63,7 +63,7 @@ def test_opening_moves_chin_and_lips_but_neither_forehead_nor_eyes():
 
 def test_shut_eyes_cover_the_eyeballs():
     def apart(**pose) -> np.ndarray:
-        height = figure().skin.lids_of_eye.opening(CharacterPose(**pose))[1]
+        height = make_figure().skin.lids_of_eye.opening(CharacterPose(**pose))[1]
         return height[1:32] - height[:32:-1]
 
     assert apart(shut=0.0).max() > 0.15
@@ -74,10 +74,10 @@ def test_shut_eyes_cover_the_eyeballs():
 
 def test_turning_moves_the_head_and_not_the_body_and_keeps_lengths():
     turns = (0, 0, 0), (0.3, 0.1, 0.05)
-    straight, aside = (figure().frame(CharacterPose(turn=turn), VIEWER).places for turn in turns)
-    body = figure().rows["clothing"]
+    straight, aside = (make_figure().frame(CharacterPose(turn=turn), VIEWER).places for turn in turns)
+    body = make_figure().rows["clothing"]
     assert np.array_equal(straight[body], aside[body])
-    nose = int(np.argmax(straight[figure().rows["skin"], 2]))
+    nose = int(np.argmax(straight[make_figure().rows["skin"], 2]))
     assert aside[nose, 0] > straight[nose, 0] + 0.2  # to the character's left
     assert aside[nose, 1] > straight[nose, 1]  # and upwards
     for angles in ((0.3, 0, 0), (0, 0.2, 0), (0, 0, 0.1), (0.2, -0.1, 0.3)):
@@ -88,12 +88,12 @@ def test_turning_moves_the_head_and_not_the_body_and_keeps_lengths():
 
 def test_the_mouth_is_darker_in_its_depth_and_when_it_closes_and_light_is_at_most_white():
     def brightness(pose: CharacterPose, name: str) -> float:
-        return float(figure().frame(pose, VIEWER).light[mouth_rows(figure())[name]].mean())
+        return float(make_figure().frame(pose, VIEWER).light[mouth_rows(make_figure())[name]].mean())
 
     assert brightness(OPEN, "wall") < 0.3 * brightness(OPEN, "lips")
     assert brightness(OPEN._replace(roundness=1), "upper teeth") < brightness(OPEN, "upper teeth")
-    light = figure().frame(OPEN, VIEWER).light
-    seen = np.delete(light, np.r_[figure().rows["catchlights"], figure().rows["right catchlights"]], axis=0)
+    light = make_figure().frame(OPEN, VIEWER).light
+    seen = np.delete(light, np.r_[make_figure().rows["catchlights"], make_figure().rows["right catchlights"]], axis=0)
     assert light.min() >= 0
     assert np.quantile(seen, 0.999) < 1.0
 
@@ -107,13 +107,13 @@ def test_the_mesh_has_the_shapes_that_are_promised(mesh):
 
 
 def test_a_shape_at_full_weight_is_its_pose(mesh):
-    assert shaped(mesh, {"jawOpen": 1.0}) == pytest.approx(figure().place(POSES["jawOpen"])[0], abs=1e-4)
+    assert shaped(mesh, {"jawOpen": 1.0}) == pytest.approx(make_figure().place(POSES["jawOpen"])[0], abs=1e-4)
     both = shaped(mesh, {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0})
-    assert both == pytest.approx(figure().place(CharacterPose(shut=1))[0], abs=1e-4)
+    assert both == pytest.approx(make_figure().place(CharacterPose(shut=1))[0], abs=1e-4)
 
 
 def test_mouth_close_brings_the_lips_of_an_open_jaw_together_and_sided_shapes_leave_the_other_side_alone(mesh):
-    lips = figure().skin.lip_rows()[9]
+    lips = make_figure().skin.lip_rows()[9]
     apart, together = (shaped(mesh, {"jawOpen": 1.0, "mouthClose": closed})[lips] for closed in (0.0, 1.0))
     assert apart[20, 1] - apart[60, 1] > 0.25
     assert together[20, 1] - together[60, 1] < 0.03
@@ -123,7 +123,7 @@ def test_mouth_close_brings_the_lips_of_an_open_jaw_together_and_sided_shapes_le
 
 
 def test_cheeks_come_forward_beside_spread_lips_and_sink_beside_round_ones():
-    skin = figure().skin
+    skin = make_figure().skin
     cheek = np.argmin(np.linalg.norm(skin.rest[: len(skin.face)] - [0.42, -0.46, -0.1], axis=1))
 
     def forward(pose: CharacterPose) -> float:
@@ -146,26 +146,26 @@ SAID = {
 
 @pytest.fixture(scope="module")
 def mesh() -> Mesh:
-    return head_mesh(figure())
+    return build_head_mesh(make_figure())
 
 
 @pytest.fixture(scope="module")
 def places(mesh: Mesh) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """The skin of each pose as sums of blendshapes, and as it is drawn; each is held for ten frames."""
     held = [pose for pose in SAID.values() for _ in range(10)]
-    curves = mouth_weights(figure(), mesh, held)
-    rows = np.arange(len(figure().skin.rest))
+    curves = fit_mouth_weights(make_figure(), mesh, held)
+    rows = np.arange(len(make_figure().skin.rest))
     moved = mesh.displacements(rows)
     found = {}
     for number, (name, pose) in enumerate(SAID.items()):
         weights = {each: float(curve[10 * number + 5]) for each, curve in curves.items()}
         added = sum(weight * moved[mesh.shape_names.index(each)] for each, weight in weights.items())
-        found[name] = (mesh.vertices[rows] + added, figure().skin.places(pose))
+        found[name] = (mesh.vertices[rows] + added, make_figure().skin.places(pose))
     return found
 
 
 def test_the_lips_are_where_they_are_drawn(places: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
-    rings = figure().skin.lip_rows()
+    rings = make_figure().skin.lip_rows()
     lips, ring = rings[:10].ravel(), rings[VISIBLE_RINGS - 1]
     for name, (summed, drawn) in places.items():
         assert np.abs(summed - drawn)[lips].max() < 0.07, name
@@ -176,8 +176,8 @@ def test_the_lips_are_where_they_are_drawn(places: dict[str, tuple[np.ndarray, n
 
 def test_closed_lips_are_those_of_the_rest_pose(mesh: Mesh) -> None:
     closed = [CharacterPose(gap=0.0, jaw=jaw, width=width) for jaw in (0.0, 0.06, 0.1) for width in (0.9, 1.0, 1.05)]
-    curves = mouth_weights(figure(), mesh, closed)
-    ring = figure().skin.lip_rows()[VISIBLE_RINGS - 1]
+    curves = fit_mouth_weights(make_figure(), mesh, closed)
+    ring = make_figure().skin.lip_rows()[VISIBLE_RINGS - 1]
     moved = mesh.displacements(ring[[20, 60]])[:, :, 1]
     table = np.stack(list(curves.values()), axis=1)
     change = table @ np.stack([moved[mesh.shape_names.index(name)] for name in curves])
@@ -185,7 +185,7 @@ def test_closed_lips_are_those_of_the_rest_pose(mesh: Mesh) -> None:
 
 
 def test_weights_are_between_0_and_1(mesh: Mesh) -> None:
-    curves = mouth_weights(figure(), mesh, [*POSES.values(), *SAID.values()])
+    curves = fit_mouth_weights(make_figure(), mesh, [*POSES.values(), *SAID.values()])
     assert min(curve.min() for curve in curves.values()) >= 0
     assert max(curve.max() for curve in curves.values()) <= 1
 
@@ -210,7 +210,7 @@ def poses(draw) -> CharacterPose:
 
 def contact(pose: CharacterPose) -> np.ndarray:
     """Return where each column of the lips would meet the other lip [shape=(COLUMNS, 3)]."""
-    return section_points(pose, figure().skin.base_z)[MEET]
+    return place_sections(pose, make_figure().skin.base_z)[MEET]
 
 
 def test_closed_lips_meet_at_every_column():
@@ -233,7 +233,7 @@ def test_the_gap_is_as_asked_and_lips_never_cross(pose):
 @given(poses())
 @settings(max_examples=10)
 def test_both_halves_of_the_mouth_are_alike(pose):
-    surface = lip_surface(section_points(pose, figure().skin.base_z))[:FRONT]
+    surface = place_lips(place_sections(pose, make_figure().skin.base_z))[:FRONT]
     mirrored = np.concatenate([np.arange(40, -1, -1), np.arange(COLUMNS - 1, 40, -1)])
     assert surface[:, mirrored] * [-1, 1, 1] == pytest.approx(surface, abs=2e-3)
 
@@ -245,27 +245,27 @@ def test_lips_never_reach_into_the_teeth(pose, tuck, press):
     moved = pose._replace(
         tuck=tuck, upper_rise=max(pose.upper_rise, 0.054 * tuck), gap=max(pose.gap, 0.054 * tuck), press=press
     )
-    lips = lip_surface(section_points(moved, figure().skin.base_z))[:FRONT].reshape(-1, 3)
+    lips = place_lips(place_sections(moved, make_figure().skin.base_z))[:FRONT].reshape(-1, 3)
     teeth = TEETH_Z - ARCH * lips[:, 0] ** 2
     beside = (lips[:, 1] > TEETH_EDGE) & (np.abs(lips[:, 0]) < 0.24)
     assert (lips[beside, 2] - teeth[beside]).min() > 0.003
-    edge = move_jaw(np.array([[0, LOWER_EDGE, TEETH_Z - 0.045]]), lower_drop(moved))[0]
+    edge = move_jaw(np.array([[0, LOWER_EDGE, TEETH_Z - 0.045]]), measure_drop(moved))[0]
     below = (lips[:, 1] < edge[1]) & (np.abs(lips[:, 0]) < 0.2)
     if below.any():
         assert (lips[below, 2] - (edge[2] - ARCH * lips[below, 0] ** 2)).min() > 0.003
 
 
 def test_the_model_of_the_teeth_in_these_tests_is_that_of_the_teeth():
-    for part, front in ((upper_teeth(), TEETH_Z), (lower_teeth(), TEETH_Z - 0.045)):
+    for part, front in ((make_upper_teeth(), TEETH_Z), (make_lower_teeth(), TEETH_Z - 0.045)):
         near = np.abs(part.places[:, 0]) < 0.24
         before = part.places[near, 2] - (front - ARCH * part.places[near, 0] ** 2)
         assert before.max() < 0.012
 
 
 def test_lower_teeth_close_behind_the_upper_ones():
-    shut = move_jaw(lower_teeth().places, lower_drop(CharacterPose(bite=1)))
+    shut = move_jaw(make_lower_teeth().places, measure_drop(CharacterPose(bite=1)))
     assert shut[:, 1].max() > TEETH_EDGE
-    apart = move_jaw(lower_teeth().places, lower_drop(CharacterPose(gap=0.2, jaw=0.15)))
+    apart = move_jaw(make_lower_teeth().places, measure_drop(CharacterPose(gap=0.2, jaw=0.15)))
     assert apart[:, 1].max() < TEETH_EDGE - 0.1
 
 
@@ -293,7 +293,7 @@ def test_the_lower_lip_of_f_lies_on_the_upper_teeth():
 
 
 def test_pressed_lips_are_thinner():
-    contours = (section_points(CharacterPose(press=press), figure().skin.base_z)[0] for press in (0, 1))
+    contours = (place_sections(CharacterPose(press=press), make_figure().skin.base_z)[0] for press in (0, 1))
     free, pressed = (contour[20, 1] - contour[60, 1] for contour in contours)
     assert pressed == pytest.approx(0.65 * free, rel=0.05)
 
@@ -314,7 +314,7 @@ def test_the_line_of_closed_lips_rises_to_the_corners_less_when_pressed_and_that
 def test_a_round_hole_is_an_ellipse_that_nothing_behind_it_narrows():
     for gap in (0.028, 0.04, 0.06, 0.1):
         pose = CharacterPose(gap=gap, upper_rise=0.48 * gap, width=0.75, roundness=1, protrusion=0.08)
-        surface = lip_surface(section_points(pose, figure().skin.base_z))
+        surface = place_lips(place_sections(pose, make_figure().skin.base_z))
         rim = surface[VISIBLE_RINGS - 1]
         line = np.interp(np.abs(rim[:, 0]), rim[20:41, 0], 0.5 * (rim[20:41, 1] + rim[60 - np.arange(21), 1]))
         half_width, half_height = rim[:, 0].max(), 0.5 * (rim[20, 1] - rim[60, 1])

@@ -8,20 +8,20 @@ from lipmotion import Staging, errors, types
 from lipmotion.articulation.mouth import ROUND_GAP
 from lipmotion.units import LIP_CLOSING
 from lipmotion_faces import head, make_face, testing
-from lipmotion_faces.head.pose import CharacterPose, head_poses
-from lipmotion_faces.head.stage import Stage, camera_for
+from lipmotion_faces.head.pose import CharacterPose, list_head_poses
+from lipmotion_faces.head.stage import Stage, make_camera
 from lipmotion_faces.rendering.drawn_surface import Camera
 
 
 def middle(phone: str, value: float = 0.08, before: str = "ah", after: str = "ah"):
     """Return the pose in the middle of a phone."""
     phones = (before, phone, after)
-    return head_poses(steady(phones, value), said(*phones), 25.0)[15]
+    return list_head_poses(steady(phones, value), said(*phones), 25.0)[15]
 
 
 def test_p_b_and_m_are_closed_exactly_whatever_the_motion_is():
     for value, phone in enumerate(sorted(LIP_CLOSING)):
-        poses = head_poses(steady(("aa", phone, "aa"), 0.04 * value), said("aa", phone, "aa"), 25.0)
+        poses = list_head_poses(steady(("aa", phone, "aa"), 0.04 * value), said("aa", phone, "aa"), 25.0)
         assert min(pose.gap for pose in poses[10:20]) == 0
         assert poses[15].press > 0.9
 
@@ -29,7 +29,7 @@ def test_p_b_and_m_are_closed_exactly_whatever_the_motion_is():
 def test_a_closed_sound_shorter_than_a_frame_is_closed_in_one():
     for start in (0.0, 0.013, 0.02, 0.031):
         labels = said("aa", "b", duration_s=0.02).shifted(0.4 + start)
-        poses = head_poses(steady(("aa", "aa", "aa"), 0.1), labels, 25.0)
+        poses = list_head_poses(steady(("aa", "aa", "aa"), 0.1), labels, 25.0)
         assert 1 <= sum(pose.gap == 0 for pose in poses) <= 2
 
 
@@ -50,7 +50,7 @@ def test_each_sound_has_its_own_shape():
 def test_the_motion_alone_moves_the_corners():
     values = np.array([[0.05, width] for width in (0.57, 0.57, 0.57, 0.5, 0.5, 0.62, 0.62)])
     motion = types.Motion(values, 25.0, (types.Channel("opening"), types.Channel("width")))
-    narrow, wide = (head_poses(motion, NOTHING_SAID, 25.0)[frame] for frame in (4, 6))
+    narrow, wide = (list_head_poses(motion, NOTHING_SAID, 25.0)[frame] for frame in (4, 6))
     assert narrow.width < 0.95
     assert wide.width > 1.05
     assert narrow.roundness > wide.roundness
@@ -60,7 +60,7 @@ def test_the_motion_alone_moves_the_corners():
 def test_tracked_jaws_are_followed_within_limits():
     values = np.array([[0.0, -1.0], [0.2, -1.05], [0.2, -1.15], [0.2, -9.0]])
     motion = types.Motion(np.repeat(values, 3, axis=0), 25.0, (types.Channel("opening"), types.Channel("y_152")))
-    jaws = [head_poses(motion, NOTHING_SAID, 25.0)[frame].jaw for frame in (1, 4, 7, 10)]
+    jaws = [list_head_poses(motion, NOTHING_SAID, 25.0)[frame].jaw for frame in (1, 4, 7, 10)]
     assert jaws[0] == pytest.approx(0, abs=0.011)
     assert jaws[1] < jaws[2] < jaws[3] < 0.25
 
@@ -68,16 +68,16 @@ def test_tracked_jaws_are_followed_within_limits():
 def test_articulatory_channels_of_the_motion_come_before_the_phones():
     names = ("opening", "tongue", "lip_tuck", "teeth", "lip_press")
     motion = types.Motion(np.tile([0.08, 1.0, 0.0, 1.0, 0.0], (31, 1)), 25.0, tuple(map(types.Channel, names)))
-    pose = head_poses(motion, said("f", "aa", "f"), 25.0)[15]
+    pose = list_head_poses(motion, said("f", "aa", "f"), 25.0)[15]
     assert pose.tongue_out > 0.99
     assert pose.bite > 0.99
-    assert head_poses(motion, said("f", "f", "f"), 25.0)[15].tuck < 0.01
+    assert list_head_poses(motion, said("f", "f", "f"), 25.0)[15].tuck < 0.01
     pressed = types.Motion(np.tile([0.0, 1.0], (41, 1)), 100.0, tuple(map(types.Channel, ("opening", "lip_press"))))
-    assert head_poses(pressed, said("ah"), 25.0)[5].press == pytest.approx(1.0)
+    assert list_head_poses(pressed, said("ah"), 25.0)[5].press == pytest.approx(1.0)
     with pytest.raises(errors.InputError, match="no channel 'opening'"):
-        head_poses(types.Motion(np.zeros((3, 1)), 25.0, (types.Channel("width"),)), NOTHING_SAID, 25.0)
+        list_head_poses(types.Motion(np.zeros((3, 1)), 25.0, (types.Channel("width"),)), NOTHING_SAID, 25.0)
     with pytest.raises(errors.InputError, match="frame rate"):
-        head_poses(opening(0.0), NOTHING_SAID, 0.0)
+        list_head_poses(opening(0.0), NOTHING_SAID, 0.0)
 
 
 def test_a_loud_high_voice_raises_the_brows():
@@ -86,7 +86,7 @@ def test_a_loud_high_voice_raises_the_brows():
     motion = opening(*[0.05] * 75)
     flat = types.Prosody(np.full(300, -10.0), np.full(300, np.log(150.0)))
     voices, units = (types.Prosody(level, pitch), flat), said("aa", duration_s=3)
-    with_voice, without = (head_poses(motion, units, 25.0, prosody=voice) for voice in voices)
+    with_voice, without = (list_head_poses(motion, units, 25.0, prosody=voice) for voice in voices)
     assert with_voice[35].brows > without[35].brows + 0.005
 
 
@@ -113,7 +113,7 @@ def pose_of(phone: str, opening: float, wider: float = 0.0) -> CharacterPose:
     rest = (0.0, REST_WIDTH)
     values = np.array([rest] * 40 + [row] * 120 + [rest] * 40)
     motion = types.Motion(values, 100.0, (types.Channel("opening"), types.Channel("width")))
-    pose = head_poses(motion, said("sil", "ah", phone, "ah", "sil"), 25.0)[25]
+    pose = list_head_poses(motion, said("sil", "ah", phone, "ah", "sil"), 25.0)[25]
     return pose._replace(turn=(0.0, 0.0, 0.0), shut=0.0, gaze=(0.0, 0.0))
 
 
@@ -199,7 +199,7 @@ def test_the_tongue_of_th_is_seen_and_is_narrower_than_the_mouth():
 @pytest.mark.parametrize("pose", [CharacterPose(), CharacterPose(press=1, bite=1)])
 def test_the_seam_of_closed_lips_is_a_smooth_line(pose):
     """The darkest place, three pixels high, changes little from column to column, in a picture of 720 lines."""
-    mouth = Stage(camera_for(1280, 720)).picture(pose)[490:540, 600:680].mean(axis=2)
+    mouth = Stage(make_camera(1280, 720)).picture(pose)[490:540, 600:680].mean(axis=2)
     darkest = ((mouth[:-2] + mouth[1:-1] + mouth[2:]) / 3).min(axis=0)
     assert np.abs(np.diff(darkest)).mean() < 1.3
     assert darkest.mean() < 0.75 * mouth.mean()
@@ -237,7 +237,7 @@ def test_the_mouth_does_not_come_through_the_skin_above_protruded_lips():
 
 
 def test_a_picture_of_the_moving_part_is_the_whole_picture():
-    stage, pose = Stage(camera_for(320, 240)), CharacterPose(gap=0.1, turn=(0.2, 0.05, 0.0))
+    stage, pose = Stage(make_camera(320, 240)), CharacterPose(gap=0.1, turn=(0.2, 0.05, 0.0))
     drawn = stage.figure.frame(pose, stage.canvas.camera.place)
     whole = stage.canvas.picture(drawn.places, drawn.light, stage.figure.triangles)
     assert np.array_equal(stage.picture(pose), whole)

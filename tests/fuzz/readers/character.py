@@ -16,7 +16,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion_faces.characters.binding_files import save_binding, write_weights
 from lipmotion_faces.characters.character_files import load_character, read_character
 from lipmotion_faces.mesh import MeshStage
-from lipmotion_faces.rendering.drawn_surface import drawn_surface
+from lipmotion_faces.rendering.drawn_surface import prepare_surface
 from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
 from meshes.heads import head, lip_points, write_glb, write_obj
 from meshes.speech import motion, units
@@ -127,7 +127,7 @@ def read(folder: Path, _: Good) -> None:
     path = next(path for name, path in sorted(found.items()) if name in HEADS)
     binding = found.get("head.binding") or found.get("weights.csv")
     mesh = read_character(path)
-    surface = drawn_surface(mesh, np.ones(len(mesh.triangles), bool), 1.0)
+    surface = prepare_surface(mesh, np.ones(len(mesh.triangles), bool), 1.0)
     require(len(surface.triangles.levels) > surface.triangles.looks[:, 0].max(initial=-1), "a texture that is missing")
     character = load_character(path, points=found.get("points.csv"), binding=binding)
     for vertices in islice(character.vertices(motion(), units(), np.array([0.55, 0.75, 1.15])), 3):

@@ -10,7 +10,7 @@ from typing import Any
 from fuzz.inputs import Files, Good
 from fuzz.plausible import good_model, refuse_constant, require, short_speech
 from lipmotion_studio.requests import TOKEN_HEADER
-from lipmotion_studio.study.application import study_application
+from lipmotion_studio.study.application import create_application
 from lipmotion_studio.study.manifest import check_videos
 from lipmotion_studio.study.store import StudyStore
 from pipeline.made import write_sound
@@ -80,5 +80,5 @@ def _applications(good: Good) -> tuple[Application, Application, str]:
     opened.ready()
     study = small_study(place / "study")
     store = StudyStore(place / "study", create=True)
-    application = study_application(study, check_videos(study, place / "study"), store)
+    application = create_application(study, check_videos(study, place / "study"), store)
     return opened.application, application, ask(application, "/api/raters", {"agrees": True}).content["token"]

@@ -22,7 +22,7 @@ from lipmotion_studio.project import (
     Project,
     ProjectRecording,
     parse_project,
-    project_document,
+    describe_project,
 )
 from lipmotion_studio.study.answers import COLUMNS, read_answers
 from lipmotion_studio.study.manifest import MANIFEST, read_study
@@ -61,7 +61,7 @@ def seeds(_: Good) -> list[Files]:
     votes = [{"line": "a", "shown": [side, side | {"name": "b", "model": ""}], "better": 1}]
     votes.append({"line": "a", "shown": ["x", "y"], "better": "x", "edits": DIGEST})
     answers = "r1,mos,0,hi,natural,a,,4,3.5,1,0,\n"
-    found = {"job.json": json.dumps(JOB), PROJECT: json.dumps(project_document(project)), VOTES: json.dumps(votes)}
+    found = {"job.json": json.dumps(JOB), PROJECT: json.dumps(describe_project(project)), VOTES: json.dumps(votes)}
     found |= {"job.toml": "".join(f"[{name}]\n{_toml(table)}" for name, table in JOB.items())}
     found |= {TRAINING: json.dumps({"format": "lipmotion.training", "version": 1, "made": [TRAINED], **TRAINED})}
     found |= {"answers.csv": ",".join(COLUMNS) + "\n" + answers}
@@ -106,7 +106,7 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
             Trainer(ProjectFolder(Path(own))).document()
     elif name == PROJECT:
         project = ProjectFolder(folder).project
-        require(parse_project(from_json(json.dumps(project_document(project)))) == project, "another project")
+        require(parse_project(from_json(json.dumps(describe_project(project)))) == project, "another project")
         for line in project.lines.values():
             require(not ProjectFolder(folder).edits(line).exists(), "edits that nobody wrote")
     elif name.startswith("answers"):

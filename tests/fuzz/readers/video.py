@@ -11,7 +11,7 @@ import numpy as np
 
 from fuzz.inputs import Files, Good
 from fuzz.plausible import require
-from lipmotion_faces.tracking.frames import nominal_rate_hz, open_video
+from lipmotion_faces.tracking.frames import find_nominal_rate, open_video
 from speech.sounds import tone, write_pictures, write_sound
 
 CODECS = {
@@ -65,6 +65,6 @@ def read(folder: Path, _: Good) -> None:
             require(height * width <= MAX_PIXELS, "a picture that is too large")
             require(math.isfinite(frame.time_s), "a picture without a time")
             times_s.append(frame.time_s)
-        rate_hz = nominal_rate_hz(np.array(times_s), video.stated_rates_hz)
+        rate_hz = find_nominal_rate(np.array(times_s), video.stated_rates_hz)
     require(bool((np.diff(times_s) > 0).all()), "times that do not rise")
     require(0 < rate_hz < math.inf, "a frame rate that is none")

@@ -34,10 +34,10 @@ from lipmotion_faces.corpus.long_videos import (
     SHORTEST_S,
     SpokenPart,
     find_transcript,
-    spoken_lines,
-    utterance_spans,
+    list_spoken_lines,
+    find_utterances,
 )
-from lipmotion_faces.corpus.sync import offsets, sync
+from lipmotion_faces.corpus.sync import measure_offsets, remove_offsets
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.track import VideoScan, track
 from pipeline.made import features_of, read_sound, replace_tracking
@@ -223,7 +223,7 @@ def joined(clips: list[Path], path: Path) -> None:
 def spans(
     stretches: list[SpokenPart], cuts_s: list[float] | None = None, duration_s: float = 100.0
 ) -> list[SpokenPart]:
-    return utterance_spans(stretches, cuts_s or [], duration_s, lambda low_s, high_s: (low_s + high_s) / 2)
+    return find_utterances(stretches, cuts_s or [], duration_s, lambda low_s, high_s: (low_s + high_s) / 2)
 
 
 def edges(found: list[SpokenPart]) -> list[tuple[float, float]]:
@@ -266,7 +266,7 @@ def test_lines_that_overlap_end_where_the_next_begins():
 def test_a_short_pause_belongs_to_both_neighbours_up_to_where_it_is_quietest():
     parts = [SpokenPart(1, 5), SpokenPart(5.3, 9), SpokenPart(9.5, 13), SpokenPart(13.3, 16)]
     for quietest_s in (9.0, 9.5):
-        found = utterance_spans(parts, [], 100.0, lambda *_, at_s=quietest_s: at_s)
+        found = find_utterances(parts, [], 100.0, lambda *_, at_s=quietest_s: at_s)
         assert edges(found) == [(0.7, quietest_s), (quietest_s, 16.3)]
 
 
@@ -320,7 +320,7 @@ def test_transcripts_beside_a_video(tmp_path, name, text, expected):
     (tmp_path / name).write_text(text)
     transcript = find_transcript(tmp_path / "talk.mp4")
     assert transcript is not None
-    assert [(part.start_s, part.end_s, part.words) for part in spoken_lines(transcript)] == expected
+    assert [(part.start_s, part.end_s, part.words) for part in list_spoken_lines(transcript)] == expected
 
 
 def test_subtitles_come_before_plain_text(tmp_path):
@@ -338,7 +338,7 @@ def test_times_that_are_missing():
         TranscriptLine((you,), 3.0, 3.5),
         TranscriptLine((you,), 5.0, None),  # not known how long
     )
-    found = spoken_lines(TimedTranscript(lines))
+    found = list_spoken_lines(TimedTranscript(lines))
     assert [(part.start_s, part.end_s, part.words) for part in found] == [
         (1.0, 3.0, ("hello", "you")),
         (3.0, 3.5, ("you",)),
@@ -382,7 +382,7 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
     """Two collections: one in step, one whose sound is 120 ms late; loudness is all that their lips follow."""
     energy = np.zeros((11, 13))
     energy[4, 12], energy[6, 12] = -1, 1
-    monkeypatch.setattr("lipmotion_faces.corpus.sound_offset._weights", energy.ravel)
+    monkeypatch.setattr("lipmotion_faces.corpus.sound_offset._load_weights", energy.ravel)
     made = Corpus.create(tmp_path / "corpus")
     for seed in range(COUNT):
         made.add(utterance(seed, 0.0, "here"), {"recipe": "9"})
@@ -391,7 +391,7 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
 
 
 def test_each_collection_has_its_own(corpus):
-    found = offsets(corpus)
+    found = measure_offsets(corpus)
     assert set(found.clips) == set(corpus.names())
     assert found.collections["there"].late_s - found.collections["here"].late_s == pytest.approx(0.12, abs=0.01)
     assert found.collections["there"].known
@@ -401,8 +401,8 @@ def test_each_collection_has_its_own(corpus):
 
 def test_sync_moves_what_is_late_once(corpus):
     before = {name: corpus.utterance(name).audio.samples.copy() for name in corpus.names()}
-    late_s = offsets(corpus).collections["there"].late_s
-    moved = sync(corpus)
+    late_s = measure_offsets(corpus).collections["there"].late_s
+    moved = remove_offsets(corpus)
     assert moved["there"] == late_s
     again = Corpus.open(corpus.path)
     shift = round(late_s * RATE_HZ)
@@ -413,8 +413,8 @@ def test_sync_moves_what_is_late_once(corpus):
         assert float(one.source["offset_removed_ms"]) == pytest.approx(1000 * late_s, abs=0.1)
         assert one.features.values.shape[0] == len(one.audio.samples) // 160 + 1
         assert json.loads((again.folder(name) / "entry.json").read_text())["settings"] == {"recipe": "9"}
-    assert abs(offsets(again).collections["there"].late_s) < 0.005
-    assert "there" not in sync(again)
+    assert abs(measure_offsets(again).collections["there"].late_s) < 0.005
+    assert "there" not in remove_offsets(again)
     assert module.move_sound(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
 
 
@@ -440,7 +440,7 @@ def test_curves_without_lips_are_passed_over(corpus):
     one = corpus.utterance("here0")
     jaw = Track(Motion(np.zeros((75, 1)), 25.0, (Channel("jaw"),)), np.ones(75, bool))
     corpus.add(replace(one, name="jaw", track=jaw))
-    assert set(offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
+    assert set(measure_offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
 
 
 def test_lips_that_do_not_follow_are_left_alone(corpus):
@@ -448,10 +448,10 @@ def test_lips_that_do_not_follow_are_left_alone(corpus):
     still = [corpus.utterance(name) for name in names]
     for name, other in zip(names, [*still[1:], still[0]], strict=True):
         corpus.add(replace(corpus.utterance(name), track=other.track), {})
-    assert not offsets(corpus).collections["there"].known
-    line = offsets(corpus).lines()[1]
+    assert not measure_offsets(corpus).collections["there"].known
+    line = measure_offsets(corpus).lines()[1]
     assert line.startswith("there: not measured: 4 clips of this voice cannot tell whether the sound is late. Training")
     assert line.endswith("give corpus prepare --offset-ms")
     before = corpus.utterance(names[0]).audio.samples.copy()
-    assert "there" not in sync(corpus)
+    assert "there" not in remove_offsets(corpus)
     np.testing.assert_array_equal(corpus.utterance(names[0]).audio.samples, before)

@@ -19,7 +19,7 @@ from lipmotion.pipeline.training.prompts import cover_greedily, find_units, prom
 from lipmotion.storage.locks import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Span, Timeline, Track, Unit
 from lipmotion.units import PHONES, Lexicon, find_similar_lips
-from lipmotion_faces.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
+from lipmotion_faces.corpus.coverage import measure_coverage, coverage_to_json, format_coverage, measure_phone_distances
 from pipeline.made import replace_tracking, write_noise
 from testing.toy import toy_utterances
 
@@ -307,7 +307,7 @@ def format_moods(path: Path, *lines: str) -> Path:
 
 def test_counts_and_shares(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab")
-    found = coverage(corpus, format_moods(tmp_path / "text", "pab", "tib", "pab tib"), lexicon=WORDS)
+    found = measure_coverage(corpus, format_moods(tmp_path / "text", "pab", "tib", "pab tib"), lexicon=WORDS)
     phones, diphones, triphones = found.kinds
     assert (phones.needed, phones.covered) == (5, 3)
     assert phones.share == pytest.approx(8 / 12)
@@ -326,7 +326,7 @@ def test_counts_and_shares(tmp_path):
 def test_what_stands_in(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab pab tib")
     lexicon = Lexicon(WORDS.user | {"bad": (("b", "aa", "d"),), "dib": (("d", "iy", "m"),)})
-    phones, diphones, triphones = coverage(corpus, format_moods(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
+    phones, diphones, triphones = measure_coverage(corpus, format_moods(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
     stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
     assert stand_ins["d"] == ("t", 1)
     assert stand_ins["m"][0] == find_similar_lips("m", {"p", "aa", "b", "t", "iy"}) == "p"
@@ -340,13 +340,13 @@ def test_what_stands_in(tmp_path):
 
 def test_the_nearest_has_the_least_distance(tmp_path, toy_corpus):
     """Recomputed one by one, in plain Python."""
-    distances, number = phone_distances(), {phone: n for n, phone in enumerate(PHONES)}
+    distances, number = measure_phone_distances(), {phone: n for n, phone in enumerate(PHONES)}
     lexicon = Lexicon()
     recorded: Counter[tuple[str, ...]] = Counter()
     for name in toy_corpus.names():
         phones = [p for word in toy_corpus.utterance(name).words or () for p in lexicon.pronunciations(word)[0]]
         recorded.update(zip(["sil", *phones[:-1]], phones, [*phones[1:], "sil"], strict=True))
-    _, _, triphones = coverage(toy_corpus, format_moods(tmp_path / "text", "please judge the toys")).kinds
+    _, _, triphones = measure_coverage(toy_corpus, format_moods(tmp_path / "text", "please judge the toys")).kinds
     assert triphones.missing
 
     def cost(wanted: tuple[str, ...], other: tuple[str, ...]) -> float:
@@ -366,7 +366,7 @@ def test_labelled_phones_count_and_silence_divides_them(tmp_path):
     step_s = utterance.audio.duration_s / len(names)
     spans = tuple(Span(n * step_s, (n + 1) * step_s, Unit(name)) for n, name in enumerate(names))
     corpus.add(replace(utterance, phones=Timeline(spans), words=("tib",)))
-    phones, diphones, _ = coverage(corpus, format_moods(tmp_path / "text", "pab tib"), lexicon=WORDS).kinds
+    phones, diphones, _ = measure_coverage(corpus, format_moods(tmp_path / "text", "pab tib"), lexicon=WORDS).kinds
     assert {unit.unit for unit in phones.missing} == {"t", "iy"}
     assert "aa-b" in {unit.unit for unit in diphones.missing}
     assert "p-aa" not in {unit.unit for unit in diphones.missing}
@@ -374,22 +374,22 @@ def test_labelled_phones_count_and_silence_divides_them(tmp_path):
 
 def test_sentences_of_the_package_and_what_is_not_counted(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "see bob", "qwrtzx", None)
-    found = coverage(corpus)
+    found = measure_coverage(corpus)
     assert (found.utterances, found.unknown, found.left_out) == (3, 2, {})
     assert [kind.needed for kind in found.kinds[:2]] == [42, 1047]
     assert found.kinds[0].share > found.kinds[1].share > found.kinds[2].share > 0
 
 
 def test_text_is_bounded_and_json_holds_everything(tmp_path):
-    found = coverage(corpus_of(tmp_path / "corpus", "see bob"))
-    lines = list(coverage_lines(found, 5))
+    found = measure_coverage(corpus_of(tmp_path / "corpus", "see bob"))
+    lines = list(format_coverage(found, 5))
     assert len(lines) == 4 + 3 * (2 + 5 + 1)
     assert max(map(len, lines)) < 80
     missing = [len(kind.missing) - 5 for kind in found.kinds]
     assert [line for line in lines if line.startswith("and ")] == [
         f"and {count} more {kind.kind}" for count, kind in zip(missing, found.kinds, strict=True)
     ]
-    document = json.loads(json.dumps(coverage_document(found)))
+    document = json.loads(json.dumps(coverage_to_json(found)))
     assert [len(kind["missing"]) for kind in document["kinds"]] == [len(kind.missing) for kind in found.kinds]
     assert set(document["kinds"][0]["missing"][0]) == {"unit", "count", "share", "stand_in", "recorded"}
 

@@ -115,7 +115,7 @@ def test_silence_is_named_as_recognition_names_it():
         *[(1.0, 1.2, "b"), (1.2, 1.3, "sil")],
     )
     assert supplied.read_supplied_phones(recording(None), 1.3) is None
-    assert "phones_sha256" not in supplied.source_digests(recording(None))
+    assert "phones_sha256" not in supplied.digest_sources(recording(None))
 
 
 @given(
@@ -146,9 +146,9 @@ def test_labels_that_go_on_after_the_sound():
 
 def test_a_source_is_not_touched(studio):
     item = replace(recording(said((0, 1, "aa"))), motion_file=MotionFile(studio / "a.npz"))
-    assert set(supplied.source_digests(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
-    assert supplied.source_digests(item) == supplied.source_digests(item)
-    assert supplied.source_digests(item) != supplied.source_digests(replace(item, phones=said((0, 1.001, "aa"))))
+    assert set(supplied.digest_sources(item)) == {"motion_file", "motion_sha256", "phones_sha256"}
+    assert supplied.digest_sources(item) == supplied.digest_sources(item)
+    assert supplied.digest_sources(item) != supplied.digest_sources(replace(item, phones=said((0, 1.001, "aa"))))
 
 
 def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):

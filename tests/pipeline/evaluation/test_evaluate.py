@@ -22,7 +22,7 @@ from lipmotion.speech.recognition.recogniser import open_recogniser
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Speech, StateTrace, Track, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
-from lipmotion_lab.evaluation.evaluate import _was_trained_on, figures_of
+from lipmotion_lab.evaluation.evaluate import _was_trained_on, measure_clips
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, load_held_out, make_speech
 from meshes.speech import motion
 from pipeline import made
@@ -318,7 +318,7 @@ def test_closings_elsewhere_are_counted_per_minute_of_other_speech():
     spoken = ((0.0, 10.0, "m"), (10.0, 20.0, "aa"))
     clip = ComparedClip(original, generated, time_s, spoken)
     recordings = SimpleNamespace(channels=("opening",), closed_under=0.1, eigenlips_channels=())
-    lips = figures_of([clip], recordings, 0)["closures_p_b_m"]  # type: ignore[arg-type]
+    lips = measure_clips([clip], recordings, 0)["closures_p_b_m"]  # type: ignore[arg-type]
     assert (lips["false_per_minute"], lips["original_per_minute"]) == pytest.approx((6, 0))
 
 

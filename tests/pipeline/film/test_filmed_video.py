@@ -17,11 +17,11 @@ from lipmotion_faces.film import background
 from lipmotion_faces.film.background import (
     HEAD_PX,
     BackgroundSequence,
-    chin_px,
+    measure_chin,
     open_background,
     open_stored_background,
 )
-from lipmotion_faces.film.filmed_video import face_codes, is_person_of, make_film, person_shown, write_film
+from lipmotion_faces.film.filmed_video import predict_codes, is_person_of, make_film, find_other_person, write_film
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Background, Stitcher
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.tracking.frames import WHOLE
@@ -100,7 +100,7 @@ def test_lips_close_in_p_b_and_m(filmed_face):
 
 def test_the_refinement_as_printed(filmed_face, brief):
     """Eqs. 14-16 of Xie & Liu 2007, colour by colour, of the mean of three pictures."""
-    codes = face_codes(filmed_face, brief, Timeline(()), 5, 25.0)
+    codes = predict_codes(filmed_face, brief, Timeline(()), 5, 25.0)
     options = replace(AS_PRINTED, noise=False)
     made = np.stack(list(Stitcher(filmed_face.appearance, options).mouths(codes))).astype(float)
     space, mouths = filmed_face.appearance.mouth, filmed_face.appearance.mouths
@@ -287,10 +287,10 @@ def test_the_person_of_one_corpus(filmed_face):
 
 def test_without_speech_nothing_is_mapped(filmed_face, caplog):
     face = face_of(filmed_face, "anna")
-    assert person_shown(model_of("ben"), replace(face, takes=())) is None
+    assert find_other_person(model_of("ben"), replace(face, takes=())) is None
     assert "built from footage without sound" in caplog.text
-    assert person_shown(model_of("ben"), face) is face
-    assert person_shown(model_of("anna"), face) is None
+    assert find_other_person(model_of("ben"), face) is face
+    assert find_other_person(model_of("anna"), face) is None
     assert shown_face(face).other_person(model_of("ben")) is face
     assert shown_face("portrait").other_person(model_of("ben")) is None
 
@@ -370,7 +370,7 @@ def test_the_face_box_holds_the_head_in_every_frame(sequence):
 
 
 def test_the_chin_is_where_the_tracker_sees_it(video):
-    found, drawn = chin_px(footage_of(video)), toy_chin_px(video.motion)
+    found, drawn = measure_chin(footage_of(video)), toy_chin_px(video.motion)
     assert np.abs(found - drawn).max() < 4  # it is smoothed over about a frame
     assert np.corrcoef(found, drawn)[0, 1] > 0.95
 

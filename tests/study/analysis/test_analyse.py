@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json, replace_nan
-from lipmotion_studio.study.analysis.analyse import RULES, analyse_study, analysis_table, counts, screen
+from lipmotion_studio.study.analysis.analyse import RULES, analyse_study, format_analysis, select_counting, screen
 from lipmotion_studio.study.answers import Answer, write_answers
 from study.simulated import Effects, comparisons, pair_answer, paired_answers, rated_answers, rating, ratings
 
@@ -35,14 +35,14 @@ def test_figures_come_with_and_without_screening(tmp_path):
 
 def test_the_table_has_all_figures():
     figures = analyse_study(study(), baseline="ph-HMM")
-    text = analysis_table(figures)
+    text = format_analysis(figures)
     assert "recording - anchor" not in text
     for part in figures["screened"]:
         for row in part["conditions"]:
             number = f"{row['share']:.1%}" if "share" in row else f"{row['mean']:.2f}"
             assert any(row["condition"] in line and number in line for line in text.splitlines())
     assert "all raters" in text
-    assert "all raters" not in analysis_table(analyse_study([each for each in study() if each.rater != "r3"]))
+    assert "all raters" not in format_analysis(analyse_study([each for each in study() if each.rater != "r3"]))
 
 
 def test_more_sentences_need_fewer_raters():
@@ -77,7 +77,7 @@ def test_no_rater_left():
     answers = [replace(rating(("r", "s"), "a", 3), expected="4"), rating(("r", "s"), "a", 3)]
     figures = analyse_study(answers)
     assert figures["screened"] is None
-    assert "no rater is left after screening: figures of all raters" in analysis_table(figures)
+    assert "no rater is left after screening: figures of all raters" in format_analysis(figures)
 
 
 DEGENERATE = {
@@ -97,7 +97,7 @@ DEGENERATE = {
 def test_degenerate_studies_have_figures_without_numbers_that_are_none(name):
     """No division warns, and what is unknown is a dash and null."""
     figures = analyse_study(DEGENERATE[name])
-    text = analysis_table(figures)
+    text = format_analysis(figures)
     assert not re.search(r"\b(nan|inf)\b", text)
     as_json(replace_nan(figures))
 
@@ -188,5 +188,5 @@ def test_four_raters_are_no_panel_for_times():
 
 
 def test_practice_and_checks_do_not_count():
-    assert len(counts(panel())) == len(panel()) - 30
+    assert len(select_counting(panel())) == len(panel()) - 30
     assert screen([]).raters == ()

@@ -4,7 +4,7 @@ from scipy import stats
 
 from lipmotion.errors import InputError
 from lipmotion_studio.study.analysis import paired
-from lipmotion_studio.study.analysis.paired import deviations, fit_strengths, link_groups
+from lipmotion_studio.study.analysis.paired import compute_deviations, fit_strengths, link_groups
 from study.simulated import Effects, comparisons, expected_preference, pair_answer, paired_answers
 
 USUAL = Effects(rater_each=0.4, sentence_each=0.3)
@@ -14,8 +14,8 @@ def test_the_binomial_test_is_that_of_a_statistics_package():
     for count in (1, 2, 7, 36, 360):
         for wins in {0, 1, count // 3, count // 2, count - 1, count}:
             expected = stats.binomtest(wins, count)
-            assert paired.binomial_p(wins, count) == pytest.approx(expected.pvalue)
-            assert paired.exact_interval(wins, count) == pytest.approx(tuple(expected.proportion_ci()))
+            assert paired.compute_binomial_p(wins, count) == pytest.approx(expected.pvalue)
+            assert paired.compute_exact_interval(wins, count) == pytest.approx(tuple(expected.proportion_ci()))
 
 
 def test_a_table_is_counted_right():
@@ -25,20 +25,20 @@ def test_a_table_is_counted_right():
         pair_answer(("r1", "s2"), ("a", "b"), True),
         pair_answer(("r2", "s1"), ("b", "a"), True),
     ]
-    table = paired.pair_table(answers)
+    table = paired.build_pair_table(answers)
     first, second = table.wins()
     assert first.tolist() == [[0, 2], [1, 0]]
     assert second.tolist() == [[0, 0], [1, 0]]
-    (pair,) = paired.paired_figures(table)["pairs"]
+    (pair,) = paired.analyse_pairs(table)["pairs"]
     assert (pair["condition"], pair["other"], pair["wins"], pair["answers"]) == ("a", "b", 3, 4)
     assert pair["share"] == pytest.approx(2 / 3)  # of three cells: the one in both orders counts once
-    assert paired.order_agreement(table).tolist() == [[1, 1], [0, 0]]
-    assert paired.consistency(table) == {"pairs": 1, "consistent": 1, "share": 1.0}
+    assert paired.measure_order_agreement(table).tolist() == [[1, 1], [0, 0]]
+    assert paired.measure_consistency(table) == {"pairs": 1, "consistent": 1, "share": 1.0}
 
 
 def test_answers_survive_the_table():
     table = comparisons(np.random.default_rng(0), np.array([0, 0.5, 1]), (3, 2), USUAL)
-    again = paired.pair_table(paired_answers(table))
+    again = paired.build_pair_table(paired_answers(table))
     assert again.conditions == table.conditions
     for name in ("shown", "is_first", "rater", "sentence"):
         assert np.array_equal(getattr(again, name), getattr(table, name)), name
@@ -47,13 +47,13 @@ def test_answers_survive_the_table():
 @pytest.mark.parametrize("other", ["a", ""])
 def test_a_pair_has_two_conditions(other):
     with pytest.raises(InputError, match=f"'a' compared with '{other}', required two conditions"):
-        paired.pair_table([pair_answer(("r", "s"), ("a", other), True)])
+        paired.build_pair_table([pair_answer(("r", "s"), ("a", other), True)])
 
 
 def test_known_preferences_are_found():
     strengths = np.array([-0.6, -0.2, 0.8])
     table = comparisons(np.random.default_rng(1), strengths, (60, 30), USUAL, order=0.3)
-    figures = paired.paired_figures(table)
+    figures = paired.analyse_pairs(table)
     found = {row["condition"]: row for row in figures["bradley_terry"]["conditions"]}
     assert [row["condition"] for row in figures["bradley_terry"]["conditions"]] == ["c2", "c1", "c0"]
     for name, truth in zip(("c0", "c1", "c2"), 0.91 * strengths, strict=True):  # raters and sentences blur odds
@@ -70,18 +70,18 @@ def test_known_preferences_are_found():
 def test_answers_of_one_rater_are_not_so_many_raters():
     """Raters disagree about what is better, each sure of it: the binomial test is wrong, the other is not."""
     cells = np.repeat(np.array([1.0, 1, 1, 0, 1, 0, 1, 1])[:, None], 40, axis=1)
-    figures = paired.share_figures(cells)
-    assert paired.binomial_p(int(cells.sum()), cells.size) < 1e-9
+    figures = paired.analyse_shares(cells)
+    assert paired.compute_binomial_p(int(cells.sum()), cells.size) < 1e-9
     assert figures["p"] > 0.1
     assert figures["low"] < 0.5 < figures["high"]
 
 
 def test_raters_who_all_agree_count_once_each():
-    figures = paired.share_figures(np.ones((6, 30)))
+    figures = paired.analyse_shares(np.ones((6, 30)))
     assert figures["over"] == paired.ALL_EQUAL
     assert (figures["low"], figures["high"]) == pytest.approx(tuple(stats.binomtest(6, 6).proportion_ci()))
     assert figures["p"] == pytest.approx(2 * 0.5**6)
-    assert paired.share_figures(np.zeros((6, 30)))["high"] == pytest.approx(1 - figures["low"])
+    assert paired.analyse_shares(np.zeros((6, 30)))["high"] == pytest.approx(1 - figures["low"])
 
 
 def test_raters_who_prefer_one_side_have_a_share_of_one_half_and_no_interval():
@@ -91,7 +91,7 @@ def test_raters_who_prefer_one_side_have_a_share_of_one_half_and_no_interval():
         for s in range(2)
         for shown in (("a", "b"), ("b", "a"))
     ]
-    figures = paired.paired_figures(paired.pair_table(answers))
+    figures = paired.analyse_pairs(paired.build_pair_table(answers))
     (pair,) = figures["pairs"]
     assert pair["share"] == 0.5
     assert np.isnan([pair["low"], pair["high"], pair["p"], pair["p_holm"]]).all()
@@ -108,7 +108,7 @@ def test_intervals_cover_known_preferences():
         row["low"] <= share <= row["high"]
         for _ in range(700)
         for row, share in zip(
-            paired.paired_figures(comparisons(draw, strengths, (12, 6), USUAL))["pairs"], truth, strict=True
+            paired.analyse_pairs(comparisons(draw, strengths, (12, 6), USUAL))["pairs"], truth, strict=True
         )
     ]
     assert 0.93 < np.mean(hits) < 0.97
@@ -153,7 +153,7 @@ def test_deviations_of_the_answers_sum_to_nothing():
     games = [((i, j), True) for i, j in np.ndindex(7, 7) for _ in range(int(HOME[i, j]))]
     games += [((i, j), False) for i, j in np.ndindex(7, 7) for _ in range(int(AWAY[i, j]))]
     pairs, is_first = np.array([pair for pair, _ in games]), np.array([won for _, won in games])
-    moved = deviations(model, pairs, is_first)
+    moved = compute_deviations(model, pairs, is_first)
     assert np.abs(moved).max() > 0.01
     assert moved.sum(axis=0) == pytest.approx(np.zeros(8), abs=1e-8)
 
@@ -163,7 +163,7 @@ def test_what_an_answer_moves_is_what_its_weight_changes():
     more = HOME.copy()
     more[0, 1] += step
     other = fit_strengths(more, AWAY)
-    moved = deviations(model, np.array([[0, 1]]), np.array([True]))[0]
+    moved = compute_deviations(model, np.array([[0, 1]]), np.array([True]))[0]
     change = np.append(other.strengths - model.strengths, other.order - model.order) / step
     assert moved == pytest.approx(change, rel=1e-2, abs=1e-4)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lipmotion_studio.study.analysis.analyse import power_of, raters_needed, rating_power, share_power
+from lipmotion_studio.study.analysis.analyse import compute_power, find_raters_needed, list_rating_power, list_share_power
 from lipmotion_studio.study.analysis.crossed import (
     BOTH,
     RANKS,
@@ -11,11 +11,11 @@ from lipmotion_studio.study.analysis.crossed import (
     SENTENCES,
     Components,
     RatingTable,
-    crossed_mean,
-    holm,
-    rating_figures,
-    rating_table,
-    relative_improvement,
+    estimate_crossed_mean,
+    correct_p_values,
+    analyse_ratings,
+    build_rating_table,
+    measure_improvement,
 )
 from lipmotion_studio.study.answers import MOS
 from study.simulated import Effects, expected_rating, rated_answers, rating, ratings
@@ -37,12 +37,12 @@ def test_improvement_is_that_of_the_paper():
     values = np.tile(np.array(list(XIE_LIU.values()))[:, None, None], (1, 4, 3))
     table = RatingTable(tuple(XIE_LIU), values, np.ones(values.shape, np.intp), SCALES[MOS])
     for name, percent in IMPROVEMENT.items():
-        assert round(relative_improvement(table, name, "ph-HMM")["percent"], 2) == percent
+        assert round(measure_improvement(table, name, "ph-HMM")["percent"], 2) == percent
 
 
 def test_improvement_has_an_interval_around_it():
     table = simulated((30, 12))
-    row = relative_improvement(table, "c2", "c0")
+    row = measure_improvement(table, "c2", "c0")
     c0, c2 = (table.of(name).mean() for name in ("c0", "c2"))
     assert row["percent"] == pytest.approx(100 * (c2 - c0) / c0)
     assert row["low"] < row["percent"] < row["high"]
@@ -52,16 +52,16 @@ def test_improvement_has_an_interval_around_it():
 
 def test_answers_survive_the_table():
     table = simulated((3, 4))
-    again = rating_table(rated_answers(table))
+    again = build_rating_table(rated_answers(table))
     assert again.conditions == table.conditions
     assert np.array_equal(again.values, table.values)
     assert (
-        rating_table(rated_answers(ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), RANKS))).scale == RANKS
+        build_rating_table(rated_answers(ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), RANKS))).scale == RANKS
     )
 
 
 def test_known_means_are_found():
-    figures = rating_figures(simulated((60, 40)), None)
+    figures = analyse_ratings(simulated((60, 40)), None)
     assert figures["baseline"] == "c0"
     assert [row["condition"] for row in figures["conditions"]] == ["c2", "c1", "c0"]
     for row, mean in zip(figures["conditions"], MEANS[::-1], strict=True):
@@ -72,7 +72,7 @@ def test_known_means_are_found():
 def test_a_difference_of_few_raters_on_one_sentence_is_the_paired_t_test():
     table = simulated((12, 1))
     usual = stats.ttest_rel(table.of("c1")[:, 0], table.of("c0")[:, 0])
-    row = next(row for row in rating_figures(table, None)["pairs"] if row["other"] == "c1")
+    row = next(row for row in analyse_ratings(table, None)["pairs"] if row["other"] == "c1")
     assert row["p"] == pytest.approx(usual.pvalue)
     assert (-row["high"], -row["low"]) == pytest.approx(tuple(usual.confidence_interval()))
     assert row["over"] == "raters"
@@ -88,7 +88,7 @@ def test_what_raters_add_to_all_conditions_leaves_differences():
 
 def test_the_anchor_is_shown_but_not_tested():
     table = simulated((8, 6))
-    figures = rating_figures(RatingTable(("a", "anchor", "recording"), table.values, table.count, table.scale), None)
+    figures = analyse_ratings(RatingTable(("a", "anchor", "recording"), table.values, table.count, table.scale), None)
     assert len(figures["conditions"]) == 3
     assert [(row["condition"], row["other"]) for row in figures["pairs"]] == [("a", "recording")]
     assert figures["baseline"] == "a"
@@ -97,7 +97,7 @@ def test_the_anchor_is_shown_but_not_tested():
 
 def test_conditions_never_compared_by_one_rater_have_no_difference():
     answers = [rating((f"r{r}", f"s{s}"), "ab"[r % 2], 1 + (r + s) % 5) for r in range(6) for s in range(4)]
-    figures = rating_figures(rating_table(answers), "a")
+    figures = analyse_ratings(build_rating_table(answers), "a")
     (pair,) = figures["pairs"]
     assert np.isnan([pair["difference"], pair["low"], pair["p"], pair["p_holm"]]).all()
     assert pair["over"] == "nothing"
@@ -112,7 +112,7 @@ def test_a_baseline_of_nothing_has_no_improvement_over_it():
         for s in "xy"
         for name in "ab"
     ]
-    (row,) = rating_figures(rating_table(ranks), "a")["relative_improvement"]
+    (row,) = analyse_ratings(build_rating_table(ranks), "a")["relative_improvement"]
     assert np.isnan(row["percent"])
 
 
@@ -121,7 +121,7 @@ def test_intervals_cover_known_means_near_the_end_of_the_scale():
     draw, truth = np.random.default_rng(3), [expected_rating(mean, Effects()) for mean in MEANS]
     hits = []
     for _ in range(400):
-        rows = rating_figures(ratings(draw, MEANS, (20, 6), Effects()), None)["conditions"]
+        rows = analyse_ratings(ratings(draw, MEANS, (20, 6), Effects()), None)["conditions"]
         hits += [row["low"] <= truth[int(row["condition"][1])] <= row["high"] for row in rows]
     assert 0.93 < np.mean(hits) < 0.97
 
@@ -135,52 +135,52 @@ def told(components: Components, difference: float, raters: int, sentences: int,
     for _ in range(studies):
         values = difference + rest * draw.normal(size=(raters, sentences))
         values += rater * draw.normal(size=(raters, 1)) + sentence * draw.normal(size=(1, sentences))
-        found += crossed_mean(values, 4.0).p_value < 0.05
+        found += estimate_crossed_mean(values, 4.0).p_value < 0.05
     return found / studies
 
 
 @pytest.mark.parametrize("components", [USUAL, Components(0, 0, 1.0), Components(0.0, 0.3, 0.5)])
 def test_power_is_that_of_simulated_studies(components):
-    assert power_of(components, 0.5, 12, 6) == pytest.approx(told(components, 0.5, 12, 6, 800), abs=0.04)
+    assert compute_power(components, 0.5, 12, 6) == pytest.approx(told(components, 0.5, 12, 6, 800), abs=0.04)
 
 
 def test_where_raters_alone_differ_power_is_that_of_the_t_test():
     critical, shift = stats.t.ppf(0.975, 15), 0.5 / np.sqrt(0.5 / 16)
     usual = 1 - stats.nct.cdf(critical, 15, shift) + stats.nct.cdf(-critical, 15, shift)
-    assert power_of(Components(0.5, 0, 1e-9), 0.5, 16, 6) == pytest.approx(usual, abs=0.01)
+    assert compute_power(Components(0.5, 0, 1e-9), 0.5, 16, 6) == pytest.approx(usual, abs=0.01)
 
 
 def test_the_number_of_raters_is_the_smallest():
     for difference in (0.3, 0.5, 1.0):
-        raters = raters_needed(USUAL, difference, 12)
+        raters = find_raters_needed(USUAL, difference, 12)
         assert raters is not None
-        assert power_of(USUAL, difference, raters, 12) >= 0.8
-        assert raters == 2 or power_of(USUAL, difference, raters - 1, 12) < 0.8
-    assert raters_needed(USUAL, 0.5, 12, 0.95) > raters_needed(USUAL, 0.5, 12)  # type: ignore[operator]
+        assert compute_power(USUAL, difference, raters, 12) >= 0.8
+        assert raters == 2 or compute_power(USUAL, difference, raters - 1, 12) < 0.8
+    assert find_raters_needed(USUAL, 0.5, 12, 0.95) > find_raters_needed(USUAL, 0.5, 12)  # type: ignore[operator]
 
 
 def test_sentences_that_differ_bound_what_raters_can_tell():
     components = Components(0.1, 0.3, 0.5)
-    assert raters_needed(components, 0.3, 6) is None
-    assert raters_needed(components, 0.3, 60) is not None
+    assert find_raters_needed(components, 0.3, 6) is None
+    assert find_raters_needed(components, 0.3, 60) is not None
 
 
 def test_judgements_that_never_vary():
     nothing = Components(0, 0, 0)
-    assert power_of(nothing, 0.1, 2, 2) == 1
-    assert power_of(nothing, 0.0, 2, 2) == pytest.approx(0.05)
-    assert raters_needed(nothing, 0.1, 2) == 2
+    assert compute_power(nothing, 0.1, 2, 2) == 1
+    assert compute_power(nothing, 0.0, 2, 2) == pytest.approx(0.05)
+    assert find_raters_needed(nothing, 0.1, 2) == 2
 
 
 def test_tables_of_raters():
-    rows = rating_power(USUAL, "mos", 12, 0.8)
+    rows = list_rating_power(USUAL, "mos", 12, 0.8)
     assert [row["difference"] for row in rows] == [0.1, 0.2, 0.3, 0.5, 1.0]
-    assert [row["difference"] for row in rating_power(USUAL, "ranking", 12, 0.8)] == [2, 5, 10, 20]
-    shares = share_power(Components(0.05, 0.02, 0.6), 12, 0.8)
+    assert [row["difference"] for row in list_rating_power(USUAL, "ranking", 12, 0.8)] == [2, 5, 10, 20]
+    shares = list_share_power(Components(0.05, 0.02, 0.6), 12, 0.8)
     assert [row["share"] for row in shares] == [0.55, 0.6, 0.65, 0.7, 0.75]
     needed = [row["raters"] for row in shares if row["raters"]]
     assert needed == sorted(needed, reverse=True)
-    assert rating_power(None, "mos", 12, 0.8) == share_power(None, 12, 0.8) == rating_power(USUAL, "mos", 1, 0.8) == []
+    assert list_rating_power(None, "mos", 12, 0.8) == list_share_power(None, 12, 0.8) == list_rating_power(USUAL, "mos", 1, 0.8) == []
 
 
 TABLE = np.random.default_rng(4).normal(3, 1, (7, 5)) + np.random.default_rng(5).normal(size=(7, 1))
@@ -204,7 +204,7 @@ SCORES = [
 
 def test_components_are_those_of_a_mixed_model():
     """Source: statsmodels 0.15.0, MixedLM by REML, with variance components of rows and columns."""
-    found = crossed_mean(np.array(SCORES), 9.0)
+    found = estimate_crossed_mean(np.array(SCORES), 9.0)
     assert found.mean == pytest.approx(np.mean(SCORES))
     assert found.over == BOTH
     assert found.components == pytest.approx((0.629217, 2.113677, 1.422465), abs=2e-4)
@@ -214,7 +214,7 @@ def test_components_are_those_of_a_mixed_model():
 def test_the_variance_is_that_of_the_mean_squares():
     table = TABLE + np.arange(5)
     by_rater, by_sentence, rest = mean_squares(table)
-    found = crossed_mean(table, 4.0)
+    found = estimate_crossed_mean(table, 4.0)
     variance = (by_rater + by_sentence - rest) / 35
     assert found.error**2 == pytest.approx(variance)
     doubt = by_rater**2 / 6 + by_sentence**2 / 4 + rest**2 / 24
@@ -224,12 +224,12 @@ def test_the_variance_is_that_of_the_mean_squares():
 def test_an_effect_estimated_as_nothing_leaves_the_degrees_of_freedom():
     table = TABLE - TABLE.mean(axis=0)  # sentences differ less than by chance
     by_rater, _, rest = mean_squares(table)
-    found = crossed_mean(table, 4.0)
+    found = estimate_crossed_mean(table, 4.0)
     assert found.components is not None
     assert found.components.sentence == 0
     assert found.error**2 == pytest.approx(by_rater / 35)
     assert found.degrees == pytest.approx(6)
-    even = crossed_mean(table - table.mean(axis=1, keepdims=True), 4.0)
+    even = estimate_crossed_mean(table - table.mean(axis=1, keepdims=True), 4.0)
     assert even.degrees == pytest.approx(24)
     assert even.error**2 == pytest.approx(rest / 35)
 
@@ -237,7 +237,7 @@ def test_an_effect_estimated_as_nothing_leaves_the_degrees_of_freedom():
 @pytest.mark.parametrize("by_rater", [True, False])
 def test_one_sentence_or_one_rater_is_the_usual_t_interval(by_rater):
     values = TABLE[:, 0]
-    found = crossed_mean(values[:, None] if by_rater else values[None], 4.0)
+    found = estimate_crossed_mean(values[:, None] if by_rater else values[None], 4.0)
     usual = stats.ttest_1samp(values, 0)
     assert found.over == (RATERS if by_rater else SENTENCES)
     assert found.interval == pytest.approx(tuple(usual.confidence_interval()))
@@ -248,18 +248,18 @@ def test_one_sentence_or_one_rater_is_the_usual_t_interval(by_rater):
 def test_who_shares_no_sentence_is_grouped_by_what_is_shared():
     table = np.full((6, 3), np.nan)
     table[np.arange(6), np.arange(6) % 3] = TABLE[:6, 0]  # every rater judges one sentence
-    found = crossed_mean(table, 4.0)
+    found = estimate_crossed_mean(table, 4.0)
     groups = np.array([TABLE[:6, 0][place::3].mean() for place in range(3)])
     assert found.over == SENTENCES
     assert found.interval == pytest.approx(tuple(stats.ttest_1samp(groups, 0).confidence_interval()))
-    assert crossed_mean(table.T, 4.0).over == RATERS
-    assert crossed_mean(table.T, 4.0).error == pytest.approx(found.error)
+    assert estimate_crossed_mean(table.T, 4.0).over == RATERS
+    assert estimate_crossed_mean(table.T, 4.0).error == pytest.approx(found.error)
 
 
 def test_gaps_leave_rows_and_columns_out():
     wider = np.full((9, 8), np.nan)
     wider[1:8, 2:7] = TABLE
-    assert crossed_mean(wider, 4.0) == crossed_mean(TABLE, 4.0)
+    assert estimate_crossed_mean(wider, 4.0) == estimate_crossed_mean(TABLE, 4.0)
 
 
 def test_components_are_right_in_tables_with_gaps():
@@ -267,7 +267,7 @@ def test_components_are_right_in_tables_with_gaps():
     for _ in range(300):
         table = draw.normal(size=(20, 1)) + 0.5 * draw.normal(size=(1, 12)) + 0.8 * draw.normal(size=(20, 12))
         table[draw.random(table.shape) < 0.4] = np.nan
-        found.append(crossed_mean(table, 4.0).components)
+        found.append(estimate_crossed_mean(table, 4.0).components)
     assert np.mean(found, axis=0) == pytest.approx([1, 0.25, 0.64], rel=0.1)  # type: ignore[arg-type]
 
 
@@ -276,7 +276,7 @@ def test_equal_judgements_have_no_interval(level):
     """What rounding leaves of their differences is not divided by."""
     table = np.full((4, 3), level)
     table[0] += np.spacing(level)
-    found = crossed_mean(table, 4.0)
+    found = estimate_crossed_mean(table, 4.0)
     assert found.error == 0
     assert np.isnan(found.interval).all()
     assert np.isnan(found.p_value)
@@ -284,23 +284,23 @@ def test_equal_judgements_have_no_interval(level):
 
 def test_intervals_within_a_scale_stay_there():
     table = np.array([[5, 5, 5], [5, 5, 4], [5, 4, 5], [5, 5, 5.0]])
-    found = crossed_mean(table, 4.0)
+    found = estimate_crossed_mean(table, 4.0)
     low, high = found.interval_within(1, 5)
     assert found.interval.high > 5 > high > found.mean > low
-    assert np.isnan(crossed_mean(np.full((2, 2), 5.0), 4.0).interval_within(1, 5)).all()
+    assert np.isnan(estimate_crossed_mean(np.full((2, 2), 5.0), 4.0).interval_within(1, 5)).all()
 
 
 def test_a_scale_of_any_place_and_size_has_the_same_interval():
-    share = crossed_mean((TABLE - TABLE.min() + 1) / 10, 1.0)
-    moved = crossed_mean((TABLE - TABLE.min() + 1) / 10 * 100 - 20, 100.0)
+    share = estimate_crossed_mean((TABLE - TABLE.min() + 1) / 10, 1.0)
+    moved = estimate_crossed_mean((TABLE - TABLE.min() + 1) / 10 * 100 - 20, 100.0)
     expected = np.array(share.interval_within(0, 1)) * 100 - 20
     assert moved.interval_within(-20, 80) == pytest.approx(tuple(expected))
 
 
 def test_the_correction_of_holm():
-    assert holm([0.01, 0.04, 0.03, float("nan")]) == pytest.approx([0.03, 0.06, 0.06, np.nan], nan_ok=True)
-    assert holm([0.5, 0.9]) == [1.0, 1.0]
-    assert holm([]) == []
+    assert correct_p_values([0.01, 0.04, 0.03, float("nan")]) == pytest.approx([0.03, 0.06, 0.06, np.nan], nan_ok=True)
+    assert correct_p_values([0.5, 0.9]) == [1.0, 1.0]
+    assert correct_p_values([]) == []
 
 
 @pytest.mark.long
@@ -308,6 +308,6 @@ def test_intervals_cover_the_truth():
     draw, hits = np.random.default_rng(1), 0
     for _ in range(2000):
         table = 0.5 * draw.normal(size=(12, 1)) + 0.3 * draw.normal(size=(1, 6)) + 0.8 * draw.normal(size=(12, 6))
-        low, high = crossed_mean(table, 4.0).interval
+        low, high = estimate_crossed_mean(table, 4.0).interval
         hits += low <= 0 <= high
     assert 0.93 < hits / 2000 < 0.97

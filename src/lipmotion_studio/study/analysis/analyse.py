@@ -15,12 +15,12 @@ from lipmotion_studio.study.analysis.crossed import (
     BOTH,
     CONFIDENCE,
     Components,
-    difference_components,
-    rating_figures,
-    rating_table,
-    variance_of_mean,
+    estimate_difference_components,
+    analyse_ratings,
+    build_rating_table,
+    combine_variances,
 )
-from lipmotion_studio.study.analysis.paired import order_agreement, pair_table, paired_figures, share_components
+from lipmotion_studio.study.analysis.paired import measure_order_agreement, build_pair_table, analyse_pairs, estimate_share_components
 from lipmotion_studio.study.answers import ANCHOR, FIRST, MOS, PAIRED, RECORDING, Answer, read_answers
 
 MIN_ATTENTION = 2 / 3
@@ -77,7 +77,7 @@ class Screening:
         }
 
 
-def counts(answers: Sequence[Answer]) -> list[Answer]:
+def select_counting(answers: Sequence[Answer]) -> list[Answer]:
     """Return the answers that count: neither practice nor checks of attention."""
     return [answer for answer in answers if not answer.practice and not answer.expected]
 
@@ -90,7 +90,7 @@ def screen(answers: Sequence[Answer]) -> Screening:
     checks: dict[str, list[Answer]] = {rater: [] for rater in raters}
     for answer in real:
         (checks if answer.expected else judged)[answer.rater].append(answer)
-    fast = _find_fast(counts(real))
+    fast = _find_fast(select_counting(real))
     usual = float(np.median([len(mine) for mine in judged.values()])) if raters else 0.0
     found: dict[str, dict[str, str]] = {}
     for rater, mine in judged.items():
@@ -138,7 +138,7 @@ def _check_sides(mine: Sequence[Answer]) -> str:
 
     if not mine:
         return ""
-    alike, pairs = order_agreement(pair_table(mine)).sum(axis=0).tolist()
+    alike, pairs = measure_order_agreement(build_pair_table(mine)).sum(axis=0).tolist()
     if pairs and bdtr(alike, pairs, 0.5) < MIN_CHANCE:
         return f"{alike} of {pairs} pairs answered alike in both orders"
     return ""
@@ -178,7 +178,7 @@ MAX_DEGREES = 1e6
 Figures = dict[str, Any]
 
 
-def power_of(components: Components, difference: float, raters: int, sentences: int) -> float:
+def compute_power(components: Components, difference: float, raters: int, sentences: int) -> float:
     """Return the probability that the test of ``crossed_mean`` tells a mean difference from 0, at the 5 % level."""
     from scipy.special import ndtr, stdtrit
 
@@ -190,42 +190,42 @@ def power_of(components: Components, difference: float, raters: int, sentences: 
     of_rater, of_sentence, of_rest = np.random.default_rng(SEED).chisquare(free, (DRAWS, 3)).T / np.array(free)[:, None]
     noise = rest * of_rest
     found = [np.maximum((part + rest) * draw - noise, 0) for part, draw in ((rater, of_rater), (sentence, of_sentence))]
-    variance, degrees = variance_of_mean(found[0], found[1], noise, free)
+    variance, degrees = combine_variances(found[0], found[1], noise, free)
     limit = stdtrit(np.minimum(degrees, MAX_DEGREES), (1 + CONFIDENCE) / 2) * np.sqrt(variance)
     truth = np.sqrt(rater + sentence + rest)
     return float((ndtr((difference - limit) / truth) + ndtr((-difference - limit) / truth)).mean())
 
 
-def raters_needed(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
+def find_raters_needed(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
     """Return the least number of raters that tells a difference; None: ``MAX_RATERS`` do not, for want of sentences."""
     low, high = 1, 2  # the power grows with the raters; one rater is no panel
-    while power_of(components, difference, high, sentences) < power:
+    while compute_power(components, difference, high, sentences) < power:
         low, high = high, 2 * high
         if low >= MAX_RATERS:
             return None
     while high - low > 1:
         middle = (low + high) // 2
-        reached = power_of(components, difference, middle, sentences) >= power
+        reached = compute_power(components, difference, middle, sentences) >= power
         low, high = (low, middle) if reached else (middle, high)
     return high if high <= MAX_RATERS else None
 
 
-def rating_power(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
+def list_rating_power(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
     """Return the raters needed for differences of means of a kind of judgement."""
     if components is None or sentences < 2:
         return []
     differences: Sequence[float] = DIFFERENCES.get(kind, RANK_DIFFERENCES)
-    return [{"difference": d, "raters": raters_needed(components, d, sentences, power)} for d in differences]
+    return [{"difference": d, "raters": find_raters_needed(components, d, sentences, power)} for d in differences]
 
 
-def share_power(components: Components | None, sentences: int, power: float) -> list[Figures]:
-    """Return the raters needed for preferences; ``components``: of ``paired.share_components``."""
+def list_share_power(components: Components | None, sentences: int, power: float) -> list[Figures]:
+    """Return the raters needed for preferences; ``components``: of ``paired.estimate_share_components``."""
     if components is None or sentences < 2:
         return []
     rows = []
     for share in SHARES:
         scaled = Components(*(share * (1 - share) * np.array(components)).tolist())
-        rows.append({"share": share, "raters": raters_needed(scaled, share - 0.5, sentences, power)})
+        rows.append({"share": share, "raters": find_raters_needed(scaled, share - 0.5, sentences, power)})
     return rows
 
 
@@ -259,7 +259,7 @@ def analyse_study(
     [('trajectory', 4.0), ('coupled', 2.0)]
     """
     given = read_answers(Path(answers)) if isinstance(answers, str | Path) else list(answers)
-    counted = counts(given)
+    counted = select_counting(given)
     if not counted:
         raise InputError(
             f"{len(given)} answers, none of which counts: required some that are neither practice nor checks"
@@ -275,8 +275,8 @@ def analyse_study(
     screening = screen(given)
     kept = screening.kept(counted)
     plan = (baseline, power, sentences)
-    everybody = _parts(counted, *plan)
-    screened = everybody if len(kept) == len(counted) else _parts(kept, *plan)
+    everybody = _analyse_parts(counted, *plan)
+    screened = everybody if len(kept) == len(counted) else _analyse_parts(kept, *plan)
     return {
         "answers": len(counted),
         "left_aside": len(given) - len(counted),
@@ -287,19 +287,19 @@ def analyse_study(
     }
 
 
-def _parts(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> list[Figures]:
+def _analyse_parts(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> list[Figures]:
     parts = []
     for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
         mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
         if kind == PAIRED:
-            figures = _comparison_figures(mine, power, sentences)
+            figures = _analyse_comparisons(mine, power, sentences)
         else:
-            table = rating_table(mine)
-            components, planned = difference_components(table), sentences or table.values.shape[2]
-            figures = rating_figures(table, baseline) | {
+            table = build_rating_table(mine)
+            components, planned = estimate_difference_components(table), sentences or table.values.shape[2]
+            figures = analyse_ratings(table, baseline) | {
                 "variance": components._asdict() if components else None,
                 "planned_sentences": planned,
-                "raters_needed": rating_power(components, kind, planned, power),
+                "raters_needed": list_rating_power(components, kind, planned, power),
             }
         part: Figures = {"kind": kind, "question": question, "answers": len(mine)}
         part |= {"raters": len({each.rater for each in mine}), "sentences": len({each.sentence for each in mine})}
@@ -307,25 +307,25 @@ def _parts(answers: Sequence[Answer], baseline: str | None, power: float, senten
     return parts
 
 
-def _comparison_figures(answers: Sequence[Answer], power: float, sentences: int | None) -> Figures:
+def _analyse_comparisons(answers: Sequence[Answer], power: float, sentences: int | None) -> Figures:
     """Return the figures of paired comparisons but those with the anchor, which only screen."""
     mine = [each for each in answers if ANCHOR not in (each.condition, each.other)]
     if not mine:
         return {"missing": "all comparisons are with the anchor"}
-    table = pair_table(mine)
-    components = share_components(table)
+    table = build_pair_table(mine)
+    components = estimate_share_components(table)
     planned = sentences or len(table.sentences)
-    return paired_figures(table) | {
+    return analyse_pairs(table) | {
         "variance": components._asdict() if components else None,
         "planned_sentences": planned,
-        "raters_needed": share_power(components, planned, power),
+        "raters_needed": list_share_power(components, planned, power),
     }
 
 
 NO_FIGURE = "–"
 
 
-def analysis_table(figures: Figures) -> str:
+def format_analysis(figures: Figures) -> str:
     """Return the figures of ``analyse_study`` as text."""
     lines = [f"{figures['answers']} answers count; {figures['left_aside']} of practice and attention do not"]
     screening = figures["screening"]
@@ -342,7 +342,7 @@ def analysis_table(figures: Figures) -> str:
         title = f"{part['kind']}, {part['question']}: {part['answers']} answers, {part['raters']} raters, "
         lines += ["", f"{title}{part['sentences']} sentences"]
         unscreened = everybody if everybody["raters"] > part["raters"] else None
-        lines += (_paired_lines if part["kind"] == PAIRED else _rating_lines)(part, unscreened)
+        lines += (_format_pairs if part["kind"] == PAIRED else _format_ratings)(part, unscreened)
         if part.get("raters_needed"):
             needed = []
             for row in part["raters_needed"]:
@@ -354,56 +354,56 @@ def analysis_table(figures: Figures) -> str:
     return "\n".join(map(printable, lines))
 
 
-def _rating_lines(part: Figures, everybody: Figures | None) -> list[str]:
+def _format_ratings(part: Figures, everybody: Figures | None) -> list[str]:
     before = {row["condition"]: row["mean"] for row in everybody["conditions"]} if everybody else {}
     relative = {row["condition"]: row for row in part["relative_improvement"]}
     rows = [["condition", "mean", "95 %", "deviation", f"% over {part['baseline']}", "95 %", "all raters"]]
     for row in part["conditions"]:
         better = relative.get(row["condition"], {"percent": None, "low": None, "high": None})
-        mean = [row["condition"], _number(row["mean"], ".2f"), _limits(row, ".2f"), _number(row["deviation"], ".2f")]
-        gain = [_number(better["percent"], "+.1f"), _limits(better, "+.1f")]
-        rows.append([*mean, *gain, _number(before.get(row["condition"]), ".2f")])
+        mean = [row["condition"], _format_number(row["mean"], ".2f"), _format_limits(row, ".2f"), _format_number(row["deviation"], ".2f")]
+        gain = [_format_number(better["percent"], "+.1f"), _format_limits(better, "+.1f")]
+        rows.append([*mean, *gain, _format_number(before.get(row["condition"]), ".2f")])
     pairs = [["pair", "difference", "95 %", "p", "p (Holm)"]]
     pairs += [
-        [f"{row['condition']} - {row['other']}", _number(row["difference"], "+.2f"), _limits(row, "+.2f"), *_tests(row)]
+        [f"{row['condition']} - {row['other']}", _format_number(row["difference"], "+.2f"), _format_limits(row, "+.2f"), *_format_tests(row)]
         for row in part["pairs"]
     ]
-    return [*_align(_without_last(rows, bool(before))), *_scope_lines(part["conditions"]), *_align(pairs)]
+    return [*_align(_without_last(rows, bool(before))), *_format_scope(part["conditions"]), *_align(pairs)]
 
 
-def _paired_lines(part: Figures, everybody: Figures | None) -> list[str]:
+def _format_pairs(part: Figures, everybody: Figures | None) -> list[str]:
     """Return how often each condition was preferred, the pairs, the strengths, and the effect of the order."""
     if "missing" in part:
         return [f"  {part['missing']}"]
     before = {(row["condition"], row["other"]): row["share"] for row in everybody.get("pairs", ())} if everybody else {}
     scores = [["condition", "preferred", "share", "95 %"]]
     scores += [
-        [row["condition"], f"{row['wins']} of {row['answers']}", _number(row["share"], ".1%"), _limits(row, ".1%")]
+        [row["condition"], f"{row['wins']} of {row['answers']}", _format_number(row["share"], ".1%"), _format_limits(row, ".1%")]
         for row in part["conditions"]
     ]
     pairs = [["pair", "preferred", "share", "95 %", "p", "p (Holm)", "p (binomial)", "all raters"]]
     for row in part["pairs"]:
         name = f"{row['condition']} over {row['other']}"
-        share = [f"{row['wins']} of {row['answers']}", _number(row["share"], ".1%"), _limits(row, ".1%")]
-        all_raters = _number(before.get((row["condition"], row["other"])), ".1%")
-        pairs.append([name, *share, *_tests(row), _p_text(row["p_binomial"]), all_raters])
+        share = [f"{row['wins']} of {row['answers']}", _format_number(row["share"], ".1%"), _format_limits(row, ".1%")]
+        all_raters = _format_number(before.get((row["condition"], row["other"])), ".1%")
+        pairs.append([name, *share, *_format_tests(row), _format_p(row["p_binomial"]), all_raters])
     first, both = part["first_preferred"], part["consistency"]
-    orders = f"  the first was preferred in {_number(first['share'], '.1%')} ({_limits(first, '.1%')}); "
-    orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_number(both['share'], '.1%')})"
-    lines = [*_align(scores), *_align(_without_last(pairs, bool(before))), *_scope_lines(part["pairs"]), orders]
+    orders = f"  the first was preferred in {_format_number(first['share'], '.1%')} ({_format_limits(first, '.1%')}); "
+    orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_format_number(both['share'], '.1%')})"
+    lines = [*_align(scores), *_align(_without_last(pairs, bool(before))), *_format_scope(part["pairs"]), orders]
     model = part["bradley_terry"]
     if "missing" in model:
         return [*lines, f"  no Bradley–Terry strengths: {model['missing']}"]
     rows = [["Bradley–Terry", "log odds", "95 %"]]
-    rows += [[row["condition"], _number(row["strength"], "+.2f"), _limits(row, "+.2f")] for row in model["conditions"]]
-    rows.append(["shown first", _number(model["order"]["strength"], "+.2f"), _limits(model["order"], "+.2f")])
+    rows += [[row["condition"], _format_number(row["strength"], "+.2f"), _format_limits(row, "+.2f")] for row in model["conditions"]]
+    rows.append(["shown first", _format_number(model["order"]["strength"], "+.2f"), _format_limits(model["order"], "+.2f")])
     lines += _align(rows)
     if model["is_shrunk"]:
         lines.append("  a strength would be infinite: half a win was given to both sides of each comparison")
     return lines
 
 
-def _scope_lines(rows: Sequence[Figures]) -> list[str]:
+def _format_scope(rows: Sequence[Figures]) -> list[str]:
     """Return what the intervals are over, where it is not raters and sentences."""
     scopes = sorted({row["over"] for row in rows} - {BOTH})
     found = [row for row in rows if row["over"] in scopes]
@@ -429,21 +429,21 @@ def _align(rows: Sequence[Sequence[str]]) -> list[str]:
     ]
 
 
-def _tests(row: Figures) -> list[str]:
-    return [_p_text(row["p"]), _p_text(row["p_holm"])]
+def _format_tests(row: Figures) -> list[str]:
+    return [_format_p(row["p"]), _format_p(row["p_holm"])]
 
 
-def _p_text(p: float | None) -> str:
-    return "<0.001" if p is not None and p < 0.001 else _number(p, ".3f")
+def _format_p(p: float | None) -> str:
+    return "<0.001" if p is not None and p < 0.001 else _format_number(p, ".3f")
 
 
-def _limits(row: Figures, form: str) -> str:
+def _format_limits(row: Figures, form: str) -> str:
     if _is_missing(row["low"]):
         return NO_FIGURE
     return f"{row['low']:{form}} to {row['high']:{form}}"
 
 
-def _number(value: float | None, form: str) -> str:
+def _format_number(value: float | None, form: str) -> str:
     return NO_FIGURE if value is None or _is_missing(value) else format(value, form)
 
 

@@ -95,7 +95,7 @@ class CrossedMean:
         return Interval(*(low + (high - low) * shares).tolist())
 
 
-def crossed_mean(values: Array, width: float) -> CrossedMean:
+def estimate_crossed_mean(values: Array, width: float) -> CrossedMean:
     """Return the mean of a table of judgements, and its standard error for other raters and other sentences.
 
     values : a row for each rater, a column for each sentence; NaN where there is no judgement [shape=(R, S)]
@@ -122,16 +122,16 @@ def crossed_mean(values: Array, width: float) -> CrossedMean:
         sums = rest.sum(axis=int(by_rater))  # of the differences from the mean in each group
         spread = len(sums) / (len(sums) - 1) * float(np.square(sums).sum()) / cells**2
         over = RATERS if by_rater else SENTENCES
-        return CrossedMean(mean, _error(spread, width), len(sums) - 1, over, None)
-    components = _components(rest, seen)
+        return CrossedMean(mean, _compute_error(spread, width), len(sums) - 1, over, None)
+    components = _estimate_components(rest, seen)
     shares = [float(np.square(seen.sum(axis=axis) / cells).sum()) for axis in (1, 0)]  # 1 / R and 1 / S without gaps
     rater, sentence, residual = np.array(components)[:, None] * np.array([*shares, 1 / cells])[:, None]
     free = 1 / shares[0] - 1, 1 / shares[1] - 1, max(cells - raters - sentences + 1.0, 1.0)
-    variance, degrees = variance_of_mean(rater, sentence, residual, free)
-    return CrossedMean(mean, _error(variance[0], width), float(degrees[0]), BOTH, components)
+    variance, degrees = combine_variances(rater, sentence, residual, free)
+    return CrossedMean(mean, _compute_error(variance[0], width), float(degrees[0]), BOTH, components)
 
 
-def variance_of_mean(
+def combine_variances(
     rater: Array, sentence: Array, rest: Array, free: tuple[float, float, float]
 ) -> tuple[Array, Array]:
     """Return the variance of a mean and its degrees of freedom, from those of raters, sentences, the rest."""
@@ -143,7 +143,7 @@ def variance_of_mean(
     return variance, np.divide(variance**2, doubt, out=np.full_like(variance, np.inf), where=doubt > 0)
 
 
-def _components(rest: Array, seen: NDArray[np.bool_]) -> Components:
+def _estimate_components(rest: Array, seen: NDArray[np.bool_]) -> Components:
     """Return the variances of effects by three sums of squares; rests are 0 where nothing was judged [shape=(R, S)]."""
     of_rater, of_sentence, cells = seen.sum(axis=1), seen.sum(axis=0), int(seen.sum())
     squares = float(np.square(rest).sum())
@@ -158,12 +158,12 @@ def _components(rest: Array, seen: NDArray[np.bool_]) -> Components:
     return Components(max(without_sentence - residual, 0.0), max(without_rater - residual, 0.0), residual)
 
 
-def _error(variance: float, width: float) -> float:
+def _compute_error(variance: float, width: float) -> float:
     error = float(np.sqrt(variance))
     return error if error > ROUNDING * width else 0.0
 
 
-def holm(p_values: list[float]) -> list[float]:
+def correct_p_values(p_values: list[float]) -> list[float]:
     """Return p-values corrected for their number (Holm 1979); NaN ones stay so, and do not count."""
     found = sorted((value, place) for place, value in enumerate(p_values) if not np.isnan(value))
     corrected, least = list(p_values), 0.0
@@ -203,10 +203,10 @@ class RatingTable:
 
     def difference(self, condition: str, other: str) -> CrossedMean:
         """Return the mean difference of two conditions, of the same rater on the same sentence."""
-        return crossed_mean(self.of(condition) - self.of(other), self.width)
+        return estimate_crossed_mean(self.of(condition) - self.of(other), self.width)
 
 
-def rating_table(answers: Sequence[Answer]) -> RatingTable:
+def build_rating_table(answers: Sequence[Answer]) -> RatingTable:
     """Return the table of judgements of one kind on one scale; conditions are in alphabetical order."""
     conditions, raters, sentences = (
         sorted({getattr(answer, name) for answer in answers}) for name in ("condition", "rater", "sentence")
@@ -222,12 +222,12 @@ def rating_table(answers: Sequence[Answer]) -> RatingTable:
     return RatingTable(tuple(conditions), values, count, SCALES.get(answers[0].kind, RANKS))
 
 
-def rating_figures(table: RatingTable, baseline: str | None) -> Figures:
+def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
     """Return means, differences of all pairs, and improvement on a baseline (None: the lowest mean) of one scale."""
     means = []
     for number, name in enumerate(table.conditions):
         values = table.of(name)
-        mean, seen = crossed_mean(values, table.width), np.isfinite(values)
+        mean, seen = estimate_crossed_mean(values, table.width), np.isfinite(values)
         row = {
             "condition": name,
             "mean": mean.mean,
@@ -239,7 +239,7 @@ def rating_figures(table: RatingTable, baseline: str | None) -> Figures:
             "over": mean.over,
         }
         means.append(row)
-    base = baseline if baseline in table.conditions else lowest(table)
+    base = baseline if baseline in table.conditions else find_lowest(table)
     pairs = table.compared()
     differences = [table.difference(*pair) for pair in pairs]
     p_values = [each.p_value for each in differences]
@@ -247,24 +247,24 @@ def rating_figures(table: RatingTable, baseline: str | None) -> Figures:
         "conditions": sorted(means, key=lambda row: -row["mean"]),
         "baseline": base,
         "relative_improvement": [
-            relative_improvement(table, name, base) for name in table.conditions if base and name not in (base, ANCHOR)
+            measure_improvement(table, name, base) for name in table.conditions if base and name not in (base, ANCHOR)
         ],
         "pairs": [
             {"condition": pair[0], "other": pair[1], "difference": mean.mean}
             | mean.interval._asdict()
             | {"p": p, "p_holm": corrected, "over": mean.over}
-            for pair, mean, p, corrected in zip(pairs, differences, p_values, holm(p_values), strict=True)
+            for pair, mean, p, corrected in zip(pairs, differences, p_values, correct_p_values(p_values), strict=True)
         ],
     }
 
 
-def lowest(table: RatingTable) -> str | None:
+def find_lowest(table: RatingTable) -> str | None:
     """Return the condition with the lowest mean but anchor and recording; None: there is no other."""
     names = [name for name in table.conditions if name not in (ANCHOR, RECORDING)]
     return min(names, key=lambda name: float(np.nanmean(table.of(name))), default=None)
 
 
-def relative_improvement(table: RatingTable, condition: str, base: str) -> Figures:
+def measure_improvement(table: RatingTable, condition: str, base: str) -> Figures:
     """Return how many per cent the mean of a condition is above that of another, with the interval.
 
     Both means are of what the same raters judged in both conditions. The interval is that of the mean of
@@ -279,11 +279,11 @@ def relative_improvement(table: RatingTable, condition: str, base: str) -> Figur
         return row
     ratio = float(values[both].mean()) / level
     percent = 100 * (ratio - 1)
-    interval = crossed_mean(100 * (values - ratio * others) / level, 100 * table.width / level).interval
+    interval = estimate_crossed_mean(100 * (values - ratio * others) / level, 100 * table.width / level).interval
     return row | {"percent": percent, "low": percent + interval.low, "high": percent + interval.high}
 
 
-def difference_components(table: RatingTable) -> Components | None:
+def estimate_difference_components(table: RatingTable) -> Components | None:
     """Return the mean variances of the effects on differences over all pairs; None: they cannot be told apart."""
     found = [mean.components for mean in (table.difference(*pair) for pair in table.compared()) if mean.components]
     return Components(*np.mean(found, axis=0).tolist()) if found else None

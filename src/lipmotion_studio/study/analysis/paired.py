@@ -38,7 +38,7 @@ class Strengths:
 
     def probability(self) -> crossed.Array:
         """Return the probability that i, shown first, is preferred to j [shape=(C, C)]."""
-        return _logistic(self.strengths[:, None] - self.strengths + self.order)
+        return _apply_logistic(self.strengths[:, None] - self.strengths + self.order)
 
 
 def fit_strengths(first_wins: crossed.Array, second_wins: crossed.Array) -> Strengths:
@@ -68,10 +68,10 @@ def fit_strengths(first_wins: crossed.Array, second_wins: crossed.Array) -> Stre
         if np.abs(np.append(worth, place) / before - 1).max() < SMALLEST_STEP:
             break
     strengths, order = np.log(worth), float(np.log(place))
-    probability = _logistic(strengths[:, None] - strengths + order)
+    probability = _apply_logistic(strengths[:, None] - strengths + order)
     weights = (first_wins + second_wins) * probability * (1 - probability)
     pairs = np.argwhere(weights > 0)
-    contrasts = _contrasts(pairs, len(weights))
+    contrasts = _build_contrasts(pairs, len(weights))
     contrasts[:, -1] *= has_order
     information = (contrasts * weights[tuple(pairs.T)][:, None]).T @ contrasts  # Fisher's, on strengths and order
     covariance: crossed.Array = np.linalg.pinv(information, hermitian=True, rcond=1e-10).astype(float)
@@ -90,15 +90,15 @@ def _has_maximum(first_wins: crossed.Array, second_wins: crossed.Array, has_orde
     """Return whether the likelihood has a maximum: no direction of strengths and order in which it never falls."""
     from scipy.optimize import linprog
 
-    rows = _contrasts(np.argwhere(first_wins > 0), len(first_wins)).tolist()
-    rows += (-_contrasts(np.argwhere(second_wins > 0), len(first_wins))).tolist()
+    rows = _build_contrasts(np.argwhere(first_wins > 0), len(first_wins)).tolist()
+    rows += (-_build_contrasts(np.argwhere(second_wins > 0), len(first_wins))).tolist()
     contrasts = np.array(rows)
     contrasts[:, -1] *= has_order
     found = linprog(-contrasts.sum(axis=0), A_ub=-contrasts, b_ub=np.zeros(len(rows)), bounds=(-1, 1), method="highs")
     return bool(-found.fun < 1e-7)
 
 
-def _contrasts(pairs: NDArray[np.intp], count: int) -> crossed.Array:
+def _build_contrasts(pairs: NDArray[np.intp], count: int) -> crossed.Array:
     """Return what the log odds of comparisons are in strengths and order [shape=(N, C + 1)]; ``pairs``: (N, 2)."""
     contrasts = np.zeros((len(pairs), count + 1))
     rows = np.arange(len(pairs))
@@ -108,7 +108,7 @@ def _contrasts(pairs: NDArray[np.intp], count: int) -> crossed.Array:
     return contrasts
 
 
-def deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.bool_]) -> crossed.Array:
+def compute_deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.bool_]) -> crossed.Array:
     """Return by how much each answer moves strengths and order, to first order [shape=(N, C + 1)].
 
     pairs : what was shown first and second [shape=(N, 2)];  is_first : whether the first was preferred [shape=(N,)]
@@ -116,10 +116,10 @@ def deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.b
     sure the strengths are (Liang & Zeger 1986).
     """
     expected = model.probability()[pairs[:, 0], pairs[:, 1]]
-    return (_contrasts(pairs, len(model.strengths)) * (is_first - expected)[:, None]) @ model.covariance
+    return (_build_contrasts(pairs, len(model.strengths)) * (is_first - expected)[:, None]) @ model.covariance
 
 
-def _logistic(values: crossed.Array) -> crossed.Array:
+def _apply_logistic(values: crossed.Array) -> crossed.Array:
     return 1 / (1 + np.exp(-values))
 
 
@@ -167,7 +167,7 @@ class PairTable:
         return first, second
 
 
-def pair_table(answers: Sequence[Answer]) -> PairTable:
+def build_pair_table(answers: Sequence[Answer]) -> PairTable:
     """Return the table of answers to paired comparisons. Raises InputError: a condition meets itself, or nothing."""
     for answer in answers:
         if not answer.other or answer.other == answer.condition:
@@ -189,52 +189,52 @@ def pair_table(answers: Sequence[Answer]) -> PairTable:
     )
 
 
-def paired_figures(table: PairTable) -> Figures:
+def analyse_pairs(table: PairTable) -> Figures:
     """Return the figures of paired comparisons."""
     everything = np.full(len(table.is_first), True)
-    first = share_figures(table.cells(table.is_first.astype(float), everything))
+    first = analyse_shares(table.cells(table.is_first.astype(float), everything))
     rows = []
     for i, j, cells in _pair_cells(table):
         chosen = table.between(i, j)
         wins, count = int((table.is_preferred(i) & chosen).sum()), int(chosen.sum())
         names: Figures = {"condition": table.conditions[i], "other": table.conditions[j]}
-        counts = {"wins": wins, "answers": count, "p_binomial": binomial_p(wins, count)}
-        rows.append(names | counts | share_figures(cells))
-    corrected = crossed.holm([row["p"] for row in rows])
+        counts = {"wins": wins, "answers": count, "p_binomial": compute_binomial_p(wins, count)}
+        rows.append(names | counts | analyse_shares(cells))
+    corrected = crossed.correct_p_values([row["p"] for row in rows])
     scores = []
     for place, name in enumerate(table.conditions):  # how often each was preferred: Hofer 2008, Fig. 6
         chosen, preferred = (table.shown == place).any(axis=1), table.is_preferred(place)
-        share = share_figures(table.cells(preferred.astype(float), chosen))
+        share = analyse_shares(table.cells(preferred.astype(float), chosen))
         counts = {"wins": int((preferred & chosen).sum()), "answers": int(chosen.sum())}
         scores.append({"condition": name} | counts | {key: share[key] for key in ("share", "low", "high")})
     return {
         "conditions": scores,
         "pairs": [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)],
         "first_preferred": {"answers": len(table.is_first)} | first,
-        "consistency": consistency(table),
-        "bradley_terry": strength_figures(table),
+        "consistency": measure_consistency(table),
+        "bradley_terry": analyse_strengths(table),
     }
 
 
-def share_figures(cells: crossed.Array) -> Figures:
+def analyse_shares(cells: crossed.Array) -> Figures:
     """Return a share, its interval over raters and sentences, and the test against one half.
 
     cells : share of each rater on each sentence; NaN: none [shape=(R, S)]
     The interval is symmetric in log odds. Where all answers agree, it is the exact one of so many independent answers
     as there are raters (Clopper & Pearson 1934), and so is the test.
     """
-    share = crossed.crossed_mean(cells, 1.0)
+    share = crossed.estimate_crossed_mean(cells, 1.0)
     raters = int(np.isfinite(cells).any(axis=1).sum())
     if share.mean in (0.0, 1.0):
         wins = int(share.mean) * raters
-        interval, p, over = exact_interval(wins, raters), binomial_p(wins, raters), ALL_EQUAL
+        interval, p, over = compute_exact_interval(wins, raters), compute_binomial_p(wins, raters), ALL_EQUAL
     else:
         interval, p = share.interval_within(0, 1), share.log_odds(0, 1).p_value
         over = share.over if share.is_known else crossed.NOTHING
     return {"share": share.mean, "low": interval.low, "high": interval.high, "p": p, "over": over}
 
 
-def exact_interval(wins: int, count: int) -> crossed.Interval:
+def compute_exact_interval(wins: int, count: int) -> crossed.Interval:
     """Return the exact interval of a probability, from independent answers. Source: Clopper & Pearson 1934."""
     from scipy.special import betaincinv
 
@@ -243,22 +243,22 @@ def exact_interval(wins: int, count: int) -> crossed.Interval:
     return crossed.Interval(low, float(betaincinv(wins + 1, count - wins, 1 - tail)) if wins < count else 1.0)
 
 
-def binomial_p(wins: int, count: int) -> float:
+def compute_binomial_p(wins: int, count: int) -> float:
     """Return the exact two-sided p-value of a binomial test against one half."""
     from scipy.special import bdtr
 
     return min(1.0, float(2 * bdtr(min(wins, count - wins), count, 0.5)))
 
 
-def consistency(table: PairTable) -> Figures:
+def measure_consistency(table: PairTable) -> Figures:
     """Return in what share of the pairs that a rater saw in both orders the same condition was preferred twice."""
-    agreed = order_agreement(table)
+    agreed = measure_order_agreement(table)
     count = int(agreed[:, 1].sum())
     share = float(agreed[:, 0].sum() / count) if count else np.nan
     return {"pairs": count, "consistent": int(agreed[:, 0].sum()), "share": share}
 
 
-def order_agreement(table: PairTable) -> Indices:
+def measure_order_agreement(table: PairTable) -> Indices:
     """Return for each rater how many pairs were preferred alike in both orders, and of how many [shape=(R, 2)]."""
     found = np.zeros((len(table.raters), 2), np.intp)
     preferred: dict[tuple[int, int, int, int], bool] = {}
@@ -272,7 +272,7 @@ def order_agreement(table: PairTable) -> Indices:
     return found
 
 
-def strength_figures(table: PairTable) -> Figures:
+def analyse_strengths(table: PairTable) -> Figures:
     """Return strengths of all conditions with intervals, and the effect of the order; or why there are none."""
     first, second = table.wins()
     groups = link_groups(first + second)
@@ -280,13 +280,13 @@ def strength_figures(table: PairTable) -> Figures:
         texts = (", ".join(table.conditions[place] for place in group) for group in groups)
         return {"missing": f"no comparison links the groups {'; '.join(texts)}"}
     model = fit_strengths(first, second)
-    moved = deviations(model, table.shown, table.is_first)
+    moved = compute_deviations(model, table.shown, table.is_first)
     names = table.conditions
 
     def row(value: float, change: crossed.Array) -> Figures:
         count = table._sums(np.ones(len(change)), np.full(len(change), True))
         sums = table._sums(change, np.full(len(change), True))
-        error = crossed.crossed_mean(np.where(count > 0, sums * int((count > 0).sum()), np.nan), 1.0)
+        error = crossed.estimate_crossed_mean(np.where(count > 0, sums * int((count > 0).sum()), np.nan), 1.0)
         interval = crossed.CrossedMean(value, error.error, error.degrees, error.over, None).interval
         low, high = (np.nan, np.nan) if model.is_shrunk else interval
         return {"strength": value, "low": low, "high": high}
@@ -305,11 +305,11 @@ def strength_figures(table: PairTable) -> Figures:
     }
 
 
-def share_components(table: PairTable) -> crossed.Components | None:
+def estimate_share_components(table: PairTable) -> crossed.Components | None:
     """Return the mean variances of effects on shares, by that of one answer; None: they cannot be told apart."""
     found = []
     for _, _, cells in _pair_cells(table):
-        share = crossed.crossed_mean(cells, 1.0)
+        share = crossed.estimate_crossed_mean(cells, 1.0)
         if share.components and share.error > 0:
             found.append(np.array(share.components) / (share.mean * (1 - share.mean)))
     return crossed.Components(*np.mean(found, axis=0).tolist()) if found else None
