@@ -31,7 +31,7 @@ from lipmotion_faces.characters.character_files import load_character
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.pose import list_head_poses
 from lipmotion_faces.head.skin import COLUMNS, VISIBLE_RINGS
-from lipmotion_faces.head.stage import make_figure, build_head_mesh, fit_mouth_weights
+from lipmotion_faces.head.stage import build_head_mesh, fit_mouth_weights, make_figure
 from lipmotion_faces.outputs.scenes import build_character_scene, build_head_scene, write_scene
 from programs import gltf_report, gltf_validator, python_with, run_with
 
@@ -74,7 +74,7 @@ def fit(result: Generation) -> dict[str, object]:
     mesh = build_head_mesh(character)
     poses = list_head_poses(result.motion, result.units, 100.0)
     curves = fit_mouth_weights(character, mesh, poses)
-    lips = character.skin.lip_rows()[:VISIBLE_RINGS]
+    lips = character.skin.list_lip_rows()[:VISIBLE_RINGS]
     rows, ring = lips.ravel(), slice((VISIBLE_RINGS - 1) * COLUMNS, VISIBLE_RINGS * COLUMNS)
     moved = mesh.displacements(rows)
     apart, gaps, closed = [], [], []
@@ -82,7 +82,7 @@ def fit(result: Generation) -> dict[str, object]:
         summed = mesh.vertices[rows] + sum(
             curve[number] * moved[mesh.shape_names.index(name)] for name, curve in curves.items()
         )
-        drawn = character.skin.places(pose)[rows]
+        drawn = character.skin.place(pose)[rows]
         both = [gap_of(each[ring]) for each in (summed, drawn)]
         apart.append(float(np.abs(summed - drawn).max()))
         gaps.append(abs(both[0] - both[1]))

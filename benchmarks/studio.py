@@ -86,7 +86,7 @@ def opened(sound: Path) -> OpenRecording:
     """Return a line of a new project, open."""
     model = load_model()
     with open_folder(sound) as folder:
-        line = folder.recording(1)
+        line = folder.find_recording(1)
         return open_recording(folder, line, model, analyse_recording(folder, line, model))
 
 
@@ -108,23 +108,23 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     drawn = shown_face("head")
     for phone in "mpmp":  # loads what edits and faces need
         timed_edit(line, f"phone 3 is {phone}")
-        line.weights(drawn, slice(0, 20))
+        line.compute_weights(drawn, slice(0, 20))
     if seconds <= RECOGNISED_S:
-        found |= {"the head, all of it, s": round(timed(lambda: line.weights(drawn)) / 1000, 2)}
+        found |= {"the head, all of it, s": round(timed(lambda: line.compute_weights(drawn)) / 1000, 2)}
     own = own_character(sound.with_name("own.glb"))
     found["a character of one's own, 45 frames of it, s"] = round(
-        timed(lambda: line.weights(own, slice(200, 245))) / 1000, 2
+        timed(lambda: line.compute_weights(own, slice(200, 245))) / 1000, 2
     )
-    found |= {"a picture of the woman, s": round(timed(lambda: line.picture(1.0, make_face("woman"))) / 1000, 2)}
+    found |= {"a picture of the woman, s": round(timed(lambda: line.draw(1.0, make_face("woman"))) / 1000, 2)}
     chance, parts = Random(3), []  # noqa: S311
     while len(parts) < (EDITS if seconds <= RECOGNISED_S else FEW_EDITS):
-        phones = line.state()["phones"]
+        phones = line.describe()["phones"]
         number = chance.randrange(2, len(phones) - 1)
         changed, edit_ms = timed_edit(line, phone_edit(chance, phones, number))
         if changed:
-            state_ms = timed(lambda: as_json(line.state()))
+            state_ms = timed(lambda: as_json(line.describe()))
             frames = slice(round(changed["start_s"] * 100), round(changed["end_s"] * 100) + 1)
-            weights_ms = timed(lambda frames=frames: line.weights(drawn, frames))
+            weights_ms = timed(lambda frames=frames: line.compute_weights(drawn, frames))
             parts.append(
                 (edit_ms, state_ms, weights_ms, edit_ms + state_ms + weights_ms, 10 * (frames.stop - frames.start))
             )
@@ -180,7 +180,7 @@ def repeated(sound: Path, part: Path, each_s: float, seconds: float) -> OpenReco
     spans = [span for n in range(int(seconds / each_s)) for span in units.shifted(n * each_s)]
     spans[-1] = replace(spans[-1], end_s=seconds)
     with open_folder(part) as folder:
-        line, model = folder.recording(1), load_model()
+        line, model = folder.find_recording(1), load_model()
         folder.write_edits(line, EditFile(named=Request(part), units=Timeline(tuple(spans)), sha256=line.sha256))
         return open_recording(folder, line, model)
 
@@ -239,7 +239,7 @@ def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
         os.waitpid(child, 0)
         with os.fdopen(reading, encoding="utf-8") as file:
             told = [json.loads(row) for row in file.read().splitlines(keepends=True) if row.endswith("\n")]
-        line.file = replace(line.folder.read_edits(line.folder.recording(line.number)), named=line.file.named)
+        line.file = replace(line.folder.read_edits(line.folder.find_recording(line.number)), named=line.file.named)
         steps = list(line.file.edits.sentences)
         done = [each["done"] for each in told if "done" in each]
         found["kills"] += 1
@@ -264,7 +264,7 @@ def edit_for_ever(line: OpenRecording, chance: Random, writing: int) -> NoReturn
                 tell(tried=[])
                 line.undo(line.revision, len(steps))
             else:
-                step = random_edit(chance, line.state())
+                step = random_edit(chance, line.describe())
                 tell(tried=[*steps, str(parse_step(step))])
                 line.edit(line.revision, (step,))
             tell(done=list(line.file.edits.sentences))

@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from lipmotion_studio.study.analysis import crossed
 from lipmotion_studio.study.analysis.analyse import compute_power, find_raters_needed
 from lipmotion_studio.study.analysis.crossed import RANKS, Components, Interval, RatingTable, analyse_ratings
-from lipmotion_studio.study.analysis.paired import fit_strengths, analyse_pairs
+from lipmotion_studio.study.analysis.paired import analyse_pairs, fit_strengths
 from study.simulated import Effects, comparisons, expected_preference, expected_rating, ratings
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ def rated(draw: np.random.Generator, size: tuple[int, int], effects: Effects) ->
     for row in figures["pairs"]:
         off = truth[row["condition"]] - truth[row["other"]]
         yield Found("difference", Interval(row["low"], row["high"]), off)
-        values = table.of(row["condition"]) - table.of(row["other"])
+        values = table.select_condition(row["condition"]) - table.select_condition(row["other"])
         for name, method in OTHERS.items():
             yield Found(f"difference, {name}", method(values, draw), off)
     for row in figures["relative_improvement"]:
@@ -128,7 +128,7 @@ def rated(draw: np.random.Generator, size: tuple[int, int], effects: Effects) ->
         yield Found("improvement", Interval(row["low"], row["high"]), percent)
     for name, value in truth.items():
         for other, method in OTHERS.items():
-            yield Found(f"mean, {other}", method(table.of(name), draw), value)
+            yield Found(f"mean, {other}", method(table.select_condition(name), draw), value)
 
 
 def compared(draw: np.random.Generator, size: tuple[int, int], effects: Effects) -> Iterator[Found]:
@@ -142,7 +142,7 @@ def compared(draw: np.random.Generator, size: tuple[int, int], effects: Effects)
     for row in figures["pairs"]:
         i, j = (int(row[name][1:]) for name in ("condition", "other"))
         yield Found("share", Interval(row["low"], row["high"]), share[i, j])
-        cells = table.cells(table.is_preferred(i).astype(float), table.between(i, j))
+        cells = table.average_cells(table.is_preferred(i).astype(float), table.mark_between(i, j))
         for name, method in OTHERS.items():
             yield Found(f"share, {name}", method(cells, draw), share[i, j])
     for row in figures["bradley_terry"]["pairs"]:
@@ -184,7 +184,7 @@ def power(studies: int) -> list[dict[str, Any]]:
             for _ in range(studies):
                 values = difference + draw.normal(size=(raters, sentences))
                 values += rater * draw.normal(size=(raters, 1)) + sentence * draw.normal(size=(1, sentences))
-                told += crossed.estimate_crossed_mean(values, 4.0).p_value < 0.05
+                told += crossed.estimate_mean(values, 4.0).p_value < 0.05
             row = {"rater": rater, "sentence": sentence, "difference": difference, "sentences": sentences}
             said = compute_power(components, difference, raters, sentences)
             rows.append(row | {"raters": raters, "said": said, "told": told / studies})
@@ -215,7 +215,7 @@ def ranges(studies: int) -> list[dict[str, Any]]:
                     values[:, ::5] = draw.integers(101, size=values[:, ::5].shape)
                 for place, each in enumerate((values, normalised(values))):
                     shown = RatingTable(table.conditions, each, table.count, RANKS)
-                    told[place] += shown.difference("c0", "c1").p_value < 0.05
+                    told[place] += shown.compare_conditions("c0", "c1").p_value < 0.05
             given, same = (told / studies).tolist()
             rows.append({"careless": careless, "difference": difference, "as given": given, "normalised": same})
             print(rows[-1], flush=True)

@@ -107,7 +107,7 @@ def faults(folder: Path, raters: list[ScriptedRater]) -> tuple[int, int]:
         rows = database.execute("SELECT rater, trial, value FROM answers").fetchall()
     values = {(rater, trial): value for rater, trial, value in rows}
     with closing(StudyStore(folder)) as store:
-        numbers = [store.rater_of(rater.token) for rater in raters]
+        numbers = [store.find_rater(rater.token) for rater in raters]
     lost = sum(
         values.get((number, trial)) != value
         for rater, number in zip(raters, numbers, strict=True)

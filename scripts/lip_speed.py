@@ -21,8 +21,8 @@ from lipmotion_faces.corpus.sound_offset import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     WEIGHTS,
-    stack_context,
     measure_opening_speed,
+    stack_context,
 )
 
 RIDGE = 100.0

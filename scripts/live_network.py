@@ -73,7 +73,7 @@ SOUNDS = (".flac", ".wav", ".opus", ".mp3")
 HINTS, HINT_LAG, HINT_SHARE = COMPONENTS, 6, 0.25
 """In training it also says what the speech encoder makes of the sound, so many steps ago, with this share of the error:
 who learns what the encoder knows learns the motion of unseen voices from fewer of them."""
-SILENCE_S, LEAST_S, LONGEST_S = 0.8, 1.2, 20.0
+SILENCE_S, MIN_S, LONGEST_S = 0.8, 1.2, 20.0
 """Silence after every recording, in which the mouth comes to rest; and how much of a long one is used."""
 GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 4
 """What is heard: as loud as is drawn, as it is, by other vocal tracts, and half of the time in a condition."""
@@ -271,7 +271,7 @@ def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
     for name in corpus.names(options.split)[::2]:
         utterance = corpus.utterance(name)
         jobs.append((utterance.audio, utterance.track, " ".join(utterance.words or ())))
-    spoken = [audio for audio in sounds if audio.duration_s > LEAST_S]
+    spoken = [audio for audio in sounds if audio.duration_s > MIN_S]
     spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in spoken]
     jobs += [(audio, None, None) for audio in (*spoken, *synthesise(options.text, options.minutes))]
     with ProcessPoolExecutor(options.workers) as pool:

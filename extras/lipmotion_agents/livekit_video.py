@@ -162,4 +162,4 @@ class AvatarVideo(VideoGenerator):
         # faces measure the mouth at rest in the motion itself: so it begins with rest
         rows = [[*frame.motion, *beside] for frame in (self._rest, pose)]
         motion = Motion(np.array(rows), float(FPS), self._channels)
-        return self._face.draw(motion, Timeline(()), fps=FPS).picture(1)
+        return self._face.draw(motion, Timeline(()), fps=FPS).draw(1)

@@ -61,7 +61,7 @@ class DrawnMotion(Generic[PoseT]):
     def __len__(self) -> int:
         return len(self._poses)
 
-    def picture(self, number: int) -> Picture:
+    def draw(self, number: int) -> Picture:
         """Return the picture of a frame [shape as of ``Face.render``]."""
         return self._paint(self._poses[number])
 

@@ -48,7 +48,7 @@ class FrameGroups:
         """Bytes of the decoded frames that are kept."""
         return sum(frame.nbytes for group in self._groups.values() for frame in group)
 
-    def frame(self, index: int) -> Frame:
+    def decode(self, index: int) -> Frame:
         """Return a frame: uint8 array [shape=(H, W, 3)], which is not to be changed.
 
         Raises IndexError: there is no such frame. Raises the errors of reading.
@@ -63,11 +63,11 @@ class FrameGroups:
         return self._groups[group][index - self._starts[group]]
 
     def _decode(self, group: int) -> None:
-        while len(self._groups) > 1 and (len(self._groups) + 1) * self._largest() > self._most_bytes:
+        while len(self._groups) > 1 and (len(self._groups) + 1) * self._find_largest() > self._most_bytes:
             self._groups.popitem(last=False)
         self._groups[group] = list(self._read(self._starts[group], self._starts[group + 1]))
 
-    def _largest(self) -> int:
+    def _find_largest(self) -> int:
         return max(sum(frame.nbytes for frame in group) for group in self._groups.values())
 
 
@@ -121,19 +121,19 @@ class StoredVideo:
     def _layout(self) -> tuple[list[int], list[int]]:
         return _read_layout(self.data)
 
-    def groups(self) -> FrameGroups:
+    def open_groups(self) -> FrameGroups:
         """Return access to any frame, each uint8 RGB [shape=(H, W, 3)]; memory does not grow with the video's length.
 
         Reading a frame raises ModelFormatError: it is damaged.
         """
-        return FrameGroups(self._decoded, self._layout[1])
+        return FrameGroups(self._decode_range, self._layout[1])
 
-    def frames(self, order: Iterable[int]) -> Iterator[Pictures]:
-        """Yield frames by their numbers, in any order; as ``groups``."""
-        groups = self.groups()
-        return (groups.frame(index) for index in order)
+    def decode(self, order: Iterable[int]) -> Iterator[Pictures]:
+        """Yield frames by their numbers, in any order; as ``open_groups``."""
+        groups = self.open_groups()
+        return (groups.decode(index) for index in order)
 
-    def _decoded(self, start: int, stop: int) -> list[Pictures]:
+    def _decode_range(self, start: int, stop: int) -> list[Pictures]:
         begins = self._layout[0]
         pictures = list(_decode(self.data, begins[start : stop + 1], self.size))
         if len(pictures) != stop - start:

@@ -27,7 +27,7 @@ REQUIRED = "".join(name for name, shape in SHAPES.items() if not shape.fallback)
 LARGEST_PX, MAX_PIXELS = 4096, 1 << 26
 """Largest side of a picture, and most pixels of all together."""
 LARGEST_BYTES = 1 << 26
-MOST_FILES = 1000
+MAX_FILES = 1000
 WHITE = (255, 255, 255)
 _NAME = re.compile(r"(?:^|[^A-Za-z])([A-Za-z]{1,4})$")
 
@@ -43,7 +43,7 @@ class CutOut:
         """The letters of the shapes that are drawn."""
         return "".join(self.pictures)
 
-    def frames(self, shapes: Iterable[str], staging: Staging) -> Iterator[Picture]:
+    def draw(self, shapes: Iterable[str], staging: Staging) -> Iterator[Picture]:
         """Yield a picture for each shape, RGB or RGBA, of even sizes, with size and background of the staging."""
         staged = {name: _stage(picture, staging) for name, picture in self.pictures.items()}
         for shape in shapes:
@@ -51,9 +51,9 @@ class CutOut:
 
 
 def picture_files(folder: Path) -> list[Path]:
-    """Return the pictures in a folder, by their names, in order; at most ``MOST_FILES``."""
+    """Return the pictures in a folder, by their names, in order; at most ``MAX_FILES``."""
     files = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in SUFFIXES and path.is_file()]
-    return files[:MOST_FILES]
+    return files[:MAX_FILES]
 
 
 def read_cut_out(folder: Path) -> CutOut:

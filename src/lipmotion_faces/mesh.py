@@ -22,7 +22,7 @@ from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces import base
-from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, prepare_surface, fill_background
+from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, fill_background, prepare_surface
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -108,7 +108,7 @@ class MeshFace(base.Face):
         if self.staging.size:
             width, height = max(2 * round(self.staging.size * 8 / 9), base.SMALLEST_PX), self.staging.size
         stage = MeshStage(self._character, width, height, self.staging.colour)
-        draw = stage.cut_out if self.staging.background == base.TRANSPARENT else stage.picture
+        draw = stage.cut_out if self.staging.background == base.TRANSPARENT else stage.draw
         return lambda pose: draw(self._character.place_vertices(pose.row), pose.turn, pose.look)
 
 
@@ -116,7 +116,7 @@ def write_picture(path: Path, character: DrivenCharacter) -> None:
     """Write a picture of a character at rest as PNG. Raises ExportError: it cannot be written."""
     from PIL import Image
 
-    picture = MeshStage(character, WIDTH, HEIGHT).picture(character.mesh.vertices)
+    picture = MeshStage(character, WIDTH, HEIGHT).draw(character.mesh.vertices)
     with atomic_file(path) as unfinished:
         Image.fromarray(picture).save(unfinished, format="PNG")
 
@@ -140,7 +140,9 @@ class MeshStage:
         near = np.linalg.norm(self._rest, axis=1) < DRAWN_HEIGHTS * across
         shown = np.asarray(near[mesh.triangles].any(axis=1))
         self._drawn = prepare_surface(mesh, shown, height / across / placement.scale)
-        self._canvas = TexturedCanvas(camera, self._drawn.triangles, None if colour is None else fill_background(camera, colour))
+        self._canvas = TexturedCanvas(
+            camera, self._drawn.triangles, None if colour is None else fill_background(camera, colour)
+        )
         self._joined, self._moving = surface.places, character.moving
         # what must be lit again when the moving vertices move: the places (of vertices that files split) around them,
         # their triangles, and for each vertex whose normal changes its place among these, and the vertex
@@ -156,11 +158,11 @@ class MeshStage:
         normals = compute_normals(self._join(self._rest), self._joined[mesh.triangles].astype(np.int32))[self._joined]
         self._normals = normals
         self._share, self._pivot = self._weigh_head(character, face)
-        self._eyes = [self._eye(bone) for bone in mesh.bones if bone.kind in (LEFT_EYE, RIGHT_EYE)]
+        self._eyes = [self._find_eye(bone) for bone in mesh.bones if bone.kind in (LEFT_EYE, RIGHT_EYE)]
         self._light, self._shine = self._light_vertices(self._rest, normals, np.arange(len(self._drawn.rows)))
-        self._still = self._canvas.picture(self._rest[self._drawn.rows], self._light, self._shine)
+        self._still = self._canvas.draw(self._rest[self._drawn.rows], self._light, self._shine)
 
-    def picture(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> base.Picture:
+    def draw(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> base.Picture:
         """Return the picture of the mesh with its vertices at other places [shape=(H, W, 3)].
 
         vertices : in the frame and unit of the mesh [shape=(V, 3)]
@@ -173,7 +175,7 @@ class MeshStage:
             return self._still.copy()
         drawn = moved[self._drawn.rows]
         area = np.concatenate([places[drawn], self._rest[self._drawn.rows[drawn]]])
-        return self._canvas.picture(places, light, shine, onto=self._still, moving=area)
+        return self._canvas.draw(places, light, shine, onto=self._still, moving=area)
 
     def cut_out(self, vertices: Array, turn: Turn = STILL, gaze: tuple[float, float] = (0.0, 0.0)) -> base.Picture:
         """Return the same picture without background, with straight alpha [shape=(H, W, 4)]."""
@@ -223,7 +225,7 @@ class MeshStage:
             return np.ones(len(self._rest)), PIVOT
         return smooth_step((self._rest[:, 1] - NECK_BOTTOM) / (NECK_TOP - NECK_BOTTOM)), PIVOT
 
-    def _eye(self, bone: Bone) -> tuple[Rows, Array, Array]:
+    def _find_eye(self, bone: Bone) -> tuple[Rows, Array, Array]:
         """Return the vertices of an eye, how far each follows it [shape=(N, 1)], and its middle [shape=(3,)]."""
         held = self._rest[bone.rows[bone.shares > 0.5 * bone.shares.max()]]
         return bone.rows, bone.shares[:, None], (held.min(axis=0) + held.max(axis=0)) / 2
@@ -245,6 +247,6 @@ class MeshStage:
         rows, kinds = self._drawn.rows[chosen], self._drawn.kinds[chosen]
         facing, colours = normals[rows] * self._drawn.sides[chosen, None], self._drawn.colours[chosen]
         at, viewer, lighting = places[rows], self._canvas.camera.place, self._drawn.lighting
-        light = lighting.light(at, facing, colours, kinds, viewer)
-        shine = lighting.light(at, facing, np.zeros_like(colours), kinds, viewer)
+        light = lighting.shade(at, facing, colours, kinds, viewer)
+        shine = lighting.shade(at, facing, np.zeros_like(colours), kinds, viewer)
         return light - shine, shine

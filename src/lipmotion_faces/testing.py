@@ -43,12 +43,12 @@ def check_face(face: Face) -> None:
     require_error(InputError, lambda: list(face.render(motion, units, fps=0.0)), "fps of 0")
     if isinstance(face, Stageable):
 
-        def first(**settings: Any) -> NDArray[np.uint8]:
+        def draw_first(**settings: Any) -> NDArray[np.uint8]:
             return next(iter(face.with_staging(Staging(**settings)).render(one.motion, one.speech.units, fps=10.0)))
 
-        small = first(size=64)
+        small = draw_first(size=64)
         require(small.shape[0] == 64, f"a picture {small.shape[0]} pixels high, required the 64 that were asked for")
-        clear = first(size=64, background=TRANSPARENT)
+        clear = draw_first(size=64, background=TRANSPARENT)
         require(clear.shape == (*small.shape[:2], 4), f"transparent frames of shape {clear.shape}, required RGBA")
         require(bool(np.any(clear[..., 3] == 0)), "no pixel is transparent")
         require(isinstance(face.with_staging(Staging()), Face), "a staged face is no face")

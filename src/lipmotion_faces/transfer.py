@@ -28,7 +28,7 @@ from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import track
 
-MOST_FOOTAGE_S = 60.0
+MAX_FOOTAGE_S = 60.0
 """Seconds of footage that are used: the first of a video, utterances spread evenly over a corpus."""
 MIN_SPEECH_S = 0.5
 """Fewest seconds of speech, with the face measured, of which a map is made."""
@@ -154,7 +154,7 @@ def _list_takes(
         if not names:
             raise InputError(f"{where}: the corpus is empty; prepare recordings of the person")
         mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)
-        for index in choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
+        for index in choose_evenly(ceil(MAX_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
             utterance = opened.utterance(names[index])
             words = " ".join(utterance.words) if utterance.words else None
             yield utterance.name, Request(utterance.audio, words, units=utterance.phones), utterance.track
@@ -162,5 +162,5 @@ def _list_takes(
         if speaker:
             raise InputError(f"{where}: a video has no speaker {speaker!r} by name; leave the name out")
         audio = read_audio(opened)
-        first = Audio(audio.samples[: round(MOST_FOOTAGE_S * audio.rate_hz)], audio.rate_hz)
-        yield where, Request(first), track(opened, crops=False, span=VideoSpan(0.0, MOST_FOOTAGE_S))
+        first = Audio(audio.samples[: round(MAX_FOOTAGE_S * audio.rate_hz)], audio.rate_hz)
+        yield where, Request(first), track(opened, crops=False, span=VideoSpan(0.0, MAX_FOOTAGE_S))

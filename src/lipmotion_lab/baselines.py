@@ -102,7 +102,7 @@ class ContextRidge(Baseline):
     def fit_map(self, recordings: Sequence[Recording], monitor: Monitor) -> Array:  # noqa: D102, ARG002 - takes seconds
         statistics, frames = None, 0
         for speech, targets, mask in recordings:
-            rows = self.regressors(speech)[mask]
+            rows = self.stack_regressors(speech)[mask]
             statistics = statistics or create_statistics(rows.shape[1], targets.shape[1])
             statistics.add(rows, targets[mask])
             frames += len(rows)
@@ -111,9 +111,9 @@ class ContextRidge(Baseline):
         return ridge(statistics, np.zeros_like(statistics.targets), self.strength * frames)
 
     def predict(self, learned: Array, speech: Speech) -> Array:  # noqa: D102
-        return self.regressors(speech) @ learned
+        return self.stack_regressors(speech) @ learned
 
-    def regressors(self, speech: Speech) -> Array:
+    def stack_regressors(self, speech: Speech) -> Array:
         """Return the regressors of each frame [shape=(T, F)]."""
         features = np.asarray(speech.features.values)
         offsets = np.arange(-self.reach, self.reach + 1)
@@ -145,7 +145,7 @@ class Hearing:
     scale: float | None
 
     @classmethod
-    def of(cls, recordings: Sequence[Speech]) -> Hearing:
+    def fit(cls, recordings: Sequence[Speech]) -> Hearing:
         """Return that of a training."""
         said = [limit_logarithms(each.posteriors) for each in recordings if each.posteriors is not None]
         heard = [np.asarray(each.encoding, np.float32) for each in recordings if each.encoding is not None]
@@ -153,7 +153,7 @@ class Hearing:
         scale = float(np.concatenate(heard).std()) if len(heard) == len(recordings) else None
         return cls(mean, basis, scale)
 
-    def time_steps(self, speech: Speech) -> Float32Array:
+    def stack_steps(self, speech: Speech) -> Float32Array:
         """Return what the network hears in every time step of 40 ms [shape=(ceil(T / 4), I)]."""
         parts = [stack_spectrum(np.asarray(speech.features.values))]
         if self.mean is not None and self.basis is not None and speech.posteriors is not None:
@@ -197,10 +197,10 @@ class BlstmBaseline(Baseline):
     def fit_map(self, recordings: Sequence[Recording], monitor: Monitor) -> TrainedNetwork:  # noqa: D102
         everything = np.concatenate([x[mask] for _, x, mask in recordings])
         mean, deviation = everything.mean(axis=0), np.maximum(everything.std(axis=0), 1e-6)
-        hearing = Hearing.of([speech for speech, _, _ in recordings])
+        hearing = Hearing.fit([speech for speech, _, _ in recordings])
         sequences = [
             TrainingSequence(
-                hearing.time_steps(speech), ((x - mean) / deviation)[::STEP].astype(np.float32), mask[::STEP]
+                hearing.stack_steps(speech), ((x - mean) / deviation)[::STEP].astype(np.float32), mask[::STEP]
             )
             for speech, x, mask in recordings
         ]
@@ -217,5 +217,5 @@ class BlstmBaseline(Baseline):
         return TrainedNetwork(network, hearing, mean, deviation)
 
     def predict(self, learned: TrainedNetwork, speech: Speech) -> Array:  # noqa: D102
-        steps = learned.network(learned.hearing.time_steps(speech)).astype(float)
+        steps = learned.network(learned.hearing.stack_steps(speech)).astype(float)
         return interpolate_steps(steps, len(speech.features.values)) * learned.deviation + learned.mean

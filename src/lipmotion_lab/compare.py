@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 OPENING = "opening"
 HIGHEST_RATE_HZ = 120.0
 """Motion of a higher rate is compared at this one."""
-LEAST_FRAMES = 4
+MIN_FRAMES = 4
 """Without them there is no third difference."""
 UPPER_FACE = tuple(name for name in ARKIT_OTHERS if name.startswith(("brow", "eyeBlink", "eyeSquint", "eyeWide")))
 
@@ -95,8 +95,8 @@ def _compare_pair(reference: _Side, other: _Side) -> dict[str, Any]:
         nearest = np.floor(time_s * side.motion.rate_hz + 0.5).astype(int)
         measured &= side.seen[np.minimum(nearest, len(side.seen) - 1)]
     count = int(measured.sum())
-    if count < LEAST_FRAMES:
-        raise InputError(f"{reference.name}, {other.name}: {count} common frames, required {LEAST_FRAMES} or more")
+    if count < MIN_FRAMES:
+        raise InputError(f"{reference.name}, {other.name}: {count} common frames, required {MIN_FRAMES} or more")
     if count < len(time_s):
         notes.append(f"{len(time_s) - count} of {len(time_s)} frames are left out: the face was not measured")
     channels = tuple(reference.motion.channels[reference.motion.column(name)] for name in names)
@@ -203,21 +203,21 @@ def _measure_channels(
 def _measure_points(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
     """Return the figures of points in mm (None: no points); at rest, points above the eyes are at their median."""
 
-    def places(side: Motion, wanted: Sequence[str]) -> Array:
+    def select(side: Motion, wanted: Sequence[str]) -> Array:
         coordinates = _select_values(side, [axis for point in wanted for axis in points[point]])
         return coordinates.reshape(len(coordinates), -1, 3) * MILLIMETRES
 
-    def both(wanted: Sequence[str]) -> tuple[list[Array], list[Array]]:
-        return [places(made, wanted)], [places(original, wanted)]
+    def select_both(wanted: Sequence[str]) -> tuple[list[Array], list[Array]]:
+        return [select(made, wanted)], [select(original, wanted)]
 
     lips = [point for point in points if point.isdecimal() and int(point) in LIP_POINTS]
     upper = [point for point in points if np.median(original[f"y_{point}"]) > 0]
-    rest = np.median(places(original, upper), axis=0)
+    rest = np.median(select(original, upper), axis=0)
     return {
         "points": len(points),
         "lip_points": len(lips),
         "upper_points": len(upper),
-        "landmark_distance_mm": curves.measure_landmarks(*both(list(points))),
-        "lip_vertex_error_mm": curves.measure_lip_error(*both(lips)) if lips else None,
-        "upper_face_deviation_mm": curves.measure_upper_face(*both(upper), rest) if upper else None,
+        "landmark_distance_mm": curves.measure_landmarks(*select_both(list(points))),
+        "lip_vertex_error_mm": curves.measure_lip_error(*select_both(lips)) if lips else None,
+        "upper_face_deviation_mm": curves.measure_upper_face(*select_both(upper), rest) if upper else None,
     }

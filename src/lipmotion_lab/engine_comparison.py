@@ -20,7 +20,7 @@ from lipmotion.storage.locks import keep_unfinished
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor, with_progress
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import sum_correlations, measure_clips, pair_curves
+from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_correlations
 from lipmotion_lab.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings, generate_compared, make_speech
 from lipmotion_lab.learning_curve import check_training_names
 
@@ -115,7 +115,7 @@ def compare_engines(
 ) -> dict[str, Any]:
     """Return the figures of all engines on ``split``.
 
-    models : folder of the engines' models (``models.engine_models``); None: they are trained and not kept
+    models : folder of the engines' models (``train_engines``); None: they are trained and not kept
     The phones in time are those of the trajectory engine's phone models, for all of them.
     Raises CorpusError: no training list, no utterances of this split or some of the training list among them, or
     motion without an opening.
@@ -124,9 +124,9 @@ def compare_engines(
     held_out = corpus.required(split)
     check_training_names(corpus, corpus.required("train"), held_out)
     channels = runner.check_opening(corpus, held_out)
-    trained = train_engines(corpus, models, settings.part(0, 0.6))
+    trained = train_engines(corpus, models, settings.narrow(0, 0.6))
     phones = trained[REFERENCE_ENGINE].model.phones
-    recordings = runner.recognise_held_out(corpus, phones, held_out, settings.part(0.6, 0.7), channels=channels)
+    recordings = runner.recognise_held_out(corpus, phones, held_out, settings.narrow(0.6, 0.7), channels=channels)
     steps = [(condition, name) for condition in recordings.conditions for name in trained]
     made: dict[str, dict[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]]] = {
         condition: {} for condition in recordings.conditions
@@ -167,7 +167,7 @@ def _make_rows(
         figures = measure_clips(clips, recordings, seed)
         width = figures["channels"].get(WIDTH, {})
         row = runner.make_opening_row(figures) | {f"{WIDTH}_{key}": width.get(key) for key in WIDTH_FIGURES}
-        row |= {"acc_gain_95": {other: acc[name].gain(statistic, seed) for other, statistic in acc.items()}}
+        row |= {"acc_gain_95": {other: acc[name].compute_gain(statistic, seed) for other, statistic in acc.items()}}
         row |= {"jerk": figures["channels"][OPENING]["jerk"], "lag_ms": figures["lag_ms"]}
         rows[name] = row | {"unpinned": runner.make_opening_row(measure_clips(free, recordings, seed))}
     return rows

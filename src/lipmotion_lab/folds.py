@@ -143,7 +143,7 @@ def cross_validate_blocks(
 ) -> dict[str, Any]:
     """Return the figures of an experiment's systems over all recordings, each of which is ``test`` once.
 
-    experiment : as ``hofer2008``, called with ``settings`` and a corpus of other lists, for each block
+    experiment : as ``run_hofer2008``, called with ``settings`` and a corpus of other lists, for each block
     references : the systems that the others are compared with
     key        : identifies its options, so that only parts finished with the same ones in ``work`` are used
     A block is of neighbouring names, in a long video of neighbouring moments. One is ``test``, the next one, in a ring,
@@ -211,9 +211,9 @@ def _make_rows(
     for system, clips in systems.items():
         row: dict[str, Any] = {}
         for name, own in statistics[system].items():
-            row |= {name: own.value, f"{name}_95": own.interval(seed)}
+            row |= {name: own.value, f"{name}_95": own.compute_interval(seed)}
             others = [each for each in references if each in systems]
-            row[f"{name}_gain_95"] = {each: own.gain(statistics[each][name], seed) for each in others}
+            row[f"{name}_gain_95"] = {each: own.compute_gain(statistics[each][name], seed) for each in others}
         if compared.closed_under is not None:
             row["opening"] = runner.make_opening_row(measure_clips(clips, compared, seed))
         rows[system] = row

@@ -82,10 +82,10 @@ def run_hofer2008(
     validation, names = corpus.required("val"), tuple(sorted(corpus.required("train")))
     key = runner.PartKey(_create_engine(channels=options.channels), (*names, *validation, *compared))
     checkpoint, utterances = runner.open_parts(work, corpus, settings, key), [corpus.utterance(name) for name in names]
-    phones, examples = runner.train_phones(utterances, settings.part(0, 0.1), checkpoint)
+    phones, examples = runner.train_phones(utterances, settings.narrow(0, 0.1), checkpoint)
     read = partial(runner.recognise_held_out, corpus, phones, channels=(OPENING,))
-    choosing = read(names=validation, settings=settings.part(0.1, 0.12))
-    recordings = read(names=compared, settings=settings.part(0.12, 0.15))
+    choosing = read(names=validation, settings=settings.narrow(0.1, 0.12))
+    recordings = read(names=compared, settings=settings.narrow(0.12, 0.15))
     cells = [(states, units) for states in options.states for units in PAPER_SCORES]
     made: dict[tuple[int, str, str], dict[str, tuple[_System, Sequence[ComparedClip]]]] = {
         case: {} for case in product(options.states, recordings.conditions, PINS)
@@ -180,12 +180,12 @@ def _make_table(
             **dict(zip(("gaussians", "motion_gaussians"), _find_best_count(system.acc), strict=True)),
             "acc_on_val": {f"{speech}, {motion}": value for (speech, motion), value in system.acc.items()},
             "jerk": figures["channels"][OPENING]["jerk"],
-            "score_95": scores[units].interval(seed),
-            "score_gain_95": scores[units].gain(scores[REFERENCE_SET], seed),
-            "acc_gain_95": acc[units].gain(acc[REFERENCE_SET], seed),
+            "score_95": scores[units].compute_interval(seed),
+            "score_gain_95": scores[units].compute_gain(scores[REFERENCE_SET], seed),
+            "acc_gain_95": acc[units].compute_gain(acc[REFERENCE_SET], seed),
         }
     pairs = [
-        {"better": better, "worse": worse, "score_gain_95": scores[better].gain(scores[worse], seed)}
+        {"better": better, "worse": worse, "score_gain_95": scores[better].compute_gain(scores[worse], seed)}
         for better, worse in combinations(PAPER_SCORES, 2)
     ]
     return {"rows": rows, "paper_order": pairs}

@@ -78,7 +78,7 @@ class Rival:
     ours: bool = False
     settings: Mapping[str, Sequence[Any]] = field(default_factory=dict)
 
-    def command(self, folder: Path) -> list[str]:
+    def build_command(self, folder: Path) -> list[str]:
         """Return the command, whose files are in a folder."""
         program, *files = self.run
         if program.startswith("{"):
@@ -127,7 +127,7 @@ class Recording:
     original: Array
     phones: list[tuple[float, float, str]]
 
-    def spoken(self, *, lips: bool) -> list[tuple[float, float]]:
+    def list_spans(self, *, lips: bool) -> list[tuple[float, float]]:
         """Return the times of p, b and m, or of all other phones."""
         return [(start, end) for start, end, phone in self.phones if phone and (phone in BILABIAL) == lips]
 
@@ -183,7 +183,7 @@ def ask(
     limit_s : seconds after which the job is ended
     Raises MissingDependencyError: it is not installed. Raises RivalError: it crashed, or answered nonsense.
     """
-    command, settings = rival.command(adapters), rival.list_settings()
+    command, settings = rival.build_command(adapters), rival.list_settings()
     scripts = [Path(word).read_bytes() for word in command if Path(word).parent == adapters]
     key = hashlib.sha256(b"".join([*scripts, json.dumps(settings, sort_keys=True).encode()])).hexdigest()[:8]
     folder = work / "answers" / f"{rival.name}-{key}"
@@ -360,13 +360,15 @@ def count_closings(recording: Recording, made: Array, shut: float) -> tuple[Arra
     matched = [o for _, o in pairs]
     frame_s = float(np.median(np.diff(recording.time_s)))
 
-    def inside(frames: NDArray[np.intp], spans: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
+    def mark_inside(
+        frames: NDArray[np.intp], spans: Sequence[tuple[float, float]], margin_s: float
+    ) -> NDArray[np.bool_]:
         return ~is_away_from_speech(recording.time_s[frames], spans, margin_s)
 
-    lips, other = recording.spoken(lips=True), recording.spoken(lips=False)
-    wanted = original[inside(original, lips, frame_s)]
+    lips, other = recording.list_spans(lips=True), recording.list_spans(lips=False)
+    wanted = original[mark_inside(original, lips, frame_s)]
     false = np.setdiff1d(generated, [g for g, _ in pairs]).astype(int)
-    false = false[inside(false, other, 0.0) & ~inside(false, lips, frame_s)]
+    false = false[mark_inside(false, other, 0.0) & ~mark_inside(false, lips, frame_s)]
     hits = int(np.isin(wanted, matched).sum())
     everything = np.array([len(pairs), len(original) - len(pairs), len(generated) - len(pairs)], float)
     return everything, np.array([hits, len(wanted) - hits, len(false)], float)
@@ -548,16 +550,16 @@ def describe_league(found: League) -> Section:
     for each in found.standings:
         row: dict[str, Any] = {"given": each.rival.given}
         for name, figure in each.figures.items():
-            row |= {name: figure.value, f"{name}_95": figure.interval(0)}
+            row |= {name: figure.value, f"{name}_95": figure.compute_interval(0)}
             if best is not None and best is not each:
-                row[f"{name}_gain_95"] = figure.gain(best.figures[name], 0)
+                row[f"{name}_gain_95"] = figure.compute_gain(best.figures[name], 0)
         rows[each.rival.title] = replace_nan(row)
     verdict = "nothing could be compared"
     if found.standings:
         first = found.standings[0]
         verdict = f"Best: {first.rival.title}, opening {first.figures['acc'].value:.3f}"
         if best is not None and best is not first:
-            low, high = first.figures["acc"].gain(best.figures["acc"], 0)
+            low, high = first.figures["acc"].compute_gain(best.figures["acc"], 0)
             verdict += f"; {low:+.3f} to {high:+.3f} more than the best rival, {best.rival.title}"
     lips = int(sum(counts[:2].sum() for counts in found.standings[0].figures["lips"].sums)) if found.standings else 0
     about = ", ".join(f"{key}: {value}" for key, value in found.about.items())
@@ -594,12 +596,14 @@ def _choose_excerpt(found: League) -> dict[str, Any]:
     if not found.standings:
         return {}
 
-    def lips(n: int, start_s: float) -> int:
-        spans = found.recordings[n].spoken(lips=True)
+    def count_lips(n: int, start_s: float) -> int:
+        spans = found.recordings[n].list_spans(lips=True)
         return sum(start_s <= start and end <= start_s + SHOWN_S for start, end in spans)
 
-    begins = [(n, s) for n, r in enumerate(found.recordings) for s in [0.0, *(span[0] for span in r.spoken(lips=True))]]
-    number, begin_s = max(begins, key=lambda each: lips(*each))
+    begins = [
+        (n, s) for n, r in enumerate(found.recordings) for s in [0.0, *(span[0] for span in r.list_spans(lips=True))]
+    ]
+    number, begin_s = max(begins, key=lambda each: count_lips(*each))
     recording = found.recordings[number]
     seen = (recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S)
     spoken = [s for s in recording.phones if s[2] and s[1] > begin_s and s[0] < begin_s + SHOWN_S]

@@ -17,7 +17,7 @@ from lipmotion.motion.space import resample_track
 from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import Example, Speech, Timeline
 from lipmotion_lab import runner
-from lipmotion_lab.evaluation.evaluate import sum_correlations, measure_clips, pair_curves
+from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_correlations
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, generate_clips, load_held_out
 from lipmotion_lab.xie_liu2007.systems import BLSTM, as_row, find_best_trial, tune_network, with_inputs_of
 
@@ -136,7 +136,7 @@ def _compare_network(
     channels: dict[str, Any] = {}
     for channel in recordings.channels:
         own, other = (sum_correlations(*pair_curves(recordings, made, channel)) for made in (ours, clips))
-        channels[channel] = {"ours": own.value, "acc": other.value, "acc_95": other.interval(settings.seed)}
-        channels[channel]["gain_95"] = own.gain(other, settings.seed)
+        channels[channel] = {"ours": own.value, "acc": other.value, "acc_95": other.compute_interval(settings.seed)}
+        channels[channel]["gain_95"] = own.compute_gain(other, settings.seed)
     best = find_best_trial(system.tried).options
     return {"options": best, "tried": [*map(as_row, system.tried)], "channels": channels}

@@ -37,8 +37,8 @@ from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.json_text import replace_nan
 from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
 from lipmotion_lab import runner
-from lipmotion_lab.engine_comparison import EngineModel, train_engines, train_engine
-from lipmotion_lab.evaluation.evaluate import sum_correlations, sum_distances, measure_clips, pair_curves
+from lipmotion_lab.engine_comparison import EngineModel, train_engine, train_engines
+from lipmotion_lab.evaluation.evaluate import measure_clips, pair_curves, sum_correlations, sum_distances
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, OPENING, generate_compared, make_speech
 from lipmotion_lab.learning_curve import check_training_names
 
@@ -159,7 +159,7 @@ def run_minnis2000(
 ) -> dict[str, Any]:
     """Return the figures of the paper's system and of its variants on ``val``, if the corpus has it, and ``test``.
 
-    models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
+    models : folder of the model ``selection.lipmotion`` (``train_engines``), so that a second run does not train
              again; None: it is trained and not kept
     quick  : only see that it runs: few epochs
     guided : as of ``list_configurations``; without, training takes a minute instead of twenty, and no model is kept
@@ -174,7 +174,7 @@ def run_minnis2000(
     lists = {split: corpus.required(split) for split in splits}
     for held_out in lists.values():
         check_training_names(corpus, corpus.required("train"), held_out)
-    training = settings.part(0, 0.6)
+    training = settings.narrow(0, 0.6)
     kept_in = models or (work and work / "model")
     if quick or not guided:
         options = ({} if guided else {"guide": 0.0, "joint_recogniser": False}) | ({"epochs": 20} if quick else {})
@@ -185,7 +185,9 @@ def run_minnis2000(
         trained = train_engines(corpus, kept_in, training, [ENGINE])[ENGINE]
     found = {}
     for (split, names), part in zip(lists.items(), runner.share_out(settings, [*lists], 0.6), strict=True):
-        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(list_configurations(guided=guided)))
+        key = runner.PartKey(
+            trained.model.engine, names, model=trained.model, others=str(list_configurations(guided=guided))
+        )
         kept = runner.open_parts(work and work / split, corpus, settings, key)
         found[split] = _measure_list(corpus, names, trained.model, list_configurations(guided=guided), kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
@@ -208,7 +210,7 @@ def _measure_list(
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
     channels = runner.check_opening(corpus, names)
-    recordings = runner.recognise_held_out(corpus, model.phones, names, settings.part(0, 0.4), channels=channels)
+    recordings = runner.recognise_held_out(corpus, model.phones, names, settings.narrow(0, 0.4), channels=channels)
     conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
     reference: dict[str, tuple[Array, Array]] = {}
 
@@ -250,7 +252,7 @@ def _measure_list(
                 statistics = sum_correlations(*both), sum_distances(*parts)
                 sums = [np.stack(each.sums) for each in statistics]
                 gains = [
-                    each.gain(replace(each, sums=list(printed)), settings.seed)
+                    each.compute_gain(replace(each, sums=list(printed)), settings.seed)
                     for each, printed in zip(statistics, reference.get(condition, sums), strict=True)
                 ]
                 row["acc_gain_95"] = gains[0]

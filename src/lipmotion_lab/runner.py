@@ -72,7 +72,7 @@ class ExperimentSettings:
     monitor: Monitor = silent_monitor
     receive: MotionReceiver = lambda *_: None
 
-    def part(self, start: float, stop: float, label: str = "") -> ExperimentSettings:
+    def narrow(self, start: float, stop: float, label: str = "") -> ExperimentSettings:
         """Return the settings of a part of the work, between two shares of the whole."""
         return replace(self, monitor=sub_monitor(self.monitor, start, stop, label))
 
@@ -113,7 +113,7 @@ def train_and_generate(
         run=Run(sub_monitor(monitor, 0, 0.8), work, settings.workers),
     )
     seconds, of_model = perf_counter() - start_s, {"channels": channels, "speakers": model.speakers}
-    recordings = recognise_held_out(corpus, model.phones, sorted(held_out), settings.part(0.8, 0.95), **of_model)
+    recordings = recognise_held_out(corpus, model.phones, sorted(held_out), settings.narrow(0.8, 0.95), **of_model)
     conditions = with_progress(list(recordings.conditions), "comparing", sub_monitor(monitor, 0.95, 1))
     generated = {
         condition: generate_clips(recordings, condition, model.engine, model.learned) for condition in conditions
@@ -127,7 +127,7 @@ def share_out(
     """Return the settings for each part of the work after ``start``: their monitors share what is left by ``sizes``."""
     ends = np.cumsum([0.0, *(sizes or [1.0] * len(labels))])
     shares = (start + (1 - start) * ends / max(ends[-1], 1e-9)).tolist()
-    return [settings.part(*share, f"{label}: ") for label, share in zip(labels, pairwise(shares), strict=True)]
+    return [settings.narrow(*share, f"{label}: ") for label, share in zip(labels, pairwise(shares), strict=True)]
 
 
 def recognise_held_out(
@@ -240,7 +240,7 @@ class Stamp:
         self._begun = datetime.now(timezone.utc)
         self._start_s = perf_counter(), sum(os.times()[:4])
 
-    def content(self, command: Sequence[str], corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+    def collect(self, command: Sequence[str], corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         """Return command, time, corpus, seed, options, commit, engines, machine and versions, by name.
 
         command : its words; of absolute paths the last name is kept, for figures are given to others

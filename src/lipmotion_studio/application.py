@@ -36,7 +36,7 @@ def create_application(studio: Studio, access: Access) -> Starlette:
     recordings, project = RecordingReplies(studio, access), ProjectReplies(studio)
     page = dict(read_page(files("lipmotion_studio") / "page"))
 
-    async def packaged(request: Request) -> Response:
+    async def send_packaged(request: Request) -> Response:
         file = page.get(request.path_params.get("name", "") or FIRST)
         if file is None:
             raise HTTPException(404, "no such page")
@@ -45,46 +45,46 @@ def create_application(studio: Studio, access: Access) -> Starlette:
     post = partial(Route, methods=["POST"])
     one = "/api/lines/{number}"
     routes = [
-        Route("/api/project", project.project),
-        Route("/api/progress", project.progress),
-        post("/api/understand", project.understand),
-        post("/api/lines", project.dropped),
-        Route(one, recordings.recording),
-        post(f"{one}/edits", recordings.edits),
-        post(f"{one}/undo", recordings.stepping(OpenRecording.undo)),
-        post(f"{one}/redo", recordings.stepping(OpenRecording.redo)),
+        Route("/api/project", project.list_recordings),
+        Route("/api/progress", project.send_progress),
+        post("/api/understand", project.analyse),
+        post("/api/lines", project.receive_recording),
+        Route(one, recordings.open_recording),
+        post(f"{one}/edits", recordings.edit),
+        post(f"{one}/undo", recordings.step_with(OpenRecording.undo)),
+        post(f"{one}/redo", recordings.step_with(OpenRecording.redo)),
         post(f"{one}/settle", recordings.settle),
-        post(f"{one}/transcript", recordings.transcript),
+        post(f"{one}/transcript", recordings.change_words),
         post(f"{one}/restore", recordings.restore),
         post(f"{one}/versions", recordings.keep),
         post(f"{one}/versions/forget", recordings.forget),
-        post(f"{one}/versions/back", recordings.back),
+        post(f"{one}/versions/back", recordings.go_back),
         post(f"{one}/mark", project.mark),
         post(f"{one}/remove", project.remove),
         post(f"{one}/export", project.export_one),
-        post(f"{one}/video", recordings.video),
-        Route(f"{one}/sound.wav", recordings.sound),
-        Route(f"{one}/recorded", recordings.recorded),
+        post(f"{one}/video", recordings.send_video),
+        Route(f"{one}/sound.wav", recordings.send_sound),
+        Route(f"{one}/recorded", recordings.send_recorded),
         post(f"{one}/votes", recordings.vote),
-        Route(f"{one}/motion", recordings.motion),
-        Route(f"{one}/weights", recordings.weights),
-        Route(f"{one}/picture", recordings.picture),
-        Route(f"{one}/why", recordings.why),
-        Route(f"{one}/doubts", recordings.doubts),
+        Route(f"{one}/motion", recordings.send_motion),
+        Route(f"{one}/weights", recordings.send_weights),
+        Route(f"{one}/picture", recordings.send_picture),
+        Route(f"{one}/why", recordings.explain),
+        Route(f"{one}/doubts", recordings.list_doubts),
         post("/api/export", project.export_all),
-        Route("/api/faces/{name}.glb", project.mesh),
-        Route("/api/lexicon", project.pronunciations),
+        Route("/api/faces/{name}.glb", project.send_mesh),
+        Route("/api/lexicon", project.list_pronunciations),
         post("/api/lexicon", project.pronounce),
-        Route("/api/training", project.training),
+        Route("/api/training", project.send_training),
         post("/api/training", project.begin_training),
-        post("/api/training/stop", project.training_after(studio.trainer.stop)),
-        post("/api/training/again", project.training_after(studio.trainer.retry, 201)),
-        post("/api/training/restore", project.training_after(studio.trainer.restore)),
-        post("/api/voice", project.voice),
-        Route("/", packaged),
-        Route("/{name:path}", packaged),
+        post("/api/training/stop", project.train_with(studio.trainer.stop)),
+        post("/api/training/again", project.train_with(studio.trainer.retry, 201)),
+        post("/api/training/restore", project.train_with(studio.trainer.restore)),
+        post("/api/voice", project.choose_voice),
+        Route("/", send_packaged),
+        Route("/{name:path}", send_packaged),
     ]
     application = Starlette(routes=routes, exception_handlers=ERRORS | {RevisionError: partial(reply_failed, 409)})
-    application.add_middleware(Guard, refusal=access.refusal)
+    application.add_middleware(Guard, refusal=access.find_refusal)
     application.add_middleware(SecurityHeaders, headers=HEADERS | {"content-security-policy": PAGE_POLICY})
     return application

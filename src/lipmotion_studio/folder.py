@@ -42,11 +42,11 @@ from lipmotion_studio.project import (
     Project,
     ProjectRecording,
     check_recordings,
+    describe_project,
     digest_edits,
     parse_project,
-    describe_project,
 )
-from lipmotion_studio.votes import Vote, read_votes, format_votes
+from lipmotion_studio.votes import Vote, format_votes, read_votes
 
 LOG = logging.getLogger("lipmotion")
 PROJECT, SOUNDS, EDITS, EXPORTS, LEXICON = "project.json", "sounds", "edits", "exports", "lexicon.txt"
@@ -125,18 +125,18 @@ class ProjectFolder:
             except ValueError as error:  # InputError is one
                 raise InputError(f"{file}: {error}") from error
 
-    def recording(self, number: int) -> ProjectRecording:
+    def find_recording(self, number: int) -> ProjectRecording:
         """Return a recording. Raises InputError: there is none of that number."""
         recording = self.project.lines.get(number)
         if recording is None:
             raise InputError(f"there is no recording {number} in the project")
         return recording
 
-    def sound(self, recording: ProjectRecording) -> Path:
+    def locate_sound(self, recording: ProjectRecording) -> Path:
         """Return the path of a recording's sound."""
         return Path(os.path.normpath(self.path / recording.sound))
 
-    def edits(self, recording: ProjectRecording) -> Path:
+    def locate_edits(self, recording: ProjectRecording) -> Path:
         """Return the path of a recording's file of edits, which is there once it is analysed."""
         return self.path / EDITS / f"{recording.name}.{EDITS_SUFFIX}"
 
@@ -145,7 +145,7 @@ class ProjectFolder:
 
     def check_sound(self, recording: ProjectRecording) -> Path:
         """Return the path of a recording's sound. Raises InputError: it is not there, or another one than it was."""
-        path = self.sound(recording)
+        path = self.locate_sound(recording)
         if recording.sha256:
             check_sound(path, recording.sha256)
         return path
@@ -154,28 +154,28 @@ class ProjectFolder:
     def check_out(self, number: int, revision: int) -> Iterator[ProjectRecording]:
         """Give a recording, seen at this revision, to be changed. Raises RevisionError: changed. InputError: gone."""
         with self.lock:
-            recording = self.recording(number)
-            check_revision("the recording", compute_revision(recording, self.summary(recording)), revision)
+            recording = self.find_recording(number)
+            check_revision("the recording", compute_revision(recording, self.summarise(recording)), revision)
             yield recording
 
-    def summary(self, recording: ProjectRecording) -> EditsSummary:
+    def summarise(self, recording: ProjectRecording) -> EditsSummary:
         """Return what a recording's file of edits holds; ``NO_EDITS`` where it is not analysed yet."""
         with self.lock:
-            state, cached = self._file_state(recording), self._summaries.get(recording.number)
+            state, cached = self._read_file_state(recording), self._summaries.get(recording.number)
             if cached is None or cached[0] != state:
                 summary = NO_EDITS
                 if state:
                     try:
-                        summary = summarise_edits(read_edits(self.edits(recording), phones=False))
+                        summary = summarise_edits(read_edits(self.locate_edits(recording), phones=False))
                     except InputError as error:
                         summary = EditsSummary(0, "", f"damaged: {error}", str(self._damage(recording, error)))
                 cached = self._summaries[recording.number] = state, summary
             return cached[1]
 
-    def _file_state(self, recording: ProjectRecording) -> object:
+    def _read_file_state(self, recording: ProjectRecording) -> object:
         """Return what tells a file of edits from an earlier one; a copy without its file counts. None: neither."""
         try:
-            status = self.edits(recording).stat()
+            status = self.locate_edits(recording).stat()
             return status.st_ino, status.st_size, status.st_mtime_ns
         except FileNotFoundError:
             return self._copy(recording).exists() or None
@@ -199,26 +199,26 @@ class ProjectFolder:
         """Return a recording's edits. Raises InputError: damaged (and where a copy is), or of another sound."""
         with self.lock:
             try:
-                file = read_edits(self.edits(recording))
+                file = read_edits(self.locate_edits(recording))
             except InputError as error:
                 raise self._damage(recording, error) from error
         if recording.sha256 and file.sha256 not in ("", recording.sha256):
             raise InputError(
-                f"{self.edits(recording)}: are edits of another recording than {self.sound(recording)}; put the right "
-                "file in its place, or add the recording again, under another name"
+                f"{self.locate_edits(recording)}: are edits of another recording than {self.locate_sound(recording)}; put "
+                "the right file in its place, or add the recording again, under another name"
             )
         return file
 
     def has_edits(self, recording: ProjectRecording) -> bool:
         """Return whether a recording is analysed, and edited since. Raises InputError: as ``read_edits``."""
-        return self.summary(recording) is not NO_EDITS and bool(self.read_edits(recording).edits.steps)
+        return self.summarise(recording) is not NO_EDITS and bool(self.read_edits(recording).edits.steps)
 
     def write_edits(self, recording: ProjectRecording, file: EditFile) -> None:
         """Write a recording's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
-        path, copy = self.edits(recording), self._copy(recording)
+        path, copy = self.locate_edits(recording), self._copy(recording)
         with self.lock, create_folders([path.parent, copy.parent]):
             write_with_copy(path, copy, lambda first: write_edits(file, first))
-            self._summaries[recording.number] = self._file_state(recording), summarise_edits(file)
+            self._summaries[recording.number] = self._read_file_state(recording), summarise_edits(file)
 
     def adopt(self, recording: ProjectRecording, file: EditFile) -> EditFile:
         """Return a recording's edits with the digest of its sound, where a project of an earlier version has none.
@@ -226,9 +226,9 @@ class ProjectFolder:
         From then on another sound is refused; a warning says so. The copy becomes that of the file.
         Raises InputError: the sound cannot be read. ExportError: it cannot be written.
         """
-        path, copy, digest = self.edits(recording), self._copy(recording), recording.sha256 or file.sha256
+        path, copy, digest = self.locate_edits(recording), self._copy(recording), recording.sha256 or file.sha256
         if not (recording.sha256 and file.sha256):
-            sound = self.sound(recording)
+            sound = self.locate_sound(recording)
             LOG.warning("%s: is taken to be the recording that was edited; from now on no other is", sound)
             digest = digest or hash_file(sound)
             self.change_recording(recording.number, lambda now: replace(now, sha256=digest))
@@ -243,7 +243,10 @@ class ProjectFolder:
     def remove_edits(self, recording: ProjectRecording) -> None:
         """Remove a recording's file of edits, and its copy. Raises ExportError: it cannot be removed."""
         with self.lock:
-            for path in (self._copy(recording), self.edits(recording)):  # a copy without its file would be a damage
+            for path in (
+                self._copy(recording),
+                self.locate_edits(recording),
+            ):  # a copy without its file would be a damage
                 remove(path)
                 if path.exists():
                     raise ExportError(f"{path}: cannot be removed")
@@ -266,7 +269,7 @@ class ProjectFolder:
             if not self.is_restorable(recording):
                 self.read_edits(recording)  # says what is damaged
                 raise InputError("the edits of the recording are not damaged; nothing is restored")
-            restore_copy(self.edits(recording), self._copy(recording))
+            restore_copy(self.locate_edits(recording), self._copy(recording))
 
     def change(self, changed: Callable[[Project], Project], *, save: bool = True) -> None:
         """Replace the project by what a function makes of it. Raises ExportError: not written; it stays as it was."""
@@ -302,8 +305,8 @@ class ProjectFolder:
         with self.lock:
             listed = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
             sources = [(Path(each.recording), each.name, each.transcript) for each in listed]
-            known = {os.path.realpath(self.sound(each)) for each in self.project.lines.values()}
-            taken, file = self._taken_names(), self.path.absolute() / PROJECT
+            known = {os.path.realpath(self.locate_sound(each)) for each in self.project.lines.values()}
+            taken, file = self._list_taken_names(), self.path.absolute() / PROJECT
             added: list[ProjectRecording] = []
             for sound, name, transcript in sources or [(source, make_portable(source.stem), "")]:
                 if os.path.realpath(sound) not in known:
@@ -327,18 +330,20 @@ class ProjectFolder:
         with self.lock:
             folder = self.path / SOUNDS
             make_folder(folder)
-            taken = self._taken_names() | {file_key(each.stem) for each in folder.iterdir()}  # also of what was removed
+            taken = self._list_taken_names() | {
+                file_key(each.stem) for each in folder.iterdir()
+            }  # also of what was removed
             number = self.project.next_number
             recording = ProjectRecording(number, clean_name(Path(name).stem), "", digest, transcript)
             recording = self._choose_name(recording, taken)
             recording = replace(recording, sound=f"{SOUNDS}/{recording.name}{suffix}")
             check_recordings(self.project.with_recordings([recording]))
-            with atomic_file(self.sound(recording)) as temporary:
+            with atomic_file(self.locate_sound(recording)) as temporary:
                 content.replace(temporary)
             self.change(lambda project: project.with_recordings([recording]))
             return number
 
-    def _taken_names(self) -> set[str]:
+    def _list_taken_names(self) -> set[str]:
         return {file_key(recording.name) for recording in self.project.lines.values()}
 
     def _choose_name(self, recording: ProjectRecording, taken: set[str]) -> ProjectRecording:
@@ -347,7 +352,7 @@ class ProjectFolder:
         def is_free(named: ProjectRecording) -> bool:
             if file_key(named.name) in taken:
                 return False
-            files = [path for path in (self.edits(named), self._copy(named)) if path.exists()]
+            files = [path for path in (self.locate_edits(named), self._copy(named)) if path.exists()]
             try:
                 return all(read_edits(path, phones=False).sha256 == recording.sha256 for path in files)
             except InputError:
@@ -377,7 +382,7 @@ class ProjectFolder:
         file = self.path / LEXICON
         return file if file.is_file() else None
 
-    def lexicon(self) -> Lexicon:
+    def load_lexicon(self) -> Lexicon:
         """Return the project's own pronunciations, ahead of those of its language. Raises InputError: unreadable."""
         lexicon = Lexicon.from_file(self.lexicon_file) if self.lexicon_file else Lexicon()
         language = self.project.language
@@ -396,15 +401,15 @@ class ProjectFolder:
         """The revision of the voice that moves the recordings, as ``compute_revision`` is that of a recording."""
         return _revision(self.project.model)
 
-    def word_revision(self, word: str) -> int:
-        """Return the revision of the project's pronunciations of a word, as ``compute_revision`` is that of a recording."""
-        return _revision([word, self.lexicon().user.get(word, ())])
+    def compute_word_revision(self, word: str) -> int:
+        """Return the revision of the project's pronunciations of a word, as ``compute_revision``."""
+        return _revision([word, self.load_lexicon().user.get(word, ())])
 
     def add_pronunciation(self, word: str, phones: tuple[str, ...], revision: int) -> None:
         """Write a pronunciation into the lexicon, ahead of earlier ones. Raises RevisionError, ExportError."""
         with self.lock:
-            check_revision(f"the word {word}", self.word_revision(word), revision)
-            known = self.lexicon().user
+            check_revision(f"the word {word}", self.compute_word_revision(word), revision)
+            known = self.load_lexicon().user
             user = {**known, word: tuple(dict.fromkeys((phones, *known.get(word, ()))))}
             rows = [f"{each} {' '.join(variant)}\n" for each, variants in sorted(user.items()) for variant in variants]
             with atomic_file(self.path / LEXICON) as temporary:

@@ -51,7 +51,7 @@ class Faces:
         path = self._characters.get(name)
         return path is not None and path.suffix.lower() == SUFFIX
 
-    def shown(self, name: str) -> ShownFace:
+    def open_face(self, name: str) -> ShownFace:
         """Return a face. Raises InputError: there is none of that name, or its file cannot be read."""
         if name not in self._shown:
             if name not in self.names:
@@ -61,11 +61,11 @@ class Faces:
             self._shown[name] = shown_face(face)
         return self._shown[name]
 
-    def mesh_name(self, name: str, motion: Motion) -> str:
+    def name_mesh(self, name: str, motion: Motion) -> str:
         """Return the name of the mesh that a motion's weights are of."""
         return HEAD_OF_MOODS if name == HEAD and any(map(is_mood, motion.names)) else name
 
-    def mesh(self, name: str) -> bytes:
+    def load_mesh(self, name: str) -> bytes:
         """Return the ``.glb`` of a face at rest. Raises InputError: there is none of that name, or it is no mesh."""
         if name in self._meshes:
             return self._meshes[name]
@@ -73,10 +73,10 @@ class Faces:
         if self.is_filmed(name):
             raise InputError(f"{name} is a filmed face, and no mesh; ask for a video of it")
         if path is not None and path.suffix.lower() in KEPT:
-            self._meshes[name] = Budget().file_bytes(path, "character")
+            self._meshes[name] = Budget().read_bytes(path, "character")
             return self._meshes[name]
         if path is not None:
-            scene = self.shown(name).scene(_create_still(), OutputSettings(self.shown(name)), None)
+            scene = self.open_face(name).build_scene(_create_still(), OutputSettings(self.open_face(name)), None)
         elif name in (HEAD, HEAD_OF_MOODS):
             scene = build_head_scene(_create_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
         else:

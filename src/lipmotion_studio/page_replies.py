@@ -26,7 +26,17 @@ from lipmotion_faces.outputs.shown_faces import ShownPerson
 from lipmotion_studio.folder import RevisionError
 from lipmotion_studio.project import APPROVED, MAX_RECORDINGS, ProjectRecording, find_preset
 from lipmotion_studio.recording import OpenRecording
-from lipmotion_studio.requests import Access, take_member, take_objects, read_content, take_seconds, take_stretch, take_text, take_texts, take_whole
+from lipmotion_studio.requests import (
+    Access,
+    read_content,
+    take_member,
+    take_objects,
+    take_stretch,
+    take_text,
+    take_texts,
+    take_time,
+    take_whole,
+)
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.trainer import MAX_LISTED
 from lipmotion_studio.training import FACE, VOICE, VoiceOptions, check_options
@@ -48,117 +58,117 @@ class RecordingReplies:
     def __init__(self, studio: Studio, access: Access) -> None:
         self._studio, self._access, self._workspace = studio, access, studio.workspace
 
-    async def recording(self, request: Request) -> Response:
+    async def open_recording(self, request: Request) -> Response:
         """The state of a recording; it is opened, and analysed if it is new."""
-        number = self._number(request)
+        number = self._find_number(request)
         if self._workspace.open(number).recording is None:
-            return self._waiting(number)
-        return await self._state_after(number, lambda _: {})
+            return self._reply_waiting(number)
+        return await self._reply_after(number, lambda _: {})
 
-    async def edits(self, request: Request) -> Response:
+    async def edit(self, request: Request) -> Response:
         """Edits to be made."""
-        number, content, revision = await self._change(request)
+        number, content, revision = await self._read_change(request)
         steps, instead = take_texts(content, "steps", most=MAX_STEPS), take_whole(content, "instead", 0)
         commands = self._studio.add_phones(steps)
-        return await self._state_after(number, lambda recording: recording.edit(revision, commands, instead))
+        return await self._reply_after(number, lambda recording: recording.edit(revision, commands, instead))
 
-    def stepping(self, step: Callable[[OpenRecording, int, int], Changed]) -> Callable[[Request], Awaitable[Response]]:
+    def step_with(self, step: Callable[[OpenRecording, int, int], Changed]) -> Callable[[Request], Awaitable[Response]]:
         """Return what replies once so many edits were taken back, or made again."""
 
         async def reply(request: Request) -> Response:
-            number, content, revision = await self._change(request)
+            number, content, revision = await self._read_change(request)
             count = take_whole(content, "count", 1, least=1)
-            return await self._state_after(number, lambda recording: step(recording, revision, count))
+            return await self._reply_after(number, lambda recording: step(recording, revision, count))
 
         return reply
 
     async def settle(self, request: Request) -> Response:
         """The full motion to be made, after edits of a long recording."""
-        number, _, revision = await self._change(request)
-        return await self._state_after(number, lambda recording: recording.settle(revision))
+        number, _, revision = await self._read_change(request)
+        return await self._reply_after(number, lambda recording: recording.settle(revision))
 
-    async def transcript(self, request: Request) -> Response:
+    async def change_words(self, request: Request) -> Response:
         """Words of a recording, or of a stretch of it."""
-        number, content, revision = await self._change(request)
+        number, content, revision = await self._read_change(request)
         words = take_text(content, "text", longest=MAX_TRANSCRIPT)
         is_part = "start_s" in content or "end_s" in content
         if not is_part and self._studio.analyse_again(number, revision, words):
-            return self._waiting(number)
-        start_s, end_s = take_seconds(content, "start_s", 0.0), take_seconds(content, "end_s", 1e6)
+            return self._reply_waiting(number)
+        start_s, end_s = take_time(content, "start_s", 0.0), take_time(content, "end_s", 1e6)
 
         def change(recording: OpenRecording) -> Changed:
             last_s = min(end_s, recording.last_s)
             step = f"say {' '.join(words.split())} from {start_s:.3f} to {last_s:.3f}"
             return recording.edit(revision, self._studio.add_phones([step]))
 
-        return await self._state_after(number, change)
+        return await self._reply_after(number, change)
 
-    async def sound(self, request: Request) -> Response:
+    async def send_sound(self, request: Request) -> Response:
         """The sound as it is played."""
-        number = self._number(request)
+        number = self._find_number(request)
         path = await self._workspace.run_apart(lambda: self._studio.prepare_sound(number))
         return FileResponse(path, media_type="audio/wav", headers=FRESH)
 
-    async def recorded(self, request: Request) -> Response:
+    async def send_recorded(self, request: Request) -> Response:
         """The real video, as browsers play it."""
-        number, folder = self._number(request), self._studio.folder
+        number, folder = self._find_number(request), self._studio.folder
         if request.headers.get("range", BEGINNING).startswith(BEGINNING):  # and not again for each part of it
-            await self._workspace.run_apart(lambda: folder.check_sound(folder.recording(number)))
+            await self._workspace.run_apart(lambda: folder.check_sound(folder.find_recording(number)))
         path, kind = await self._workspace.run_apart(lambda: self._studio.prepare_video(number))
         return FileResponse(path, media_type=kind, headers=FRESH)
 
     async def vote(self, request: Request) -> Response:
         """Which of two motions somebody found better."""
-        number, content, revision = await self._change(request)
+        number, content, revision = await self._read_change(request)
         shown = [take_text(side, "by", "") for side in take_objects(content, "shown")]
         better = None if content.get("better") is None else take_whole(content, "better", most=1)
 
         def add() -> dict[str, Any]:
             with self._studio.folder.check_out(number, revision) as recording:
-                vote = Vote(recording.name, tuple(self._studio.side(number, by) for by in shown), better)
+                vote = Vote(recording.name, tuple(self._studio.find_side(number, by) for by in shown), better)
                 return tally(self._studio.folder.add_vote(vote), vote)
 
         return reply_json(await self._workspace.run_apart(add))
 
     async def keep(self, request: Request) -> Response:
         """The edits as they are, to be kept as a version."""
-        number, _, revision = await self._change(request)
+        number, _, revision = await self._read_change(request)
         return await self._change_versions(
             number, revision, lambda now, recording: now.with_version(recording.file.edits.sentences)
         )
 
     async def forget(self, request: Request) -> Response:
         """A version that is kept no longer."""
-        number, content, revision = await self._change(request)
+        number, content, revision = await self._read_change(request)
         name = take_text(content, "version")
         return await self._change_versions(number, revision, lambda now, _: now.without_version(name))
 
-    async def back(self, request: Request) -> Response:
+    async def go_back(self, request: Request) -> Response:
         """A version to go back to; the edits as they are become one, too."""
-        number, content, revision = await self._change(request)
+        number, content, revision = await self._read_change(request)
         name = take_text(content, "version")
-        return await self._state_after(number, lambda recording: recording.restore_version(revision, name))
+        return await self._reply_after(number, lambda recording: recording.restore_version(revision, name))
 
     async def restore(self, request: Request) -> Response:
         """The last good copy of edits that are damaged."""
-        number, _, revision = await self._change(request)
+        number, _, revision = await self._read_change(request)
         with self._studio.folder.check_out(number, revision) as recording:
             self._studio.folder.restore_edits(recording)
             self._workspace.forget(number)
         self._workspace.open(number)
-        return self._waiting(number)
+        return self._reply_waiting(number)
 
-    async def motion(self, request: Request) -> Response:
+    async def send_motion(self, request: Request) -> Response:
         """Numbers of the motion."""
         query = request.query_params
         of = take_text(query, "of", "motion")
         if of not in NUMBERS:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
         names = take_text(query, "names", longest=MAX_NAMES).split(",") if "names" in query else None
-        by, number = take_text(query, "by", ""), self._number(request)
+        by, number = take_text(query, "by", ""), self._find_number(request)
 
         def reply(recording: OpenRecording) -> Response:
-            motion = self._studio.vary(number, recording, by).numbers("variance" if of == "deviation" else of)
+            motion = self._studio.vary(number, recording, by).select_motion("variance" if of == "deviation" else of)
             if names is not None:
                 chosen = [name for name in names if name in motion.names or not by]
                 if unknown := [name for name in chosen if name not in motion.names]:
@@ -173,74 +183,74 @@ class RecordingReplies:
 
         return await self._workspace.run(number, reply)
 
-    async def weights(self, request: Request) -> Response:
+    async def send_weights(self, request: Request) -> Response:
         """The weights of a face's morph targets."""
         query = request.query_params
-        name, by, number = take_text(query, "face", "head"), take_text(query, "by", ""), self._number(request)
+        name, by, number = take_text(query, "face", "head"), take_text(query, "by", ""), self._find_number(request)
 
         def reply(opened: OpenRecording) -> Response:
             recording = self._studio.vary(number, opened, by)
-            styled = recording.numbers("delivered")
+            styled = recording.select_motion("delivered")
             frames = take_stretch(query, styled.rate_hz, len(styled.values))
             is_part = frames.stop - frames.start < len(styled.values)
-            motion = recording.weights(self._studio.faces.shown(name), frames if is_part else None)
-            mesh = self._studio.faces.mesh_name(name, styled)
+            motion = recording.compute_weights(self._studio.faces.open_face(name), frames if is_part else None)
+            mesh = self._studio.faces.name_mesh(name, styled)
             return _reply_numbers(motion, frames.start, {"x-lipmotion-mesh": quote(mesh)})
 
         return await self._workspace.run(number, reply)
 
-    async def picture(self, request: Request) -> Response:
+    async def send_picture(self, request: Request) -> Response:
         """A picture of a drawn face, as PNG."""
         query = request.query_params
-        time_s, face = take_seconds(query, "time"), self._studio.drawn_face(take_text(query, "face", "woman"))
-        by, number = take_text(query, "by", ""), self._number(request)
+        time_s, face = take_time(query, "time"), self._studio.find_drawn_face(take_text(query, "face", "woman"))
+        by, number = take_text(query, "by", ""), self._find_number(request)
 
         def draw(recording: OpenRecording) -> bytes:
             from PIL import Image
 
-            picture, file = self._studio.vary(number, recording, by).picture(time_s, face), io.BytesIO()
+            picture, file = self._studio.vary(number, recording, by).draw(time_s, face), io.BytesIO()
             Image.fromarray(np.ascontiguousarray(picture)).save(file, format="PNG", compress_level=3)
             return file.getvalue()
 
         return Response(await self._workspace.run(number, draw), media_type="image/png", headers=FRESH)
 
-    async def video(self, request: Request) -> Response:
+    async def send_video(self, request: Request) -> Response:
         """A video of a stretch."""
         content = await read_content(request)
-        start_s, end_s = take_seconds(content, "start_s"), take_seconds(content, "end_s")
-        name, by, number = take_text(content, "face", "woman"), take_text(content, "by", ""), self._number(request)
+        start_s, end_s = take_time(content, "start_s"), take_time(content, "end_s")
+        name, by, number = take_text(content, "face", "woman"), take_text(content, "by", ""), self._find_number(request)
 
         def write(opened: OpenRecording) -> bytes:
-            self._studio.folder.check_sound(self._studio.folder.recording(number))
-            face = self._studio.faces.shown(name)
+            self._studio.folder.check_sound(self._studio.folder.find_recording(number))
+            face = self._studio.faces.open_face(name)
             recording = self._studio.vary(number, opened, by, name)
             with open_temporary() as folder:
                 path = folder / "stretch.mp4"
                 if isinstance(face, ShownPerson):
                     recording.write_film(path, start_s, end_s, face)
                 else:
-                    recording.write_video(path, start_s, end_s, self._studio.drawn_face(name))
+                    recording.write_video(path, start_s, end_s, self._studio.find_drawn_face(name))
                 return path.read_bytes()
 
         return Response(await self._workspace.run(number, write), media_type="video/mp4", headers=FRESH)
 
-    async def why(self, request: Request) -> Response:
+    async def explain(self, request: Request) -> Response:
         """What determined a frame."""
-        time_s, number = take_seconds(request.query_params, "time"), self._number(request)
-        return reply_json(await self._workspace.run(number, lambda recording: recording.why(time_s)))
+        time_s, number = take_time(request.query_params, "time"), self._find_number(request)
+        return reply_json(await self._workspace.run(number, lambda recording: recording.explain(time_s)))
 
-    async def doubts(self, request: Request) -> Response:
+    async def list_doubts(self, request: Request) -> Response:
         """The phones, the least sure first."""
-        return reply_json(await self._workspace.run(self._number(request), OpenRecording.doubts))
+        return reply_json(await self._workspace.run(self._find_number(request), OpenRecording.list_doubts))
 
-    def _number(self, request: Request) -> int:
+    def _find_number(self, request: Request) -> int:
         """Return the number of a recording. Raises HTTPException: there is none of that number."""
-        return self._studio.number(str(request.path_params["number"]))
+        return self._studio.find_number(str(request.path_params["number"]))
 
-    async def _change(self, request: Request) -> tuple[int, dict[str, Any], int]:
+    async def _read_change(self, request: Request) -> tuple[int, dict[str, Any], int]:
         """Return the recording of a change, what it brings, and the revision that its author saw."""
         content = await read_content(request)
-        return self._number(request), content, take_whole(content, "revision")
+        return self._find_number(request), content, take_whole(content, "revision")
 
     async def _change_versions(
         self, number: int, revision: int, changed: Callable[[ProjectRecording, OpenRecording], ProjectRecording]
@@ -251,9 +261,9 @@ class RecordingReplies:
                 self._studio.folder.change_recording(number, lambda _: other)
             return {}
 
-        return await self._state_after(number, change)
+        return await self._reply_after(number, change)
 
-    async def _state_after(self, number: int, do: Callable[[OpenRecording], Changed]) -> Response:
+    async def _reply_after(self, number: int, do: Callable[[OpenRecording], Changed]) -> Response:
         """Return the state of a recording after something was done, and what that returns."""
 
         def reply(recording: OpenRecording) -> Response:
@@ -261,22 +271,22 @@ class RecordingReplies:
                 changed, status = do(recording), 200
             except RevisionError as error:
                 changed, status = {"error": str(error)}, 409
-            state = {"media": self._media(number)} | recording.state()
+            state = {"media": self._list_media(number)} | recording.describe()
             state["misfits"] = self._workspace.misfits.get(number, [])
             with self._studio.folder.lock:
-                state |= self._studio.recording_document(number) | {"revision": recording.revision}
+                state |= self._studio.describe_recording(number) | {"revision": recording.revision}
             state["transcript"] = state["transcript"] or recording.transcript
             return reply_json({**changed, "state": state} if status == 409 else state | changed, status)
 
         return await self._workspace.run(number, reply)
 
-    def _waiting(self, number: int) -> Response:
-        document = self._studio.recording_document(number) | {"media": self._media(number)}
+    def _reply_waiting(self, number: int) -> Response:
+        document = self._studio.describe_recording(number) | {"media": self._list_media(number)}
         if document["status"] == READY:  # since it was looked up: its state comes with the next request
             document["status"] = WORKING
         return reply_json(document)
 
-    def _media(self, number: int) -> dict[str, Any]:
+    def _list_media(self, number: int) -> dict[str, Any]:
         video = self._studio.find_video(number)
         parts = {"sound": "sound.wav"} | ({"video": "recorded"} if video else {})
         addresses = {name: self._access.with_key(f"/api/lines/{number}/{path}") for name, path in parts.items()}
@@ -307,7 +317,7 @@ class ProjectReplies:
     def __init__(self, studio: Studio) -> None:
         self._studio, self._trainer, self._run_apart = studio, studio.trainer, studio.workspace.run_apart
 
-    async def project(self, request: Request) -> Response:
+    async def list_recordings(self, request: Request) -> Response:
         """The recordings, page by page, and what forms need."""
         query = request.query_params
         first, count = take_whole(query, "from", 0), take_whole(query, "count", 200, most=2000)
@@ -315,11 +325,11 @@ class ProjectReplies:
         document = await self._run_apart(lambda: self._studio.list_recordings(first, count, **chosen))
         return reply_json(document | {"largest_upload_bytes": MAX_UPLOAD_BYTES})
 
-    async def progress(self, _: Request) -> Response:
+    async def send_progress(self, _: Request) -> Response:
         """What is at work."""
-        return reply_json(self._studio.progress())
+        return reply_json(self._studio.describe_progress())
 
-    async def understand(self, request: Request) -> Response:
+    async def analyse(self, request: Request) -> Response:
         """Recordings that are to be analysed."""
         content = await read_content(request)
         known = self._studio.folder.project.lines
@@ -328,7 +338,7 @@ class ProjectReplies:
             raise HTTPException(404, "no such recording")
         return reply_json({"waiting": self._studio.workspace.queue(numbers)})
 
-    async def dropped(self, request: Request) -> Response:
+    async def receive_recording(self, request: Request) -> Response:
         """A recording that was dropped on the page, as body."""
         name = take_text(request.query_params, "name", longest=500)
         transcript = unquote(request.headers.get("x-lipmotion-transcript", ""), errors="replace")
@@ -340,17 +350,17 @@ class ProjectReplies:
         finally:
             remove(file)
         self._studio.workspace.queue([number])
-        return reply_json(self._studio.row(self._studio.folder.recording(number)), 201)
+        return reply_json(self._studio.describe_row(self._studio.folder.find_recording(number)), 201)
 
     async def mark(self, request: Request) -> Response:
         """A mark of a recording."""
-        number, content = self._number(request), await read_content(request)
+        number, content = self._find_number(request), await read_content(request)
         mark, revision = take_text(content, "mark"), take_whole(content, "revision")
         return reply_json(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
 
     async def remove(self, request: Request) -> Response:
         """A recording that leaves the project; its files stay."""
-        number, folder = self._number(request), self._studio.folder
+        number, folder = self._find_number(request), self._studio.folder
         with folder.check_out(number, take_whole(await read_content(request), "revision")):
             folder.change(lambda project: project.without_recording(number))
             self._studio.workspace.forget(number)
@@ -358,7 +368,7 @@ class ProjectReplies:
 
     async def export_one(self, request: Request) -> Response:
         """Files of one recording."""
-        number = self._number(request)
+        number = self._find_number(request)
         return await self._export(await read_content(request), [number])
 
     async def export_all(self, request: Request) -> Response:
@@ -375,23 +385,27 @@ class ProjectReplies:
         preset, face = find_preset(take_text(content, "preset", ""), files), take_text(content, "face", "")
         return reply_json(await self._run_apart(lambda: self._studio.export_several(numbers, preset, face)))
 
-    async def mesh(self, request: Request) -> Response:
+    async def send_mesh(self, request: Request) -> Response:
         """The ``.glb`` of a face."""
         name = str(request.path_params["name"])
         try:
-            content = await self._run_apart(lambda: self._studio.faces.mesh(name))
+            content = await self._run_apart(lambda: self._studio.faces.load_mesh(name))
         except InputError as error:
             raise HTTPException(404, str(error)) from error
         return Response(content, headers=FRESH, media_type="model/gltf-binary")
 
-    async def pronunciations(self, request: Request) -> Response:
+    async def list_pronunciations(self, request: Request) -> Response:
         """How a word is pronounced."""
         return self._reply_word(_take_word(request.query_params))
 
     async def pronounce(self, request: Request) -> Response:
         """A pronunciation that the project keeps."""
         content = await read_content(request)
-        word, phones, revision = _take_word(content), take_texts(content, "phones", most=MAX_PHONES), take_whole(content, "revision")
+        word, phones, revision = (
+            _take_word(content),
+            take_texts(content, "phones", most=MAX_PHONES),
+            take_whole(content, "revision"),
+        )
         if not phones or not set(phones) <= set(PHONES):
             raise InputError(f"the phones of a word are some of: {' '.join(PHONES)}")
         await self._run_apart(lambda: self._studio.folder.add_pronunciation(word, phones, revision))
@@ -399,12 +413,12 @@ class ProjectReplies:
 
     def _reply_word(self, word: str) -> Response:
         with self._studio.folder.lock:
-            lexicon, revision = self._studio.folder.lexicon(), self._studio.folder.word_revision(word)
+            lexicon, revision = self._studio.folder.load_lexicon(), self._studio.folder.compute_word_revision(word)
         known = {"word": word, "known": lexicon.known(word), "own": word in lexicon.user}
         pronunciations = [list(phones) for phones in lexicon.pronunciations(word)]
         return reply_json(known | {"pronunciations": pronunciations, "revision": revision})
 
-    async def training(self, _: Request) -> Response:
+    async def send_training(self, _: Request) -> Response:
         """What is being made, or was made last; what can be made, and of what."""
         return await self._reply_training()
 
@@ -417,7 +431,7 @@ class ProjectReplies:
         await self._run_apart(lambda: self._trainer.begin(kind, name, numbers, options))
         return await self._reply_training(201)
 
-    def training_after(self, act: Callable[[], None], status: int = 200) -> Callable[[Request], Awaitable[Response]]:
+    def train_with(self, act: Callable[[], None], status: int = 200) -> Callable[[Request], Awaitable[Response]]:
         """Return what replies once something was done: what is made was stopped, gone on with, or restored."""
 
         async def reply(request: Request) -> Response:
@@ -427,7 +441,7 @@ class ProjectReplies:
 
         return reply
 
-    async def voice(self, request: Request) -> Response:
+    async def choose_voice(self, request: Request) -> Response:
         """The voice that the project uses from now on."""
         content = await read_content(request)
         name, revision = take_text(content, "voice"), take_whole(content, "revision")
@@ -436,23 +450,23 @@ class ProjectReplies:
         return await self._reply_training()
 
     async def _reply_training(self, status: int = 200) -> Response:
-        return reply_json(await self._run_apart(self._training_document), status)
+        return reply_json(await self._run_apart(self._describe_training), status)
 
-    def _training_document(self) -> dict[str, Any]:
+    def _describe_training(self) -> dict[str, Any]:
         folder, trainer = self._studio.folder, self._trainer
-        videos, used = trainer.videos(), folder.project.model
+        videos, used = trainer.list_videos(), folder.project.model
         options = []
         for each in fields(VoiceOptions):
             row = {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
             options.append(row | {"choices": list(each.metadata["rule"].choices)})
         return {
-            "job": trainer.document(),
+            "job": trainer.describe(),
             "damage": trainer.damage,
             "restorable": bool(trainer.damage) and trainer.is_restorable,
-            "earlier": trainer.earlier(),
-            "voices": [{"name": name, "used": path == used} for name, path in self._studio.voices().items()],
+            "earlier": trainer.list_earlier(),
+            "voices": [{"name": name, "used": path == used} for name, path in self._studio.list_voices().items()],
             "revision": folder.voice_revision,
-            "faces": [path.relative_to(folder.path).as_posix() for path in trainer.files(FACE).values()],
+            "faces": [path.relative_to(folder.path).as_posix() for path in trainer.list_files(FACE).values()],
             "videos": [{"id": v.number, "name": v.name, "duration_s": v.duration_s} for v in videos[:MAX_LISTED]],
             "count": len(videos),
             "recordings": folder.recordings.name if folder.recordings else "",
@@ -460,8 +474,8 @@ class ProjectReplies:
             "options": options,
         }
 
-    def _number(self, request: Request) -> int:
-        return self._studio.number(str(request.path_params["number"]))
+    def _find_number(self, request: Request) -> int:
+        return self._studio.find_number(str(request.path_params["number"]))
 
 
 def _take_word(content: Mapping[str, Any]) -> str:

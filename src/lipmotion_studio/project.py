@@ -102,11 +102,11 @@ class ProjectRecording:
         return replace(self, versions=(*self.versions, version))
 
     def without_version(self, name: str) -> ProjectRecording:
-        """Return the recording without a version. Raises InputError: as ``version``."""
-        removed = self.version(name)
+        """Return the recording without a version. Raises InputError: as ``find_version``."""
+        removed = self.find_version(name)
         return replace(self, versions=tuple(version for version in self.versions if version != removed))
 
-    def version(self, name: str) -> EditVersion:
+    def find_version(self, name: str) -> EditVersion:
         """Return a version. Raises InputError: none of that name is kept."""
         for version in self.versions:
             if version.name == name:

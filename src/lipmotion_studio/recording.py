@@ -70,8 +70,8 @@ class OpenRecording:
         onto: FilmedFace | None = None,
     ) -> None:
         self.file, self.folder, self.number, self.model, self.audio = file, folder, number, model, audio
-        self.sound_path, self.settled = folder.sound(folder.recording(number)), True
-        known, self.summary = folder.summary(folder.recording(number)), summarise_edits(file)
+        self.sound_path, self.settled = folder.locate_sound(folder.find_recording(number)), True
+        known, self.summary = folder.summarise(folder.find_recording(number)), summarise_edits(file)
         if known.state == self.summary.state:  # else others have changed the file since it was read
             self.summary = known
         self._others: dict[tuple[int, int], OpenRecording] = {}
@@ -125,7 +125,7 @@ class OpenRecording:
     @property
     def revision(self) -> int:
         """The number of the recording as it is now; another one after each change (``folder.compute_revision``)."""
-        return compute_revision(self.folder.recording(self.number), self.summary)
+        return compute_revision(self.folder.find_recording(self.number), self.summary)
 
     def settle(self, revision: int) -> dict[str, Any]:
         """Make the full motion, where it is not yet; return what moved. Raises RevisionError: as ``edit``."""
@@ -157,9 +157,9 @@ class OpenRecording:
     def restore_version(self, revision: int, version: str) -> dict[str, Any]:
         """Go back to a kept version; keep the edits as they are, too. Raises as ``edit``; InputError: no version."""
         check_revision("the recording", self.revision, revision)
-        recording, now = self.folder.recording(self.number), self.file.edits.sentences
+        recording, now = self.folder.find_recording(self.number), self.file.edits.sentences
         recording.with_version(now)  # refuses one too many before anything has changed
-        sentences = recording.version(version).steps
+        sentences = recording.find_version(version).steps
         same = next((n for n, (old, new) in enumerate(zip(now, sentences, strict=False)) if old != new), len(now))
         same = min(same, len(sentences))
         return self._change(self.file.undo(len(now) - same).then(*sentences[same:]), revision, keep_version=True)
@@ -187,11 +187,11 @@ class OpenRecording:
                     self.folder.change_recording(self.number, lambda _: kept)
                 if is_other:
                     self.folder.write_edits(recording, file)
-                    self.file, self.summary = file, self.folder.summary(recording)
+                    self.file, self.summary = file, self.folder.summarise(recording)
         self.settled = settled
         return {"changed": find_moved(before, after)}
 
-    def state(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, Any]:
         """Return what the page shows of the recording, but for what the project says of it."""
         generation = self.generation
         motion, outlook = generation.motion, generation.outlook
@@ -219,7 +219,7 @@ class OpenRecording:
             "warnings": list(outlook.advice) if outlook else [],
         }
 
-    def numbers(self, of: str) -> Motion:
+    def select_motion(self, of: str) -> Motion:
         """Return the numbers of a kind: ``motion``, ``delivered``, ``variance`` or ``confidence``."""
         generation = self.generation
         if of == "delivered":
@@ -230,34 +230,34 @@ class OpenRecording:
             return Motion(rate_frames(generation)[:, None], generation.motion.rate_hz, CONFIDENCE)
         return generation.motion
 
-    def weights(self, face: ShownFace, frames: slice | None = None) -> Motion:
+    def compute_weights(self, face: ShownFace, frames: slice | None = None) -> Motion:
         """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them."""
-        weights = with_turn(build_scene(self.performance(face), frames))
+        weights = with_turn(build_scene(self.prepare(face), frames))
         if frames is None or len(weights.values) == frames.stop - frames.start:
             return weights
         return replace(weights, values=weights.values[frames])
 
-    def performance(self, face: ShownFace) -> Performance:
+    def prepare(self, face: ShownFace) -> Performance:
         """Return the motion with what outputs need of it."""
         edits = self.file.edits
         settings = OutputSettings(face, self.sound_path, staging=edits.staging(), delivery=edits.delivery())
         return Performance(self.generation, settings, self.audio, None, self.model)
 
-    def picture(self, time_s: float, face: str | Face) -> NDArray[np.uint8]:
+    def draw(self, time_s: float, face: str | Face) -> NDArray[np.uint8]:
         """Return the picture of a drawn face at a time. Raises InputError: as there."""
         with self._preview():
-            return self._pictures.picture(time_s, self.file.edits, face=face)
+            return self._pictures.draw(time_s, self.file.edits, face=face)
 
     def write_video(self, path: Path, start_s: float, end_s: float, face: str | Face) -> None:
-        """Write a stretch as a video of a drawn face. Raises InputError: as ``picture``; or it is too long, or none."""
+        """Write a stretch as a video of a drawn face. Raises InputError: as ``draw``; or it is too long, or none."""
         count = int((len(self.generation.motion.values) - 1) / 100 * DRAWN_HZ + 1e-9) + 1
         frames, sound = self._cut(start_s, end_s, count, DRAWN_HZ)
-        pictures = (self.picture(number / DRAWN_HZ, face) for number in frames)
+        pictures = (self.draw(number / DRAWN_HZ, face) for number in frames)
         write_mp4(path, pictures, fps=DRAWN_HZ, audio=sound)
 
     def write_film(self, path: Path, start_s: float, end_s: float, person: ShownPerson) -> None:
         """Write a stretch as a film. Raises InputError: as ``write_video``, or edits that it cannot show."""
-        performance = self.performance(person)
+        performance = self.prepare(person)
         person.check(performance.settings)
         person.check_video(path, performance.settings)
         film = person.film(performance)
@@ -276,7 +276,7 @@ class OpenRecording:
         last = max(min(round(last_s * rate_hz), count - 1), first)
         return range(first, last + 1), Audio(sound.samples[part], sound.rate_hz)
 
-    def why(self, time_s: float) -> dict[str, Any]:
+    def explain(self, time_s: float) -> dict[str, Any]:
         """Return what determined the motion at a time. Raises InputError: a time outside the recording."""
         with self._preview():
             (explanation,) = explain_session(self.session, self.file.edits, [time_s])
@@ -297,7 +297,7 @@ class OpenRecording:
             "text": write_explanation(explanation),
         }
 
-    def doubts(self) -> list[dict[str, Any]]:
+    def list_doubts(self) -> list[dict[str, Any]]:
         """Return the phones, by their confidence, the least sure first."""
         return list_doubts(self.generation)
 
@@ -317,10 +317,10 @@ def find_moved(before: Motion, after: Motion) -> dict[str, float] | None:
 def list_phones(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, Any]]:
     """Return phones in time as objects of JSON; those that are not among ``plain`` were edited."""
 
-    def identity(span: Span[Unit]) -> tuple[str, float, float]:
+    def identify(span: Span[Unit]) -> tuple[str, float, float]:
         return span.label.phone or span.label.unit, span.start_s, span.end_s
 
-    before = set(map(identity, plain))
+    before = set(map(identify, plain))
     return [
         {
             "label": span.label.phone or span.label.unit,
@@ -328,7 +328,7 @@ def list_phones(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, 
             "end_s": span.end_s,
             "word": span.label.word,
             "confidence": span.label.confidence or None,  # 0: of a recogniser that does not tell
-            "edited": identity(span) not in before,
+            "edited": identify(span) not in before,
         }
         for span in units
     ]
@@ -373,7 +373,7 @@ def analyse_recording(
     """
     audio, project = load_sound(folder, recording), folder.project
     named = Request(
-        folder.sound(recording),
+        folder.locate_sound(recording),
         model=folder.model_file,
         lexicon=folder.lexicon_file,
         language=project.language,
@@ -388,7 +388,7 @@ def analyse_recording(
     folder.check_sound(replace(recording, sha256=digest))  # it may have been replaced since
     duration_s, doubt = audio.duration_s, average_doubt(generation)
     with folder.lock:
-        folder.recording(recording.number)  # it may have been removed since
+        folder.find_recording(recording.number)  # it may have been removed since
         folder.write_edits(recording, replace(file, sha256=digest))
         folder.change_recording(
             recording.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt, sha256=digest), save=False
@@ -403,7 +403,7 @@ def open_recording(
     file = folder.read_edits(recording)
     audio = audio or load_sound(folder, replace(recording, sha256=recording.sha256 or file.sha256))
     file = folder.adopt(recording, file)
-    named = replace(file.named, recording=folder.sound(recording), model=folder.model_file)
+    named = replace(file.named, recording=folder.locate_sound(recording), model=folder.model_file)
     opened = OpenRecording(replace(file, named=named), folder, recording.number, model, audio)
     if recording.duration_s is None:  # it was analysed by a studio that was killed before the project was written
         duration_s, doubt = audio.duration_s, average_doubt(opened.generation)

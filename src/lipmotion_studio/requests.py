@@ -30,15 +30,15 @@ class Access:
     token: str
     hosts: frozenset[str]
 
-    def key(self, path: str) -> str:
+    def make_key(self, path: str) -> str:
         """Return the key that allows to load one address: for elements of a page, which bring no headers."""
         return hmac.new(self.token.encode(), path.encode(), sha256).hexdigest()[:KEY_DIGITS]
 
     def with_key(self, path: str) -> str:
         """Return an address with its key."""
-        return f"{path}?key={self.key(path)}"
+        return f"{path}?key={self.make_key(path)}"
 
-    def refusal(self, method: str, path: str, query: bytes, headers: dict[str, str]) -> tuple[int, str] | None:
+    def find_refusal(self, method: str, path: str, query: bytes, headers: dict[str, str]) -> tuple[int, str] | None:
         """Return why a request is refused, with a status; None: it is not."""
         foreign = find_foreign_refusal(path, headers, self.hosts.__contains__)
         if foreign or (path != API and not path.startswith(f"{API}/")):
@@ -46,7 +46,7 @@ class Access:
         if hmac.compare_digest(headers.get(TOKEN_HEADER, "").encode(), self.token.encode()):
             return None
         given = parse_qs(query.decode("latin-1")).get("key", [""])[0] if method in ("GET", "HEAD") else ""
-        if hmac.compare_digest(given.encode(), self.key(path).encode()):
+        if hmac.compare_digest(given.encode(), self.make_key(path).encode()):
             return None
         return 401, "the token is missing, or that of an earlier run; open the address that lipmotion studio printed"
 
@@ -68,24 +68,30 @@ def take_member(given: Mapping[str, Any], name: str, usual: Any, schema: Schema)
     return require(schema, given.get(name, usual), name)
 
 
-def take_whole(given: Mapping[str, Any], name: str, usual: int | None = None, *, least: int = 0, most: int = 1 << 31) -> int:
+def take_whole(
+    given: Mapping[str, Any], name: str, usual: int | None = None, *, least: int = 0, most: int = 1 << 31
+) -> int:
     """Return a whole number of a request, also from its text in an address. Raises as ``take_member``."""
     return int(
-        take_member(given, name, usual, number_or_text(partial(parse_whole, what=f"{name} is"), values.whole(least, most)))
+        take_member(
+            given, name, usual, number_or_text(partial(parse_whole, what=f"{name} is"), values.whole(least, most))
+        )
     )
 
 
-def take_seconds(given: Mapping[str, Any], name: str, usual: float | None = None) -> float:
+def take_time(given: Mapping[str, Any], name: str, usual: float | None = None) -> float:
     """Return a time of a request in seconds, also from its text in an address. Raises as ``take_member``."""
     return float(
-        take_member(given, name, usual, number_or_text(partial(parse_number, what=f"{name} is"), values.number(0, LATEST_S)))
+        take_member(
+            given, name, usual, number_or_text(partial(parse_number, what=f"{name} is"), values.number(0, LATEST_S))
+        )
     )
 
 
 def take_stretch(given: Mapping[str, Any], rate_hz: float, frames: int) -> slice:
     """Return the frames from ``start_s`` to ``end_s`` of a request, or all. Raises InputError: no such times."""
     last_s = (frames - 1) / rate_hz
-    start_s, end_s = take_seconds(given, "start_s", 0.0), min(take_seconds(given, "end_s", last_s), last_s)
+    start_s, end_s = take_time(given, "start_s", 0.0), min(take_time(given, "end_s", last_s), last_s)
     first, last = math.ceil(start_s * rate_hz - 1e-6), math.floor(end_s * rate_hz + 1e-6)
     if first > last:
         raise InputError(f"{start_s} to {end_s} s holds no frame, required a part of 0 to {last_s:.2f} s")

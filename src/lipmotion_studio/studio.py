@@ -168,7 +168,7 @@ class Studio:
         self.workspace = Workspace(folder, self.used.model)
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
         self.trainer = Trainer(folder)
-        self.faces = Faces(places, lambda: self.trainer.files(FACE))
+        self.faces = Faces(places, lambda: self.trainer.list_files(FACE))
         self._run = ExitStack()
         self._sounds = self._run.enter_context(open_temporary())
         self._exporting: dict[str, int] | None = None
@@ -179,7 +179,7 @@ class Studio:
         self.workspace.close()
         self._run.close()
 
-    def number(self, text: str) -> int:
+    def find_number(self, text: str) -> int:
         """Return the number of a recording in an address. Raises HTTPException: there is no such recording."""
         number = int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else 0
         if number not in self.folder.project.lines:
@@ -197,7 +197,7 @@ class Studio:
         recordings = [
             each
             for each in project.lines.values()
-            if (not mark or each.mark == mark) and (not status or self.workspace.status(each) == status)
+            if (not mark or each.mark == mark) and (not status or self.workspace.find_status(each) == status)
         ]
         if order == "doubt":
             recordings.sort(key=lambda each: -1.0 if each.doubt is None else each.doubt, reverse=True)
@@ -207,20 +207,20 @@ class Studio:
             "revision": revision,
             "count": len(recordings),
             "from": first,
-            "lines": [self.row(each) for each in recordings[first : first + count]],
-            "forms": self._forms(),
+            "lines": [self.describe_row(each) for each in recordings[first : first + count]],
+            "forms": self._list_choices(),
             "version": find_version(),
             "model": {"name": self.used.name, "engine": self.used.model.engine.name},
         }
 
-    def row(self, recording: ProjectRecording) -> dict[str, Any]:
+    def describe_row(self, recording: ProjectRecording) -> dict[str, Any]:
         """Return a row of the list, of a recording that may have left the project since."""
-        summary, exports = self.folder.summary(recording), recording.exports
+        summary, exports = self.folder.summarise(recording), recording.exports
         changed = bool(exports) and (exports[-1].steps, exports[-1].model) != (summary.digest, self.used.digest)
         return {
             "id": recording.number,
             "name": recording.name,
-            "status": self.workspace.status(recording),
+            "status": self.workspace.find_status(recording),
             "revision": compute_revision(recording, summary),
             "mark": recording.mark,
             "marked": recording.marked,
@@ -229,45 +229,49 @@ class Studio:
             "duration_s": recording.duration_s,
             "edits": summary.count,
             "exported": "changed" if changed else "yes" if exports else "no",
-            "error": self.workspace.error(recording),
+            "error": self.workspace.find_error(recording),
         }
 
-    def recording_document(self, number: int) -> dict[str, Any]:
+    def describe_recording(self, number: int) -> dict[str, Any]:
         """Return what the page shows of a recording, ready or not."""
         with self.folder.lock:
-            recording, work = self.folder.recording(number), self.workspace.work(number)
+            recording, work = self.folder.find_recording(number), self.workspace.find_work(number)
             document: dict[str, Any] = {"id": number, "name": recording.name, "mark": recording.mark}
             document |= {"transcript": recording.transcript}
-            document["revision"] = compute_revision(recording, self.folder.summary(recording))
+            document["revision"] = compute_revision(recording, self.folder.summarise(recording))
         document["versions"] = [
             {"name": each.name, "number": each.number, "edits": len(each.steps), "digest": each.digest}
             for each in recording.versions
         ]
-        status, error = self.workspace.status(recording), self.workspace.error(recording)
+        status, error = self.workspace.find_status(recording), self.workspace.find_error(recording)
         if work is None or status == FAILED:
             restorable = status == FAILED and self.folder.is_restorable(recording)
             return document | {"status": status, "progress": None, "error": error, "restorable": restorable}
         status = WORKING if work.status == READY and work.recording is None else work.status
         return document | {"status": status, "progress": _describe_work(work), "error": work.error}
 
-    def progress(self) -> dict[str, Any]:
+    def describe_progress(self) -> dict[str, Any]:
         """Return which recordings wait, or are at work, or were until a short while ago."""
-        works = self.workspace.current_work()
-        rows = [{"id": work.number, "status": work.status, **_describe_work(work), "error": work.error} for work in works]
+        works = self.workspace.list_current()
+        rows = [
+            {"id": work.number, "status": work.status, **_describe_work(work), "error": work.error} for work in works
+        ]
         waiting = sum(work.status == WAITING for work in works)
         document = {"lines": rows, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
-        return document | {"training": self.trainer.short_document()}
+        return document | {"training": self.trainer.summarise()}
 
-    def voices(self) -> dict[str, str]:
+    def list_voices(self) -> dict[str, str]:
         """Return the models that the project may use by the names of their files, as paths from its folder."""
         project = self.folder.project
-        made = {name: path.relative_to(self.folder.path).as_posix() for name, path in self.trainer.files(VOICE).items()}
+        made = {
+            name: path.relative_to(self.folder.path).as_posix() for name, path in self.trainer.list_files(VOICE).items()
+        }
         others = [path for path in (project.given_model, project.model) if path and path not in made.values()]
         return {"": ""} | {Path(path).name: path for path in others} | made
 
     def load_voice(self, name: str) -> tuple[str, KnownModel]:
         """Return path and model of a voice. Raises InputError: none of that name. Others as ``load_model``."""
-        voices = self.voices()
+        voices = self.list_voices()
         if name not in voices:
             raise InputError(f"no voice {shorten(repr(name))}; required one of: {', '.join(filter(None, voices))}")
         file = Path(os.path.normpath(self.folder.path / voices[name])) if voices[name] else None
@@ -290,7 +294,7 @@ class Studio:
         self.used = voice
         self.workspace.use(voice.model)
 
-    def _forms(self) -> dict[str, Any]:
+    def _list_choices(self) -> dict[str, Any]:
         """Return what can be chosen, from the registries and configurations."""
         controls = []  # what edits can set of delivery and staging
         for part in (Delivery, Staging):
@@ -325,7 +329,7 @@ class Studio:
         steps = [parse_step(sentence) for sentence in sentences]
         if not any(isinstance(step, WordIs | WordsSaid) for step in steps):
             return tuple(steps)
-        user = self.folder.lexicon().user
+        user = self.folder.load_lexicon().user
         for place, step in enumerate(steps):
             if isinstance(step, WordIs):
                 words = split_words(step.word)
@@ -347,7 +351,7 @@ class Studio:
         are damaged. ExportError: it cannot be written.
         """
         with self.folder.check_out(number, revision) as recording:
-            if self.workspace.status(recording) in (WAITING, WORKING):
+            if self.workspace.find_status(recording) in (WAITING, WORKING):
                 raise NotReadyError
             if self.folder.has_edits(recording):
                 return False
@@ -361,26 +365,26 @@ class Studio:
         """Mark a recording as it is now; return its row. Raises InputError: no mark, damaged edits. RevisionError."""
         with self.folder.check_out(number, revision) as recording:
             self.folder.has_edits(recording)  # which is refused where they are damaged
-            marked = replace(recording, mark=mark, marked=self.folder.summary(recording).digest)
+            marked = replace(recording, mark=mark, marked=self.folder.summarise(recording).digest)
             self.folder.change_recording(number, lambda _: marked)
-            return self.row(marked)
+            return self.describe_row(marked)
 
-    def drawn_face(self, name: str) -> str | Face:
+    def find_drawn_face(self, name: str) -> str | Face:
         """Return a face of which pictures are drawn. Raises InputError: there is none of that name, or a filmed one."""
         if self.faces.is_filmed(name):
             raise InputError("a filmed face is made as a video, not picture by picture; make the video of a selection")
-        return getattr(self.faces.shown(name), "face", name)
+        return getattr(self.faces.open_face(name), "face", name)
 
     def prepare_sound(self, number: int) -> Path:
         """Return the path of a recording's sound as it is played. Raises InputError: unreadable, or another one."""
-        path, sound = self._sounds / f"{number}.wav", self.folder.check_sound(self.folder.recording(number))
+        path, sound = self._sounds / f"{number}.wav", self.folder.check_sound(self.folder.find_recording(number))
         if not path.exists():
             write_sound(path, read_sound(sound))
         return path
 
     def find_video(self, number: int) -> tuple[Path, float] | None:
         """Return the path of a recording's real video, and when in it the sound begins [s]; None: there is none."""
-        sound = self.folder.sound(self.folder.recording(number))
+        sound = self.folder.locate_sound(self.folder.find_recording(number))
         if sound not in self._videos:
             video = find_real_video(sound)
             self._videos[sound] = (video, find_sound_start(video, sound)) if video else None
@@ -397,7 +401,7 @@ class Studio:
         path = self._sounds / f"{number}.mp4"
         with self._writing_video:
             if not path.exists():
-                write_playable(video, self.folder.sound(self.folder.recording(number)), path)
+                write_playable(video, self.folder.locate_sound(self.folder.find_recording(number)), path)
         return path, MP4
 
     def vary(self, number: int, recording: OpenRecording, by: str, face: str = "") -> OpenRecording:
@@ -407,20 +411,22 @@ class Studio:
         Raises InputError: there is no such version or model, or it cannot make an edit.
         """
         if by not in ("", OTHER):
-            return self.vary(number, recording.with_edits(self.folder.recording(number).version(by).steps), "", face)
-        model = self._model_called(by).model
-        onto = self.faces.shown(face).other_person(model, recording.file.named.speaker) if face else None
+            return self.vary(
+                number, recording.with_edits(self.folder.find_recording(number).find_version(by).steps), "", face
+            )
+        model = self._find_model(by).model
+        onto = self.faces.open_face(face).find_other_person(model, recording.file.named.speaker) if face else None
         return recording if model is self.used.model and onto is None else recording.with_model(model, onto)
 
-    def side(self, number: int, by: str) -> Side:
+    def find_side(self, number: int, by: str) -> Side:
         """Return what identifies a motion of a recording in a comparison; ``by``: as in ``vary``. Raises as that."""
-        recording = self.folder.recording(number)
+        recording = self.folder.find_recording(number)
         if by not in ("", OTHER):
-            return Side(self.used.name, self.used.digest, recording.version(by).digest)
-        model = self._model_called(by)
-        return Side(model.name, model.digest, self.folder.summary(recording).digest)
+            return Side(self.used.name, self.used.digest, recording.find_version(by).digest)
+        model = self._find_model(by)
+        return Side(model.name, model.digest, self.folder.summarise(recording).digest)
 
-    def _model_called(self, by: str) -> KnownModel:
+    def _find_model(self, by: str) -> KnownModel:
         """Return the model that requests call so. Raises InputError: there is none."""
         if not by:
             return self.used
@@ -435,8 +441,8 @@ class Studio:
         such face. ExportError: a file cannot be written.
         Others as ``Job.run``.
         """
-        recording = self.folder.recording(number)
-        if self.folder.summary(recording) is NO_EDITS:
+        recording = self.folder.find_recording(number)
+        if self.folder.summarise(recording) is NO_EDITS:
             raise InputError(f"{recording.name}: is not analysed yet; open it first")
         out = self.folder.path / EXPORTS
         copy = out / f"{recording.name}.{EDITS_SUFFIX}"
@@ -448,7 +454,7 @@ class Studio:
             outputs = Outputs(files, curves=preset.curves, fps=preset.fps)
             job, shown = Job(request, outputs), open_face(outputs)
             if face and any(isinstance(each, VideoOutput) for each in check_outputs(job, shown, request.recording)):
-                shown = self.faces.shown(face)
+                shown = self.faces.open_face(face)
             run(job, face=shown, model=self.used.model)
         digests = {Path(path).relative_to(self.folder.path).as_posix(): hash_file(Path(path)) for path in files}
         record = ExportRecord(

@@ -64,7 +64,7 @@ class TrainingJob:
     wanted: TrainingRequest
     told: dict[str, Any]
 
-    def document(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, Any]:
         """Return the job as the page shows it."""
         return {**asdict(self.wanted), "lines": list(self.wanted.lines), "file": self.wanted.file, **self.told}
 
@@ -100,29 +100,29 @@ class Trainer:
         """Whether something is being made."""
         return self._status.get("state") == WORKING
 
-    def document(self) -> dict[str, Any] | None:
+    def describe(self) -> dict[str, Any] | None:
         """Return what was asked for last, and how it goes on or ended; None: nothing was."""
         with self._lock:
-            return TrainingJob(self._request, self.short_document()).document() if self._request else None
+            return TrainingJob(self._request, self.summarise()).describe() if self._request else None
 
-    def short_document(self) -> dict[str, Any]:
+    def summarise(self) -> dict[str, Any]:
         """Return the state of a job: ``stage``, ``share``, ``left_s`` (0: longer than estimated), warnings, report."""
         with self._lock:
             left_s = None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
             return dict(self._status) | ({"left_s": left_s} if self.is_working else {})
 
-    def earlier(self) -> list[dict[str, Any]]:
-        """Return the last voice and the last face that were made, as ``document``, where that is another one."""
+    def list_earlier(self) -> list[dict[str, Any]]:
+        """Return the last voice and the last face that were made, as ``describe``, where that is another one."""
         with self._lock:
             last = self._request if self._status.get("state") == DONE else None
-            return [job.document() for job in self._finished.values() if job.wanted != last]
+            return [job.describe() for job in self._finished.values() if job.wanted != last]
 
-    def videos(self) -> list[ProjectRecording]:
+    def list_videos(self) -> list[ProjectRecording]:
         """Return the recordings of the project that are videos."""
         recordings = self._folder.project.lines.values()
         return [each for each in recordings if Path(each.sound).suffix.lower() in VIDEO_SUFFIXES]
 
-    def files(self, kind: str) -> dict[str, Path]:
+    def list_files(self, kind: str) -> dict[str, Path]:
         """Return the files of the voices or the faces of the project by their names."""
         folder, suffix = PLACES[kind]
         paths = sorted((self._folder.path / folder).glob(f"*{suffix}"))
@@ -173,7 +173,7 @@ class Trainer:
                 raise InputError(self.damage)
             if self.is_working or self._thread is not None:
                 raise InputError("a voice or a face is being made; wait for it, or stop it")
-            order = self._order(request)
+            order = self._build_order(request)
             for folder, _ in PLACES.values():  # what was begun and will not be gone on with
                 for left in (self._folder.path / folder).glob(f"*{UNFINISHED}"):
                     if left.name != name_work_folder(order.target).name:
@@ -191,9 +191,9 @@ class Trainer:
             self._thread = threading.Thread(target=self._follow, args=(process, pipe), name="training", daemon=True)
             self._thread.start()
 
-    def _order(self, request: TrainingRequest) -> TrainingOrder:
+    def _build_order(self, request: TrainingRequest) -> TrainingOrder:
         folder = self._folder
-        videos = {each.number: each for each in self.videos()}
+        videos = {each.number: each for each in self.list_videos()}
         missing = [number for number in request.lines if number not in videos]
         if missing:
             raise InputError(f"recording {missing[0]} is no video of this project; choose among its videos")
@@ -203,7 +203,7 @@ class Trainer:
                 "--recordings FOLDER"
             )
         chosen = tuple(
-            TrainingRecording(folder.sound(each).absolute(), each.name, each.transcript, each.sha256)
+            TrainingRecording(folder.locate_sound(each).absolute(), each.name, each.transcript, each.sha256)
             for each in map(videos.__getitem__, request.lines)
         )
         place = folder.path.absolute()
@@ -312,7 +312,7 @@ class Trainer:
 def _read_jobs(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
     """Return the last job, and earlier ones. Raises InputError: the file cannot be read, or is of a later version."""
 
-    def job(content: Mapping[str, Any]) -> TrainingJob:
+    def make_job(content: Mapping[str, Any]) -> TrainingJob:
         request, status = content["wanted"], content["told"]
         VoiceOptions.stored(request.options)  # raises where there are no such options
         state = INTERRUPTED if status["state"] == WORKING else status["state"]
@@ -322,7 +322,7 @@ def _read_jobs(file: Path) -> tuple[TrainingJob, list[TrainingJob]]:
     text = read_text_file(file, "training")
     try:
         content = _STATE(from_json(text))
-        return job(content), [job(each) for each in content.get("made", ())]
+        return make_job(content), [make_job(each) for each in content.get("made", ())]
     except ValueError as error:  # InputError is one
         raise InputError(f"{file}: {error}") from error
 

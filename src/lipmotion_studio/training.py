@@ -28,7 +28,7 @@ from lipmotion.types import Item, Monitor, Progress, sub_monitor
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.progress import warnings_to
 from lipmotion.units import Lexicon
-from lipmotion_faces.corpus.long_videos import HELD_OUT_SHARE, LEAST_SPLIT_UTTERANCES
+from lipmotion_faces.corpus.long_videos import HELD_OUT_SHARE, MIN_SPLIT_UTTERANCES
 from lipmotion_faces.corpus.prepare import prepare
 from lipmotion_faces.film.build import build_face
 from lipmotion_faces.filmed.face import save_face
@@ -187,7 +187,7 @@ def split_names(corpus: Corpus, names: Sequence[str], *, held_out: bool) -> tupl
     lists = {split: [name for name in names if name in corpus.names(split)] for split in ("train", "test")}
     if lists["test"]:
         return lists["train"], lists["test"]
-    count = round(HELD_OUT_SHARE * len(names)) if len(names) >= LEAST_SPLIT_UTTERANCES else 0
+    count = round(HELD_OUT_SHARE * len(names)) if len(names) >= MIN_SPLIT_UTTERANCES else 0
     return names[: len(names) - count], names[len(names) - count :]
 
 

@@ -94,23 +94,23 @@ class Workspace:
         self._analysing = threading.Lock()
         self._background = ThreadPoolExecutor(1, "understand")
 
-    def status(self, recording: ProjectRecording) -> str:
+    def find_status(self, recording: ProjectRecording) -> str:
         """Return the status of a recording: one of ``STATUSES``."""
-        work, summary = self._works.get(recording.number), self.folder.summary(recording)
+        work, summary = self._works.get(recording.number), self.folder.summarise(recording)
         if work is not None and not (work.status == READY and summary.error):
             return work.status
         return FAILED if summary.error else NEW if summary is NO_EDITS else READY
 
-    def work(self, number: int) -> Work | None:
+    def find_work(self, number: int) -> Work | None:
         """Return what happens to a recording; None: nothing."""
         return self._works.get(number)
 
-    def error(self, recording: ProjectRecording) -> str:
+    def find_error(self, recording: ProjectRecording) -> str:
         """Return why a recording has failed; empty: it has not."""
         work = self._works.get(recording.number)
-        return (work.error if work is not None else "") or self.folder.summary(recording).error
+        return (work.error if work is not None else "") or self.folder.summarise(recording).error
 
-    def current_work(self) -> list[Work]:
+    def list_current(self) -> list[Work]:
         """Return the recordings that wait or are at work, and those that were until a short while ago."""
         recent = time.monotonic() - RECENT_S
         return [work for work in self._works.values() if work.status in (WAITING, WORKING) or work.since_s > recent]
@@ -118,7 +118,7 @@ class Workspace:
     def queue(self, numbers: Iterable[int]) -> int:
         """Queue new and failed recordings for analysis, after those that wait already; return how many wait."""
         for number in numbers:
-            if self.status(self.folder.recording(number)) in (NEW, FAILED):
+            if self.find_status(self.folder.find_recording(number)) in (NEW, FAILED):
                 self.forget(number)
                 work = self._works[number] = Work(number)
                 self._waiting.append(work)
@@ -130,7 +130,7 @@ class Workspace:
         work = self._works.get(number)
         if work is not None and work.recording is not None and not work.users:
             with self.folder.lock:  # others than the studio may have changed its file
-                is_behind = self.folder.summary(self.folder.recording(number)) is not work.recording.summary
+                is_behind = self.folder.summarise(self.folder.find_recording(number)) is not work.recording.summary
             if is_behind:
                 self.forget(number)
                 work = None
@@ -219,20 +219,20 @@ class Workspace:
             self._run(work, lambda: self._analyse(work))
 
     def _open(self, work: Work) -> None:
-        def opening() -> None:
-            audio, recording = self._analyse(work), self.folder.recording(work.number)
+        def analyse_and_open() -> None:
+            audio, recording = self._analyse(work), self.folder.find_recording(work.number)
             model = None
             while model is not self.model:  # another one may be used since
                 model = self.model
                 work.recording = open_recording(self.folder, recording, model, audio)
 
-        self._run(work, opening)
+        self._run(work, analyse_and_open)
 
     def _analyse(self, work: Work) -> AnalysedAudio | None:
         """Analyse a recording, if it is not yet, and return its sound; one at a time."""
         with self._analysing:
-            recording = self.folder.recording(work.number)
-            summary = self.folder.summary(recording)
+            recording = self.folder.find_recording(work.number)
+            summary = self.folder.summarise(recording)
             if summary.error:
                 raise InputError(summary.error)
             if summary is not NO_EDITS:

@@ -15,13 +15,13 @@ from lipmotion_faces.appearance.candidates import (
     PAPER,
     RefinementOptions,
     Refiner,
-    find_best_sequence,
     choose_candidates,
     draw_to_recorded,
+    find_best_sequence,
     make_candidates,
     measure_details,
-    sharpen,
     measure_squared_distances,
+    sharpen,
 )
 from oracles.components import components, share
 
@@ -162,7 +162,7 @@ def refiner(space: Eigenlips) -> Refiner:
 
 
 def refine(refiner: Refiner, coefficients: np.ndarray) -> np.ndarray:
-    return refiner.pictures(coefficients, refiner.choose(coefficients))
+    return refiner.refine(coefficients, refiner.choose(coefficients))
 
 
 def test_the_paper_frame_by_frame(space: Eigenlips, refiner: Refiner) -> None:
@@ -232,7 +232,7 @@ def test_parts_of_a_video_are_those_of_the_whole(space: Eigenlips, refiner: Refi
     wanted = space.project(HELD_OUT[:30])
     steady = Refiner(space, refiner.candidates)
     chosen, whole = steady.choose(wanted), refine(steady, wanted)
-    parts = [steady.pictures(wanted[part], chosen[part]) for part in (slice(0, 11), slice(11, 30))]
+    parts = [steady.refine(wanted[part], chosen[part]) for part in (slice(0, 11), slice(11, 30))]
     assert np.abs(np.concatenate(parts).astype(int) - whole).max() <= 1  # products of other sizes may round otherwise
 
 

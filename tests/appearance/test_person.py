@@ -138,7 +138,9 @@ def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
     dimmed = replace(footage, clips=(footage.clips[0], lower_face.relight(footage.clips[1], lamp), *footage.clips[2:]))
     found, wanted = learn_appearance(dimmed), learn_appearance(footage)
     assert found.light == pytest.approx(wanted.light, abs=0.5)
-    assert lower_face.measure_cheek_light(found.mouths) == pytest.approx(np.tile(found.light, (len(found.mouths), 1)), abs=0.5)
+    assert lower_face.measure_cheek_light(found.mouths) == pytest.approx(
+        np.tile(found.light, (len(found.mouths), 1)), abs=0.5
+    )
     motion = types.Motion(footage.motion[::5], 25.0, footage.channels)
     pictures = [each.mouth.restore(each.predict_codes(motion).mouth).astype(int) for each in (found, wanted)]
     assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
@@ -364,7 +366,7 @@ def test_the_tip_moves_as_far_as_it_should() -> None:
 def test_what_does_not_move_stays_to_the_bit() -> None:
     noise = np.random.default_rng(0).integers(0, 256, (2, lower_face.HEIGHT, lower_face.WIDTH, 3), np.uint8)
     before = noise.copy()
-    still = lower_face.move_chin(noise, np.full(2, CHIN_PX), np.array([0.0, 0.9 * lower_face.LEAST_PX]))
+    still = lower_face.move_chin(noise, np.full(2, CHIN_PX), np.array([0.0, 0.9 * lower_face.MIN_PX]))
     assert np.array_equal(still, before)
     moved = lower_face.move_chin(noise, np.full(2, CHIN_PX), np.array([8.0, -8.0]))
     assert np.array_equal(noise, before)  # the given pictures are not changed

@@ -10,8 +10,8 @@ from lipmotion_faces.appearance.lower_face import (
     CORNER,
     HEIGHT,
     LARGEST_SCALE,
-    LEAST_BOTTOM_PX,
     MARGIN_PX,
+    MIN_BOTTOM_PX,
     NARROWEST_PX,
     SAME_PERSON_LIKENESS,
     TOP_PX,
@@ -19,15 +19,15 @@ from lipmotion_faces.appearance.lower_face import (
     WIDTH,
     FaceShape,
     choose_scale,
-    measure_cheek_light,
-    measure_shape,
-    compute_signature,
     compare_signatures,
-    mark_mouth,
+    compute_signature,
     find_mouth_part,
     map_region,
-    relight,
+    mark_mouth,
     mark_replaced,
+    measure_cheek_light,
+    measure_shape,
+    relight,
 )
 from lipmotion_faces.appearance.placing import cut, feather, invert_map, place
 from lipmotion_faces.kernels.affine import resample
@@ -194,7 +194,7 @@ def test_the_shape_is_that_of_the_person() -> None:
     assert shape.bottom_px == pytest.approx(118 - MARGIN_PX)
     narrow, wide = measure_shape(0.01, chins), measure_shape(3.0, chins)
     assert (narrow.half_width_px, wide.half_width_px) == (NARROWEST_PX, WIDEST_PX)
-    assert measure_shape(0.4, chins - 60).bottom_px == LEAST_BOTTOM_PX
+    assert measure_shape(0.4, chins - 60).bottom_px == MIN_BOTTOM_PX
     assert measure_shape(0.4, chins + 500).bottom_px == CORNER[1] + HEIGHT - 4
 
 
@@ -211,7 +211,7 @@ def test_the_mouth_is_where_mouth_pictures_have_it_and_replaced_within_its_regio
 
 
 @pytest.mark.parametrize("scale", [1, 2])
-@pytest.mark.parametrize("shape", [SHAPE, FaceShape(NARROWEST_PX, LEAST_BOTTOM_PX), FaceShape(WIDEST_PX, 156.0)])
+@pytest.mark.parametrize("shape", [SHAPE, FaceShape(NARROWEST_PX, MIN_BOTTOM_PX), FaceShape(WIDEST_PX, 156.0)])
 def test_what_is_replaced_lies_inside_and_ends_above_the_chin(shape: FaceShape, scale: int) -> None:
     mask = mark_replaced(shape, scale)
     assert mask.shape == (HEIGHT * scale, WIDTH * scale)
@@ -256,10 +256,14 @@ def face(seed: int) -> np.ndarray:
 
 def test_neither_light_nor_noise_nor_background_make_another_person() -> None:
     one = face(1) + np.random.default_rng(9).normal(0, 5, (4, 128, 128, 3))
-    assert compare_signatures(compute_signature(one), compute_signature(0.6 * one[:1] + 20)) == pytest.approx(1, abs=0.02)
+    assert compare_signatures(compute_signature(one), compute_signature(0.6 * one[:1] + 20)) == pytest.approx(
+        1, abs=0.02
+    )
     around = face(1)
     around[112:] = 0
     around[:, :18] = 255
     assert compare_signatures(compute_signature(face(1)), compute_signature(around)) == pytest.approx(1)
     assert compare_signatures(compute_signature(face(1)), compute_signature(face(2))) < SAME_PERSON_LIKENESS
-    assert compare_signatures(compute_signature(np.full((128, 128, 3), 7)), compute_signature(face(1))) == pytest.approx(0)  # flat
+    assert compare_signatures(
+        compute_signature(np.full((128, 128, 3), 7)), compute_signature(face(1))
+    ) == pytest.approx(0)  # flat

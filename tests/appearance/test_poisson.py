@@ -38,7 +38,7 @@ MASKS = {
 def correct(system: CloningSystem, source: np.ndarray, background: np.ndarray) -> np.ndarray:
     """Return what cloning adds to the source: the membrane in the region, else the background minus the source."""
     result = np.subtract(background, source, dtype=np.float32)
-    for frames, membrane in system._membranes(source, background):
+    for frames, membrane in system._solve_membranes(source, background):
         np.copyto(result[(frames, *system.box)], membrane, where=system.grids.region[..., None])
     return result
 
@@ -172,7 +172,7 @@ def disc(height: int, width: int) -> np.ndarray:
 @pytest.mark.parametrize("shape", [(57, 71), (130, 101), (5, 40), (3, 3)])
 def test_filling_is_the_matrix(shape: tuple[int, int]) -> None:
     grids = nest_grids(disc(*shape))
-    matrix = grids.matrix()
+    matrix = grids.build_matrix()
     for colours in (1, 3):
         filler = GridFiller(grids, 2, colours)
         for count in (2, 1):  # memory that was used before changes nothing
@@ -187,7 +187,7 @@ def test_cubic_functions_are_exact() -> None:
     grids = nest_grids(disc(130, 150))
     y, x = np.mgrid[:130, :150] / 150 - 0.5
     cubic = (x**3 - 3 * x * y**2 + y**2 - x).ravel()
-    filled = grids.matrix() @ cubic[np.concatenate(grids.nodes)]
+    filled = grids.build_matrix() @ cubic[np.concatenate(grids.nodes)]
     inside = grids.region.ravel()
     assert filled[inside] == pytest.approx(cubic[inside], abs=1e-12)
 

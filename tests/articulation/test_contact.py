@@ -7,7 +7,7 @@ from lipmotion.articulation.contact import (
     EDITED_GAP,
     GAP,
     LARGEST_GAP,
-    LEAST_GAP,
+    MIN_GAP,
     TRACKER_DEFICIT,
     close_lips,
     find_closures,
@@ -43,7 +43,7 @@ def test_the_gap_is_0_where_trackers_see_closed_lips_and_grows_with_the_opening(
 
 
 def test_an_opening_has_the_gap_that_it_was_made_of_or_its_own():
-    gap = np.array([0.0, LEAST_GAP, 0.02, 0.1, 0.25, 0.4])
+    gap = np.array([0.0, MIN_GAP, 0.02, 0.1, 0.25, 0.4])
     assert opening_to_gap(gap_to_opening(gap)) == pytest.approx(gap, abs=1e-3)
     assert opening_to_gap(gap_to_opening(np.zeros(1)))[0] == 0
     both = Motion(np.array([[0.3, 0.1], [0.3, -0.1]]), 100.0, (Channel("opening"), Channel(GAP)))
@@ -60,7 +60,7 @@ def test_lips_touch_once_in_every_p_b_and_m_for_longer_than_a_picture(phone, sta
     [(first, stop)] = runs(gap == 0)
     assert CONTACT_S[0] - 0.011 <= (stop - first) / 100 <= CONTACT_S[1] + 0.021
     assert start_s - 0.04 < (first + stop - 1) / 200 < start_s + length_s + 0.04
-    assert gap[gap > 0].min() >= LEAST_GAP
+    assert gap[gap > 0].min() >= MIN_GAP
     assert np.abs(np.diff(gap)).max() < 0.04
     for fps in RATES:
         assert show_contact(gap == 0, 100.0, np.arange(int(fps)) / fps).sum() >= 2
@@ -94,13 +94,13 @@ def test_closures_are_the_least_open_frames():
 def test_pictures_show_every_contact_and_no_other():
     draw = np.random.default_rng(4)
     for _ in range(20):
-        gap = np.where(np.repeat(draw.random(20) < 0.3, 6), 0.0, draw.uniform(LEAST_GAP, 0.2, 120))
+        gap = np.where(np.repeat(draw.random(20) < 0.3, 6), 0.0, draw.uniform(MIN_GAP, 0.2, 120))
         gap[50:53] = 0.1, 0.0, 0.1  # a contact of one frame
         for fps in RATES:
             time_s = np.arange(int(1.19 * fps) + 1) / fps
             shown, values = show_contact(gap == 0, 100.0, time_s), sample_pictures(gap, gap == 0, 100.0, time_s)
             assert np.array_equal(values == 0, shown)
-            assert values[values > 0].min() >= LEAST_GAP
+            assert values[values > 0].min() >= MIN_GAP
             for first, stop in runs(gap == 0):
                 near = (time_s > (first - 1) / 100 - 0.5 / fps) & (time_s < stop / 100 + 0.5 / fps)
                 assert shown[near].any()

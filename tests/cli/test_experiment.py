@@ -76,6 +76,8 @@ def test_all_engines(figures_of, run, toy_corpus, here):
     assert (figures["split"], figures["clips"]) == ("test", 2)
     kept = sorted(path.name for path in (here / "models").iterdir())
     assert kept == ["coupled.lipmotion", "selection.lipmotion", "trajectory.lipmotion"]
-    assert sections.build_engines_section(figures_of(sections.build_engines_section, *chosen)) == sections.build_engines_section(figures)
+    assert sections.build_engines_section(
+        figures_of(sections.build_engines_section, *chosen)
+    ) == sections.build_engines_section(figures)
     (here / "models" / "coupled.lipmotion").write_bytes(b"no model")
     assert is_one_error(run("experiment", *chosen, "-o", "a.json", "--workers", "1"), 6)

@@ -219,16 +219,16 @@ def test_the_interval_is_that_of_drawn_clips(clips):
 
     one, other = evaluate.sum_correlations(near, original), evaluate.sum_correlations(far, original)
     wanted = np.percentile([acc(near, chosen) for chosen in drawn], [2.5, 97.5])
-    assert one.interval(7) == pytest.approx(tuple(wanted), abs=1e-12)
+    assert one.compute_interval(7) == pytest.approx(tuple(wanted), abs=1e-12)
     paired = np.percentile([acc(near, chosen) - acc(far, chosen) for chosen in drawn], [2.5, 97.5])
-    assert one.gain(other, 7) == pytest.approx(tuple(paired), abs=1e-12)
-    assert evaluate.mark_significance(one.gain(other, 7)) == "*"
-    assert one.gain(one, 7) == (0, 0)
+    assert one.compute_gain(other, 7) == pytest.approx(tuple(paired), abs=1e-12)
+    assert evaluate.mark_significance(one.compute_gain(other, 7)) == "*"
+    assert one.compute_gain(one, 7) == (0, 0)
 
 
 def test_the_interval_of_one_clip_is_its_value():
     one = evaluate.ClipStatistic([np.array([3.0, 2.0])], lambda total: float(total[0] / total[1]))
-    assert one.interval(0) == (1.5, 1.5)
+    assert one.compute_interval(0) == (1.5, 1.5)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,15 @@ import pytest
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Channel, Motion, Track
-from lipmotion_lab.league import League, Rival, count_closings, measure_league, load_recordings, read_rivals, write_league
+from lipmotion_lab.league import (
+    League,
+    Rival,
+    count_closings,
+    load_recordings,
+    measure_league,
+    read_rivals,
+    write_league,
+)
 
 ADAPTERS = Path(__file__).parents[2] / "extras" / "league"
 STANDIN = """

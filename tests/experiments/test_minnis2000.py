@@ -22,10 +22,10 @@ from lipmotion_lab.minnis2000 import (
     ADDITIONS,
     EVERYTHING,
     PRINTED,
-    run_minnis2000,
-    list_overlaps,
     list_configurations,
+    list_overlaps,
     measure_velocity_change,
+    run_minnis2000,
 )
 from lipmotion_lab.report.sections import build_hofer_section
 from testing.toy import SMALL

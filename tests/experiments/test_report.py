@@ -259,8 +259,10 @@ def test_every_table_and_chart_is_whole(name):
     names = [table.name for table in section.tables]
     assert len(names) == len(set(names))
     for table in section.tables:
-        assert all(record[column.key] is not None for record in table.records()[:1] for column in table.columns[:1])
-        keys = {tuple(record) for record in table.records()}
+        assert all(
+            record[column.key] is not None for record in table.list_records()[:1] for column in table.columns[:1]
+        )
+        keys = {tuple(record) for record in table.list_records()}
         assert len(keys) == 1
     for chart in section.charts:
         assert ElementTree.fromstring(chart).find("svg").attrib["role"] == "img"  # noqa: S314 (our own)
@@ -285,7 +287,7 @@ def test_hofers_pairs_are_counted_from_their_intervals():
 def test_xie_and_lius_figures_stand_beside_ours():
     section, figures = section_of("xieliu2007"), figures_of("xieliu2007")
     ours = figures["rows"][-1]["conditions"]["audio only"]
-    for record in section.table.records():
+    for record in section.table.list_records():
         assert record["acc"] == ours[record["system"]]["acc"]
         printed = PAPER_FIGURES.get(record["system"].removesuffix(", K on val"), (None, None))
         assert (record["paper_amse"], record["paper_acc"]) == printed
@@ -388,13 +390,13 @@ def order(here: dict[str, float | None], signs: dict[str, int], is_error: bool =
 )
 def test_the_verdict_counts_pairs(signs, outcome):
     found = order({"a": 0.3, "b": 0.2, "c": 0.1}, dict(zip(("ab", "ac", "bc"), signs, strict=True)))
-    assert found.verdict() == f"ACC: of the paper's 3 pairs {outcome}. Best in print: a; here: a."
+    assert found.write_verdict() == f"ACC: of the paper's 3 pairs {outcome}. Best in print: a; here: a."
 
 
 def test_the_smallest_error_is_the_best():
     found = order({"a": 0.1, "b": None, "c": 0.3}, {"ab": 1, "ac": 1, "bc": 1}, is_error=True)
-    assert found.verdict().endswith("Best in print: c; here: a.")
-    assert found.sentences()[1] == "Here: a 0.1, c 0.3."
+    assert found.write_verdict().endswith("Best in print: c; here: a.")
+    assert found.write_sentences()[1] == "Here: a 0.1, c 0.3."
 
 
 ROWS = {
@@ -425,7 +427,7 @@ def test_the_page_shows_the_interval_and_a_star():
 
 def test_a_table_without_rows():
     empty = Table("t", "none", (Column("acc", "ACC", ".2f"),), {})
-    assert (empty.as_csv().strip(), empty.records()) == ("system", [])
+    assert (empty.as_csv().strip(), empty.list_records()) == ("system", [])
 
 
 def test_figures_intervals_and_the_papers_stand_on_one_axis():

@@ -65,9 +65,9 @@ def test_the_network_with_the_best_settings_is_chosen(validation, monkeypatch):
 
 
 def test_of_equal_trials_the_first_is_the_best():
-    assert systems.find_best_trial([systems.Trial({"a": 1}, 0.5, 0, 0), systems.Trial({"a": 2}, 0.5, 0, 0)]).options == {
-        "a": 1
-    }
+    assert systems.find_best_trial(
+        [systems.Trial({"a": 1}, 0.5, 0, 0), systems.Trial({"a": 2}, 0.5, 0, 0)]
+    ).options == {"a": 1}
 
 
 def test_gaussians_are_split_while_that_is_better():

@@ -39,13 +39,13 @@ def test_names_of_preston_blair(tmp_path: Path) -> None:
 
 def test_frames_have_the_size_and_the_background_that_is_asked_for(tmp_path: Path) -> None:
     drawn = read_cut_out(draw(tmp_path, " ".join(LETTERS), (21, 31)))
-    (white,) = drawn.frames("A", Staging())
+    (white,) = drawn.draw("A", Staging())
     assert white.shape == (32, 22, 3)
     assert (white[0, 5].tolist(), white[-1, 5].tolist()) == ([255] * 3, [10] * 3)
-    (green,) = drawn.frames("A", Staging(background="#00ff00", size=62 + 2))
+    (green,) = drawn.draw("A", Staging(background="#00ff00", size=62 + 2))
     assert green.shape == (64, 44, 3)
     assert green[0, 5].tolist() == [0, 255, 0]
-    clear = list(drawn.frames("AB", Staging(background="transparent")))
+    clear = list(drawn.draw("AB", Staging(background="transparent")))
     assert [picture.shape for picture in clear] == [(32, 22, 4)] * 2
     assert clear[1][0, 5, 3] == 0
 

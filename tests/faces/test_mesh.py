@@ -81,10 +81,10 @@ def test_bones_say_what_follows_the_head(character):
     head_bone = Bone(HEAD, place, rows, np.ones(len(rows)))
     neck_bone = Bone(NECK, place, rows, np.ones(len(rows)))
     turned = [
-        MeshStage(replace(character, mesh=replace(mesh, bones=bones)), 256, 144).picture(mesh.vertices, (0.2, 0, 0))
+        MeshStage(replace(character, mesh=replace(mesh, bones=bones)), 256, 144).draw(mesh.vertices, (0.2, 0, 0))
         for bones in ((head_bone, neck_bone), (neck_bone,), ())
     ]
-    still = MeshStage(character, 256, 144).picture(mesh.vertices)
+    still = MeshStage(character, 256, 144).draw(mesh.vertices)
     assert all((each != still).any() for each in turned)
     assert (turned[0] != turned[2]).any()
     assert (turned[1] == turned[2]).all()  # without a head bone, heights say it

@@ -21,8 +21,8 @@ from lipmotion_faces.portrait.geometry import (
     HeadPlacement,
     MouthPose,
     list_grid,
-    outline_lips,
     outline_interior,
+    outline_lips,
 )
 from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 
@@ -42,7 +42,7 @@ def frames(motion, units=NOTHING_SAID, face="woman", fps=25.0, **staging):
 
 def hole(frame: np.ndarray) -> int:
     """Return the number of pixels between the lips that are as dark as the inside of a mouth."""
-    area = layer.View(len(frame)).window(-0.25, 0.75, 0.25, 1.3).area
+    area = layer.View(len(frame)).cut_window(-0.25, 0.75, 0.25, 1.3).area
     return int((frame[area].sum(axis=2) < 200).sum())
 
 
@@ -86,7 +86,7 @@ def test_the_chin_drops_in_one_piece():
 def test_f_shows_teeth_where_closed_lips_show_none():
     labels = Timeline((Span(0.0, 0.4, Unit("f")), Span(0.4, 0.8, Unit("m"))))
     drawn = frames(opening(*np.zeros(21)), labels, size=360, **STILL)
-    area = layer.View(360).window(-0.05, LINE_Y - 0.03, 0.05, LINE_Y + 0.05).area
+    area = layer.View(360).cut_window(-0.05, LINE_Y - 0.03, 0.05, LINE_Y + 0.05).area
 
     def brightest(frame: np.ndarray) -> float:
         return float(frame[area].min(axis=2).max())
@@ -98,9 +98,9 @@ def test_teeth_that_are_hardly_seen_are_covered_but_not_grey() -> None:
     """Down the middle there are pixels of dark and of teeth, and hardly any between the two but in the lip's shadow."""
     size = 1200
     drawer = Rasteriser(characters.WOMAN, size)
-    canvas, area = drawer.canvas(), layer.View(size).window(-0.004, LINE_Y - 0.06, 0.004, LINE_Y + 0.12).area
+    canvas, area = drawer.make_canvas(), layer.View(size).cut_window(-0.004, LINE_Y - 0.06, 0.004, LINE_Y + 0.12).area
     for gap, teeth in ((0.06, 0.2), (0.06, 0.25), (0.09, 0.05), (0.09, 0.1)):
-        column = drawer.picture(FacePose(MouthPose(gap, teeth=teeth)), canvas)[area].astype(float).mean(axis=1)
+        column = drawer.draw(FacePose(MouthPose(gap, teeth=teeth)), canvas)[area].astype(float).mean(axis=1)
         grey = (np.ptp(column, axis=1) < 45) & (column.max(axis=1) > 80) & (column.max(axis=1) < 190)
         assert grey.sum() <= 5
 
@@ -148,20 +148,20 @@ def test_unusable_settings_and_motions_are_refused():
 
 def test_columns_and_rows_are_those_of_the_pixel_centres():
     view = layer.View(80)
-    whole = view.window(-9, -9, 9, 9)
-    for columns in (whole.columns(), whole.columns(4)):
+    whole = view.cut_window(-9, -9, 9, 9)
+    for columns in (whole.list_columns(), whole.list_columns(4)):
         assert columns == pytest.approx(-columns[::-1], abs=1e-6)  # the point between the eyes is in the middle
-    assert np.diff(whole.columns()) == pytest.approx(1 / view.scale, rel=1e-4)
-    assert whole.rows()[32] == pytest.approx(0.5 / view.scale)
-    part = view.window(-0.5, 0.2, 0.5, 0.6)
-    assert part.columns() == pytest.approx(whole.columns()[part.x0 : part.x1])
+    assert np.diff(whole.list_columns()) == pytest.approx(1 / view.scale, rel=1e-4)
+    assert whole.list_rows()[32] == pytest.approx(0.5 / view.scale)
+    part = view.cut_window(-0.5, 0.2, 0.5, 0.6)
+    assert part.list_columns() == pytest.approx(whole.list_columns()[part.x0 : part.x1])
 
 
 def test_a_head_that_rolls_is_turned_about_its_neck():
     """Each place moves at right angles to its distance from the pivot, and clockwise; below the neck nothing moves."""
-    window = layer.View(160).window(-9, -9, 9, 9)
+    window = layer.View(160).cut_window(-9, -9, 9, 9)
     x, y = list_grid(window)
-    right, down = HeadField(window).shifts(HeadPlacement(roll=0.1))
+    right, down = HeadField(window).shift(HeadPlacement(roll=0.1))
     head = y < NECK_TOP
     assert (right * x + down * (y - PIVOT_Y))[head] == pytest.approx(0, abs=1e-9)
     assert right[head].max() < 0  # what is shown at the top comes from the left
@@ -181,9 +181,9 @@ POSES = (
 
 def test_a_frame_does_not_depend_on_the_ones_before():
     drawing = Rasteriser(characters.WOMAN, 96)
-    used = drawing.canvas()
+    used = drawing.make_canvas()
     for pose in (*POSES, *POSES[::-1]):
-        assert np.array_equal(drawing.picture(pose, used), drawing.picture(pose, drawing.canvas()))
+        assert np.array_equal(drawing.draw(pose, used), drawing.draw(pose, drawing.make_canvas()))
 
 
 X = np.linspace(-0.5, 0.5, 1001)
@@ -238,7 +238,9 @@ def test_upper_teeth_stay_with_the_skull_and_lower_teeth_go_with_the_jaw():
         within = outline_interior(LIPS, drawn, X, outline_lips(LIPS, drawn, X))
         assert within.teeth_upper[MIDDLE] == pytest.approx(LIPS.line_y + TEETH_EDGE)
         assert within.teeth_lower[MIDDLE] >= within.teeth_upper[MIDDLE]
-    low, high = (outline_interior(LIPS, p, X, outline_lips(LIPS, p, X)) for p in (pose(0.1, teeth=1), pose(0.3, teeth=1)))
+    low, high = (
+        outline_interior(LIPS, p, X, outline_lips(LIPS, p, X)) for p in (pose(0.1, teeth=1), pose(0.3, teeth=1))
+    )
     assert high.teeth_lower[MIDDLE] > low.teeth_lower[MIDDLE]
 
 

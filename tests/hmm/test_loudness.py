@@ -63,7 +63,7 @@ def test_another_silence_around_a_recording_changes_no_level(frames: int, other:
 def test_short_pauses_are_part_of_the_sound_and_clicks_are_none():
     sound = np.zeros(400, bool)
     sound[100:150] = sound[150 + loudness.PAUSE_FRAMES - 1 : 250] = True
-    sound[300 : 300 + loudness.LEAST_FRAMES - 1] = True
+    sound[300 : 300 + loudness.MIN_FRAMES - 1] = True
     assert loudness.find_sound_runs(sound) == [(100, 250)]
     assert loudness.find_sound_runs(sound, 10) == [(100, 150), (150 + loudness.PAUSE_FRAMES - 1, 250)]
     assert loudness.find_sound_runs(np.zeros(9, bool)) == []

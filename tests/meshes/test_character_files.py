@@ -136,7 +136,7 @@ def test_a_budget_is_that_of_all_files_together(tmp_path: Path) -> None:
     budget.spend("bytes of files", file_limits.ALLOWANCE["bytes of files"] - 3)
     (tmp_path / "head.bin").write_bytes(b"four")
     with pytest.raises(errors.InputError, match="bytes of files"):
-        budget.file_bytes(tmp_path / "head.bin", "buffer")
+        budget.read_bytes(tmp_path / "head.bin", "buffer")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes as POSIX has them")

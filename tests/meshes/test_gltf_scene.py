@@ -406,7 +406,7 @@ def test_everything_stays_and_the_animation_comes_first(original: Path, tmp_path
     assert gltf_writer.write_animated_gltf(tmp_path / "a.glb", original, weights("jawOpen", "mouthFunnel"), "a.wav")
     before, after = gltf_document.read_gltf_document(original), gltf_document.read_gltf_document(tmp_path / "a.glb")
     for name in ("images", "meshes", "materials", "nodes"):
-        assert after.items(name) == before.items(name)
+        assert after.list_items(name) == before.list_items(name)
     assert after.json["asset"] == before.json["asset"]
     assert [each["name"] for each in after.json["animations"]] == ["speech", "dance"]
     assert after.json["accessors"][: len(before.json["accessors"])] == before.json["accessors"]
@@ -419,8 +419,8 @@ def written_curves(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return the times of the first animation of a head, and its weights by name."""
     document = gltf_document.read_gltf_document(path)
     sampler, arrays = document.json["animations"][0]["samplers"][0], gltf_document.GltfArrays(document)
-    times_s = arrays.floats(sampler["input"], 1)[:, 0]
-    stored = arrays.floats(sampler["output"], 1).reshape(len(times_s), -1)
+    times_s = arrays.read_floats(sampler["input"], 1)[:, 0]
+    stored = arrays.read_floats(sampler["output"], 1).reshape(len(times_s), -1)
     return times_s, dict(zip(head().shape_names, stored.T, strict=True))
 
 

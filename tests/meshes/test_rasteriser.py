@@ -9,7 +9,14 @@ from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, Mes
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.characters import character_files, gltf_scene, textures
 from lipmotion_faces.characters.textures import decode_srgb
-from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, TexturedCanvas, prepare_surface, fill_background, shade_background
+from lipmotion_faces.rendering.drawn_surface import (
+    Camera,
+    Canvas,
+    TexturedCanvas,
+    fill_background,
+    prepare_surface,
+    shade_background,
+)
 from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach
 from meshes.gltf import UV, document, glb, textured_document, with_colours
 
@@ -35,14 +42,14 @@ def picture_of(mesh: Mesh, camera: Camera) -> np.ndarray:
         colours[rows], kinds[rows] = decode_srgb(part.material.colour), number
     glosses = [part.material.gloss for part in mesh.parts]
     lighting = Lighting([Finish((0.3, 0.2, 0.15), gloss=0.5 * gloss, focus=4 + round(2 * gloss)) for gloss in glosses])
-    light = lighting.light(vertices, compute_normals(vertices, mesh.triangles), colours, kinds, camera.place)
-    return Canvas(camera).picture(vertices, light, mesh.triangles)
+    light = lighting.shade(vertices, compute_normals(vertices, mesh.triangles), colours, kinds, camera.place)
+    return Canvas(camera).draw(vertices, light, mesh.triangles)
 
 
 def test_the_height_of_the_picture_is_as_stated_and_nearer_things_are_larger():
     centre = np.array([[0.5, -0.25, 0.0]])
-    assert CAMERA.on_screen(centre)[0][:2] == pytest.approx((60, 50))
-    low, high, near = CAMERA.on_screen(np.array([[0.5, -1.25, 0.0], [0.5, 0.75, 0.0], [0.5, 0.75, 1.0]]))
+    assert CAMERA.project(centre)[0][:2] == pytest.approx((60, 50))
+    low, high, near = CAMERA.project(np.array([[0.5, -1.25, 0.0], [0.5, 0.75, 0.0], [0.5, 0.75, 1.0]]))
     assert low[1] - high[1] == pytest.approx(100)
     assert near[1] < high[1]
     assert near[2] < high[2]
@@ -89,16 +96,16 @@ def test_drawing_the_moving_part_alone_gives_the_whole_picture():
     both = np.concatenate([still, moving])
     light = np.random.default_rng(1).uniform(0, 1, both.shape).astype(np.float32)
     triangles = np.concatenate([mesh.triangles, mesh.triangles + len(still)]).astype(np.int32)
-    base = canvas.picture(both, light, triangles[: len(mesh.triangles)])
-    part = canvas.picture(both, light, triangles, onto=base, moving=slice(len(still), None))
-    assert np.array_equal(part, canvas.picture(both, light, triangles))
+    base = canvas.draw(both, light, triangles[: len(mesh.triangles)])
+    part = canvas.draw(both, light, triangles, onto=base, moving=slice(len(still), None))
+    assert np.array_equal(part, canvas.draw(both, light, triangles))
     assert not np.array_equal(part, base)
 
 
 def test_marked_vertices_are_found_where_they_can_be_seen():
     mesh, canvas = ball(), Canvas(Camera(100, 100, across=2.0))
     marked = mesh.vertices[:, 0] > 0
-    seen = canvas.shown(mesh.vertices, marked, mesh.triangles)
+    seen = canvas.mark_shown(mesh.vertices, marked, mesh.triangles)
     assert seen[50, 60]
     assert not seen[50, 40]
     assert seen.sum() == pytest.approx(0.5 * np.pi * 25**2, rel=0.1)
@@ -144,7 +151,7 @@ def square_picture(mesh: Mesh) -> np.ndarray:
     drawn = prepare_surface(mesh, np.ones(len(mesh.triangles), bool), 40.0)
     canvas = TexturedCanvas(camera, drawn.triangles, fill_background(camera, (0, 0, 0)))
     light = np.tile(drawn.colours.astype(np.float32), (1, 1))
-    return canvas.picture(mesh.vertices[drawn.rows], light, np.zeros_like(light))
+    return canvas.draw(mesh.vertices[drawn.rows], light, np.zeros_like(light))
 
 
 def test_the_picture_of_a_gltf_lies_upright(tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_faces.kernels.shading import LEAST_FACING_COSINE
+from lipmotion_faces.kernels.shading import MIN_FACING_COSINE
 
 Real = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ def shade(
             diffuse[c] = diffuse[c] + 0.9 * rim * lamps[n, 3 + c]
             shine[c] = shine[c] + 0.12 * rim * lamps[n, 3 + c]
     light = np.stack([colours[:, c] * diffuse[c] + shine[c] for c in range(3)], axis=1)
-    light[faces < LEAST_FACING_COSINE] = 0
+    light[faces < MIN_FACING_COSINE] = 0
     return light.astype(np.float32)
 
 

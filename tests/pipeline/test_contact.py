@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from formats.examples import of_motion
 from lipmotion import Delivery, Edits, Model, Request, Session, Staging, cues, read_motion
-from lipmotion.articulation.contact import LEAST_GAP, opening_to_gap
+from lipmotion.articulation.contact import MIN_GAP, opening_to_gap
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import LIP_SPEED, find_mouth, frame_times
 from lipmotion.formats import write_motion
@@ -24,7 +24,7 @@ from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline,
 from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
 from lipmotion_faces.head.pose import list_head_poses
-from lipmotion_faces.head.stage import make_figure, build_head_mesh, measure_lip_gap
+from lipmotion_faces.head.stage import build_head_mesh, make_figure, measure_lip_gap
 from lipmotion_faces.outputs.scenes import build_character_scene, build_head_scene
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths
 from lipmotion_faces.portrait.portrait_rasteriser import list_face_poses
@@ -39,7 +39,7 @@ RATES = (24.0, 25.0, 30.0, 60.0, 100.0)
 FILES = ("a.vmd", "a.vrma")
 """Files of vowels that can be read, of one frame rate or any."""
 OWN_VOWELS = {"jawOpen": "A", "mouthPucker": "O", "mouthStretchLeft": "E"}
-TOUCHING_GAP = LEAST_GAP / 2
+TOUCHING_GAP = MIN_GAP / 2
 
 
 def _sentence() -> Timeline[Unit]:
@@ -143,7 +143,7 @@ def _of_head_scene(generation: Generation, fps: float) -> Mask:
     character = make_figure()
     mesh = build_head_mesh(character, moods=any(name.startswith("mood_") for name in generation.motion.names))
     moved = mesh.displacements(np.arange(len(character.skin.rest)))
-    parting = dict(zip(mesh.shape_names, measure_lip_gap(moved[:, character.skin.lip_rows()]), strict=True))
+    parting = dict(zip(mesh.shape_names, measure_lip_gap(moved[:, character.skin.list_lip_rows()]), strict=True))
     return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING_GAP)
 
 

@@ -17,8 +17,8 @@ from lipmotion_faces.characters import fbx
 from lipmotion_faces.characters.gltf_document import GltfArrays, read_gltf_document
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.head.skin import VISIBLE_RINGS
-from lipmotion_faces.head.stage import make_figure, build_head_mesh
-from lipmotion_faces.outputs.scenes import build_character_scene, build_scene, build_head_scene, write_scene
+from lipmotion_faces.head.stage import build_head_mesh, make_figure
+from lipmotion_faces.outputs.scenes import build_character_scene, build_head_scene, build_scene, write_scene
 from meshes.heads import head, write_glb
 from pipeline.made import in_mood, performed, read_character
 from programs import gltf_report, gltf_validator, python_with, run_with
@@ -46,8 +46,8 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 
 
 def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
-    table, mesh = own_head.table(), own_head.mesh
-    ring = make_figure().skin.lip_rows()[VISIBLE_RINGS - 1]
+    table, mesh = own_head.tabulate_weights(), own_head.mesh
+    ring = make_figure().skin.list_lip_rows()[VISIBLE_RINGS - 1]
     upper, lower = ring[20], ring[60]
     places = mesh.vertices[[upper, lower], 1]
     gaps = places + np.einsum("ts,sv->tv", table, mesh.displacements(np.array([upper, lower]))[:, :, 1])
@@ -128,7 +128,7 @@ def test_held_weights_change_at_once_and_others_do_not(character, tmp_path):
     weights = Motion(np.array([[0, 0], [0, 0.5], [1, 1], [1, 0]], float), 10.0, channels)
     mesh = replace(mesh, shapes=tuple(replace(mesh.shapes[0], name=name) for name in names))
     scene = Scene(mesh, weights, stepped=("jawOpen",))
-    time_s, table = scene.keys()
+    time_s, table = scene.list_keys()
     assert time_s == pytest.approx([0, 0.1, 0.199, 0.2, 0.3])
     assert table[:, 0] == pytest.approx([0, 0, 0, 1, 1])
     assert table[:, 1] == pytest.approx([0, 0.5, 0.995, 1, 0])
@@ -137,8 +137,8 @@ def test_held_weights_change_at_once_and_others_do_not(character, tmp_path):
     write_scene(tmp_path / "a.glb", scene)
     (sampler,) = read_gltf_document(tmp_path / "a.glb").json["animations"][0]["samplers"]
     stored = GltfArrays(read_gltf_document(tmp_path / "a.glb"))
-    assert stored.floats(sampler["input"], 1)[:, 0] == pytest.approx(time_s)
-    assert stored.floats(sampler["output"], 1)[:, 0] == pytest.approx(table.reshape(-1))
+    assert stored.read_floats(sampler["input"], 1)[:, 0] == pytest.approx(time_s)
+    assert stored.read_floats(sampler["output"], 1)[:, 0] == pytest.approx(table.reshape(-1))
 
 
 def test_keys_that_others_give_are_left_out(generation, tmp_path):
@@ -146,16 +146,21 @@ def test_keys_that_others_give_are_left_out(generation, tmp_path):
     assert scene.thinning.tolerance == 0.02
     assert len(scene.thinning.closed_s) == 2  # m and p
     write_scene(tmp_path / "a.glb", scene)
-    stored, rotation = GltfArrays(read_gltf_document(tmp_path / "a.glb")), len(scene.table())
+    stored, rotation = GltfArrays(read_gltf_document(tmp_path / "a.glb")), len(scene.tabulate_weights())
     weights, turned = read_gltf_document(tmp_path / "a.glb").json["animations"][0]["samplers"]
-    time_s = stored.floats(weights["input"], 1)[:, 0]
-    values = stored.floats(weights["output"], 1).reshape(len(time_s), -1)
-    assert len(time_s) < rotation == len(stored.floats(turned["input"], 1)) == len(stored.floats(turned["output"], 4))
+    time_s = stored.read_floats(weights["input"], 1)[:, 0]
+    values = stored.read_floats(weights["output"], 1).reshape(len(time_s), -1)
+    assert (
+        len(time_s)
+        < rotation
+        == len(stored.read_floats(turned["input"], 1))
+        == len(stored.read_floats(turned["output"], 4))
+    )
     shown = np.stack([np.interp(scene.weights.time_s, time_s, column) for column in values.T], axis=1)
-    assert np.abs(shown - scene.table()).max() < 0.0201
+    assert np.abs(shown - scene.tabulate_weights()).max() < 0.0201
     closed = [round(each_s * scene.weights.rate_hz) for each_s in scene.thinning.closed_s]
     assert closed
-    assert shown[closed] == pytest.approx(scene.table()[closed], abs=1e-6)
+    assert shown[closed] == pytest.approx(scene.tabulate_weights()[closed], abs=1e-6)
 
 
 def test_the_shapes_of_the_head_are_those_of_its_mesh(own_head):

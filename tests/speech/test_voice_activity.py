@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, average_power, find_spoken_frames
+from lipmotion.hmm.loudness import DECIBEL, MIN_FRAMES, average_power, find_spoken_frames
 from lipmotion.speech.features import analysed_audio, mfcc
 from lipmotion.speech.sound import pauses, voice_activity
 from lipmotion.types import Audio
@@ -33,7 +33,7 @@ def test_sound_has_its_stretch_with_a_margin_that_ends_with_the_recording() -> N
 def test_short_pauses_do_not_part_sound_and_clicks_and_constant_energy_are_none() -> None:
     assert len(voice_activity.find_sound(energy(1000, (200, 300), (380, 500)))) == 1
     assert len(voice_activity.find_sound(energy(1000, (200, 300), (600, 700)))) == 2
-    assert not voice_activity.find_sound(energy(1000, (300, 300 + LEAST_FRAMES // 3), (600, 602)))
+    assert not voice_activity.find_sound(energy(1000, (300, 300 + MIN_FRAMES // 3), (600, 602)))
     assert not voice_activity.find_sound(np.full(500, -11.5, np.float32))
 
 

@@ -37,7 +37,7 @@ def stored():
 
 
 def test_frames_come_back_in_order(stored):
-    frames = np.stack(list(stored.frames(range(21))))
+    frames = np.stack(list(stored.decode(range(21))))
     assert len(stored) == stored.count == 21
     assert frames.dtype == np.uint8
     assert min(psnr_db(a, b) for a, b in zip(film(), frames, strict=True)) > 36
@@ -47,8 +47,8 @@ def test_frames_come_back_in_order(stored):
 
 @pytest.mark.parametrize("order", [range(20, -1, -1), [7, 8, 7, 20, 0, 15, 16], [3] * 4, []])
 def test_any_order_gives_the_same_frames(stored, order):
-    whole = list(stored.frames(range(21)))
-    frames = list(stored.frames(order))
+    whole = list(stored.decode(range(21)))
+    frames = list(stored.decode(order))
     assert len(frames) == len(order)
     for n, frame in zip(order, frames, strict=True):
         np.testing.assert_array_equal(frame, whole[n])
@@ -58,7 +58,7 @@ def test_odd_sizes():
     for size in ((47, 64), (48, 63), (17, 19)):
         frames = film(3, size)
         stored = encode_video(frames, 25.0)
-        shown = np.stack(list(stored.frames(range(3))))
+        shown = np.stack(list(stored.decode(range(3))))
         assert shown.shape == frames.shape
         assert psnr_db(shown, frames) > 34
         pictures = decode_pictures(encode_pictures(frames))
@@ -70,7 +70,7 @@ def test_a_smaller_factor_is_better_and_groups_are_of_any_length():
     sizes = [len(encode_video(film(), 25.0, crf=crf).data) for crf in (10, 20, 30)]
     assert sizes == sorted(sizes, reverse=True)
     for group in (1, 5, 100):
-        assert len(list(encode_video(film(), 25.0, group=group).frames(range(20, -1, -1)))) == 21
+        assert len(list(encode_video(film(), 25.0, group=group).decode(range(20, -1, -1)))) == 21
 
 
 def test_an_archive_holds_it(stored, tmp_path: Path):
@@ -78,7 +78,7 @@ def test_an_archive_holds_it(stored, tmp_path: Path):
     write_archive(path, {}, stored_video_to_arrays(stored))
     read = stored_video_from_arrays(read_archive(path))
     assert (read.rate_hz, read.size, read.count) == (25.0, (48, 64), 21)
-    np.testing.assert_array_equal(next(read.frames([9])), next(stored.frames([9])))
+    np.testing.assert_array_equal(next(read.decode([9])), next(stored.decode([9])))
 
 
 def test_pictures_keep_their_colours():
@@ -123,7 +123,7 @@ class TestDamage:
         else:
             data = np.roll(data, at)
         with suppress(ModelFormatError):
-            assert {frame.shape for frame in replace(stored, data=data).frames(range(21))} == {(48, 64, 3)}
+            assert {frame.shape for frame in replace(stored, data=data).decode(range(21))} == {(48, 64, 3)}
         with suppress(ModelFormatError):
             assert decode_pictures(data).shape[1:] == (48, 64, 3)
 
@@ -139,7 +139,7 @@ class TestDamage:
         with pytest.raises(ModelFormatError, match="21 frames, required 20"):
             replace(stored, count=20)
         with pytest.raises(ModelFormatError, match="64 × 48 pixels, required 64 × 40"):
-            list(replace(stored, size=(40, 64)).frames([0]))
+            list(replace(stored, size=(40, 64)).decode([0]))
 
     def test_arrays_of_wrong_kinds(self, stored):
         arrays = stored_video_to_arrays(stored)
@@ -182,22 +182,22 @@ class Film:
 @pytest.mark.parametrize("most_bytes", [0, 3 * 4 * 300, 10**6])
 def test_every_frame_is_the_right_one(order, most_bytes):
     groups = FrameGroups(Film().frames, STARTS, most_bytes)
-    assert [int(groups.frame(n)[0, 0, 0]) for n in order] == list(order)
+    assert [int(groups.decode(n)[0, 0, 0]) for n in order] == list(order)
 
 
 def test_frames_are_read_once_each_way_and_memory_is_bounded():
     film = Film()
     groups = FrameGroups(film.frames, STARTS, 0)
     for n in [*range(18), *range(16, -1, -1)]:
-        groups.frame(n)
+        groups.decode(n)
     ways = [(0, 4), (4, 8), (8, 12), (12, 16), (16, 18)]
     assert film.read == [*ways, *ways[2::-1]]  # the last two were still there
     long, sizes = FrameGroups(film.frames, range(0, 401, 4), most_bytes=3 * 4 * 300), []
     for n in range(400):
-        long.frame(n)
+        long.decode(n)
         sizes.append(long.nbytes)
     assert max(sizes) == 3 * 4 * 300
     assert len(groups) == 18
     for index in (-1, 18, 100):
         with pytest.raises(IndexError, match=rf"frame {index} of 18"):
-            groups.frame(index)
+            groups.decode(index)

@@ -52,7 +52,7 @@ def vote(folder: Path) -> None:
 
 def pronounce(folder: Path) -> None:
     with open_folder(None, folder) as project:
-        project.add_pronunciation("bob", ("b", "aa", "b"), project.word_revision("bob"))
+        project.add_pronunciation("bob", ("b", "aa", "b"), project.compute_word_revision("bob"))
 
 
 def train_voice(folder: Path) -> None:

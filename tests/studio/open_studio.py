@@ -47,7 +47,7 @@ class OpenStudio(NamedTuple):
         raise AssertionError(f"line {number} is not ready after {PATIENCE_S} s")
 
     def row(self, number: int = 1) -> dict[str, Any]:
-        return self.studio.row(self.folder.recording(number))
+        return self.studio.describe_row(self.folder.find_recording(number))
 
     def change(self, what: str, number: int = 1, **content: Any) -> Reply:
         """Return the reply to a change of a line by somebody who sees it as it is."""

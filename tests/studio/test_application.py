@@ -49,7 +49,7 @@ def studio(place: OpenStudio) -> OpenStudio:
 
 def stored(studio: OpenStudio) -> dict[str, Any]:
     """Return the file of the edits of the line."""
-    return dict(json.loads(studio.folder.edits(studio.folder.recording(1)).read_text(encoding="utf-8")))
+    return dict(json.loads(studio.folder.locate_edits(studio.folder.find_recording(1)).read_text(encoding="utf-8")))
 
 
 def test_an_edit_is_made_stored_and_taken_back(studio):
@@ -121,7 +121,7 @@ def test_numbers_are_those_of_the_motion(studio):
     reply = studio.ask("/api/lines/1/motion?start_s=0.5&end_s=1.0")
     names = json.loads(reply.headers["x-lipmotion-names"])
     found = np.frombuffer(reply.body, "<f4").reshape(-1, len(names))
-    work = studio.studio.workspace.work(1)
+    work = studio.studio.workspace.find_work(1)
     assert names == [channel["name"] for channel in state["channels"]]
     assert found == pytest.approx(work.recording.generation.motion.values[50:101], abs=1e-6)
     assert reply.headers["x-lipmotion-first"] == "50"
@@ -137,7 +137,7 @@ def test_of_a_long_line_the_whole_motion_is_made_when_it_is_asked_for(studio, mo
     monkeypatch.setattr(recording_module, "LONG_S", 0.0)
     state = studio.edit("phone 3 is p").content
     assert not state["settled"]
-    work = studio.studio.workspace.work(1)
+    work = studio.studio.workspace.find_work(1)
     assert studio.ask("/api/lines/1/settle", {"revision": state["revision"] + 1}).status == 409
     state = studio.ask("/api/lines/1/settle", {"revision": state["revision"]}).content
     assert state["settled"]
@@ -229,7 +229,7 @@ def test_pronunciations_are_offered_and_kept(studio):
     seen = studio.ask("/api/lexicon?word=zenodo").content["revision"]
     kept = studio.ask("/api/lexicon", {"word": "zenodo", "phones": ["z", "eh", "n", "ow"], "revision": seen}).content
     assert (kept["own"], kept["pronunciations"]) == (True, [["z", "eh", "n", "ow"]])
-    assert studio.folder.lexicon().pronunciations("zenodo") == (("z", "eh", "n", "ow"),)
+    assert studio.folder.load_lexicon().pronunciations("zenodo") == (("z", "eh", "n", "ow"),)
     state = studio.edit("word 1 is zenodo").content
     assert state["steps"] == ["word 1 is zenodo said z eh n ow"]
     state = studio.ask("/api/lines/1/undo", {"revision": state["revision"]}).content
@@ -314,10 +314,10 @@ def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(studio, 
     reply = studio.ask("/api/lines?name=other.wav", toy_speech.read_bytes())
     other = reply.content["id"]
     assert studio.ready(other)["status"] == "ready"
-    assert studio.studio.workspace.work(1) is None
+    assert studio.studio.workspace.find_work(1) is None
     again = studio.ready()
     assert (again["steps"], again["revision"]) == (["phone 3 is p"], edited["revision"])
-    assert studio.studio.workspace.work(other) is None
+    assert studio.studio.workspace.find_work(other) is None
     assert studio.ask("/api/understand", {"lines": "all"}).content["waiting"] == 0
     assert studio.ask("/api/understand", {"lines": [99]}).status == 404
     said = studio.change("transcript", other, text="mama").content

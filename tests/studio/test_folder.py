@@ -7,9 +7,9 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.storage.files import make_portable
-from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, open_folder, find_project_path
-from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, parse_project, describe_project
-from lipmotion_studio.votes import Side, Vote, read_votes, tally, format_votes
+from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, find_project_path, open_folder
+from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, describe_project, parse_project
+from lipmotion_studio.votes import Side, Vote, format_votes, read_votes, tally
 from pipeline.made import write_sound
 from testing.toy import ToySentence
 
@@ -32,20 +32,20 @@ def test_a_project_is_there_again(lines):
         for content in ("sound", "other"):
             (folder.path / content).write_text(content, encoding="utf-8")
         number = folder.drop("C:\\over there\\..\\A.WAV", folder.path / "sound", "hello")
-        assert folder.recording(number).name == "C__over there_.._A"
+        assert folder.find_recording(number).name == "C__over there_.._A"
         assert folder.drop("a.wav", folder.path / "other", "") == number + 1
         folder.change_recording(1, lambda line: replace(line, mark="approved", exports=(RECORD,)))
-        seen = folder.word_revision("tear")
+        seen = folder.compute_word_revision("tear")
         folder.add_pronunciation("tear", ("t", "eh", "r"), seen)
         with pytest.raises(RevisionError):
             folder.add_pronunciation("tear", ("d", "eh", "r"), seen)
-        folder.add_pronunciation("tear", ("t", "ih", "r"), folder.word_revision("tear"))
+        folder.add_pronunciation("tear", ("t", "ih", "r"), folder.compute_word_revision("tear"))
         project = folder.project
     assert folder.path == lines.with_name("lines.studio")
     with open_folder(folder.path) as again:
         assert again.project == project
-        assert again.lexicon().user == {"tear": (("t", "ih", "r"), ("t", "eh", "r"))}
-        assert again.recording(number + 1).sound == "sounds/a-2.wav"
+        assert again.load_lexicon().user == {"tear": (("t", "ih", "r"), ("t", "eh", "r"))}
+        assert again.find_recording(number + 1).sound == "sounds/a-2.wav"
     with open_folder(lines) as once_more:  # nothing is added twice
         assert once_more.project == project
     document = json.loads((folder.path / PROJECT).read_text(encoding="utf-8"))
@@ -115,9 +115,9 @@ def test_what_is_called_as_a_device_gets_another_name(lines, tmp_path, name):
     with open_folder(sound, tmp_path / "own") as folder:
         (folder.path / "came").write_text("sound", encoding="utf-8")
         for number in (1, folder.drop(name, folder.path / "came", "")):
-            line = folder.recording(number)
+            line = folder.find_recording(number)
             assert make_portable(line.name) == line.name
-            assert make_portable(folder.edits(line).name) == folder.edits(line).name
+            assert make_portable(folder.locate_edits(line).name) == folder.locate_edits(line).name
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion_studio.studio import MP4, find_real_video, find_media_type, find_sound_start, write_playable
+from lipmotion_studio.studio import MP4, find_media_type, find_real_video, find_sound_start, write_playable
 from pipeline.made import write_sound
 from testing.toy import ToySentence, write_film
 

@@ -105,14 +105,14 @@ def test_what_is_stopped_or_killed_goes_on(studio):
     wait_until(lambda: job(studio)["share"] > 0.6)
     studio.studio.trainer.close()  # as where the studio ends meanwhile
     found = Trainer(studio.folder)  # as where it is opened again
-    document = found.document()
+    document = found.describe()
     assert document is not None
     assert (document["state"], document["name"]) == ("interrupted", "me")
     kept = Corpus.open(studio.folder.path / TRAINING / "corpus").names()
     assert set(kept) == {f"toy{number:02d}" for number in range(SENTENCES)}
     found.retry()
     wait_until(lambda: not found.is_working and found._thread is None)
-    document = found.document()
+    document = found.describe()
     assert document is not None
     assert (document["state"], document["report"]["file"]) == ("done", "voices/me.lipmotion")
     assert not list((studio.folder.path / "voices").glob("*.unfinished"))
@@ -192,10 +192,10 @@ def test_the_time_left_counts_down_and_reports_are_kept(tmp_path, monkeypatch):
         """Return what is told at a time, once something was reported."""
         now_s[0] = at_s
         if more:
-            before = trainer.short_document()
+            before = trainer.summarise()
             tells.send(more)
-            wait_until(lambda: trainer.short_document() != before)
-        document = trainer.short_document()
+            wait_until(lambda: trainer.summarise() != before)
+        document = trainer.summarise()
         return document["state"], document["share"], document.get("left_s")
 
     assert told(0.0, stage="tracking", share=0.0) == ("working", 0.0, None)
@@ -207,15 +207,15 @@ def test_the_time_left_counts_down_and_reports_are_kept(tmp_path, monkeypatch):
     assert told(171.0, report={"minutes": 3.5}) == ("done", 1.0, None)
     tells.close()
     wait_until(lambda: trainer._thread is None)
-    assert trainer.earlier() == []
+    assert trainer.list_earlier() == []
     pipe, tells = Pipe(duplex=False)
     trainer.begin("face", "me", [], VoiceOptions())
     for opened in (trainer, Trainer(folder)):  # as it is, and as where the studio is opened again
-        (voice,) = opened.earlier()
+        (voice,) = opened.list_earlier()
         assert (voice["kind"], voice["file"], voice["report"]["minutes"]) == ("voice", "voices/me.lipmotion", 3.5)
     tells.close()
     wait_until(lambda: trainer._thread is None)
-    assert [(job["state"], job["kind"]) for job in (trainer.document() or {}, *trainer.earlier())] == [
+    assert [(job["state"], job["kind"]) for job in (trainer.describe() or {}, *trainer.list_earlier())] == [
         ("failed", "face"),
         ("done", "voice"),
     ]
@@ -239,13 +239,13 @@ def test_a_damaged_state_is_an_error_with_a_way_back(tmp_path, damage):
     assert Trainer(folder).damage == ""  # and keeps a copy
     file.write_text(damage, encoding="utf-8")
     trainer = Trainer(folder)
-    assert (trainer.document(), str(file) in trainer.damage, trainer.is_restorable) == (None, True, True)
+    assert (trainer.describe(), str(file) in trainer.damage, trainer.is_restorable) == (None, True, True)
     for act in (trainer.retry, lambda: trainer.begin("voice", "a", [], VoiceOptions())):
         with pytest.raises(errors.InputError, match="damaged"):
             act()
     assert file.read_text(encoding="utf-8") == damage
     trainer.restore()
-    document = trainer.document() or {}
+    document = trainer.describe() or {}
     assert (document["name"], document["error"], trainer.damage) == ("me", "no memory", "")
     assert [each.read_text(encoding="utf-8") for each in file.parent.glob("*.damaged-*")] == [damage]
     with pytest.raises(errors.InputError, match="not damaged"):

@@ -31,25 +31,25 @@ def test_what_is_dropped_under_the_name_of_a_line_that_was_removed_is_a_new_line
     first = studio.ask("/api/lines?name=take.wav", sound, x_lipmotion_transcript="mama").content
     studio.ready(first["id"])
     assert studio.change("edits", first["id"], steps=["phone 2 is p"]).status == 200
-    path = studio.folder.sound(studio.folder.recording(first["id"]))
+    path = studio.folder.locate_sound(studio.folder.find_recording(first["id"]))
     assert studio.change("remove", first["id"]).status == 200
     other = sound[:-2] + b"\0\1"
     second = studio.ask("/api/lines?name=take.wav", other, x_lipmotion_transcript="bob").content
     state = studio.ready(second["id"])
     assert (second["name"], state["transcript"], state["steps"]) == ("take-2", "bob", [])
     assert path.read_bytes() == sound
-    assert studio.folder.sound(studio.folder.recording(second["id"])).read_bytes() == other
+    assert studio.folder.locate_sound(studio.folder.find_recording(second["id"])).read_bytes() == other
 
 
 def test_a_line_that_was_removed_has_its_edits_when_its_sound_is_added_again(studio):
-    sound = studio.folder.sound(studio.folder.recording(1))
+    sound = studio.folder.locate_sound(studio.folder.find_recording(1))
     assert studio.edit("phone 3 is p").status == 200
     assert studio.change("remove").status == 200
     other = sound.with_name("inner") / "line.wav"
     other.parent.mkdir()
     other.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
-    assert [studio.folder.recording(number).name for number in studio.folder.add(other)] == ["line-2"]
-    assert [studio.folder.recording(number).name for number in studio.folder.add(sound)] == ["line"]
+    assert [studio.folder.find_recording(number).name for number in studio.folder.add(other)] == ["line-2"]
+    assert [studio.folder.find_recording(number).name for number in studio.folder.add(sound)] == ["line"]
     assert studio.ready(3)["steps"] == ["phone 3 is p"]
 
 
@@ -74,14 +74,14 @@ def test_the_voice_and_the_lexicon_name_the_revision_that_they_saw(studio):
         late = studio.ask(path, content | {"revision": seen + 1})
         assert (late.status, "window" in late.content["error"]) == (409, True)
         assert studio.ask(path, content | {"revision": seen}).status == 200
-    assert studio.folder.lexicon().user == {"tear": (("t", "eh", "r"),)}
+    assert studio.folder.load_lexicon().user == {"tear": (("t", "eh", "r"),)}
     late = studio.ask("/api/lexicon", {"word": "tear", "phones": ["t", "ih", "r"], "revision": seen})
-    assert (late.status, len(studio.folder.lexicon().user["tear"])) == (409, 1)
+    assert (late.status, len(studio.folder.load_lexicon().user["tear"])) == (409, 1)
 
 
 def test_damaged_edits_are_an_error_with_a_way_back(studio):
     assert studio.edit("phone 3 is p").status == 200
-    seen, file = studio.row(), studio.folder.edits(studio.folder.recording(1))
+    seen, file = studio.row(), studio.folder.locate_edits(studio.folder.find_recording(1))
     damage = file.read_bytes()[:-40]
     file.write_bytes(damage)
     row = studio.row()
@@ -102,9 +102,9 @@ def test_damaged_edits_are_an_error_with_a_way_back(studio):
 
 
 def test_edits_that_others_make_of_an_open_line_are_seen(studio):
-    state, line = studio.ready(), studio.folder.recording(1)
-    file = read_edits(studio.folder.edits(line))
-    write_edits(file.then("phone 3 is p"), studio.folder.edits(line))
+    state, line = studio.ready(), studio.folder.find_recording(1)
+    file = read_edits(studio.folder.locate_edits(line))
+    write_edits(file.then("phone 3 is p"), studio.folder.locate_edits(line))
     content = {"revision": state["revision"], "steps": ["phone 4 is p"]}
     assert studio.ask("/api/lines/1/edits", content).status in (409, 503)
     assert studio.ready()["steps"] == ["phone 3 is p"]
@@ -116,7 +116,7 @@ def test_a_project_of_an_earlier_version_adopts_its_sounds(toy_speech, toy_sente
     with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
         studio.ready()
         assert studio.edit("phone 3 is p").status == 200
-        file, project = studio.folder.edits(studio.folder.recording(1)), studio.folder.path / "project.json"
+        file, project = studio.folder.locate_edits(studio.folder.find_recording(1)), studio.folder.path / "project.json"
     for path, name in ((file, "recording_sha256"), (project, "sha256")):
         document = json.loads(path.read_text(encoding="utf-8"))
         for each in (document, *document.get("lines", ())):
@@ -126,7 +126,7 @@ def test_a_project_of_an_earlier_version_adopts_its_sounds(toy_speech, toy_sente
     with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
         assert (studio.ready()["steps"], "is taken to be" in caplog.text) == (["phone 3 is p"], True)
     digest = sha256_of(toy_speech)
-    assert (read_edits(file).sha256, ProjectFolder(project.parent).recording(1).sha256) == (digest, digest)
+    assert (read_edits(file).sha256, ProjectFolder(project.parent).find_recording(1).sha256) == (digest, digest)
     assert (project.parent / "copies" / file.name).read_bytes() == file.read_bytes()
 
 

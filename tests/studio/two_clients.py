@@ -164,9 +164,9 @@ class TwoClients(RuleBasedStateMachine):
         reply = self.ask("/api/lines?name=take.wav", content, x_lipmotion_transcript=words)
         assert reply.status == 201
         row = reply.content
-        line = self.studio.folder.recording(row["id"])
+        line = self.studio.folder.find_recording(row["id"])
         sha256 = sha256_of(self.sounds[sound])
-        shadow = Shadow(row["id"], row["name"], self.studio.folder.sound(line), sha256, words)
+        shadow = Shadow(row["id"], row["name"], self.studio.folder.locate_sound(line), sha256, words)
         self.lines[shadow.number] = shadow
         self.ready(shadow)
 
@@ -293,7 +293,7 @@ class TwoClients(RuleBasedStateMachine):
         line = self.line(pick)
         if line.damage:
             return
-        file = self.studio.folder.edits(self.studio.folder.recording(line.number))
+        file = self.studio.folder.locate_edits(self.studio.folder.find_recording(line.number))
         self.ready(line)
         DAMAGES[damage](file)
         line.damage = f"{damage} {file.read_bytes()[:100]!r}" if file.exists() else damage

@@ -88,7 +88,7 @@ def test_nothing_that_raters_get_names_a_condition(place):
 def test_no_trial_is_skipped(place):
     now = place.join()
     reply = place.send(now["token"], scripted_answer(place.study, now) | {"trial": 1})
-    assert (reply.status, place.store.sheets()) == (409, [])
+    assert (reply.status, place.store.list_sheets()) == (409, [])
 
 
 def test_a_link_that_is_not_known_and_a_rater_who_was_forgotten(place):
@@ -110,7 +110,7 @@ def test_bodies_that_are_refused(place, content, headers, status):
     token = place.join()["token"]
     reply = ask(place.application, "/api/answers", content, token=token, headers=headers)
     assert (reply.status, list(reply.content)) == (status, ["error"])
-    assert place.store.sheets() == []
+    assert place.store.list_sheets() == []
 
 
 def test_nobody_joins_without_agreeing(place):

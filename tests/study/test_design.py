@@ -280,7 +280,7 @@ def test_what_is_asked_names_the_conditions_as_they_are_shown(tmp_path):
     paired, opinions = small_study(tmp_path / "p"), small_study(tmp_path / "m", answers.MOS)
     trial = paired.trials[3]
     assert manifest.list_questions(paired, trial) == [
-        ("preference", *(video.condition for video in paired.shown(trial)))
+        ("preference", *(video.condition for video in paired.list_shown(trial)))
     ]
     asked = manifest.list_questions(opinions, opinions.trials[0])
     assert [question for question, _, _ in asked] == ["smoothness", "closure", "protrusion", "turning", "overall"]

@@ -31,11 +31,11 @@ def store(folder: Path) -> Iterator[StudyStore]:
 def test_the_first_answer_stands(store):
     number, _ = store.add_rater().result()
     first = AnswerSheet(number, 0, ("1", "2"), 3.5, 2)
-    assert store.next_trial(number) == 0
+    assert store.find_next_trial(number) == 0
     assert store.record(first).result()
     assert store.record(AnswerSheet(number, 0, ("5", "5"), 9.0, 7)).result()
-    assert store.sheets() == [first]
-    assert store.next_trial(number) == 1
+    assert store.list_sheets() == [first]
+    assert store.find_next_trial(number) == 1
 
 
 def test_what_is_sent_by_many_at_once_is_stored_once(store):
@@ -43,7 +43,7 @@ def test_what_is_sent_by_many_at_once_is_stored_once(store):
     sheets = [AnswerSheet(number, trial, ("first",), 1.0, 2) for number in numbers for trial in range(8)]
     with ThreadPoolExecutor(8) as pool:
         assert all(pool.map(lambda sheet: store.record(sheet).result(), sheets * 5))
-    assert store.sheets() == sheets
+    assert store.list_sheets() == sheets
 
 
 def test_an_answer_is_on_the_disk_before_it_is_acknowledged(store, folder):
@@ -59,8 +59,8 @@ def test_tokens_are_long_and_different_and_not_stored(store, folder):
     tokens = [store.add_rater().result()[1] for _ in range(50)]
     assert len(set(tokens)) == 50
     assert min(map(len, tokens)) >= 32
-    assert [store.rater_of(token) for token in tokens] == list(range(1, 51))
-    assert store.rater_of("") is store.rater_of("\ud800") is None
+    assert [store.find_rater(token) for token in tokens] == list(range(1, 51))
+    assert store.find_rater("") is store.find_rater("\ud800") is None
     stored = b"".join(path.read_bytes() for path in folder.glob(f"{ANSWERS}*"))
     assert not any(token.encode() in stored for token in tokens)
 
@@ -70,7 +70,7 @@ def test_a_forgotten_rater_is_gone_and_the_number_is_not_given_again(store, fold
     for number in numbers:
         store.record(AnswerSheet(number, 0, (f"judgement-of-{number}",), 1.0, 2)).result()
     assert store.forget(2) == 1
-    assert [sheet.rater for sheet in store.sheets()] == [1]
+    assert [sheet.rater for sheet in store.list_sheets()] == [1]
     stored = b"".join(path.read_bytes() for path in folder.glob(f"{ANSWERS}*"))
     assert b"judgement-of-1" in stored
     assert b"judgement-of-2" not in stored
@@ -85,8 +85,8 @@ def test_answers_are_still_there_after_the_next_start(folder):
         number, token = store.add_rater().result()
         store.record(AnswerSheet(number, 0, ("first",), 1.0, 2)).result()
     with closing(StudyStore(folder)) as store:
-        assert store.rater_of(token) == number
-        assert store.next_trial(number) == 1
+        assert store.find_rater(token) == number
+        assert store.find_next_trial(number) == 1
 
 
 def test_no_answers_those_of_another_study_and_what_is_no_database_are_refused(folder):

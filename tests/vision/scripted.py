@@ -36,7 +36,7 @@ class ScriptedMesh(Opened):
     def __init__(self, answers: Iterator[NDArray[np.float64] | None], most: int) -> None:
         self.answers, self.most = answers, most
 
-    def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
+    def find_faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
         if self.most == 1:
             ScriptedMesh.last = next(self.answers)
         return [] if self.last is None else [self.last]
@@ -45,7 +45,7 @@ class ScriptedMesh(Opened):
 class NoFinder(Opened):
     """Stands for the detector, which finds no more than the mesh."""
 
-    def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
+    def find_boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
         return []
 
 
@@ -54,13 +54,13 @@ class Scripted(LandmarkTracker):
 
     answers: Iterator[NDArray[np.float64] | None] = iter(())
 
-    def versions(self) -> dict[str, str]:
+    def list_versions(self) -> dict[str, str]:
         return {"mediapipe": "scripted"}
 
-    def points(self, most: int = 1) -> ScriptedMesh:
+    def open_point_finder(self, most: int = 1) -> ScriptedMesh:
         return ScriptedMesh(self.answers, most)
 
-    def boxes(self) -> NoFinder:
+    def open_box_finder(self) -> NoFinder:
         return NoFinder()
 
 

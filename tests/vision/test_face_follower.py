@@ -50,27 +50,27 @@ class Mesh(Opened):
     def __init__(self, most: int = 1) -> None:
         self.most = most
 
-    def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
+    def find_faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
         return [points(face) for face in Mesh.shown if face[0].islower() and face[3] >= SMALL_FACE_PX][: self.most]
 
 
 class Finder(Opened):
     """Stands for the detector: finds all faces of the frame that is being shown, those in capitals too."""
 
-    def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[trackers.FaceBox]:  # noqa: ARG002
+    def find_boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[trackers.FaceBox]:  # noqa: ARG002
         return [trackers.FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
 
 
 class Shown(trackers.LandmarkTracker):
     """Finds the faces of the frame that is being shown."""
 
-    def versions(self) -> dict[str, str]:
+    def list_versions(self) -> dict[str, str]:
         return {}
 
-    def points(self, most: int = 1) -> Mesh:
+    def open_point_finder(self, most: int = 1) -> Mesh:
         return Mesh(most)
 
-    def boxes(self) -> Finder:
+    def open_box_finder(self) -> Finder:
         return Finder()
 
 
@@ -89,7 +89,7 @@ class SmallMesh:
     def __exit__(self, *_: object) -> None:
         SmallMesh.open -= 1
 
-    def faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+    def find_faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
         near = [face for face in Mesh.shown if face[0].islower() and abs(face[1] - self.x) < 2 * face[3]]
         if near:
             self.x = near[0][1]
@@ -113,7 +113,7 @@ def show(monkeypatch: pytest.MonkeyPatch) -> Show:
         with face_follower.FaceFollower(person) as follower:
             for faces, place in frames:
                 Mesh.shown = faces
-                found = follower.points(picture(faces, place))
+                found = follower.follow(picture(faces, place))
                 followed.append(None if found is None else float(found[EYES, 0].mean()))
         return follower, followed
 
@@ -130,31 +130,31 @@ def moved(face: Face, by: float) -> Face:
 def test_a_moving_face_is_one_scene(show: Show) -> None:
     follower, followed = show([([moved(ANNA, n)], 0) for n in range(30)])
     assert followed == [150.0 + n for n in range(30)]
-    assert follower.person().all()
-    assert follower.cuts() == []
+    assert follower.mark_person().all()
+    assert follower.list_cuts() == []
     assert (
-        len(show([([ANNA], 0)] * 110)[0].thumbnails()) == face_follower.MOST_THUMBNAILS
+        len(show([([ANNA], 0)] * 110)[0].list_thumbnails()) == face_follower.MAX_THUMBNAILS
     )  # later looks are kept when they are new
 
 
 def test_the_one_shown_longest_is_the_person(show: Show) -> None:
     follower, _ = show([([BELLA], 1)] * 8 + [([ANNA], 0)] * 20 + [([BELLA], 1)] * 5)
-    assert follower.person().tolist() == [False] * 8 + [True] * 20 + [False] * 5
-    assert follower.cuts() == [8, 28]
+    assert follower.mark_person().tolist() == [False] * 8 + [True] * 20 + [False] * 5
+    assert follower.list_cuts() == [8, 28]
 
 
 def test_she_is_known_again_elsewhere(show: Show) -> None:
     near = ("a", 120.0, 110.0, 96.0)
     follower, _ = show([([ANNA], 0)] * 10 + [([near], 2)] * 6 + [([BELLA], 1)] * 5 + [([ANNA], 0)] * 4)
-    assert follower.person().tolist() == [True] * 16 + [False] * 5 + [True] * 4
-    assert follower.cuts() == [10, 16, 21]
+    assert follower.mark_person().tolist() == [True] * 16 + [False] * 5 + [True] * 4
+    assert follower.list_cuts() == [10, 16, 21]
 
 
 def test_a_face_that_jumps_is_looked_at_again(show: Show) -> None:
     """Without a cut in the picture, the mesh goes over to somebody else."""
     there = moved(BELLA, 1.5 * face_follower.JUMP * 64)
     follower, _ = show([([ANNA], 0)] * 12 + [([there], 0)] * 4 + [([ANNA], 0)] * 4)
-    assert follower.person().tolist() == [True] * 12 + [False] * 4 + [True] * 4
+    assert follower.mark_person().tolist() == [True] * 12 + [False] * 4 + [True] * 4
 
 
 SMALL_ANNA, SMALL_BELLA = ("a", 220.0, 60.0, 32.0), ("b", 80.0, 60.0, 32.0)
@@ -163,8 +163,8 @@ SMALL_ANNA, SMALL_BELLA = ("a", 220.0, 60.0, 32.0), ("b", 80.0, 60.0, 32.0)
 def test_a_small_face_is_found_from_the_first_frame_and_followed(show: Show) -> None:
     follower, followed = show([([moved(SMALL_ANNA, n)], 0) for n in range(20)])
     assert followed == [220.0 + n for n in range(20)]
-    assert follower.person().all()
-    assert follower.cuts() == []
+    assert follower.mark_person().all()
+    assert follower.list_cuts() == []
     assert SmallMesh.open == 0
 
 
@@ -173,7 +173,7 @@ def test_a_small_face_that_is_lost_is_searched_where_it_was(show: Show) -> None:
     frames = [([SMALL_ANNA], 0)] * 8 + [([hidden], 0)] * 3 + [([SMALL_BELLA, moved(SMALL_ANNA, 10)], 0)] * 8
     follower, followed = show(frames)
     assert followed == [220.0] * 8 + [None] * 3 + [230.0] * 8
-    assert np.flatnonzero(~follower.person()).tolist() == [8, 9, 10]
+    assert np.flatnonzero(~follower.mark_person()).tolist() == [8, 9, 10]
     assert SmallMesh.open == 0
     assert show([([hidden], 0)] * 6)[1] == [None] * 6  # of which the mesh is unsure is nobody's
     assert SmallMesh.open == 0
@@ -183,15 +183,15 @@ def test_of_several_small_ones_the_largest_then_the_known_one(show: Show) -> Non
     larger = ("b", 110.0, 60.0, 36.0)
     assert set(show([([SMALL_ANNA, larger], 0)] * 4)[1]) == {110.0}
     known, _ = show([([SMALL_ANNA], 0)] * 8)
-    assert set(show([([SMALL_ANNA, larger], 0)] * 4, known.thumbnails())[1]) == {220.0}
+    assert set(show([([SMALL_ANNA, larger], 0)] * 4, known.list_thumbnails())[1]) == {220.0}
 
 
 def test_only_the_person_who_is_wanted_counts(show: Show) -> None:
-    wanted = show([([ANNA], 0)] * 8)[0].thumbnails()
+    wanted = show([([ANNA], 0)] * 8)[0].list_thumbnails()
     follower, _ = show([([BELLA], 1)] * 20 + [([ANNA], 0)] * 5, wanted)
-    assert follower.person().tolist() == [False] * 20 + [True] * 5
-    assert follower.share_of_person() == pytest.approx(0.2)
-    assert not show([([BELLA], 1)] * 20, wanted)[0].person().any()
+    assert follower.mark_person().tolist() == [False] * 20 + [True] * 5
+    assert follower.measure_share() == pytest.approx(0.2)
+    assert not show([([BELLA], 1)] * 20, wanted)[0].mark_person().any()
 
 
 def test_of_several_the_largest_then_the_middle_one(show: Show) -> None:
@@ -207,15 +207,15 @@ def test_of_several_the_same_throughout_in_any_order(show: Show) -> None:
     frames[7] = ([one, ("B", *other[1:])], 0)
     follower, followed = show(frames)
     assert set(followed) == {230.0, None}
-    assert np.flatnonzero(~follower.person()).tolist() == [7]
+    assert np.flatnonzero(~follower.mark_person()).tolist() == [7]
 
 
 def test_after_a_cut_to_several_the_known_one_is_taken(show: Show) -> None:
     wide = [("b", 90.0, 100.0, 64.0), ("a", 240.0, 100.0, 48.0)]
     follower, followed = show([([ANNA], 0)] * 8 + [(wide, 3)] * 8)
     assert followed[8:] == [240.0] * 8
-    assert follower.person().all()
-    assert follower.cuts() == [8]
+    assert follower.mark_person().all()
+    assert follower.list_cuts() == [8]
 
 
 def test_away_for_long_is_compared_again(show: Show) -> None:
@@ -223,7 +223,7 @@ def test_away_for_long_is_compared_again(show: Show) -> None:
     for after, is_known in ((BELLA, False), (ANNA, True)):
         follower, followed = show([([ANNA], 0)] * 8 + gone + [([moved(after, 15)], 0)] * 4)
         assert [x is None for x in followed] == [False] * 8 + [True] * len(gone) + [False] * 4
-        assert follower.person().tolist() == [True] * 8 + [False] * len(gone) + [is_known] * 4
+        assert follower.mark_person().tolist() == [True] * 8 + [False] * len(gone) + [is_known] * 4
 
 
 pytest.importorskip("cv2")
@@ -244,7 +244,7 @@ def middle_of_bright(image: NDArray[np.uint8]) -> NDArray[np.float64]:
 
 def test_positions_in_the_window_are_those_in_the_picture():
     for side in (96, 384, 800):
-        window = face_follower.FaceWindow.around(500, 300, side)
+        window = face_follower.FaceWindow.place(500, 300, side)
         shown = window.cut(dot(720, 1280, 480, 310))
         assert shown.shape == (face_follower.SIZE_PX, face_follower.SIZE_PX, 3)
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [484, 314, 0], atol=0.6)
@@ -256,7 +256,7 @@ def test_positions_in_the_window_are_those_in_the_picture():
 
 def test_beyond_the_edges_it_is_black():
     for x, y in ((4, 4), (1270, 4), (4, 710), (1270, 710)):
-        window = face_follower.FaceWindow.around(x, y, 300)
+        window = face_follower.FaceWindow.place(x, y, 300)
         shown = window.cut(dot(720, 1280, x - 4, y - 4))
         np.testing.assert_allclose(window.to_picture(middle_of_bright(shown)), [x, y, 0], atol=3)
         assert (shown == 0).mean() > 0.9
@@ -272,7 +272,7 @@ class BrightMesh:
     def __exit__(self, *_: object) -> None:
         BrightMesh.closed += 1
 
-    def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+    def find_faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
         rows, columns = np.nonzero(image[..., 0] > 127)
         if not rows.size:
             return []
@@ -291,11 +291,11 @@ def test_the_window_goes_along_and_grows_with_the_face():
     ) as mesh:
         for n in range(40):  # it moves much further than a window's side, and becomes twice as large
             x, side = 200 + 20 * n, 60 + 2 * n
-            (found,) = mesh.faces(square(x, side))
+            (found,) = mesh.find_faces(square(x, side))
             np.testing.assert_allclose(found[:, :2], [[x, 300], [x + side, 300 + side]], atol=2)
         assert mesh._window.side == pytest.approx(face_follower.REACH * side, rel=0.3)
-        assert mesh.faces(np.zeros((720, 1280, 3), np.uint8)) == []
-        assert len(mesh.faces(square(x, side))) == 1
+        assert mesh.find_faces(np.zeros((720, 1280, 3), np.uint8)) == []
+        assert len(mesh.find_faces(square(x, side))) == 1
     assert BrightMesh.closed == 1
 
 
@@ -337,24 +337,24 @@ def finder() -> mediapipe.FaceFinder:
 
 
 def test_the_whole_picture_is_enough(finder):
-    boxes = finder.boxes(bright(720, 1280, 300, 100, 80))
+    boxes = finder.find_boxes(bright(720, 1280, 300, 100, 80))
     assert [(box.x, box.y, box.side) for box in boxes] == [pytest.approx((340, 140, 80))]
     assert finder._running.shapes == [(720, 1280)]
 
 
 def test_what_is_smaller_is_found_in_a_part_once(finder):
     image = bright(720, 1280, 400, 300, 20)  # in the left part and in the middle one
-    assert [(box.x, box.y, box.side) for box in finder.boxes(image)] == [pytest.approx((410, 310, 20))]
+    assert [(box.x, box.y, box.side) for box in finder.find_boxes(image)] == [pytest.approx((410, 310, 20))]
     assert finder._running.shapes[1:] == [(720, 720)] * 3
-    assert finder.boxes(image, thorough=False) == []
+    assert finder.find_boxes(image, thorough=False) == []
     finder._running.shapes.clear()
-    finder.boxes(np.zeros((288, 360, 3), np.uint8))
+    finder.find_boxes(np.zeros((288, 360, 3), np.uint8))
     assert finder._running.shapes == [(288, 360)]  # a small picture has no parts
 
 
 def test_a_large_picture_is_reduced_and_the_box_is_not(finder):
     pytest.importorskip("cv2")
-    boxes = finder.boxes(bright(2160, 3840, 900, 600, 300))
+    boxes = finder.find_boxes(bright(2160, 3840, 900, 600, 300))
     assert finder._running.shapes == [(720, 1280)]
     assert (boxes[0].x, boxes[0].y, boxes[0].side) == pytest.approx((1050, 750, 300), abs=3)
 
@@ -372,7 +372,7 @@ def test_parts_cover_the_picture(height, width):
 def test_missing_mediapipe_is_named_when_it_is_first_needed(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
     with mediapipe.FaceFinder() as finder, pytest.raises(MissingDependencyError):
-        finder.boxes(np.zeros((48, 64, 3), np.uint8))
+        finder.find_boxes(np.zeros((48, 64, 3), np.uint8))
 
 
 @pytest.mark.video
@@ -388,7 +388,7 @@ def test_a_face_in_a_large_picture(recordings: Path, scale: float):
     image = np.full((720, 1280, 3), 128, np.uint8)
     image[100 : 100 + frame.shape[0], 700 : 700 + frame.shape[1]] = frame
     with mediapipe.FaceFinder() as finder:
-        boxes = finder.boxes(image)
+        boxes = finder.find_boxes(image)
     assert len(boxes) == 1
     assert boxes[0].x == pytest.approx(700 + 157 * scale, abs=12)
     assert boxes[0].y == pytest.approx(100 + 175 * scale, abs=20)

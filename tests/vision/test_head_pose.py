@@ -102,7 +102,9 @@ def test_an_upright_face_of_the_right_size_is_cut_out_as_it_is():
 def test_the_eyes_of_the_turned_head_become_level():
     angle = np.deg2rad(20)
     half = 45 * np.array([np.cos(angle), np.sin(angle)])
-    crop = head_pose.crop_mouth(ramp(256, 200), head_pose.map_eyes_to_image(np.array([130, 80]) + np.stack([-half, half])))
+    crop = head_pose.crop_mouth(
+        ramp(256, 200), head_pose.map_eyes_to_image(np.array([130, 80]) + np.stack([-half, half]))
+    )
     along = np.diff(crop[28].astype(int), axis=0).mean(axis=0)
     np.testing.assert_allclose(along[:2], [np.cos(angle), np.sin(angle)], atol=0.03)
 
@@ -115,7 +117,9 @@ def test_a_large_face_is_averaged_not_skipped_and_outside_of_the_image_its_edge_
     assert crop.shape == (56, 72, 3)
     assert crop.std() < 20  # of noise with a deviation of 74
     flat = np.full((100, 160, 3), 77, np.uint8)
-    assert (head_pose.crop_mouth(flat, head_pose.map_eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77).all()
+    assert (
+        head_pose.crop_mouth(flat, head_pose.map_eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77
+    ).all()
 
 
 def nodding(frames: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -193,8 +197,7 @@ def test_a_face_looks_the_same_from_nearer_and_turned():
     turned = image_similarity.reduce_face(np.rot90(far), np.stack([eyes[:, 1], far.shape[1] - eyes[:, 0]], axis=1))
     assert image_similarity.correlate_images(upright, turned) > 0.95
     assert (
-        image_similarity.correlate_images(upright, image_similarity.reduce_face(far, eyes + np.array([20, 25])))
-        < 0.6
+        image_similarity.correlate_images(upright, image_similarity.reduce_face(far, eyes + np.array([20, 25]))) < 0.6
     )
 
 

@@ -16,17 +16,17 @@ from vision.scripted import NoFinder, Opened
 class Brightest(trackers.LandmarkTracker, Opened):
     """Finds a face around the brightest place of a picture."""
 
-    def versions(self) -> dict[str, str]:
+    def list_versions(self) -> dict[str, str]:
         return {"brightest": "2"}
 
-    def points(self, most: int = 1) -> "Brightest":
+    def open_point_finder(self, most: int = 1) -> "Brightest":
         assert most in (1, 4)
         return self
 
-    def boxes(self) -> NoFinder:
+    def open_box_finder(self) -> NoFinder:
         return NoFinder()
 
-    def faces(self, image: np.ndarray) -> list[np.ndarray]:
+    def find_faces(self, image: np.ndarray) -> list[np.ndarray]:
         y, x = (int(place) for place in np.unravel_index(int(image[..., 0].argmax()), image.shape[:2]))
         points = np.random.default_rng(0).uniform(-30, 30, (len(trackers.TRACKED_POINTS), 3)) + np.array([x, y, 0])
         for side, corner in zip((-20, 20), trackers.EYE_CORNERS, strict=True):
@@ -44,7 +44,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("installed")
 def test_a_tracker_is_chosen_by_name() -> None:
     assert isinstance(trackers.make_tracker(), mediapipe.MediaPipe)
-    assert isinstance(trackers.make_tracker().boxes(), mediapipe.FaceFinder)
+    assert isinstance(trackers.make_tracker().open_box_finder(), mediapipe.FaceFinder)
     assert type(trackers.make_tracker("brightest")).__name__ == "Brightest"
     assert trackers.TRACKERS.group in extensions.GROUPS
     with pytest.raises(errors.InputError, match="no tracker 'other'; there are: mediapipe, brightest, wrong"):

@@ -43,7 +43,7 @@ def mouths(frames: list[Image]) -> list[tuple[NDArray[np.float64], float]]:
     """Where the mouth is in every frame, and the distance between the eyes."""
     column = {index: n for n, index in enumerate(trackers.TRACKED_POINTS)}
     with mediapipe.FaceMesh() as mesh:
-        faces = [mesh.faces(image)[0] for image in frames]
+        faces = [mesh.find_faces(image)[0] for image in frames]
     right, left = (column[index] for index in trackers.EYE_CORNERS)
     return [(face[column[13], :2], float(np.linalg.norm(face[right, :2] - face[left, :2]))) for face in faces]
 

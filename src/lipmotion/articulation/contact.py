@@ -24,7 +24,7 @@ TRACKER_DEFICIT, FULL_DEFICIT_GAP = 0.006, 0.03
 """Trackers measure this much less than the distance of parted lips; from the second length on, all of it is added."""
 MEASURED_GAP, LARGEST_GAP = 0.3, 0.48
 """Up to the first gap, lips are as far apart as measured; further ones approach the second, in eye distances."""
-LEAST_GAP: Final = 0.006
+MIN_GAP: Final = 0.006
 """Lips that do not touch are at least this far apart, in eye distances (0.5 mm on a face)."""
 CONTACT_S: Final = (0.05, 0.09)
 """The lips are made to touch in p, b and m for ``CONTACT_SHARE`` of the phone, but for at least the first time (longer
@@ -106,10 +106,10 @@ def close_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
     """Return a gap with the lips in contact in every p, b and m, for ``CONTACT_S`` or longer [shape=(T,)].
 
     gap : of the frames of the motion, with all that phones but p, b and m ask of it [shape=(T,)]
-    It is 0 where the lips touch, and at least ``LEAST_GAP`` where not. What edits have decided stays (``EDITED``).
+    It is 0 where the lips touch, and at least ``MIN_GAP`` where not. What edits have decided stays (``EDITED``).
     """
     time_s, open_share = motion.time_s, np.ones(len(gap))
-    parted = np.concatenate([[-1], np.flatnonzero(gap >= LEAST_GAP / 2), [len(gap)]])
+    parted = np.concatenate([[-1], np.flatnonzero(gap >= MIN_GAP / 2), [len(gap)]])
     for frame, begin_s, end_s in find_closures(motion, units):
         length_s = float(np.clip(CONTACT_SHARE * (end_s - begin_s), *CONTACT_S))
         after = int(np.searchsorted(parted, frame))  # the first frame in which the lips are apart, from this one on
@@ -122,7 +122,7 @@ def close_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
         outside = np.abs(time_s[near] - at_s) - length_s / 2 - 1e-9
         open_share[near] = np.minimum(open_share[near], smooth_step(outside / FADE_S))
     gap = gap * np.maximum(open_share, read_edited(motion, "opening"))
-    return np.where(gap < LEAST_GAP / 2, 0.0, np.maximum(gap, LEAST_GAP))
+    return np.where(gap < MIN_GAP / 2, 0.0, np.maximum(gap, MIN_GAP))
 
 
 def show_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:

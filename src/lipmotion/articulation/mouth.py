@@ -74,7 +74,7 @@ class SpokenMouth:
     """The mouth in F frames; each curve has the shape (F,).
 
     rate_hz    : frames per second; frame n is at ``n / rate_hz`` seconds
-    gap        : distance between the inner lips; 0 where they touch, else at least ``contact.LEAST_GAP``
+    gap        : distance between the inner lips; 0 where they touch, else at least ``contact.MIN_GAP``
     width      : distance of the lip corners, relative to the rest pose
     fullness   : thickness of the lips, relative to the rest pose
     jaw        : drop of the chin

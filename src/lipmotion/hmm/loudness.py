@@ -26,7 +26,7 @@ LEAST_RANGE = 6 * DECIBEL
 """Where the loud level is no further above the noise, as in tones and in noise alone, nothing is said."""
 NEAR_LOUD = 20 * DECIBEL
 """The noise is measured around frames no further beneath the loud level."""
-PAUSE_FRAMES, LEAST_FRAMES = 30, 6
+PAUSE_FRAMES, MIN_FRAMES = 30, 6
 """Shorter pauses are part of the sound around them; shorter sounds are clicks."""
 QUIET_REACH_FRAMES = 10
 """A frame is quiet only if all frames within so many are: the closure of a stop is part of speech."""
@@ -79,7 +79,7 @@ def find_sound_runs(sound: NDArray[np.bool_], pause: int = PAUSE_FRAMES) -> list
     if not len(frames):
         return []
     runs = np.split(frames, np.flatnonzero(np.diff(frames) > pause) + 1)
-    return [(int(run[0]), int(run[-1]) + 1) for run in runs if run[-1] + 1 - run[0] >= LEAST_FRAMES]
+    return [(int(run[0]), int(run[-1]) + 1) for run in runs if run[-1] + 1 - run[0] >= MIN_FRAMES]
 
 
 def find_spoken_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:

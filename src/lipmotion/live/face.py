@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import LEAST_GAP, opening_to_gap
+from lipmotion.articulation.contact import MIN_GAP, opening_to_gap
 from lipmotion.errors import InputError
 from lipmotion.extensions import load_provided
 from lipmotion.live.network import LAGS, STEP_S, answer_silence, live_network
@@ -167,6 +167,6 @@ def _solve(frame: LiveFrame, shapes: FaceShapes) -> dict[str, float]:
             weights[0, row] += frame[f"viseme_{name}"]
     for row, name in enumerate(() if shapes.style == "visemes" else shapes.known):
         weights[0, row] = frame.weights.get(name, 0.0)
-    if np.array([frame[name] for name in ARKIT_MOUTH]) @ arkit_mouth().gap < LEAST_GAP / 2:
+    if np.array([frame[name] for name in ARKIT_MOUTH]) @ arkit_mouth().gap < MIN_GAP / 2:
         weights = with_gap(weights, shapes, np.minimum(weights @ shapes.gap, 0.0))
     return {known.removeprefix("vowel_"): value for known, value in zip(shapes.known, weights[0].tolist(), strict=True)}

@@ -124,7 +124,7 @@ def run(  # noqa: PLR0913
     request = read_request(job.request, words_beside=words_beside, is_typed=is_typed)
     model = model or load_model(job.request.model)
     if request.onto is None:
-        request = replace(request, onto=face.other_person(model, job.request.speaker))
+        request = replace(request, onto=face.find_other_person(model, job.request.speaker))
 
     curves = choose_curves(job.outputs, face)
     session = edits.session(

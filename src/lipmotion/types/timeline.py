@@ -128,7 +128,7 @@ STRANGER, STRANGER_MOVEMENT, STRANGER_DOUBT = 0.45, 0.75, 0.15
 unit of squared distance from the mean, and where no phone is sure."""
 OTHER_WORDS = 0.5
 """Squared error that a transcript of something else adds: 0.5 on average of eight strangers, 0.2 for a known voice."""
-LEAST_DEVIATION = 0.02
+MIN_DEVIATION = 0.02
 """A curve that moves less, in eye distances or as a weight, counts as moving so far."""
 
 
@@ -170,7 +170,7 @@ class SpeechKnowledge:
         from its mean, and how unsure the phones are. Variance and distance are in the variance of the curve.
         """
         values = np.asarray(curve, float)
-        unit = max(float(values.var()), LEAST_DEVIATION**2)
+        unit = max(float(values.var()), MIN_DEVIATION**2)
         distance = np.square(values - values.mean()) / unit
         one = np.ones(len(values))
         strange = (1 - self.voice) * np.stack([one, distance, (1 - self.phones) * one])

@@ -22,7 +22,7 @@ ROUNDS = 8
 """Rounds in which the centres of the groups are moved: more did not lower the error on GRID."""
 MIXED_CANDIDATES, MIXTURE_SHARE = 20, 0.95
 """Recorded mouths of which a predicted one is mixed, and the share of the mixture."""
-LEAST_NEARNESS = 1e-3
+MIN_NEARNESS = 1e-3
 """The furthest of them is penalised as if its squared distance were smaller by this share than the largest one."""
 PICTURES_AT_ONCE = 16
 BLOCK = 2048
@@ -171,7 +171,7 @@ def draw_to_recorded(wanted: Values, recorded: Values) -> Values:
         steps = recorded[near] - some[:, None]
         products = (steps @ steps.swapaxes(1, 2)).astype(np.float64)
         penalty = np.take_along_axis(distances, near, axis=1).astype(np.float64)
-        penalty /= 1 + LEAST_NEARNESS - penalty / np.maximum(penalty.max(axis=1, keepdims=True), np.finfo(float).tiny)
+        penalty /= 1 + MIN_NEARNESS - penalty / np.maximum(penalty.max(axis=1, keepdims=True), np.finfo(float).tiny)
         least = NO_DISTANCE * np.trace(products, axis1=1, axis2=2)[:, None] + np.finfo(float).tiny
         products[:, np.arange(count), np.arange(count)] += penalty + least
         weights = np.maximum(np.linalg.solve(products, np.ones((len(some), count, 1)))[:, :, 0], 0)
@@ -203,7 +203,9 @@ def _find_nearest(values: Values, others: Values) -> Index:
             best[nearer], number[nearer] = least[nearer], distances.argmin(axis=1)[nearer] + start
         return number
     starts = range(0, len(values), BLOCK)
-    return np.concatenate([measure_squared_distances(values[start : start + BLOCK], others).argmin(axis=1) for start in starts])
+    return np.concatenate(
+        [measure_squared_distances(values[start : start + BLOCK], others).argmin(axis=1) for start in starts]
+    )
 
 
 Levels = NDArray[np.floating[Any]]
@@ -314,7 +316,7 @@ class Refiner:
                 f"coefficients of shape {coefficients.shape}, required finite ones of shape (T, {wanted}), "
                 "as Eigenlips.project gives them"
             )
-        numbers, costs = self._nearest(np.stack(np.split(coefficients.astype(np.float32), len(COLOURS), axis=1)))
+        numbers, costs = self._find_nearest(np.stack(np.split(coefficients.astype(np.float32), len(COLOURS), axis=1)))
         if self.options.steadiness:
             changes = self.candidates.detail_distances
             if self.options.together:
@@ -324,7 +326,7 @@ class Refiner:
             path = numbers[:, :, 0]
         return np.broadcast_to(path, (len(COLOURS), path.shape[1])).T.copy()
 
-    def pictures(self, coefficients: Levels, chosen: Index) -> Pictures:
+    def refine(self, coefficients: Levels, chosen: Index) -> Pictures:
         """Return the pictures [shape=(T, H, W, 3)] of eigenlips [shape=(T, 3·K)] with the detail of candidates.
 
         chosen : of ``choose``, or a part of it: pictures of long speech are made a few frames at a time
@@ -340,7 +342,7 @@ class Refiner:
         np.rint(levels, out=levels)
         return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
 
-    def _nearest(self, wanted: Costs) -> tuple[Index, Costs]:
+    def _find_nearest(self, wanted: Costs) -> tuple[Index, Costs]:
         """Return the nearest candidates of each frame, in order, and their costs [shape=(1 or 3, T, n), both]."""
         count = min(self.options.neighbours, len(self.candidates))
         frames = wanted.shape[1]

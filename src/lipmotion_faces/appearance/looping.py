@@ -29,7 +29,7 @@ LOWER_FACE = (-60.0, 42.0, 60.0, 140.0)
 """The region that is replaced, or moves with speech: not compared."""
 FACE_STEP, EYES_STEP = 6.0, 4.0
 """Distance of the samples of these regions, px of the face that looks straight ahead."""
-LEAST_ORDINARY = (0.2, 0.2, 0.2)
+MIN_ORDINARY = (0.2, 0.2, 0.2)
 """Least ordinary difference of neighbouring frames, in the whole frame and the upper face, levels, and of the
 place of the face, px of the frame: smaller differences are not seen."""
 
@@ -52,7 +52,7 @@ class FrameDescriptors:
     def __len__(self) -> int:
         return len(self.whole)
 
-    def part(self, start: int, stop: int) -> FrameDescriptors:
+    def select(self, start: int, stop: int) -> FrameDescriptors:
         """Return the descriptors of frames from ``start`` (included) to ``stop`` (excluded)."""
         return FrameDescriptors(*(rows[start:stop] for rows in (self.whole, self.face, self.eyes, self.place)))
 
@@ -65,9 +65,7 @@ class FrameDescriptors:
         Whole frame, upper face and place of the face have the same weight [shape=(T, A + B + 6)].
         """
         groups = []
-        for rows, least, frames in zip(
-            (self.whole, self.face, self.place), LEAST_ORDINARY, (fade, 1, fade), strict=True
-        ):
+        for rows, least, frames in zip((self.whole, self.face, self.place), MIN_ORDINARY, (fade, 1, fade), strict=True):
             steps = [np.linalg.norm(np.diff(rows[start:stop], axis=0), axis=1) for start, stop in scenes]
             different = np.concatenate([part[part > 0] for part in steps])
             ordinary = float(np.median(different)) if len(different) else 0.0
@@ -156,7 +154,7 @@ Kind = Literal["turn", "jump"]
 JUMP_LIMIT = 2.5
 """No jump is made between frames that differ by more than this many times the difference of ordinary neighbours, what
 a cross-fade spreads over its frames being counted a frame."""
-LEAST_RUN_S = 0.8
+MIN_RUN_S = 0.8
 """Frames are shown one after the other for at least so long between two joins, where the background is long enough."""
 USUAL_RUN_S = 4.0
 """A run of this length costs as much as a join at which everything moves as usual; longer ones cost less."""
@@ -172,7 +170,7 @@ BUSY_CHANGE_RATIO, BUSY_S = 2.5, 0.12
 """Eyes that change by more than this many times the median change blink or look elsewhere: no join so near, s."""
 BUSY_COST = 10.0
 """What a join there costs: more than any other."""
-MOST_COMPARED_FRAMES = 1500
+MAX_COMPARED_FRAMES = 1500
 """In longer backgrounds no jumps are searched, as every pair of frames would be compared."""
 TRIES = 32
 """Orders that are drawn; the one with the least cost of its worst join, its last frame and its repeats is returned."""
@@ -236,7 +234,7 @@ def find_loop_order(
     a blink while there is another one.
     Raises InputError: no frames are wanted, or none may be shown.
     Source: Schödl et al. 2000, "Video textures" (cost of jumps); turns and runs are ours.
-    Cost: O(T²) for T frames up to ``MOST_COMPARED_FRAMES``, else O(T).
+    Cost: O(T²) for T frames up to ``MAX_COMPARED_FRAMES``, else O(T).
     """
     allowed = np.ones(len(descriptors), bool) if usable is None else np.asarray(usable, bool)
     if count < 1 or allowed.shape != (len(descriptors),) or not allowed.any():
@@ -251,8 +249,8 @@ def find_loop_order(
         start = int(starts[np.argmin(plan.restless[starts] + plan.restless[starts + count - 1])])
         return _make_order([(start, 1, count)], (), count, 0)
     draws = np.random.default_rng(seed)
-    orders = [plan.order(count, longest, draws) for _ in range(TRIES)]
-    return min(orders, key=plan.blemish)
+    orders = [plan.find_order(count, longest, draws) for _ in range(TRIES)]
+    return min(orders, key=plan.rate_blemish)
 
 
 class _Plan:
@@ -285,19 +283,19 @@ class _Plan:
         self.restless = (
             speed / (float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0)
         ) + BUSY_COST * self.busy
-        self._least = max(1, round(LEAST_RUN_S * rate_hz))
+        self._least = max(1, round(MIN_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
         self._repeat = REPEAT_S * rate_hz
         self._fade = count_fade_frames(rate_hz)
         count = len(descriptors)
-        if count > MOST_COMPARED_FRAMES:
+        if count > MAX_COMPARED_FRAMES:
             none = np.full((count, 1), -1), np.full((count, 1), np.inf)
             self._jumps = {1: none, -1: none}
         else:
             distance = measure_row_distances(descriptors.standardise(self.scenes, self._fade))
             self._jumps = {way: self._find_jumps(distance, way) for way in (1, -1)}
 
-    def order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
+    def find_order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
         """Return one order of frames, drawn by chance."""
         early = np.arange(longest[0], longest[0] + max(1, (longest[1] - longest[0]) // 4))
         at, way, shown = int(early[np.argmin(self.restless[early])]), 1, 0
@@ -321,11 +319,11 @@ class _Plan:
             joins.append(Join(shown, "turn" if after < 0 else "jump", float(join_costs[chosen])))
             if after < 0:
                 way = -way
-                after = end + way if self._room(end, way) else end
+                after = end + way if self._count_room(end, way) else end
             at = after
         return _make_order(runs, tuple(joins), count, self._fade)
 
-    def blemish(self, order: LoopOrder) -> float:
+    def rate_blemish(self, order: LoopOrder) -> float:
         """Return how bad an order is: the cost of its worst join, how restless its last frame is, and its repeats."""
         worst = max((join.cost for join in order.joins), default=0.0) + float(self.restless[order.first[-1]])
         shown = np.lexsort((np.arange(len(order)), order.first))
@@ -334,7 +332,7 @@ class _Plan:
 
     def _list_joins(self, at: int, way: int) -> tuple[Numbers, Array, Numbers]:
         """Return possible joins: the last frame before each, its cost, and the frame after it, -1 for a turn."""
-        room = self._room(at, way)
+        room = self._count_room(at, way)
         least = min(self._least, max(room, 1))
         lengths = np.arange(least, room + 1) if room >= least else np.array([room])
         ends = at + way * lengths
@@ -343,7 +341,7 @@ class _Plan:
         nexts = np.concatenate([np.full(len(ends), -1), targets[row, scene]])
         return np.concatenate([ends, ends[row]]), np.concatenate([self.restless[ends], costs[row, scene]]), nexts
 
-    def _room(self, at: int, way: int) -> int:
+    def _count_room(self, at: int, way: int) -> int:
         """Return how many frames there are behind a frame, in its scene."""
         start, stop = self.scenes[int(self._scene_of[at])]
         return stop - 1 - at if way > 0 else at - start

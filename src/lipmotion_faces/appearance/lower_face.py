@@ -35,7 +35,7 @@ JAW_SHARE = 1.15
 """Half of its width, as a share of half the distance between the ends of the tracked jaw line."""
 NARROWEST_PX, WIDEST_PX = 34.0, 58.0
 """Limits of half its width: the mouth must fit in, and it must fit into the picture."""
-LEAST_BOTTOM_PX = 106.0
+MIN_BOTTOM_PX = 106.0
 """The part that is replaced holds the mouth, whatever the chin."""
 MOUTH_AXES_PX = 34.0, 26.0
 """Half width and half height of the ellipse in which the mouth is replaced, about the middle of the mouth region."""
@@ -55,7 +55,7 @@ def measure_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
     """Return the shape of the replaced part, by how far the chin is below the eyes in all frames [shape=(T,)]."""
     half = float(np.clip(JAW_SHARE * jaw_half_width * EYE_DISTANCE_PX, NARROWEST_PX, WIDEST_PX))
     highest = float(np.percentile(chin_px, 1))
-    return FaceShape(half, float(np.clip(highest - MARGIN_PX, LEAST_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
+    return FaceShape(half, float(np.clip(highest - MARGIN_PX, MIN_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
 
 
 def map_region(face_to_frame: Array, scale: float) -> Array:
@@ -164,7 +164,7 @@ LARGEST_PX = 14.0
 """The chin is not moved further: more would fold the neck."""
 LARGEST_RISE_SHARE, LARGEST_DROP_SHARE = 0.6, 1.2
 """Nor further than these shares of its distance to what is not moved: more would fold or tear a short chin."""
-LEAST_PX = 0.05
+MIN_PX = 0.05
 """A smaller movement is none."""
 A = -0.5
 """The parameter of cubic convolution (Keys 1981)."""
@@ -196,7 +196,7 @@ def move_chin(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pictures:
     across = (np.arange(WIDTH * scale) + 0.5) / scale + CORNER[0]
     share = np.maximum(1 - (across / HINGE_PX) ** 2, 0) * (1 - _ease(np.abs(across), *SIDE_PX))
     columns = np.flatnonzero(share > 0)
-    for frame in np.flatnonzero(np.abs(drops) >= LEAST_PX):
+    for frame in np.flatnonzero(np.abs(drops) >= MIN_PX):
         by = float(drops[frame]) * share[columns]
         moved = _move_columns(pictures[frame][:, columns], float(chin_px[frame]), by, scale)
         result[frame, :, columns] = moved.swapaxes(0, 1)

@@ -33,7 +33,7 @@ RIDGE, RIDGE_FRAMES = 1.0, 1000
 """The ridge parameter of T frames is RIDGE + (RIDGE_FRAMES / T)²: short footage is trusted less."""
 OUTER_PERCENTAGE = 0.2
 """Percentage of the frames at each end of a component beyond which it is cut off: no map holds far from all footage."""
-LEAST_DEVIATION = 1e-4
+MIN_DEVIATION = 1e-4
 """A channel that moves less, in its unit, is left out."""
 
 
@@ -60,9 +60,9 @@ class MotionMap:
 
     def predict(self, motion: Motion) -> Floats:
         """Return the values at every frame [shape=(T, V)]. Raises InputError: a channel is missing, or not finite."""
-        return self._regressors(select_channels(motion, self.names)) @ self.coefficients
+        return self._stack_regressors(select_channels(motion, self.names)) @ self.coefficients
 
-    def _regressors(self, values: Array) -> Floats:
+    def _stack_regressors(self, values: Array) -> Floats:
         components = np.clip((values - self.mean) / self.scale @ self.basis, *self.limits).astype(np.float32)
         near = np.ascontiguousarray(components[:, : self.centres.shape[1]])
         likeness = WEIGHT * np.exp(measure_squared_distances(near, self.centres) / (-2 * WIDTH**2))
@@ -93,20 +93,20 @@ def fit_motion_map(values: Array, channels: tuple[Channel, ...], targets: NDArra
             f"motion of shape {values.shape} for {len(targets)} pictures, required finite motion of as many frames, "
             f"at least {FRAMES_PER_CENTRE}"
         )
-    used = values.std(axis=0) > LEAST_DEVIATION
+    used = values.std(axis=0) > MIN_DEVIATION
     names = tuple(channel.name for channel, use in zip(channels, used, strict=True) if use)
     mean, scale = values[:, used].mean(axis=0), values[:, used].std(axis=0)
     standardised = (values[:, used] - mean) / scale
     variances, vectors = np.linalg.eigh(standardised.T @ standardised / len(standardised))
     variances, vectors = variances[::-1][:COMPONENTS], vectors[:, ::-1][:, :COMPONENTS]
-    moving = variances > LEAST_DEVIATION
+    moving = variances > MIN_DEVIATION
     basis = vectors[:, moving] / np.sqrt(variances[moving])
     components = standardised @ basis
     limits = np.percentile(components, [OUTER_PERCENTAGE, 100 - OUTER_PERCENTAGE], axis=0)
     near = np.clip(components, *limits)[:, :LIKENESS_COMPONENTS].astype(np.float32)
     centres = near[choose_candidates(near, min(CENTRES, len(near) // FRAMES_PER_CENTRE))]
     unfitted = MotionMap(names, mean, scale, basis, limits, centres, np.zeros((0, 0), np.float32))
-    regressors = unfitted._regressors(values[:, used]).astype(np.float64)
+    regressors = unfitted._stack_regressors(values[:, used]).astype(np.float64)
     moments = create_statistics(regressors.shape[1], targets.shape[1])
     moments.add(regressors, targets.astype(np.float64))
     prior = np.zeros((regressors.shape[1], targets.shape[1]))

@@ -31,8 +31,8 @@ from lipmotion.types import Channel, Motion
 from lipmotion_faces.appearance import candidates, lower_face, motion_map
 from lipmotion_faces.appearance.camera_noise import (
     CameraNoise,
-    camera_noise_to_arrays,
     camera_noise_from_arrays,
+    camera_noise_to_arrays,
     estimate_noise,
 )
 from lipmotion_faces.coded_video import decode_pictures, encode_pictures
@@ -169,7 +169,7 @@ class Appearance:
         middle = measured.mean(axis=0)
         wanted = middle + DISTANCE_GAINS * (motion_map.select_channels(motion, LIP_DISTANCES) - middle)
         wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
-        weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), motion_map.LEAST_DEVIATION)
+        weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), motion_map.MIN_DEVIATION)
         sought, recorded = (
             np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
             for codes, distances in ((predicted, wanted), (self.mouth_codes, measured))
@@ -221,12 +221,12 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     chosen_jaws = candidates.choose_candidates(jaw_codes, JAW_CANDIDATES)
     names = [channel.name for channel in footage.channels]
 
-    def recorded(frames: Index) -> Pictures:
+    def read_frames(frames: Index) -> Pictures:
         if footage.scale == 1:
             return pictures[frames]
         return lower_face.relight(footage.finer(frames), reference / light[frames])
 
-    chosen_faces = recorded(chosen_jaws)
+    chosen_faces = read_frames(chosen_jaws)
     jaw_and_chin = np.concatenate([jaw_codes, footage.chin_px[:, None]], axis=1)
     ends = np.cumsum([len(clip) for clip in footage.clips])[:-1]
     return Appearance(
@@ -234,7 +234,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         footage.scale,
         reference,
         mouth,
-        np.ascontiguousarray(recorded(chosen)[(slice(None), *lower_face.find_mouth_part(footage.scale))]),
+        np.ascontiguousarray(read_frames(chosen)[(slice(None), *lower_face.find_mouth_part(footage.scale))]),
         codes[chosen],
         footage.motion[chosen][:, [names.index(name) for name in LIP_DISTANCES]],
         jaw,
@@ -303,14 +303,14 @@ def enlarge(eigenlips: Eigenlips, scale: int) -> Eigenlips:
     middle = (0.5 / scale) - 0.5
     to_source = np.array([[1 / scale, 0, middle], [0, 1 / scale, middle]])
 
-    def larger(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    def enlarge(rows: NDArray[np.float32]) -> NDArray[np.float32]:
         pictures = np.moveaxis(rows, 0, -1).reshape(-1, height, width, len(COLOURS))
         pictures = affine.resample(pictures, to_source, (scale * height, scale * width))
         return np.ascontiguousarray(np.moveaxis(pictures, -1, 0)).reshape(*rows.shape[:-1], -1)
 
     return Eigenlips(
-        np.clip(larger(eigenlips.mean), 0, 255),
-        larger(eigenlips.basis),
+        np.clip(enlarge(eigenlips.mean), 0, 255),
+        enlarge(eigenlips.basis),
         eigenlips.explained,
         (scale * height, scale * width),
     )

@@ -66,7 +66,7 @@ class NestedGrids:
         height, width = self.region.shape
         return -(-height >> level), -(-width >> level)
 
-    def matrix(self) -> csr_array:
+    def build_matrix(self) -> csr_array:
         """Return the interpolation as a matrix [shape=(H · W, number of nodes)], with empty rows outside the region."""
         from scipy.sparse import csr_array
 
@@ -169,7 +169,7 @@ BATCH = 64
 
 @dataclass(frozen=True, eq=False)
 class CloningSystem:
-    """The Poisson equation of one region, solved for any pictures by one matrix product; made by ``build_cloning_system``.
+    """The Poisson equation of one region, solved for any pictures by one matrix product (``build_cloning_system``).
 
     mask     : bool array [shape=(h, w)], the pixels that cloning replaces
     box      : the rows and the columns of the region and its edge
@@ -204,7 +204,7 @@ class CloningSystem:
         whole = background.dtype == np.uint8
         result = background.astype(np.uint8) if whole else _round_levels(background.astype(np.float32))
         new, old = (pictures[(slice(None), *self.box)] for pictures in (source, result))
-        for frames, membrane in self._membranes(source, background, largest_difference):
+        for frames, membrane in self._solve_membranes(source, background, largest_difference):
             np.add(membrane, new[frames], out=membrane, casting="same_kind")
             cloned = _round_levels(membrane)
             flat = cloned.reshape(len(cloned), -1, COLOURS)
@@ -212,7 +212,7 @@ class CloningSystem:
             old[frames] = cloned
         return result
 
-    def _membranes(
+    def _solve_membranes(
         self, source: Pictures, background: Pictures, limit: float = np.inf
     ) -> Iterator[tuple[slice, NDArray[np.float32]]]:
         """Yield slices of the pictures and their membranes in the box [shape=(t, H, W, 3)], valid in the region."""
@@ -289,7 +289,7 @@ def build_cloning_system(mask: Mask) -> CloningSystem:
         (-eye_array(count, k=offset, format="csr") for offset in (-width, -1, 1, width)),
         4 * eye_array(count, format="csr"),
     )
-    interpolation = grids.matrix()
+    interpolation = grids.build_matrix()
     tested = interpolation.T @ laplacian
     factors = splu((tested @ interpolation).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
     right = -tested.tocsc()[:, edge]

@@ -18,7 +18,7 @@ from lipmotion.storage.schema import ArraySpec, check_arrays, format_errors
 from lipmotion.storage.sources import check_source
 from lipmotion.storage.text_table import read_whole_table
 from lipmotion.types.values import parse_whole
-from lipmotion_faces.characters.file_limits import MOST_VERTICES
+from lipmotion_faces.characters.file_limits import MAX_VERTICES
 
 BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
 BINDING_SUFFIX = ".binding"
@@ -28,13 +28,13 @@ LARGEST_TABLE_BYTES = 1 << 26
 AGAIN = "bind the character again"
 BINDING_ARRAYS = {
     "points": ArraySpec(np.int64, "C", 0, 1000),
-    "vertices": ArraySpec(np.int64, "C", 0, MOST_VERTICES),
+    "vertices": ArraySpec(np.int64, "C", 0, MAX_VERTICES),
     "scale": ArraySpec(np.float64, "", 1e-12, 1e12),
     "axes": ArraySpec(np.float64, "3 3", -1.0001, 1.0001),
-    "rows": ArraySpec(np.int64, "n", 0, MOST_VERTICES),
+    "rows": ArraySpec(np.int64, "n", 0, MAX_VERTICES),
     "controls": ArraySpec(np.int64, "n K", 0, 1000),
     "weights": ArraySpec(np.float64, "n K", 0, 1),
-    "vertex_count": ArraySpec(np.int64, "", 1, MOST_VERTICES),
+    "vertex_count": ArraySpec(np.int64, "", 1, MAX_VERTICES),
 }
 """The arrays of a binding file; fields of ``ControlBinding`` and ``LipPlacement``."""
 

@@ -111,7 +111,7 @@ def read_obj(path: Path) -> Mesh:
     budget = Budget()
     surface, number = _Surface(budget), 0
     try:
-        for line, words in _list_lines(budget.file_bytes(path, "mesh"), _STATEMENTS, budget):
+        for line, words in _list_lines(budget.read_bytes(path, "mesh"), _STATEMENTS, budget):
             number = line
             surface.add(words[0], words[1:])
         number = 0
@@ -163,7 +163,7 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
     for path in others:
         read, places = Budget(), array("d")  # its vertices, without reading its polygons
         try:
-            for line in _VERTEX.finditer(read.file_bytes(path, "mesh")):
+            for line in _VERTEX.finditer(read.read_bytes(path, "mesh")):
                 read.spend("vertices", 1)
                 _add_vertex(places, line[1].split())
             vertices = _as_rows(places, 3)
@@ -232,7 +232,7 @@ def _read_materials(folder: Path, library: str, used: Collection[str], budget: B
     materials: dict[str, Material] = {}
     pictures: dict[str, str] = {}
     name = ""
-    for _, (kind, *words) in _list_lines(budget.file_bytes(path, "material library"), _LOOKS, budget):
+    for _, (kind, *words) in _list_lines(budget.read_bytes(path, "material library"), _LOOKS, budget):
         if kind == b"newmtl":
             name = _join_words(words)
             materials[name] = Material(name)
@@ -260,7 +260,7 @@ def _read_texture(folder: Path, name: str, budget: Budget) -> Texture | None:
     """Return the texture in a picture in a folder; None, and a warning, where there is none that can be read."""
     path, texture = _find_sibling(folder, name), None
     if path is not None:
-        content = budget.file_bytes(path, "picture")
+        content = budget.read_bytes(path, "picture")
         budget.spend("bytes of pictures", len(content))
         texture = read_texture(content, budget)
     if texture is None:

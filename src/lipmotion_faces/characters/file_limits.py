@@ -37,7 +37,7 @@ parts         : primitives, counted again for every node that shows them
 morph targets : of all parts;  displacements : vertices that they, or expressions, move
 numbers       : of the arrays that are read;  compressed bytes : of them, what is decoded from meshopt
 """
-MOST_VERTICES = ALLOWANCE["vertices"]
+MAX_VERTICES = ALLOWANCE["vertices"]
 
 
 class Budget:
@@ -54,7 +54,7 @@ class Budget:
                 f"{self._spent[what]} {what}, required at most {ALLOWANCE[what]}; reduce the mesh, or pictures"
             )
 
-    def file_bytes(self, path: Path, kind: str) -> bytes:
+    def read_bytes(self, path: Path, kind: str) -> bytes:
         """Return the content of a file, which counts. Raises InputError: no file, empty, too large, unreadable."""
         check_source(path, kind)
         size = path.stat().st_size

@@ -39,7 +39,7 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 LARGEST_NUMBER = 1e9
 """Largest plausible number of a file: a place, a factor."""
-MOST_GROUPS = 8
+MAX_GROUPS = 8
 """Most groups of four joints a vertex."""
 _LISTS = (
     *("accessors", "animations", "buffers", "bufferViews", "images", "materials", "meshes", "nodes", "scenes", "skins"),
@@ -85,11 +85,11 @@ def build_schema(json: Mapping[str, Any]) -> Schema:
 
         return check
 
-    def vector(size: int) -> Schema:
+    def make_vector(size: int) -> Schema:
         return items(_NUMBER, size, size)
 
     target = members({"POSITION": to("accessors")})
-    groups = [f"{kind}_{group}" for kind in ("JOINTS", "WEIGHTS") for group in range(MOST_GROUPS)]
+    groups = [f"{kind}_{group}" for kind in ("JOINTS", "WEIGHTS") for group in range(MAX_GROUPS)]
     primitive = {
         "attributes": members({name: to("accessors") for name in ("POSITION", "TEXCOORD_0", "COLOR_0", *groups)}),
         "indices": to("accessors"),
@@ -101,7 +101,12 @@ def build_schema(json: Mapping[str, Any]) -> Schema:
     mesh = {"name": _NAME, "primitives": items(members(primitive, ["attributes"])), "extras": primitive["extras"]}
     node = {
         **{"name": _NAME, "mesh": to("meshes"), "skin": to("skins"), "children": items(to("nodes"))},
-        **{"matrix": vector(16), "translation": vector(3), "rotation": vector(4), "scale": vector(3)},
+        **{
+            "matrix": make_vector(16),
+            "translation": make_vector(3),
+            "rotation": make_vector(4),
+            "scale": make_vector(3),
+        },
     }
     place = {"bufferView": to("bufferViews"), "byteOffset": _SIZE}
     indices = {**place, "componentType": one_of([5121, 5123, 5125])}
@@ -121,7 +126,7 @@ def build_schema(json: Mapping[str, Any]) -> Schema:
         "buffers": members({"uri": text(_LARGEST_INTEGER), "byteLength": _SIZE}),
         "bufferViews": members(_build_view_schema(to("buffers")), ["buffer", "byteLength"]),
         "images": members({"uri": text(_LARGEST_INTEGER), "bufferView": to("bufferViews")}),
-        "materials": members(_build_material_schema(to("textures"), vector)),
+        "materials": members(_build_material_schema(to("textures"), make_vector)),
         "meshes": members(mesh, ["primitives"]),
         "nodes": members(node),
         "scenes": members({"nodes": items(to("nodes"))}),
@@ -158,11 +163,11 @@ def _build_view_schema(buffer: Schema) -> dict[str, Schema]:
     }
 
 
-def _build_material_schema(texture: Schema, vector: Any) -> dict[str, Schema]:
-    moved = members({"offset": vector(2), "scale": vector(2), "rotation": _NUMBER})
+def _build_material_schema(texture: Schema, make_vector: Any) -> dict[str, Schema]:
+    moved = members({"offset": make_vector(2), "scale": make_vector(2), "rotation": _NUMBER})
     placed = {"index": texture, "extensions": members({"KHR_texture_transform": moved})}
     look = {
-        **{"baseColorFactor": vector(4), "roughnessFactor": _NUMBER},
+        **{"baseColorFactor": make_vector(4), "roughnessFactor": _NUMBER},
         "baseColorTexture": members(placed, ["index"]),
     }
     return {
@@ -200,11 +205,11 @@ class GltfDocument:
     budget: Budget
     buffers: dict[int, memoryview] = field(default_factory=dict)
 
-    def items(self, name: str) -> list[dict[str, Any]]:
+    def list_items(self, name: str) -> list[dict[str, Any]]:
         """Return a list of objects of the document; none if it is missing."""
         return self.parts.get(name, [])
 
-    def linked(self, uri: str, kind: str) -> bytes:
+    def read_link(self, uri: str, kind: str) -> bytes:
         """Return the bytes of an address, or of a file beside it. Raises InputError: none, elsewhere, damaged."""
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
@@ -217,7 +222,7 @@ class GltfDocument:
         name = unquote(uri) if len(uri) <= LONGEST_NAME_CHARACTERS else uri
         if not name or len(name) > LONGEST_NAME_CHARACTERS or Path(name).name != name or "\\" in name or "\0" in name:
             raise InputError(f"its {kind} is {shorten(repr(name))}, required a file in the same folder")
-        return self.budget.file_bytes(self.folder / name, kind)
+        return self.budget.read_bytes(self.folder / name, kind)
 
 
 def read_gltf_document(path: Path) -> GltfDocument:
@@ -227,7 +232,7 @@ def read_gltf_document(path: Path) -> GltfDocument:
     Raises InputError: damaged, too large, version 1, or it requires an extension that is not known.
     """
     budget = Budget()
-    content = memoryview(budget.file_bytes(path, "mesh"))
+    content = memoryview(budget.read_bytes(path, "mesh"))
     text, binary = _split_chunks(content) if content[:4] == MAGIC else (content, None)
     budget.spend("bytes of a document", len(text))
     plain = bytes(text).rstrip(b"\0 ")
@@ -251,9 +256,9 @@ def read_gltf_document(path: Path) -> GltfDocument:
             raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
         if name not in READABLE and not name.startswith("KHR_materials_"):
             raise InputError(f"it requires the extension {shorten(name)!r}, which is not read; export without it")
-    for index, buffer in enumerate(document.items("buffers")):
+    for index, buffer in enumerate(document.list_items("buffers")):
         if "uri" in buffer:
-            document.buffers[index] = memoryview(document.linked(buffer["uri"], "buffer"))
+            document.buffers[index] = memoryview(document.read_link(buffer["uri"], "buffer"))
         elif index == 0 and binary is not None:
             document.buffers[index] = binary
     return document
@@ -307,36 +312,36 @@ class GltfArrays:
 
     def count(self, number: int) -> int:
         """Return the number of elements of an accessor, as the document says."""
-        return int(self._document.items("accessors")[number]["count"])
+        return int(self._document.list_items("accessors")[number]["count"])
 
-    def floats(self, number: int, width: int, count: int | None = None) -> NDArray[np.float64]:
+    def read_floats(self, number: int, width: int, count: int | None = None) -> NDArray[np.float64]:
         """Return an accessor as numbers [shape=(N, width)]; normalised whole numbers become -1 to 1 or 0 to 1.
 
         count : the elements that it must have; None: any
         Raises InputError: it has another width or count, it leads out of its buffer, or values are not finite.
         """
-        raw = self._raw(number, width, count)
+        raw = self._read_raw(number, width, count)
         with np.errstate(invalid="ignore"):  # signalling NaN; refused below
             values = raw.astype(np.float64)
-        if self._document.items("accessors")[number].get("normalized") and raw.dtype.kind in "iu":
+        if self._document.list_items("accessors")[number].get("normalized") and raw.dtype.kind in "iu":
             values = np.maximum(values / np.iinfo(raw.dtype).max, -1.0)
         if not (np.abs(values) <= LARGEST_NUMBER).all():
             raise InputError(f"it has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}; export it again")
         return values
 
-    def whole(self, number: int, width: int, count: int | None = None) -> NDArray[np.int64]:
-        """Return an accessor of whole numbers [shape=(N, width)]. Raises InputError: as ``floats``, or of fractions."""
-        raw = self._raw(number, width, count)
+    def read_integers(self, number: int, width: int, count: int | None = None) -> NDArray[np.int64]:
+        """Return an accessor of whole numbers [shape=(N, width)]. Raises InputError: as ``read_floats``; fractions."""
+        raw = self._read_raw(number, width, count)
         if raw.dtype.kind not in "iu":
             raise InputError("it counts vertices in fractions; export it again")
         return raw.astype(np.int64)
 
-    def bytes_of(self, number: int) -> memoryview:
+    def read_view(self, number: int) -> memoryview:
         """Return the bytes of a buffer view. Raises InputError: it leads out of its buffer."""
-        return self._view(number)[0]
+        return self._read_view(number)[0]
 
-    def _raw(self, number: int, width: int, wanted: int | None) -> NDArray[Any]:
-        accessor = self._document.items("accessors")[number]
+    def _read_raw(self, number: int, width: int, wanted: int | None) -> NDArray[Any]:
+        accessor = self._document.list_items("accessors")[number]
         count, kind = accessor["count"], accessor["type"]
         if WIDTHS[kind] != width:
             raise InputError(f"an array of {kind}, required {width} numbers each; export it again")
@@ -344,24 +349,24 @@ class GltfArrays:
             raise InputError(f"an array of {count} elements, required {wanted}; export it again")
         self._document.budget.spend("numbers", count * width)
         dtype = np.dtype(COMPONENTS[accessor["componentType"]])
-        values = self._elements(accessor, dtype, count, width)
+        values = self._read_elements(accessor, dtype, count, width)
         if "sparse" not in accessor:
             return values
         few, where = accessor["sparse"]["count"], accessor["sparse"]["indices"]
         if few > len(values):
             raise InputError(f"a sparse array changes {few} of {len(values)} elements; export it again")
-        rows = self._elements(where, np.dtype(COMPONENTS[where["componentType"]]), few, 1)[:, 0]
+        rows = self._read_elements(where, np.dtype(COMPONENTS[where["componentType"]]), few, 1)[:, 0]
         if few and rows.max() >= len(values):
             raise InputError("a sparse array that leads out of its array; export it again")
         changed = values.copy()
-        changed[rows] = self._elements(accessor["sparse"]["values"], dtype, few, width)
+        changed[rows] = self._read_elements(accessor["sparse"]["values"], dtype, few, width)
         return changed
 
-    def _elements(self, place: dict[str, Any], dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
+    def _read_elements(self, place: dict[str, Any], dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
         """Return what an accessor, or a part of a sparse one, places in a view; zeros if it names none."""
         if "bufferView" not in place:
             return np.zeros((count, width), dtype)
-        data, stride = self._view(place["bufferView"])
+        data, stride = self._read_view(place["bufferView"])
         offset, size = place.get("byteOffset", 0), dtype.itemsize * width
         stride = stride or size
         if stride < size or (count and offset + (count - 1) * stride + size > len(data)):
@@ -372,9 +377,9 @@ class GltfArrays:
             return np.zeros((0, width), dtype)
         return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
 
-    def _view(self, number: int) -> tuple[memoryview, int]:
+    def _read_view(self, number: int) -> tuple[memoryview, int]:
         """Return the bytes of a buffer view, and the distance of its elements (0: none apart)."""
-        view = self._document.items("bufferViews")[number]
+        view = self._document.list_items("bufferViews")[number]
         packed = next((view["extensions"][name] for name in COMPRESSION if name in view.get("extensions", {})), None)
         if packed is None:
             return self._slice(view), view.get("byteStride", 0)
@@ -422,7 +427,7 @@ class PlacedNode:
 
 def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
     """Return the nodes of the scene, or all roots', by number. Raises InputError: one is twice, too deep, too far."""
-    nodes, scenes = document.items("nodes"), document.items("scenes")
+    nodes, scenes = document.list_items("nodes"), document.list_items("scenes")
     if scenes:
         roots = scenes[document.parts.get("scene", 0)].get("nodes", [])
     else:

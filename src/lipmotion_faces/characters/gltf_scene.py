@@ -29,13 +29,13 @@ from lipmotion.meshes.model.mesh import (
 from lipmotion_faces.characters.gltf_document import (
     COMPONENTS,
     LARGEST_NUMBER,
-    MOST_GROUPS,
+    MAX_GROUPS,
     WIDTHS,
     GltfArrays,
     GltfDocument,
     PlacedNode,
-    place_nodes,
     clean_name,
+    place_nodes,
     read_gltf_document,
 )
 from lipmotion_faces.characters.textures import decode_srgb, encode_srgb, read_texture
@@ -69,17 +69,17 @@ class _Materials:
         self._textures: dict[str | int, Texture | None] = {}
         self._materials: dict[int, Material] = {}
 
-    def material(self, number: int | None) -> Material:
+    def read_material(self, number: int | None) -> Material:
         """Return a material (None: the default one): base colour, texture (unreadable: ``UNKNOWN``), gloss."""
         if number is None:
             return Material()
         if number not in self._materials:
-            stored = self._document.items("materials")[number]
+            stored = self._document.list_items("materials")[number]
             look, alpha = stored.get("pbrMetallicRoughness", {}), stored.get("alphaMode", OPAQUE)
             factor = np.clip(look.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)), 0, 1)
             colour, texture = encode_srgb(factor[:3]), None
             if "baseColorTexture" in look:
-                texture = self._texture(self._document.items("textures")[look["baseColorTexture"]["index"]])
+                texture = self._read_texture(self._document.list_items("textures")[look["baseColorTexture"]["index"]])
                 colour = colour if texture else np.array(UNKNOWN)
             red, green, blue = np.clip(colour, 0, 1).tolist()
             self._materials[number] = Material(
@@ -96,7 +96,7 @@ class _Materials:
 
     def move_uv(self, number: int | None, uv: Array) -> Array:
         """Return places in a material's texture, v down [shape=(N, 2)], as ``KHR_texture_transform`` moves them."""
-        look = {} if number is None else self._document.items("materials")[number].get("pbrMetallicRoughness", {})
+        look = {} if number is None else self._document.list_items("materials")[number].get("pbrMetallicRoughness", {})
         how = look.get("baseColorTexture", {}).get("extensions", {}).get("KHR_texture_transform")
         if not how:
             return uv
@@ -104,18 +104,18 @@ class _Materials:
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         return (uv * how.get("scale", (1.0, 1.0))) @ turn + how.get("offset", (0.0, 0.0))
 
-    def _texture(self, texture: dict[str, Any]) -> Texture | None:
+    def _read_texture(self, texture: dict[str, Any]) -> Texture | None:
         source = texture.get("extensions", {}).get("EXT_texture_webp", texture).get("source")
         if source is None:
             _warn("is in a format (KTX2, AVIF) that is not read; export it as PNG or JPEG")
             return None
-        image = self._document.items("images")[source]
+        image = self._document.list_items("images")[source]
         place = image.get("bufferView", image.get("uri", ""))
         if place not in self._textures:
             self._textures[place] = None
             try:
                 linked = isinstance(place, str)
-                content = self._document.linked(place, "picture") if linked else self._arrays.bytes_of(place)
+                content = self._document.read_link(place, "picture") if linked else self._arrays.read_view(place)
                 self._document.budget.spend("bytes of pictures", len(content))
                 self._textures[place] = read_texture(content, self._document.budget)
                 if self._textures[place] is None:
@@ -131,14 +131,14 @@ def _warn(what: str) -> None:
 
 def _read_tints(document: GltfDocument, arrays: GltfArrays, number: int, count: int) -> Array:
     """Return the light and the opacity by which those of a material are multiplied, 0 to 1 [shape=(N, 4)]."""
-    accessor = document.items("accessors")[number]
+    accessor = document.list_items("accessors")[number]
     width, kind = WIDTHS[accessor["type"]], np.dtype(COMPONENTS[accessor["componentType"]])
     if width not in {3, 4} or not (kind.kind == "f" or (kind.kind == "u" and kind.itemsize < 4)):
         raise InputError(
             f"colours of vertices are {accessor['type']!r} of {accessor['componentType']!r}, required VEC3 or VEC4 of "
             "floats, unsigned bytes or unsigned shorts; export it again"
         )
-    values = arrays.floats(number, width, count)
+    values = arrays.read_floats(number, width, count)
     if kind.kind == "u" and not accessor.get("normalized"):  # parts of the largest number, also where that is not said
         values = values / np.iinfo(kind).max
     tints = np.ones((count, 4))
@@ -156,14 +156,14 @@ class _Skin:
     def weigh(self, arrays: GltfArrays, attributes: Mapping[str, int], count: int) -> tuple[Rows, Array]:
         """Return the joints that every vertex follows, as rows of the skin's list, and how far [shape=(N, W), both]."""
         joints, weights = [np.zeros((count, 0), np.int64)], [np.zeros((count, 0))]
-        for group in range(MOST_GROUPS):
+        for group in range(MAX_GROUPS):
             if f"JOINTS_{group}" not in attributes or f"WEIGHTS_{group}" not in attributes:
                 break
-            numbers = arrays.whole(attributes[f"JOINTS_{group}"], 4, count)
+            numbers = arrays.read_integers(attributes[f"JOINTS_{group}"], 4, count)
             if count and not 0 <= numbers.min() <= numbers.max() < len(self.joints):
                 raise InputError(f"vertices follow joint {numbers.max()} of {len(self.joints)}; export it again")
             joints.append(numbers)
-            weights.append(arrays.floats(attributes[f"WEIGHTS_{group}"], 4, count))
+            weights.append(arrays.read_floats(attributes[f"WEIGHTS_{group}"], 4, count))
         return np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
 
     def blend(self, joints: Rows, weights: Array) -> tuple[Array, Array]:
@@ -201,7 +201,7 @@ def read_gltf(path: Path) -> Mesh:
     Raises InputError: damaged, too large, or without triangles.
     """
     try:
-        return _SceneSurface(read_gltf_document(path)).mesh()
+        return _SceneSurface(read_gltf_document(path)).build_mesh()
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
@@ -235,12 +235,12 @@ class _SceneSurface:
         self._mapped = self._tinted = False
         self._count = 0
 
-    def mesh(self) -> Mesh:
+    def build_mesh(self) -> Mesh:
         """Return the whole surface. Raises InputError: it is damaged or too large, or there are no triangles."""
         for number in sorted(self._nodes):
-            node = self._document.items("nodes")[number]
+            node = self._document.list_items("nodes")[number]
             if "mesh" in node:
-                mesh = self._document.items("meshes")[node["mesh"]]
+                mesh = self._document.list_items("meshes")[node["mesh"]]
                 name = clean_name(node.get("name") or mesh.get("name", "")) or f"mesh {node['mesh']}"
                 self._budget.spend("parts", len(mesh["primitives"]))
                 for primitive in mesh["primitives"]:
@@ -276,12 +276,14 @@ class _SceneSurface:
         attributes, count = primitive["attributes"], len(block.vertices)
         size = self._arrays.count(primitive["indices"]) if "indices" in primitive else count
         self._budget.spend("triangles", -(-size // 3))
-        corners = self._arrays.whole(primitive["indices"], 1)[:, 0] if "indices" in primitive else np.arange(count)
+        corners = (
+            self._arrays.read_integers(primitive["indices"], 1)[:, 0] if "indices" in primitive else np.arange(count)
+        )
         if size % 3 or (size and not 0 <= corners.min() <= corners.max() < count):
             raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
         if not corners.size:
             return
-        material = self._materials.material(primitive.get("material"))
+        material = self._materials.read_material(primitive.get("material"))
         if "COLOR_0" in attributes and "material" not in primitive:
             material = replace(material, colour=WHITE)
         used = np.unique(corners)
@@ -289,7 +291,7 @@ class _SceneSurface:
         mapped = np.zeros((corners.size // 3, 3, 2))
         if "TEXCOORD_0" in attributes:
             uv = self._materials.move_uv(
-                primitive.get("material"), self._arrays.floats(attributes["TEXCOORD_0"], 2, count)
+                primitive.get("material"), self._arrays.read_floats(attributes["TEXCOORD_0"], 2, count)
             )
             mapped = (uv * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
             self._mapped = True
@@ -309,16 +311,16 @@ class _SceneSurface:
 
     def _share_vertices(self, number: int, mesh: dict[str, Any], primitive: dict[str, Any]) -> _SharedVertices:
         """Return the vertices of a primitive at their places in the scene; keep its bones and morph targets."""
-        node, attributes = self._document.items("nodes")[number], primitive["attributes"]
+        node, attributes = self._document.list_items("nodes")[number], primitive["attributes"]
         moved = tuple(target.get("POSITION") for target in primitive.get("targets", []))
         shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
         if shared in self._blocks:
             return self._blocks[shared]
         count = self._arrays.count(attributes["POSITION"])
         self._budget.spend("vertices", count)
-        vertices = self._arrays.floats(attributes["POSITION"], 3)
+        vertices = self._arrays.read_floats(attributes["POSITION"], 3)
         if "skin" in node:
-            skin = self._skin(node["skin"])
+            skin = self._read_skin(node["skin"])
             joints, weights = skin.weigh(self._arrays, attributes, count)
             linear, shift = skin.blend(joints, weights)
             self._bones += skin.find_head_bones(joints, weights, self._nodes, self._count)
@@ -328,16 +330,16 @@ class _SceneSurface:
             for kind, above in sorted(placed.kinds.items()):
                 self._bones.append(Bone(kind, self._nodes[above].matrix[:3, 3], rows, np.ones(count)))
         self._add_targets(node["mesh"], mesh, primitive, linear, count)
-        colours = np.tile(self._materials.material(primitive.get("material")).colour, (count, 1))
+        colours = np.tile(self._materials.read_material(primitive.get("material")).colour, (count, 1))
         block = _SharedVertices(self._count, _map_vectors(linear, vertices) + shift, colours, np.ones((count, 4)))
         self._blocks[shared] = block
         self._count += count
         return block
 
-    def _skin(self, number: int) -> _Skin:
+    def _read_skin(self, number: int) -> _Skin:
         """Return a skin at rest. Raises InputError: a joint is not in the scene, or matrices are missing."""
         if number not in self._skins:
-            skin = self._document.items("skins")[number]
+            skin = self._document.list_items("skins")[number]
             listed, inverse = skin["joints"], skin.get("inverseBindMatrices")
             count = len(listed) if inverse is None else self._arrays.count(inverse)
             self._budget.spend("joints", max(count, len(listed)))
@@ -348,7 +350,7 @@ class _SceneSurface:
             joints = tuple(self._nodes[joint] for joint in listed)
             matrices = np.array([joint.matrix for joint in joints])
             if inverse is not None:
-                inverses = self._arrays.floats(inverse, 16)[: len(joints)].reshape(-1, 4, 4)
+                inverses = self._arrays.read_floats(inverse, 16)[: len(joints)].reshape(-1, 4, 4)
                 matrices = matrices @ inverses.transpose(0, 2, 1)
             self._skins[number] = _Skin(joints, matrices[:, :3])
         return self._skins[number]
@@ -371,7 +373,7 @@ class _SceneSurface:
             size = self._arrays.count(target["POSITION"])
             if size != count:
                 raise InputError(f"the target {shorten(name)!r} moves {size} of {count} vertices; export it again")
-            moved = _map_vectors(linear, self._arrays.floats(target["POSITION"], 3))
+            moved = _map_vectors(linear, self._arrays.read_floats(target["POSITION"], 3))
             rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > MIN_DISPLACEMENT)
             self._budget.spend("displacements", len(rows))
             displacements.append((rows + self._count, moved[rows]))
@@ -388,7 +390,7 @@ def _map_vectors(linear: Array, vectors: Array) -> Array:
 def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
     """Return the names of the targets of a primitive, of its mesh or arrays; missing and repeated ones are numbered."""
     targets = primitive.get("targets", [])
-    accessors = document.items("accessors")
+    accessors = document.list_items("accessors")
     arrays = [accessors[target["POSITION"]].get("name", "") if "POSITION" in target else "" for target in targets]
     holders = [holder.get("extras", {}).get("targetNames", []) for holder in (mesh, primitive)]
     stored: list[str] = next((names for names in (*holders, arrays) if any(names)), [])
@@ -416,7 +418,7 @@ def _build_expression_shapes(
         name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else clean_name(group.get("name", ""))
         expressions[name] = [_read_bind(each["mesh"], each, FULL_WEIGHT) for each in group.get("binds", [])]
     kinds = extensions.get("VRMC_vrm", {}).get("expressions", {})
-    meshes = dict(enumerate(node.get("mesh", -1) for node in document.items("nodes")))
+    meshes = dict(enumerate(node.get("mesh", -1) for node in document.list_items("nodes")))
     for kind in ("preset", "custom"):
         for name, expression in kinds.get(kind, {}).items():
             binds = expression.get("morphTargetBinds", [])

@@ -27,8 +27,8 @@ from lipmotion.types.motion import RADIAN
 from lipmotion_faces.characters.gltf_document import (
     GltfArrays,
     GltfDocument,
-    place_nodes,
     clean_name,
+    place_nodes,
     read_gltf_document,
 )
 from lipmotion_faces.characters.gltf_scene import name_mesh_targets
@@ -69,7 +69,7 @@ class _Track:
     keys: Array
     kind: str
 
-    def at(self, time_s: Array) -> Array:
+    def sample(self, time_s: Array) -> Array:
         """Return values at frames' times [shape=(len(time_s), S)]; a frame that is nearly a key has its value."""
         rounding = ROUNDING_FRAMES * time_s[1] if len(time_s) > 1 else 0.0
         before = np.clip(np.searchsorted(self.time_s, time_s + rounding, "right") - 1, 0, len(self.time_s) - 1)
@@ -103,7 +103,9 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     document = read_gltf_document(path)
     arrays = GltfArrays(document)
     animations = [
-        (each, tracks) for each in document.items("animations") if (tracks := list(_read_tracks(document, arrays, each)))
+        (each, tracks)
+        for each in document.list_items("animations")
+        if (tracks := list(_read_tracks(document, arrays, each)))
     ]
     if not animations:
         raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
@@ -121,7 +123,7 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
         LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(named), listed, named[which])
     turns: dict[str, tuple[int, _Track]] = {}  # of the first neck and the first head, with the numbers of their nodes
     for number, target, sampler in _list_targets(document, animation):
-        kind = find_bone_kind(document.items("nodes")[number].get("name", ""))
+        kind = find_bone_kind(document.list_items("nodes")[number].get("name", ""))
         if target == "rotation" and kind in TURNING and kind not in turns:
             turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
     ordered = dict(turns[kind] for kind in TURNING if kind in turns)
@@ -134,7 +136,7 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     every = [
         (known, curve)
         for track in tracks
-        for name, curve in zip(track.names, track.at(time_s).T, strict=True)
+        for name, curve in zip(track.names, track.sample(time_s).T, strict=True)
         for known in KNOWN_AS.get(name, (name,))
     ]
     columns = choose_columns([to_arkit(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
@@ -155,9 +157,9 @@ def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Arra
     try:
         for number, track in turns.items():
             if number in placed:
-                local = Rotation.from_quat(document.items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
+                local = Rotation.from_quat(document.list_items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
                 at_rest = Rotation.from_matrix(placed[number].matrix[:3, :3])
-                turned = turned * (at_rest * local.inv() * Rotation.from_quat(track.at(time_s)) * at_rest.inv())
+                turned = turned * (at_rest * local.inv() * Rotation.from_quat(track.sample(time_s)) * at_rest.inv())
     except ValueError as error:  # a quaternion of zeros, a bone without size
         raise InputError(f"a rotation of the head is none ({error}); export the animation again") from error
     return np.asarray(np.broadcast_to(turned.as_quat(), (len(time_s), 4)))
@@ -182,10 +184,10 @@ def _list_targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator
         if path == "pointer" and pointer:
             node, path = int(pointer[2]), pointer[3] + (pointer[4] or "")
             if pointer[1] == "meshes":
-                node = next((n for n, each in enumerate(document.items("nodes")) if each.get("mesh") == node), -1)
+                node = next((n for n, each in enumerate(document.list_items("nodes")) if each.get("mesh") == node), -1)
         if (
             0 <= number < len(samplers)
-            and 0 <= node < len(document.items("nodes"))
+            and 0 <= node < len(document.list_items("nodes"))
             and {"input", "output"} <= samplers[number].keys()
         ):
             yield node, path, samplers[number]
@@ -202,8 +204,8 @@ def _read_tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str
     }
     for node, path, sampler in _list_targets(document, animation):
         if path.startswith("weights"):
-            owner, one = document.items("nodes")[node].get("mesh", -1), path.partition("/")[2]
-            names = name_mesh_targets(document, document.items("meshes")[owner]) if owner >= 0 else ()
+            owner, one = document.list_items("nodes")[node].get("mesh", -1), path.partition("/")[2]
+            names = name_mesh_targets(document, document.list_items("meshes")[owner]) if owner >= 0 else ()
             names = names[int(one) :][:1] if one else names
             if names:
                 yield _track(arrays, sampler, names, 1)
@@ -213,11 +215,11 @@ def _read_tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str
 
 def _track(arrays: GltfArrays, sampler: dict[str, Any], names: tuple[str, ...], width: int) -> _Track:
     """Return the keys of a sampler; of vectors (``width`` 3) the first numbers, of quaternions (4) all."""
-    times = arrays.floats(sampler["input"], 1)[:, 0]
+    times = arrays.read_floats(sampler["input"], 1)[:, 0]
     if not len(times) or not 0 <= times[0] <= times[-1] <= LONGEST_S or not (np.diff(times) > 0).all():
         raise InputError("the times of an animation do not rise from 0 on, within a day; export it again")
     kind, turns = sampler.get("interpolation", "LINEAR"), width == len(QUATERNION)
     rows = (3 if kind == CUBIC else 1) * (1 if turns else len(names))
-    values = arrays.floats(sampler["output"], width, rows * len(times))[:, : width if turns else 1]
+    values = arrays.read_floats(sampler["output"], width, rows * len(times))[:, : width if turns else 1]
     shape = (len(times), 3, len(names)) if kind == CUBIC else (len(times), len(names))
     return _Track(names, times, values.reshape(shape), kind)

@@ -226,7 +226,7 @@ def _add_joints(document: dict[str, Any], buffer: GltfBuffer, turn: HeadTurn) ->
 
 
 def _add_animation(buffer: GltfBuffer, scene: Scene, head: int) -> dict[str, Any]:
-    time_s, table = scene.keys()
+    time_s, table = scene.list_keys()
     frames_s = scene.weights.time_s if scene.weights else np.zeros(0)
     times = buffer.add(time_s, "SCALAR", limits=True)
     curves: list[tuple[int, str, int, int]] = []
@@ -266,16 +266,21 @@ def write_animated_gltf(
     """
     document = read_gltf_document(original)
     binary = document.buffers.get(0)
-    if binary is None or "uri" in document.items("buffers")[0] or len(document.buffers) > 1 or not len(weights.values):
+    if (
+        binary is None
+        or "uri" in document.list_items("buffers")[0]
+        or len(document.buffers) > 1
+        or not len(weights.values)
+    ):
         return False
     moved: dict[int, tuple[str, ...]] = {}  # the nodes whose mesh has morph targets that move, with all targets' names
-    for number, node in enumerate(document.items("nodes")):
-        names = name_mesh_targets(document, document.items("meshes")[node["mesh"]] if "mesh" in node else {})
+    for number, node in enumerate(document.list_items("nodes")):
+        names = name_mesh_targets(document, document.list_items("meshes")[node["mesh"]] if "mesh" in node else {})
         if set(names) & set(weights.names):
             moved[number] = names
     if not set(weights.names) <= {name for names in moved.values() for name in names}:
         return False
-    json, body = document.json, bytes(binary[: document.items("buffers")[0].get("byteLength", len(binary))])
+    json, body = document.json, bytes(binary[: document.list_items("buffers")[0].get("byteLength", len(binary))])
     buffer = GltfBuffer(json.setdefault("bufferViews", []), json.setdefault("accessors", []))
     buffer.chunks = [body + b"\0" * (-len(body) % 4)]
     buffer.size = len(buffer.chunks[0])

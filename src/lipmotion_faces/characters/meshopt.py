@@ -95,7 +95,7 @@ def decode_indices(data: bytes, count: int) -> NDArray[np.uint32]:
     last = [0, 0]
     result = np.empty(count, np.uint32)
     for number in range(count):
-        value = reader.varint()
+        value = reader.read_varint()
         which, value = value & 1, value >> 1
         last[which] = (last[which] + ((value >> 1) ^ -(value & 1))) & 0xFFFFFFFF
         result[number] = last[which]
@@ -106,24 +106,24 @@ class _Reader:
     def __init__(self, data: bytes, position: int, end: int) -> None:
         self.data, self.position, self.end, self.last = data, position, end, 0
 
-    def byte(self) -> int:
+    def read_byte(self) -> int:
         if self.position >= self.end:
             raise InputError(_DAMAGED)
         self.position += 1
         return self.data[self.position - 1]
 
-    def varint(self) -> int:
+    def read_varint(self) -> int:
         value = shift = 0
         for _ in range(5):
-            byte = self.byte()
+            byte = self.read_byte()
             value |= (byte & 127) << shift
             shift += 7
             if byte < 128:
                 return value
         raise InputError(_DAMAGED)
 
-    def index(self) -> int:
-        value = self.varint()
+    def read_index(self) -> int:
+        value = self.read_varint()
         self.last = (self.last + ((value >> 1) ^ -(value & 1))) & 0xFFFFFFFF
         return self.last
 
@@ -145,22 +145,22 @@ class _Triangles:
         self.edges[self.edge_count % FIFO] = (first, second)
         self.edge_count += 1
 
-    def fresh(self) -> int:
+    def add_vertex(self) -> int:
         self.next += 1
         return self.next - 1
 
-    def on_edge(self, code: int, cached_codes: int) -> tuple[int, int, int]:
+    def read_on_edge(self, code: int, cached_codes: int) -> tuple[int, int, int]:
         """Return the triangle of a new vertex and an edge that another triangle had."""
         a, b = self.edges[(self.edge_count - 1 - (code >> 4)) % FIFO]
         which = code & 15
         if which == 0:
-            c = self.fresh()
+            c = self.add_vertex()
             self.push_vertex(c)
         elif which < cached_codes:
             c = self.vertices[(self.vertex_count - 1 - which) % FIFO]
         else:
             if which == 15:
-                c = self.reader.index()
+                c = self.reader.read_index()
             else:
                 c = self.reader.last = (self.reader.last + (which - (which ^ 3))) & 0xFFFFFFFF
             self.push_vertex(c)
@@ -168,24 +168,24 @@ class _Triangles:
         self.push_edge(a, c)
         return a, b, c
 
-    def apart(self, code: int) -> tuple[int, int, int]:
+    def read_apart(self, code: int) -> tuple[int, int, int]:
         """Return a triangle that shares no edge with the newest ones."""
         listed = code < 0xFE
-        pair = self.auxiliary[code & 15] if listed else self.reader.byte()
+        pair = self.auxiliary[code & 15] if listed else self.reader.read_byte()
         second, third = pair >> 4, pair & 15
         if not listed and pair == 0:
             self.next = 0
         explicit = code == 0xFF
-        a = 0 if explicit else self.fresh()
+        a = 0 if explicit else self.add_vertex()
         base = self.vertex_count
-        b = self.fresh() if second == 0 else self.vertices[(base - second) % FIFO]
-        c = self.fresh() if third == 0 else self.vertices[(base - third) % FIFO]
+        b = self.add_vertex() if second == 0 else self.vertices[(base - second) % FIFO]
+        c = self.add_vertex() if third == 0 else self.vertices[(base - third) % FIFO]
         if explicit:
-            a = self.reader.index()
+            a = self.reader.read_index()
         if not listed and second == 15:
-            b = self.reader.index()
+            b = self.reader.read_index()
         if not listed and third == 15:
-            c = self.reader.index()
+            c = self.reader.read_index()
         self.push_vertex(a)
         if second == 0 or (not listed and second == 15):
             self.push_vertex(b)
@@ -206,7 +206,7 @@ def decode_triangles(data: bytes, count: int) -> NDArray[np.uint32]:
     state = _Triangles(data[end:], _Reader(data, 1 + count // 3, end))
     result = np.empty((count // 3, 3), np.uint32)
     for number, code in enumerate(data[1 : 1 + count // 3]):
-        result[number] = state.on_edge(code, cached_codes) if code < 0xF0 else state.apart(code)
+        result[number] = state.read_on_edge(code, cached_codes) if code < 0xF0 else state.read_apart(code)
     return result.reshape(-1)
 
 

@@ -16,7 +16,7 @@ from lipmotion.types import Motion
 
 Array = NDArray[np.float64]
 
-LEAST_TURN = 1e-3
+MIN_TURN = 1e-3
 """Normals that a blendshape turns by less than this are left out of it."""
 
 
@@ -75,7 +75,7 @@ class Scene:
                 f"required ({len(self.mesh.vertices)},) and ({frames}, 4)"
             )
 
-    def table(self) -> Array:
+    def tabulate_weights(self) -> Array:
         """Return the weights of all blendshapes of the mesh, in their order [shape=(T, S)]; T is 0 without weights."""
         weights, names = self.weights, self.mesh.shape_names
         if weights is None:
@@ -85,13 +85,15 @@ class Scene:
             table[:, names.index(name)] = weights.values[:, column]
         return table
 
-    def keys(self) -> tuple[Array, Array]:
+    def list_keys(self) -> tuple[Array, Array]:
         """Return times in seconds [shape=(K,)], and the weights of all blendshapes at these [shape=(K, S)].
 
         Between two keys weights lie on a straight line: where some are stepped, there is a key just before a change.
         """
         time_s = self.weights.time_s if self.weights else np.zeros(0)
-        return place_keys(time_s, self.table(), [name in self.stepped for name in self.mesh.shape_names], self.thinning)
+        return place_keys(
+            time_s, self.tabulate_weights(), [name in self.stepped for name in self.mesh.shape_names], self.thinning
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +122,7 @@ def compute_shading_normals(mesh: Mesh, *, split: bool = True) -> ShadingNormals
         touched[around] = True
         wider = triangles[touched[triangles].any(axis=1)]
         change = _join_normals(moved, wider, joined, count) - rest
-        rows = np.flatnonzero(touched[joined] & (np.abs(change).max(axis=1) > LEAST_TURN))
+        rows = np.flatnonzero(touched[joined] & (np.abs(change).max(axis=1) > MIN_TURN))
         turned.append((rows.astype(np.int64), change[rows]))
     return ShadingNormals(rest, tuple(turned))
 

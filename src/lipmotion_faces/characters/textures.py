@@ -70,7 +70,9 @@ class TextureTable:
     levels: NDArray[np.int64]
     first: tuple[int, ...]
 
-    def level(self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]) -> NDArray[np.int32]:
+    def choose_level(
+        self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]
+    ) -> NDArray[np.int32]:
         """Return the row of ``levels`` that suits triangles, by areas in texture and on screen [each shape=(F,)]."""
         first = self.first[texture]
         last = (*self.first, len(self.levels))[texture + 1] - 1

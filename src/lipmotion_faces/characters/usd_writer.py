@@ -24,7 +24,9 @@ INDENT = "    "
 _CONTROL = re.compile("[\x00-\x1f\x7f]")
 
 
-def write_prim(schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str) -> Iterator[str]:
+def write_prim(
+    schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str
+) -> Iterator[str]:
     """Yield the lines of a prim.
 
     schema  : ``Mesh``, for instance
@@ -172,10 +174,12 @@ def write_usda(path: Path, scene: Scene) -> None:
 
 
 def _list_animation(scene: Scene) -> Iterator[str]:
-    joints, (time_s, table) = _list_joints(scene), scene.keys()
+    joints, (time_s, table) = _list_joints(scene), scene.list_keys()
     yield f"uniform token[] blendShapes = {format_tokens(scene.mesh.shape_names)}"
     if len(table):
-        yield from _list_samples("float[] blendShapeWeights", map(_format_numbers, table), time_s * _choose_codes_hz(scene))
+        yield from _list_samples(
+            "float[] blendShapeWeights", map(_format_numbers, table), time_s * _choose_codes_hz(scene)
+        )
     else:
         yield f"float[] blendShapeWeights = {_format_numbers(np.zeros(len(scene.mesh.shapes)))}"
     yield f"uniform token[] joints = {format_tokens(joints)}"
@@ -228,8 +232,13 @@ def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
         offsets = np.zeros((2, len(rows), 3))
         for values, (of, added) in zip(offsets, ((shape.rows, shape.displacements), turned), strict=True):
             values[np.searchsorted(rows, of)] = added
-        moved = [f"uniform vector3f[] offsets = {_format_numbers(offsets[0])}", f"uniform int[] pointIndices = {_format_integers(rows)}"]
-        yield from write_prim("BlendShape", name, [f"uniform vector3f[] normalOffsets = {_format_numbers(offsets[1])}", *moved])
+        moved = [
+            f"uniform vector3f[] offsets = {_format_numbers(offsets[0])}",
+            f"uniform int[] pointIndices = {_format_integers(rows)}",
+        ]
+        yield from write_prim(
+            "BlendShape", name, [f"uniform vector3f[] normalOffsets = {_format_numbers(offsets[1])}", *moved]
+        )
     for name, part in _list_parts(mesh):
         subset = [
             'uniform token elementType = "face"',

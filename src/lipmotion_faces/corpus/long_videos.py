@@ -27,7 +27,7 @@ from lipmotion_faces.tracking.track import VideoScan, scan_video
 
 SHORTEST_S, LONGEST_S = 3.0, 12.0
 """Wanted length of an utterance. Longer ones are divided at their longest pause, shorter ones joined where they can."""
-LEAST_S = 0.8
+MIN_S = 0.8
 """Shorter pieces are left out."""
 LONGEST_PAUSE_S = 1.0
 """A longer pause always divides, and is left out except for its edges."""
@@ -90,7 +90,7 @@ def find_utterances(
             pieces[-1] = _join([before, piece])
         else:
             pieces.append(piece)
-    wanted = [piece for piece in pieces if piece.duration_s >= LEAST_S]
+    wanted = [piece for piece in pieces if piece.duration_s >= MIN_S]
     return _add_margins(wanted, cuts_s, duration_s, quietest)
 
 
@@ -131,12 +131,12 @@ def _divide(group: list[SpokenPart]) -> list[list[SpokenPart]]:
         return [group]
     middle_s = (group[0].start_s + group[-1].end_s) / 2
 
-    def worth(n: int) -> tuple[bool, float]:
+    def rate(n: int) -> tuple[bool, float]:
         is_long = min(group[n - 1].end_s - group[0].start_s, group[-1].end_s - group[n].start_s) >= SHORTEST_S
         pause_s = group[n].start_s - group[n - 1].end_s
         return is_long, pause_s if is_long else -abs(group[n].start_s - middle_s)
 
-    at = max(range(1, len(group)), key=worth)
+    at = max(range(1, len(group)), key=rate)
     return _divide(group[:at]) + _divide(group[at:])
 
 
@@ -175,7 +175,7 @@ DIVIDED_KINDS = (*VIDEO_KINDS, VIDEO, LRS)
 """Kinds of recordings of which the long ones are divided; GRID's and others hold a sentence each."""
 LONG_S = 30.0
 """Videos that state a longer duration are divided; a shorter one is one utterance."""
-LEAST_SPLIT_UTTERANCES = 10
+MIN_SPLIT_UTTERANCES = 10
 """A single video with fewer utterances is all for training."""
 HELD_OUT_SHARE = 0.1
 """Share of the utterances, the last ones, that are ``test``; as many before them are ``val``."""
@@ -308,7 +308,7 @@ def divide_video(
     spans = find_utterances(parts, scan.cuts_s.tolist(), end_s, partial(find_quietest, levels))
     spans = [span for longer in spans if (span := _fit_to_pictures(longer, scan, end_s)).duration_s > 0]
     held_out = 0
-    if splits_by_time and len(spans) >= LEAST_SPLIT_UTTERANCES:
+    if splits_by_time and len(spans) >= MIN_SPLIT_UTTERANCES:
         held_out = round(HELD_OUT_SHARE * len(spans))
     splits = [recording.split] * (len(spans) - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
     return [_cut_part(span, recording, split, audio, scan) for span, split in zip(spans, splits, strict=True)]

@@ -139,7 +139,7 @@ def prepare(
     offset_s = None if offset_ms is None else offset_ms / 1000
     folder = add_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
     chosen = make_tracker(tracker)
-    packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
+    packages = chosen.list_versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
     with lock_folder(output):
         corpus = Corpus.create(output)
@@ -221,7 +221,9 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
     """Log a warning if the corpus holds utterances of recordings that are gone, or that cannot be used any longer."""
     good = {outcome.name for outcome in outcomes if not outcome.problem}
     others = [name for name in corpus.names() if name not in good]
-    older = [name for name in others if (_read_stored_source(corpus.folder(name)) or {}).get("collection") == collection]
+    older = [
+        name for name in others if (_read_stored_source(corpus.folder(name)) or {}).get("collection") == collection
+    ]
     if older:
         shown = ", ".join(older[:NAMED_UTTERANCES]) + (", ..." if len(older) > NAMED_UTTERANCES else "")
         LOG.warning(

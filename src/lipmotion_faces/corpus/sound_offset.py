@@ -20,21 +20,21 @@ CLAP_STEP_S = 0.001
 """Distance of the levels in which claps are looked for."""
 BEFORE_S, RISE_S = 0.06, 0.004
 """A clap is louder within ``RISE_S`` than everything in ``BEFORE_S`` before it..."""
-LEAST_RISE_DB = 18.0
+MIN_RISE_DB = 18.0
 """...by this much..."""
-DECAY_S, LEAST_DECAY_DB = (0.15, 0.25), 15.0
+DECAY_S, MIN_DECAY_DB = (0.15, 0.25), 15.0
 """...and between these times after it, it has become this much quieter."""
-LEAST_LEVEL_DB = -15.0
+MIN_LEVEL_DB = -15.0
 """Claps have at least this level against the loudest millisecond of the recording."""
 APART_S = 0.3
 """Where several marks are nearer to each other, the strongest counts."""
-MOST_MARKS = 20
+MAX_MARKS = 20
 """Most marks of a kind that are kept, the strongest."""
 BEEP_FRAME_S, BEEP_STEP_S = 0.032, 0.008
-LEAST_TONE_SHARE = 0.9
+MIN_TONE_SHARE = 0.9
 """Share of the energy of a beep that is in three neighbouring bands of its spectrum (96 Hz at 16 kHz)."""
-LEAST_BEEP_S, LEAST_BEEP_HZ = 0.1, 500.0
-LEAST_BEEP_LEVEL_DB = -30.0
+MIN_BEEP_S, MIN_BEEP_HZ = 0.1, 500.0
+MIN_BEEP_LEVEL_DB = -30.0
 """Beeps have at least this level against the loudest frame."""
 FLOOR = 1e-10
 BLOCK = 4096
@@ -81,7 +81,7 @@ def _find_claps(audio: Audio) -> list[SoundMark]:
     after = 10 * np.log10((sums[end] - sums[begin]) / np.maximum(end - begin, 1) + FLOOR)
     rises = peak[1:] - loudest_before[:-1]
     decays = (peak - after)[1:]
-    good = (rises >= LEAST_RISE_DB) & (decays >= LEAST_DECAY_DB) & (peak[1:] >= level.max() + LEAST_LEVEL_DB)
+    good = (rises >= MIN_RISE_DB) & (decays >= MIN_DECAY_DB) & (peak[1:] >= level.max() + MIN_LEVEL_DB)
     strength = np.minimum(rises, decays)
     return [
         SoundMark((frame + 1) * CLAP_STEP_S, CLAP, float(strength[frame]))
@@ -106,25 +106,25 @@ def _find_beeps(audio: Audio) -> list[SoundMark]:
         tone[frames] = bands[np.arange(len(best)), best] / (level[frames] + FLOOR)
         hertz[frames] = (best + 1) / BEEP_FRAME_S
     level = 10 * np.log10(level + FLOOR)
-    good = (tone >= LEAST_TONE_SHARE) & (hertz >= LEAST_BEEP_HZ) & (level >= level.max() + LEAST_BEEP_LEVEL_DB)
+    good = (tone >= MIN_TONE_SHARE) & (hertz >= MIN_BEEP_HZ) & (level >= level.max() + MIN_BEEP_LEVEL_DB)
     same = np.concatenate([[False], good[1:] & good[:-1] & (np.abs(np.diff(hertz)) <= 1.01 / BEEP_FRAME_S), [False]])
     starts = np.flatnonzero(same[1:] & ~same[:-1])
     ends = np.flatnonzero(same[:-1] & ~same[1:])
-    least = LEAST_BEEP_S / BEEP_STEP_S
+    least = MIN_BEEP_S / BEEP_STEP_S
     long = [(first, last) for first, last in zip(starts.tolist(), ends.tolist(), strict=True) if last - first >= least]
     marks = []
     for first, last in long:
         frames = slice(first, last + 1)
         time_s, pitch = (first * step + size / 2) / audio.rate_hz, float(np.median(hertz[frames]))
         marks.append(SoundMark(time_s, BEEP, float(level[frames].mean()), pitch))
-    return sorted(marks, key=lambda mark: -mark.strength_db)[:MOST_MARKS]
+    return sorted(marks, key=lambda mark: -mark.strength_db)[:MAX_MARKS]
 
 
 def _select_strongest(frames: NDArray[np.intp], strength: Array, apart: float) -> list[int]:
     """Return the strongest of some frames, none nearer to a stronger one than ``apart`` frames."""
     kept: list[int] = []
     for frame in frames[np.argsort(-strength[frames], kind="stable")].tolist():
-        if len(kept) == MOST_MARKS:
+        if len(kept) == MAX_MARKS:
             break
         if all(abs(frame - other) >= apart for other in kept):
             kept.append(frame)
@@ -134,16 +134,16 @@ def _select_strongest(frames: NDArray[np.intp], strength: Array, apart: float) -
 Array = NDArray[np.float64]
 
 ALIKE = "the sound of both"
-LEAST_OVERLAP_SHARE = 0.5
+MIN_OVERLAP_SHARE = 0.5
 """Share of the shorter recording that the other one must cover, where levels are compared."""
 SAME_S = 0.03
 """Marks whose offsets differ by less are of one offset."""
 SAME_PITCH_HZ = 40.0
 """Beeps whose pitches differ by less are the same beep."""
-LEAST_LEVEL_CORRELATION, LEAST_MARGIN, PEAK_S = 0.5, 0.1, 0.25
+MIN_LEVEL_CORRELATION, MIN_MARGIN, PEAK_S = 0.5, 0.1, 0.25
 """Least correlation of levels at which the sounds alone decide, by how much it must exceed all others, and how far from
 the best an offset is another one."""
-LEAST_MARK_CORRELATION = 0.15
+MIN_MARK_CORRELATION = 0.15
 """Marks alone decide, without any likeness of the sounds, only where no other offset is possible."""
 WAVEFORM_CORRELATION = 0.3
 """Where sounds around beeps correlate by this much, their waveforms are more exact than the beginnings of beeps."""
@@ -185,16 +185,16 @@ def measure_offset(first: Audio, second: Audio) -> SoundOffset:
     levels = _measure_levels(first), _measure_levels(second)
     likeness = _Likeness(*levels)
     hypotheses = _pair_marks(find_marks(first), find_marks(second))
-    best_s, best, second_best = likeness.best()
+    best_s, best, second_best = likeness.find_best()
     candidates = [
-        (likeness.at(late_s) + MARK_SCORE * min(len(pairs), 2), late_s, pairs) for late_s, pairs in hypotheses
+        (likeness.score(late_s) + MARK_SCORE * min(len(pairs), 2), late_s, pairs) for late_s, pairs in hypotheses
     ]
-    certain = best >= LEAST_LEVEL_CORRELATION and best - second_best >= LEAST_MARGIN
+    certain = best >= MIN_LEVEL_CORRELATION and best - second_best >= MIN_MARGIN
     if candidates:
         score, late_s, pairs = max(candidates, key=lambda each: each[0])
-        alike = likeness.at(late_s)
+        alike = likeness.score(late_s)
         alone = len(candidates) == 1 or len(pairs) > 1
-        if not (certain and best > score) and (alike >= LEAST_MARK_CORRELATION or alone):
+        if not (certain and best > score) and (alike >= MIN_MARK_CORRELATION or alone):
             kind = pairs[0][0].kind
             at_mark = _compare_beeps if kind == BEEP else _compare_claps
             fine_s = float(np.median([at_mark(first, second, *pair) for pair in pairs]))
@@ -206,12 +206,12 @@ def measure_offset(first: Audio, second: Audio) -> SoundOffset:
     marks = f"{len(candidates)} offsets fit claps or beeps" if candidates else "no clap and no beep is in both"
     raise InputError(
         f"the offset of the two sounds is not clear: {marks}, and their levels correlate by {best:.2f} at most, "
-        f"required {LEAST_LEVEL_CORRELATION}; give the offset (--offset-ms, or offsets.csv)"
+        f"required {MIN_LEVEL_CORRELATION}; give the offset (--offset-ms, or offsets.csv)"
     )
 
 
 class _Likeness:
-    """Correlation of two rows of levels at every offset that leaves ``LEAST_OVERLAP_SHARE`` of both."""
+    """Correlation of two rows of levels at every offset that leaves ``MIN_OVERLAP_SHARE`` of both."""
 
     def __init__(self, first: Array, second: Array) -> None:
         from scipy.signal import fftconvolve
@@ -223,18 +223,18 @@ class _Likeness:
         squares = fftconvolve(ones[1], flipped**2), fftconvolve(second**2, ones_flipped)
         spread = [np.maximum(square - total**2 / count, 1e-9) for square, total in zip(squares, sums, strict=True)]
         scores = (fftconvolve(second, flipped) - sums[0] * sums[1] / count) / np.sqrt(spread[0] * spread[1])
-        long = LEAST_OVERLAP_SHARE * min(len(first), len(second))
+        long = MIN_OVERLAP_SHARE * min(len(first), len(second))
         # a short overlap is alike by chance; it counts less
         self.scores = np.where(count >= long, scores * np.sqrt(1 - long / (2 * np.maximum(count, long))), 0.0)
         self.zero = len(first) - 1
 
-    def at(self, late_s: float) -> float:
+    def score(self, late_s: float) -> float:
         """Return the correlation near an offset; 0 where there is no overlap."""
         middle = self.zero + round(late_s / STEP_S)
         near = self.scores[max(middle - 1, 0) : max(middle + 2, 0)]
         return float(near.max()) if len(near) else 0.0
 
-    def best(self) -> tuple[float, float, float]:
+    def find_best(self) -> tuple[float, float, float]:
         """Return the best offset in seconds, its correlation, and the highest one elsewhere."""
         top = int(self.scores.argmax())
         away = np.abs(np.arange(len(self.scores)) - top) > PEAK_S / STEP_S

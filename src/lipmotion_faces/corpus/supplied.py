@@ -125,7 +125,7 @@ def _contain_speech(spans: Iterable[Span[Unit]]) -> bool:
 
 
 GIVEN = "as given"
-LEAST_SHARED_S = 0.5
+MIN_SHARED_S = 0.5
 """Shortest time that sound and motion must share."""
 
 
@@ -182,10 +182,10 @@ def trim_to_shared(sound: SeparateSound, track: Track) -> tuple[Audio, Track, fl
     samples = sound.audio.samples[max(round((start_s + sound.late_s) * rate), 0) :]
     last = min(frames, first + int(len(samples) / rate * hertz + 1e-9))
     shared_s = (last - first) / hertz
-    if shared_s < LEAST_SHARED_S:
+    if shared_s < MIN_SHARED_S:
         raise InputError(
             f"{sound.note}: {sound.audio.duration_s:.2f} s of sound and {frames / hertz:.2f} s of motion share "
-            f"{max(shared_s, 0):.2f} s, required {LEAST_SHARED_S:g}"
+            f"{max(shared_s, 0):.2f} s, required {MIN_SHARED_S:g}"
         )
     samples = samples[: max(round(shared_s * rate), WINDOW)]
     shared = slice(first, last)

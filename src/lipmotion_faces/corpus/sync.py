@@ -1,4 +1,4 @@
-"""Synchronisation of sound and motion: ``measure_offsets(corpus)`` measures the offset, ``remove_offsets(corpus)`` removes it."""
+"""Sound and motion in step: ``measure_offsets(corpus)`` measures the offset, ``remove_offsets(corpus)`` removes it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REACH_S = 0.4
 OPENING = "opening"
 REMOVED_MS = "offset_removed_ms"
 """Key in the source of an utterance: milliseconds by which its sound was moved."""
-LEAST_MOVE_S = 0.005
+MIN_MOVE_S = 0.005
 """Smallest offset in seconds that is removed."""
 
 
@@ -35,11 +35,11 @@ class CorpusOffsets:
     collections: Mapping[str, Offset]
     members: Mapping[str, tuple[str, ...]]
 
-    def lines(self) -> list[str]:
+    def list_lines(self) -> list[str]:
         """Return the offsets as text for users, one line a collection."""
-        return [f"{name or 'corpus'}: {self._line(name)}" for name in sorted(self.collections)]
+        return [f"{name or 'corpus'}: {self._format_line(name)}" for name in sorted(self.collections)]
 
-    def _line(self, collection: str) -> str:
+    def _format_line(self, collection: str) -> str:
         pooled, clips = self.collections[collection], {name: self.clips[name] for name in self.members[collection]}
         counted = f"{len(clips)} clips" if len(clips) > 1 else "1 clip"
         if not pooled.known:
@@ -116,7 +116,7 @@ def remove_offsets(corpus: Corpus) -> dict[str, float]:
 
 def _is_worth_moving(pooled: Offset) -> bool:
     """Return whether an offset is known, large enough, and significantly different from zero."""
-    return pooled.known and abs(pooled.late_s) >= LEAST_MOVE_S and (pooled.low_s > 0 or pooled.high_s < 0)
+    return pooled.known and abs(pooled.late_s) >= MIN_MOVE_S and (pooled.low_s > 0 or pooled.high_s < 0)
 
 
 def move_sound(utterance: Utterance, late_s: float) -> Utterance:

@@ -26,7 +26,7 @@ from lipmotion_faces.tracking.track import Footage, decode_footage, open_footage
 
 LOG = logging.getLogger("lipmotion")
 
-MOST_BACKGROUND_S, MOST_PART_S = 20.0, 10.0
+MAX_BACKGROUND_S, MAX_PART_S = 20.0, 10.0
 """Longest background that is kept in the file of a face, and the longest part of it."""
 HEAD_PX = -75.0, -80.0, 75.0, 150.0
 """Left, top, right and bottom of a head, px of the face, from the point between the eyes."""
@@ -38,7 +38,7 @@ ALIGNED_PX = -125.0, -135.0, 125.0, 155.0
 """The part around a head in which heads are laid upon one another where one frame fades into another."""
 ALIGNED_EDGE_PX = 25.0
 """Width of the edge of that part."""
-MOST_PARTS = 24
+MAX_PARTS = 24
 """Parts of the footage that are tried as backgrounds."""
 COMPARED_STEP = 3
 """Every so many frames of them are compared."""
@@ -48,7 +48,7 @@ SHORT_S, SHORT_COST = 3.0, 2.0
 """A part that is shorter costs so much more, in proportion to what is missing: it would repeat too soon."""
 COMPARED_SHARE = 0.9
 """A part of this share of ``SHORT_S`` is still compared."""
-MOST_TRACKED_S = 120.0
+MAX_TRACKED_S = 120.0
 """Seconds of a video that are used as a background."""
 LONGEST_GAP_S = 0.2
 """Where the face is not seen for so short a time, as where pictures were dropped, its interpolated place will do."""
@@ -90,19 +90,19 @@ class BackgroundSequence:
         maps[:, :, :2] *= zoom
         return replace(self, face_to_frame=maps)
 
-    def frames(self, count: int, rate_hz: float) -> Iterator[Background]:
-        """Yield ``count`` frames at a rate, in ``order``."""
+    def decode(self, count: int, rate_hz: float) -> Iterator[Background]:
+        """Yield ``count`` frames at a rate, in ``find_order``."""
         groups = self.groups()
         shown = np.floor(np.arange(count) * (self.rate_hz / rate_hz) + 0.5).astype(int)
-        order = self.order(groups, int(shown[-1]) + 1)
+        order = self.find_order(groups, int(shown[-1]) + 1)
         for first, second, weight in zip(order.first[shown], order.second[shown], order.weight[shown], strict=True):
-            one, other = (self._frame(groups, int(number)) for number in (first, second))
+            one, other = (self._decode_frame(groups, int(number)) for number in (first, second))
             yield one if weight == 0 else mix_frames(one, other, float(weight))
 
-    def order(self, groups: FrameGroups, count: int) -> looping.LoopOrder:
+    def find_order(self, groups: FrameGroups, count: int) -> looping.LoopOrder:
         """Return which frames are shown, at the background's own rate.
 
-        They are the first ones, if these are as many and show the face without a cut; others are in ``loop_order``,
+        They are the first ones, if these are as many and show the face without a cut; else in ``find_loop_order``,
         which shows no frame without a face.
         """
         total = len(self.chin_px)
@@ -110,11 +110,11 @@ class BackgroundSequence:
         if self.in_time or is_whole:
             shown = np.minimum(np.arange(count), total - 1)
             return looping.LoopOrder(shown, shown, np.zeros(count), ())
-        descriptors = looping.describe_frames((groups.frame(number) for number in range(total)), self.face_to_frame)
+        descriptors = looping.describe_frames((groups.decode(number) for number in range(total)), self.face_to_frame)
         return looping.find_loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
 
-    def _frame(self, groups: FrameGroups, number: int) -> Background:
-        frame = groups.frame(number)
+    def _decode_frame(self, groups: FrameGroups, number: int) -> Background:
+        frame = groups.decode(number)
         height, width = (length // 2 * 2 for length in frame.shape[:2])
         place, chin_px = self.face_to_frame[number], float(self.chin_px[number])
         return Background(frame[:height, :width], place, chin_px, bool(self.usable[number]))
@@ -123,17 +123,18 @@ class BackgroundSequence:
 def find_best_background(footages: Sequence[Footage]) -> StoredBackground:
     """Return the parts of some footage that can be shown one after the other with the least visible joins.
 
-    ``MOST_PARTS`` parts of one size, spread evenly, are compared. They last at most ``MOST_PART_S``, show the face in
+    ``MAX_PARTS`` parts of one size, spread evenly, are compared. They last at most ``MAX_PART_S``, show the face in
     all frames, and have no cut. Parts much shorter than ``SHORT_S`` are compared only if there are no longer ones. The
     first is the one that could best be shown alone for a minute; each next one has a frame that is most like one of
-    those before, up to ``MOST_BACKGROUND_S`` and as long as jumps lead there.
+    those before, up to ``MAX_BACKGROUND_S`` and as long as jumps lead there.
     """
     chosen = _order_parts(choose_parts(footages))
     height, width = (length // 2 * 2 for length in chosen[0][0].size)
     frames = (frame[:height, :width] for part in chosen for frame in decode_footage(*part))
     video = encode_video(frames, chosen[0][0].rate_hz)
     maps, chins = (
-        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen]) for of in (steady_face, measure_chin)
+        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen])
+        for of in (steady_face, measure_chin)
     )
     return StoredBackground(video, maps, chins, tuple(start for start, _ in _list_spans(chosen)[1:]))
 
@@ -152,7 +153,7 @@ def choose_parts(footages: Sequence[Footage]) -> list[_Part]:
     parts = [part for part in parts if (part[0].size, part[0].rate_hz) == most_common]
     least_s = COMPARED_SHARE * min(SHORT_S, max(map(_measure_duration, parts)))
     parts = [part for part in parts if _measure_duration(part) >= least_s]
-    return [parts[number] for number in choose_evenly(MOST_PARTS, len(parts))]
+    return [parts[number] for number in choose_evenly(MAX_PARTS, len(parts))]
 
 
 def _list_spans(parts: Sequence[_Part]) -> list[tuple[int, int]]:
@@ -168,15 +169,17 @@ def _order_parts(parts: Sequence[_Part]) -> list[_Part]:
     descriptors = looping.describe_frames(shown, maps)
     blemishes = []
     for scene in scenes:  # how visible the worst join is if a part is shown for a minute; short ones are worse
-        order = looping.find_loop_order(descriptors.part(*scene), round(SHOWN_S * rate_hz), rate_hz)
+        order = looping.find_loop_order(descriptors.select(*scene), round(SHOWN_S * rate_hz), rate_hz)
         missing = max(0.0, 1 - (scene[1] - scene[0]) / rate_hz / SHORT_S)
         blemishes.append(max((join.cost for join in order.joins), default=0.0) + SHORT_COST * missing)
     part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in scenes])[::COMPARED_STEP]
-    distances = looping.measure_row_distances(descriptors.standardise(scenes, looping.count_fade_frames(rate_hz))[::COMPARED_STEP])
+    distances = looping.measure_row_distances(
+        descriptors.standardise(scenes, looping.count_fade_frames(rate_hz))[::COMPARED_STEP]
+    )
     chosen = [int(np.argmin(blemishes))]
     while True:
         nearest = distances[np.isin(part_of, chosen)].min(axis=0)
-        left_s = MOST_BACKGROUND_S - sum(_measure_duration(parts[number]) for number in chosen)
+        left_s = MAX_BACKGROUND_S - sum(_measure_duration(parts[number]) for number in chosen)
         apart = {
             number: float(nearest[part_of == number].min())
             for number in range(len(parts))
@@ -190,7 +193,7 @@ def _order_parts(parts: Sequence[_Part]) -> list[_Part]:
 
 def divide_footage(footage: Footage) -> list[_Part]:
     """Return the parts of some footage that show the face without a cut: first frame, and the one after the last."""
-    longest = max(1, round(MOST_PART_S * footage.rate_hz))
+    longest = max(1, round(MAX_PART_S * footage.rate_hz))
     parts = []
     for first, last in looping.list_scenes(_mark_usable(footage), footage.cuts):
         count = -(-(last - first) // longest)
@@ -218,12 +221,12 @@ def open_stored_background(background: StoredBackground) -> BackgroundSequence:
     video = background.video
     usable = np.ones(len(video), bool)
     maps, chins = background.face_to_frame, background.chin_px
-    return BackgroundSequence(video.groups, video.rate_hz, maps, chins, usable, background.cuts)
+    return BackgroundSequence(video.open_groups, video.rate_hz, maps, chins, usable, background.cuts)
 
 
 def open_background(path: Path, appearance: Appearance | None = None, *, in_time: bool = False) -> BackgroundSequence:
     """Return a video as a background; warn where it is not ``appearance``'s. Raises InputError: no video, no face."""
-    footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
+    footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MAX_TRACKED_S))
     if appearance is not None:
         frame = int(np.flatnonzero(footage.track.seen)[0])
         shown = next(decode_footage(footage, frame, frame + 1))
@@ -231,7 +234,9 @@ def open_background(path: Path, appearance: Appearance | None = None, *, in_time
             shown, lower_face.map_region(footage.face_to_image[frame], 1), (lower_face.HEIGHT, lower_face.WIDTH)
         )
         recorded = appearance.jaw.mean.T.reshape(lower_face.HEIGHT, lower_face.WIDTH, 3)
-        likely = lower_face.compare_signatures(lower_face.compute_signature(picture), lower_face.compute_signature(recorded))
+        likely = lower_face.compare_signatures(
+            lower_face.compute_signature(picture), lower_face.compute_signature(recorded)
+        )
         if likely < lower_face.SAME_PERSON_LIKENESS:
             warning = (
                 "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
@@ -239,7 +244,9 @@ def open_background(path: Path, appearance: Appearance | None = None, *, in_time
             warning += "footage of the same person"
             LOG.warning(warning, footage.path, likely, lower_face.SAME_PERSON_LIKENESS)
     groups, maps = partial(open_footage, footage), steady_face(footage)
-    return BackgroundSequence(groups, footage.rate_hz, maps, measure_chin(footage), _mark_usable(footage), footage.cuts, in_time)
+    return BackgroundSequence(
+        groups, footage.rate_hz, maps, measure_chin(footage), _mark_usable(footage), footage.cuts, in_time
+    )
 
 
 def measure_chin(footage: Footage) -> NDArray[np.float64]:

@@ -32,11 +32,11 @@ from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_dama
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import UNSEEN_LIMIT, Footage, decode_footage, track_footage
 
-MOST_FOOTAGE_S = 240.0
+MAX_FOOTAGE_S = 240.0
 """Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""
 LONG_S = 10.0
 """Recordings are used whole if they are no longer; of longer ones the beginning, at least so much."""
-MOST_MEASURED_RECORDINGS = 240
+MAX_MEASURED_RECORDINGS = 240
 """The durations of at most so many recordings are read."""
 RIGHTS = ("licence", "attribution")
 """What is kept of the rights of a recording."""
@@ -60,7 +60,7 @@ class Take:
 
 
 def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
-    """Return recordings of one person, about ``MOST_FOOTAGE_S`` in all, spread evenly; long ones are shortened first.
+    """Return recordings of one person, about ``MAX_FOOTAGE_S`` in all, spread evenly; long ones are shortened first.
 
     source     : a video, of which the beginning is used; a folder of recordings, or a prepared corpus: of these the
                  training list
@@ -72,7 +72,7 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
     if source.is_file():
         check_source(source, "video")
         recording = SourceRecording(source.stem, source, None, speaker=speaker)
-        return [_make_take(recording, source.parent, seconds=MOST_FOOTAGE_S)]
+        return [_make_take(recording, source.parent, seconds=MAX_FOOTAGE_S)]
     if (source / MANIFEST).is_file():
         takes = _list_corpus(Corpus.open(source), recordings, speaker)
     else:
@@ -81,16 +81,16 @@ def choose_takes(source: Path, recordings: Path | None = None, speaker: str = ""
         takes = [_make_take(item, source) for item in [item for item in items if item.split == "train"] or items]
     if not takes:
         raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
-    durations_s = [_read_duration(takes[index]) for index in choose_evenly(MOST_MEASURED_RECORDINGS, len(takes))]
-    longest_s = left_s = MOST_FOOTAGE_S
+    durations_s = [_read_duration(takes[index]) for index in choose_evenly(MAX_MEASURED_RECORDINGS, len(takes))]
+    longest_s = left_s = MAX_FOOTAGE_S
     for number, duration_s in enumerate(sorted(durations_s)):
         share_s = left_s / (len(durations_s) - number)
-        if duration_s > share_s:  # all of them have MOST_FOOTAGE_S together
+        if duration_s > share_s:  # all of them have MAX_FOOTAGE_S together
             longest_s = max(share_s, LONG_S)
             break
         left_s -= duration_s
     mean_s = sum(min(duration_s, longest_s) for duration_s in durations_s) / len(durations_s)
-    chosen = choose_evenly(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
+    chosen = choose_evenly(ceil(MAX_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))
     used = [takes[index] for index in chosen]
     if max(durations_s) <= longest_s:
         return used
@@ -166,11 +166,11 @@ def _read_duration(take: Take) -> float:
 
 LOG = logging.getLogger("lipmotion")
 
-LEAST_FOOTAGE_S = 10.0
+MIN_FOOTAGE_S = 10.0
 """Shorter footage is refused: of 3 s the pictures are wrong (docs/results/video.md)."""
 GOOD_FOOTAGE_S = 60.0
 """Shorter footage is warned about."""
-MOST_PICTURES_HZ = 30.0
+MAX_PICTURES_HZ = 30.0
 """Every second frame, or fewer, of faster video is learned from."""
 SPOKEN_TAKES_S = 20.0
 """Seconds of speech that are kept, for motion of other people's models."""
@@ -209,7 +209,7 @@ def build_face(
     recordings : of a corpus, the folder of the videos that it was prepared from
     speaker    : whose face, where there are several people
     name       : of the face; empty: the speaker's, or the file's
-    Raises InputError: no such footage, several people, or less than ``LEAST_FOOTAGE_S`` with the face.
+    Raises InputError: no such footage, several people, or less than ``MIN_FOOTAGE_S`` with the face.
     Raises MissingDependencyError: OpenCV or MediaPipe is not installed.
     Source: Xie & Liu 2007, §5, §6.
 
@@ -221,9 +221,9 @@ def build_face(
     takes = choose_takes(source, None if recordings is None else Path(recordings), speaker)
     filmed = _film_all(takes, processes, monitor)
     seconds = sum(len(take.used) / take.footage.rate_hz * _step(take.footage) for take in filmed)
-    if seconds < LEAST_FOOTAGE_S:
+    if seconds < MIN_FOOTAGE_S:
         raise InputError(
-            f"{source}: {seconds:.1f} s of footage with the face, required {LEAST_FOOTAGE_S:.0f} s or more, "
+            f"{source}: {seconds:.1f} s of footage with the face, required {MIN_FOOTAGE_S:.0f} s or more, "
             f"{GOOD_FOOTAGE_S:.0f} s of varied speech for good pictures; give a longer video, or a folder of several"
         )
     if seconds < GOOD_FOOTAGE_S:
@@ -334,7 +334,7 @@ def read_sound(take: Take) -> Audio | None:
 
 def _step(footage: Footage) -> int:
     """Return how many frames of a video there are for each that is learned from."""
-    return max(1, int(np.ceil(footage.rate_hz / MOST_PICTURES_HZ - 1e-6)))
+    return max(1, int(np.ceil(footage.rate_hz / MAX_PICTURES_HZ - 1e-6)))
 
 
 def _cut_lower_faces(footage: Footage, frames: NDArray[np.intp], scale: int) -> NDArray[np.uint8]:

@@ -128,7 +128,7 @@ def make_film(  # noqa: PLR0913
     if options.overlay == "inset" and speech is not None:
         frames, rate_hz = read_video_frames(speech)
         codes = _make_codes(face, timed, sound, rate_hz, eigenlips, options)
-        mouths = Stitcher(face.appearance, stitching).mouths(codes)
+        mouths = Stitcher(face.appearance, stitching).draw_mouths(codes)
         first = next(frames, None)
         if first is None:
             raise InputError(f"{speech}: holds no pictures; give a video as speech")
@@ -146,7 +146,7 @@ def make_film(  # noqa: PLR0913
     codes = _make_codes(face, timed, sound, rate_hz, eigenlips, options)
     has_jaw = options.jaw != "none" and options.overlay is None
     stitcher = Stitcher(face.appearance, replace(stitching, jaw=has_jaw))
-    frames = stitcher.stitch(codes, background.frames(len(codes), rate_hz))
+    frames = stitcher.stitch(codes, background.decode(len(codes), rate_hz))
     return Film(frames, len(codes), rate_hz, background.face_box)
 
 

@@ -15,7 +15,7 @@ from lipmotion.storage import schema
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive
 from lipmotion.storage.sources import check_source
 from lipmotion.types import Audio, Channel, Motion
-from lipmotion_faces.appearance.person import Appearance, appearance_to_arrays, appearance_from_arrays
+from lipmotion_faces.appearance.person import Appearance, appearance_from_arrays, appearance_to_arrays
 from lipmotion_faces.coded_video import STORED_VIDEO, StoredVideo, stored_video_from_arrays, stored_video_to_arrays
 
 Array = NDArray[np.float64]
@@ -134,8 +134,8 @@ def load_face(path: str | Path) -> FilmedFace:
         arrays = read_archive(path)
         with schema.format_errors("the face", "build it again"):
             count = int(header["takes"])
-            if not 0 <= count <= MOST_TAKES:
-                raise ValueError(f"{count} takes, required 0 to {MOST_TAKES}")
+            if not 0 <= count <= MAX_TAKES:
+                raise ValueError(f"{count} takes, required 0 to {MAX_TAKES}")
             folders = ("appearance", "background", *(f"take{number}" for number in range(count)))
             inner = {folder: schema.select_arrays(arrays, f"{folder}/") for folder in folders}
             schema.refuse_undeclared(arrays, (f"{folder}/{key}" for folder, part in inner.items() for key in part))
@@ -158,7 +158,7 @@ def read_face_header(path: Path) -> dict[str, Any]:
     return read_header_of(path, FORMAT, VERSION, "face", "give a file that `lipmotion face build` wrote")
 
 
-MOST_TAKES = 1000
+MAX_TAKES = 1000
 BACKGROUND = {
     "face_to_frame": schema.ArraySpec(np.float64, "T 2 3", -1e5, 1e5),
     "chin_px": schema.ArraySpec(np.float64, "T", 0, 1000),
@@ -178,7 +178,7 @@ def _read_background(arrays: schema.Arrays) -> StoredBackground:
     video = stored_video_from_arrays({name: array for name, array in arrays.items() if name not in BACKGROUND})
     stored = schema.check_arrays(arrays, BACKGROUND, T=len(video))
     maps = stored["face_to_frame"]
-    if (np.abs(np.linalg.det(maps[:, :, :2])) < LEAST_DETERMINANT).any() or any(length % 2 for length in video.size):
+    if (np.abs(np.linalg.det(maps[:, :, :2])) < MIN_DETERMINANT).any() or any(length % 2 for length in video.size):
         raise ValueError("flat places of the face, or frames of odd sizes")
     cuts = stored.arrays.get("cuts", np.zeros(0, np.intp))
     if (np.diff(cuts) < 1).any() or (cuts >= len(video)).any():
@@ -186,7 +186,7 @@ def _read_background(arrays: schema.Arrays) -> StoredBackground:
     return StoredBackground(video, maps, stored["chin_px"], tuple(cuts.tolist()))
 
 
-LEAST_DETERMINANT = 1e-6
+MIN_DETERMINANT = 1e-6
 """A map with a smaller determinant has no inverse."""
 
 

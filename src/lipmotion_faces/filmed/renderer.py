@@ -101,15 +101,15 @@ class Stitcher:
             ]
             behind = np.clip(np.rint(np.stack(aligned)), 0, 255).astype(np.uint8)
             if self.options.jaw:
-                jaws = self._jaws.pictures(codes.jaw[part], jaw_chosen[part])
+                jaws = self._jaws.refine(codes.jaw[part], jaw_chosen[part])
                 chins = np.array([each.chin_px for each in batch])
                 behind = lower_face.move_chin(behind, chins, codes.chin_px[part] - chins)
                 behind = self._lower_face.clone(
-                    lower_face.relight(jaws, self._gains(behind)), behind, LARGEST_DIFFERENCE
+                    lower_face.relight(jaws, self._measure_gains(behind)), behind, LARGEST_DIFFERENCE
                 )
             source, mouth = behind.copy(), (slice(None), *lower_face.find_mouth_part(scale))
             source[mouth] = candidates.sharpen(
-                lower_face.relight(mouths, self._gains(behind)), self.options.sharpening, scale
+                lower_face.relight(mouths, self._measure_gains(behind)), self.options.sharpening, scale
             )
             patches = self._mouth_alone.clone(source, behind)
             for each, patch, to in zip(batch, patches, maps, strict=True):
@@ -118,7 +118,7 @@ class Stitcher:
                     place(frame, patch, self._weight, to)
                 yield frame
 
-    def mouths(self, codes: FaceCodes) -> Iterator[Picture]:
+    def draw_mouths(self, codes: FaceCodes) -> Iterator[Picture]:
         """Yield pictures of the mouth alone [shape=(56 · scale, 72 · scale, 3)], one for each frame of motion."""
         codes = self._average(codes)
         chosen = self._mouths.choose(codes.mouth)
@@ -136,10 +136,10 @@ class Stitcher:
         if self.options.mouth is None:
             pictures = self._mouths.eigenlips.restore(codes)
         else:
-            pictures = self._mouths.pictures(codes, chosen)
+            pictures = self._mouths.refine(codes, chosen)
         return self._noise.add(pictures, first) if self.options.noise else pictures
 
-    def _gains(self, behind: Pictures) -> Array:
+    def _measure_gains(self, behind: Pictures) -> Array:
         """Return how much lighter the footage is than the pictures of the person, in each colour [shape=(T, 3)]."""
         part = (slice(None), *lower_face.find_mouth_part(self.appearance.scale))
         return np.maximum(lower_face.measure_cheek_light(behind[part]), 1.0) / self.appearance.light

@@ -1,7 +1,7 @@
 """A three-dimensional head: a friendly character made by this code, drawn without a graphics card.
 
 The spoken mouth and what moves beside it (``articulation``) become poses (``pose``); a pose moves the surfaces
-(``skin`` with ``lips``, ``inside``, ``eyes``), which ``make_figure`` puts together, lights and gives to the rasteriser. The
+(``skin`` with ``lips``, ``inside``, ``eyes``), which ``make_figure`` joins, lights and gives to the rasteriser. The
 forms are made once.
 """
 
@@ -62,4 +62,4 @@ class Head(Face):
         if self.staging.size:
             width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST_PX), self.staging.size
         stage = Stage(make_camera(width, height), self.staging.colour)
-        return stage.cut_out if self.staging.background == TRANSPARENT else stage.picture
+        return stage.cut_out if self.staging.background == TRANSPARENT else stage.draw

@@ -46,16 +46,16 @@ class Eyelids:
         self._x = np.linspace(part.EYE[0] - 0.3, part.EYE[0] + 0.3, 61)
         self._y = np.linspace(-0.28, 0.3, 59)
         grid = np.meshgrid(self._x, self._y, indexing="ij")
-        depth = part.find_front(part.measure_head, grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
+        depth = part.find_front(part.to_head, grid[0].ravel(), grid[1].ravel()).reshape(grid[0].shape)
         self._depth = spline_filter(depth, order=3)
 
-    def edge(self) -> Real:
+    def find_edge(self) -> Real:
         """Return the outermost ring, which never moves [shape=(LID_COLUMNS, 3)]."""
         angle = np.where(LID_SIDE > 0, np.arccos(LID_ACROSS), -np.arccos(LID_ACROSS))
         up = np.where(LID_SIDE > 0, _EDGE_UP, _EDGE_DOWN)
         return self._lift(part.EYE[0] + _EDGE_X * np.cos(angle), up * np.sin(angle))
 
-    def opening(self, pose: CharacterPose) -> tuple[Real, Real]:
+    def place_opening(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return column and height of the edge of the lids [shape=(LID_COLUMNS,), both]."""
         gaze, bow, mood = 0.10 * pose.gaze[1], 1 - LID_ACROSS**2, pose.mood
         squint = 0.6 * max(pose.smile, 0.0)
@@ -68,10 +68,10 @@ class Eyelids:
         upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (lower - upper), lower)
         return part.EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 
-    def rings(self, pose: CharacterPose) -> Real:
+    def place_rings(self, pose: CharacterPose) -> Real:
         """Return all rings but the outermost, from the eyeball outwards [shape=(LID_RINGS, LID_COLUMNS, 3)]."""
-        x, y = self.opening(pose)
-        edge = self.edge()
+        x, y = self.place_opening(pose)
+        edge = self.find_edge()
         share = (np.arange(LID_RINGS - 1) / (LID_RINGS - 1))[:, None] ** 1.25
         rings = self._lift((x + share * (edge[:, 0] - x)).ravel(), (y + share * (edge[:, 1] - y)).ravel())
         rings = rings.reshape(LID_RINGS - 1, LID_COLUMNS, 3)
@@ -171,7 +171,7 @@ def make_brow() -> part.Part:
     share = np.linspace(0, 1, 30)
     x = 0.135 + 0.40 * share
     y = 0.279 + 0.006 * share + 0.026 * np.sin(np.pi * share**1.3)
-    path = np.stack([x, y, part.find_front(part.measure_head, x, y) + 0.004], axis=1)
+    path = np.stack([x, y, part.find_front(part.to_head, x, y) + 0.004], axis=1)
     wide = 0.033 * np.clip(1.02 - share, 0.01, 1) ** 0.6 * np.clip(share / 0.4, 0.02, 1) ** 0.6
     upward = np.broadcast_to([0.25, 0.1, 1.0], path.shape)
     places, triangles, strands = part.make_tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)

@@ -14,9 +14,34 @@ from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.base import rotate_head
 from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.eyes import LASHES, LID_SIDE, make_brow, make_catchlights, make_eyeball, list_lash_triangles, place_lashes, shift_brow
-from lipmotion_faces.head.inside import measure_drop, make_lower_teeth, place_tongue, list_tongue_triangles, make_upper_teeth
-from lipmotion_faces.head.part import EYE, MIDDLE, Part, list_grid_triangles, measure_head, join_parts, make_part, find_from_middle, make_tube
+from lipmotion_faces.head.eyes import (
+    LASHES,
+    LID_SIDE,
+    list_lash_triangles,
+    make_brow,
+    make_catchlights,
+    make_eyeball,
+    place_lashes,
+    shift_brow,
+)
+from lipmotion_faces.head.inside import (
+    list_tongue_triangles,
+    make_lower_teeth,
+    make_upper_teeth,
+    measure_drop,
+    place_tongue,
+)
+from lipmotion_faces.head.part import (
+    EYE,
+    MIDDLE,
+    Part,
+    find_from_middle,
+    join_parts,
+    list_grid_triangles,
+    make_part,
+    make_tube,
+    to_head,
+)
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, measure_closure, move_jaw
 from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach, normalise
@@ -64,12 +89,12 @@ def _make_cap() -> Part:
     loop = np.concatenate([half_loop, half_loop[-2:0:-1] * [-1, 1, 1], half_loop[:1]])
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))])
     curve = CubicSpline(length, loop, bc_type="periodic")(np.arange(_COLUMNS) / _COLUMNS * length[-1])
-    line = find_from_middle(measure_head, normalise(curve - MIDDLE))  # where the hair begins, clockwise from above
+    line = find_from_middle(to_head, normalise(curve - MIDDLE))  # where the hair begins, clockwise from above
     start, pole = normalise(line - MIDDLE), normalise(BUN - MIDDLE)
     share = np.linspace(0, 1, _ROWS)[:, None, None] ** 1.15
     angle = np.arccos(np.clip(start @ pole, -1, 1))[None, :, None]
     ways = (np.sin((1 - share) * angle) * start + np.sin(share * angle) * pole) / np.sin(angle)
-    skin = find_from_middle(measure_head, ways.reshape(-1, 3)).reshape(ways.shape)
+    skin = find_from_middle(to_head, ways.reshape(-1, 3)).reshape(ways.shape)
     phase = 2 * np.pi * np.arange(_COLUMNS) / _COLUMNS
     share = share[..., 0]
     wave = 0.5 * np.sin(23 * phase + 2 * np.sin(3 * phase)) + 0.3 * np.sin(41 * phase + 1.3) + 0.2 * np.sin(67 * phase)
@@ -99,7 +124,9 @@ def _make_bun() -> Part:
     places = np.stack([x, 0.33 * radius * np.cos(down), z], axis=-1)
     strands = normalise(np.stack([-np.sin(around), 0.6 * np.ones_like(around), np.cos(around)], axis=-1).reshape(-1, 3))
     triangles = list_grid_triangles(36, 128, closed=True)[:, ::-1]
-    return make_part("bun", places.reshape(-1, 3) + BUN, triangles, _draw_streaks(height.ravel()), palette.HAIR_FINISH, strands)
+    return make_part(
+        "bun", places.reshape(-1, 3) + BUN, triangles, _draw_streaks(height.ravel()), palette.HAIR_FINISH, strands
+    )
 
 
 def _make_lock(points: Sequence[Sequence[float]], wide: float, thick: float, shade: float) -> Part:
@@ -108,7 +135,7 @@ def _make_lock(points: Sequence[Sequence[float]], wide: float, thick: float, sha
     share = np.linspace(0, 1, 36)
     curve = CubicSpline(np.linspace(0, 1, len(knots)), knots)(share)
     ways = normalise(curve[:, :3] - MIDDLE)
-    path = find_from_middle(measure_head, ways) + curve[:, 3:] * ways
+    path = find_from_middle(to_head, ways) + curve[:, 3:] * ways
     taper = np.clip(1.15 * np.sin(np.pi * np.clip(0.12 + 0.87 * share, 0, 1)), 0.015, 1) ** 0.7
     places, triangles, strands = make_tube(path, wide * taper, thick * taper, ways, sides=16)
     across = np.tile(np.cos(2 * np.pi * np.arange(16) / 16), 36)
@@ -148,10 +175,14 @@ def make_earring() -> Part:
     down, around = np.meshgrid(np.linspace(0, np.pi, 12), 2 * np.pi * np.arange(20) / 20, indexing="ij")
     ball = np.stack([np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)], axis=-1)
     places = 0.035 * ball.reshape(-1, 3) + np.array([0.835, -0.455, -0.74])
-    return make_part("earring", places, list_grid_triangles(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH)
+    return make_part(
+        "earring", places, list_grid_triangles(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH
+    )
 
 
-def _make_rings(name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish) -> Part:
+def _make_rings(
+    name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish
+) -> Part:
     """Return a part of rings about the body from rows (height, half width, half depth, middle z, squareness)."""
     at = np.linspace(0, len(table) - 1, count)
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
@@ -213,7 +244,7 @@ def paint_skin(skin: Skin) -> Real:
     tint(0.12, (0, -1.05), (0.15, 0.1), palette.BLUSH)
     tint(0.25, (0.33, 0.17), (0.2, 0.06), palette.BLUSH)
     tint(0.8, (0.055, -0.495), (0.028, 0.018), palette.SKIN_DEEP)
-    lips = skin.lip_rows()
+    lips = skin.list_lip_rows()
     bare = colour[lips[0]]
     colour[lips[1]] = 0.45 * colour[lips[1]] + 0.55 * np.array(palette.LIP)
     colour[lips[2 : VISIBLE_RINGS - 1].ravel()] = palette.LIP
@@ -224,7 +255,7 @@ def paint_skin(skin: Skin) -> Real:
     colour[lips[1:VISIBLE_RINGS]] += faded * (bare - colour[lips[1:VISIBLE_RINGS]])
     colour[lips[VISIBLE_RINGS + 1 :].ravel()] = palette.MOUTH
     for eye in range(2):
-        lids = skin.lid_rows(eye)
+        lids = skin.list_lid_rows(eye)
         colour[lids[0]] = palette.EYE_CORNER
         colour[lids[1]] = 0.5 * np.array(palette.EYE_CORNER) + 0.5 * np.array(palette.SKIN)
         for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
@@ -298,7 +329,7 @@ class Figure:
             [np.zeros_like(each.places) if each.strands is None else each.strands for each in parts]
         )
         self._kinds = np.repeat([palette.FINISHES.index(each.finish) for each in parts], np.diff(stops)).astype(np.intp)
-        lips = self.skin.lip_rows()
+        lips = self.skin.list_lip_rows()
         self._kinds[lips[1 : VISIBLE_RINGS + 2].ravel()] = palette.FINISHES.index(palette.LIP_FINISH)
         self._wall = lips[VISIBLE_RINGS + 1 : RINGS].ravel()
         self._kinds[lips[VISIBLE_RINGS + 2 :].ravel()] = palette.FINISHES.index(palette.MOUTH_FINISH)
@@ -328,7 +359,7 @@ class Figure:
             places[self.rows[name]] += shift_brow(places[self.rows[name]], pose)
             places[self.rows[name], 1] += pose.brows
         look, half = rotate_head(*pose.gaze), rotate_head(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
-        lid = places[self.skin.lid_rows(0)[1][:LASHES]]
+        lid = places[self.skin.list_lid_rows(0)[1][:LASHES]]
         for side, name in _EYES:
             flip = np.array([side, 1.0, 1.0])
             eye = self.rows[name + "eye"]
@@ -339,7 +370,7 @@ class Figure:
             normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
         return places, normals
 
-    def frame(self, pose: CharacterPose, viewer: Real) -> Drawn:
+    def shade(self, pose: CharacterPose, viewer: Real) -> Drawn:
         """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
         places, normals = self.place(pose)
         colours, arrives = self._shade(pose, places)
@@ -351,10 +382,10 @@ class Figure:
         strands[moving] = strands[moving] @ turn
         for turning, unturned in zip((places, normals), still, strict=True):
             turning[neck] = held * unturned + (1 - held) * turning[neck]
-        light = self._lighting.light(places, normals, colours, self._kinds, viewer, reaches=arrives, strands=strands)
+        light = self._lighting.shade(places, normals, colours, self._kinds, viewer, reaches=arrives, strands=strands)
         return Drawn(places, light)
 
-    def turning(self) -> Real:
+    def weigh_turn(self) -> Real:
         """Return how far each vertex turns with the head about ``PIVOT``: 0 the body, 1 the head [shape=(V,)]."""
         share = np.zeros(len(self._places))
         share[self.head] = 1 - self._held[self.head, 0]
@@ -363,13 +394,13 @@ class Figure:
     def _shade(self, pose: CharacterPose, places: Real) -> tuple[Real, Real]:
         """Return colours and arriving light: eyes are darker under their lids, the mouth is darker inside."""
         colours, arrives = self.colours.copy(), self._reaches.copy()
-        x, y = self.skin.lids_of_eye.opening(pose)
+        x, y = self.skin.lids_of_eye.place_opening(pose)
         for side, name in _EYES:
             eye = self.rows[name + "eye"]
             upper = np.interp(side * places[eye, 0], x[:LASHES], y[:LASHES])
             under = np.clip((upper - places[eye, 1] + 0.01) / 0.085, 0, 1)
             colours[eye] *= (0.6 + 0.4 * under)[:, None]
-        ring = places[self.rows["skin"]][self.skin.lip_rows()[VISIBLE_RINGS - 1]]
+        ring = places[self.rows["skin"]][self.skin.list_lip_rows()[VISIBLE_RINGS - 1]]
         top, low = ring[_UPPER_COLUMN, 1], ring[_LOWER_COLUMN, 1]
         front = 0.5 * (ring[_UPPER_COLUMN, 2] + ring[_LOWER_COLUMN, 2])
         span, half = max(top - low, 0.0), max(0.26 * pose.width, 0.1)
@@ -384,7 +415,7 @@ class Figure:
             arrives[rows] = lit[:, None]
         licked = TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
         arrives[self.rows["tongue"]] = np.minimum(1.0, licked)
-        lips, closed = self.skin.lip_rows(), measure_closure(pose)
+        lips, closed = self.skin.list_lip_rows(), measure_closure(pose)
         for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE_RINGS - len(SEAM_LIGHT)):
             shaded = np.maximum(closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER)
             arrives[lips[ring]] *= 1 - (1 - part_of) * shaded

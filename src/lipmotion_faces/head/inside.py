@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.part import MOUTH_Y, Part, list_grid_triangles, join_parts, make_part
+from lipmotion_faces.head.part import MOUTH_Y, Part, join_parts, list_grid_triangles, make_part
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import ARCH, TEETH_EDGE, TEETH_Z, move_jaw
 

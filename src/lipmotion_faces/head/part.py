@@ -112,7 +112,7 @@ MIDDLE = np.array([0.0, -0.3, -0.75])
 """A place inside the head from which every place of the skin can be seen."""
 
 
-def measure_ellipsoid(p: Real, centre: tuple[float, float, float], radii: tuple[float, float, float]) -> Real:
+def to_ellipsoid(p: Real, centre: tuple[float, float, float], radii: tuple[float, float, float]) -> Real:
     """Return the approximate distance from an ellipsoid. Source: Quilez, "Distance functions"."""
     away = p - np.array(centre)
     first = np.linalg.norm(away / np.array(radii), axis=1)
@@ -120,7 +120,7 @@ def measure_ellipsoid(p: Real, centre: tuple[float, float, float], radii: tuple[
     return np.asarray(first * (first - 1) / np.maximum(second, 1e-9))
 
 
-def measure_cone(p: Real, a: tuple[float, float, float], b: tuple[float, float, float], ra: float, rb: float) -> Real:
+def to_cone(p: Real, a: tuple[float, float, float], b: tuple[float, float, float], ra: float, rb: float) -> Real:
     """Return the approximate distance from a rounded cone between two balls."""
     start, axis = np.array(a), np.array(b) - np.array(a)
     along = np.clip((p - start) @ axis / (axis @ axis), 0, 1)
@@ -138,23 +138,23 @@ def cut(a: Real, b: Real, blend: float) -> Real:
     return -unite(-a, b, blend)
 
 
-def measure_head(p: Real) -> Real:
+def to_head(p: Real) -> Real:
     """Return the distance from the skin of the head without neck, lips, eyes open or shut, and ears."""
     q = p.copy()
     q[:, 0] = np.abs(q[:, 0])
-    d = measure_ellipsoid(q, (0, 0.34, -0.80), (0.83, 0.92, 0.93))
-    d = unite(d, measure_ellipsoid(q, (0, -0.30, -0.60), (0.72, 0.78, 0.60)), 0.35)
-    d = unite(d, measure_ellipsoid(q, (0.34, -0.35, -0.33), (0.30, 0.27, 0.32)), 0.3)
-    d = unite(d, measure_cone(q, (0.0, -0.95, -0.27), (0.33, -0.60, -0.62), 0.16, 0.22), 0.35)
-    d = unite(d, measure_ellipsoid(q, (0, -0.98, -0.185), (0.19, 0.14, 0.16)), 0.22)
-    d = unite(d, measure_ellipsoid(q, (0, -0.71, -0.17), (0.36, 0.27, 0.22)), 0.25)
-    d = cut(d, measure_ellipsoid(q, (0.335, 0.0, 0.115), (0.27, 0.2, 0.14)), 0.2)
+    d = to_ellipsoid(q, (0, 0.34, -0.80), (0.83, 0.92, 0.93))
+    d = unite(d, to_ellipsoid(q, (0, -0.30, -0.60), (0.72, 0.78, 0.60)), 0.35)
+    d = unite(d, to_ellipsoid(q, (0.34, -0.35, -0.33), (0.30, 0.27, 0.32)), 0.3)
+    d = unite(d, to_cone(q, (0.0, -0.95, -0.27), (0.33, -0.60, -0.62), 0.16, 0.22), 0.35)
+    d = unite(d, to_ellipsoid(q, (0, -0.98, -0.185), (0.19, 0.14, 0.16)), 0.22)
+    d = unite(d, to_ellipsoid(q, (0, -0.71, -0.17), (0.36, 0.27, 0.22)), 0.25)
+    d = cut(d, to_ellipsoid(q, (0.335, 0.0, 0.115), (0.27, 0.2, 0.14)), 0.2)
     d = unite(d, np.linalg.norm(q - EYE, axis=1) - LID_RADIUS, 0.05)
-    d = unite(d, measure_cone(q, (0, 0.10, -0.07), (0, -0.35, 0.10), 0.052, 0.078), 0.14)
-    d = unite(d, measure_ellipsoid(q, (0, -0.40, 0.135), (0.092, 0.082, 0.095)), 0.1)
-    d = unite(d, measure_ellipsoid(q, (0.094, -0.43, 0.045), (0.06, 0.055, 0.075)), 0.06)
-    d = cut(d, measure_ellipsoid(q, (0.052, -0.495, 0.105), (0.034, 0.026, 0.05)), 0.025)
-    return cut(d, measure_ellipsoid(q, (0, -0.57, 0.08), (0.036, 0.07, 0.036)), 0.09)
+    d = unite(d, to_cone(q, (0, 0.10, -0.07), (0, -0.35, 0.10), 0.052, 0.078), 0.14)
+    d = unite(d, to_ellipsoid(q, (0, -0.40, 0.135), (0.092, 0.082, 0.095)), 0.1)
+    d = unite(d, to_ellipsoid(q, (0.094, -0.43, 0.045), (0.06, 0.055, 0.075)), 0.06)
+    d = cut(d, to_ellipsoid(q, (0.052, -0.495, 0.105), (0.034, 0.026, 0.05)), 0.025)
+    return cut(d, to_ellipsoid(q, (0, -0.57, 0.08), (0.036, 0.07, 0.036)), 0.09)
 
 
 def trace_rays(form: Form, start: Real, direction: Real, *, steps: int = 70) -> Real:

@@ -130,8 +130,8 @@ def pose_head(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
 def stack_poses(poses: Sequence[CharacterPose]) -> CharacterPose:
     """Return poses as one whose numbers are columns [shape=(T, 1)]: for what is computed for many at once."""
 
-    def columns(rows: Sequence[Any]) -> list[Any]:  # a member of several numbers is left out: empty
+    def stack(rows: Sequence[Any]) -> list[Any]:  # a member of several numbers is left out: empty
         numbers = ([] if isinstance(column[0], tuple) else column for column in zip(*rows, strict=True))
         return [np.array(column, float)[:, None] for column in numbers]
 
-    return CharacterPose._make(columns(poses))._replace(mood=UpperFace._make(columns([pose.mood for pose in poses])))
+    return CharacterPose._make(stack(poses))._replace(mood=UpperFace._make(stack([pose.mood for pose in poses])))

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial import Delaunay, cKDTree
 
-from lipmotion.articulation.contact import LEAST_GAP, smooth_step
+from lipmotion.articulation.contact import MIN_GAP, smooth_step
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
-from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, measure_head, find_outward, find_front, find_from_middle
+from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, find_from_middle, find_front, find_outward, to_head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.rendering.lighting import normalise
 
@@ -96,7 +96,9 @@ def place_sections(pose: CharacterPose, base_z: Real) -> Real:
     middle = _find_between(pose)
     # how much nearer to the middle than the corners the inner edge of the lips lies
     hole_share = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
-    as_ring = np.maximum(1 - hole_share, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * measure_closure(pose, RING_GAP))
+    as_ring = (
+        np.maximum(1 - hole_share, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * measure_closure(pose, RING_GAP))
+    )
     squeeze = as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
     rounded = _ENVELOPE ** (1 + np.minimum(2 * pose.roundness, 1.0))
     belly = rounded + squeeze * (1 - rounded)
@@ -121,7 +123,7 @@ def place_sections(pose: CharacterPose, base_z: Real) -> Real:
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
     contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * measure_closure(pose)
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
-    below_upper = np.minimum(BITTEN_EDGE_Y - middle, rise - LEAST_GAP)  # the teeth part the lips
+    below_upper = np.minimum(BITTEN_EDGE_Y - middle, rise - MIN_GAP)  # the teeth part the lips
     on_teeth = np.minimum(middle + below_upper * hole, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
     crest = _find_meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
@@ -246,8 +248,8 @@ class Binding:
 
     def move(self, pose: CharacterPose, contour: Real, columns: Binding) -> Real:
         """Return the places [shape=(..., N, 3)], bound to columns of the contour [shape=(..., COLUMNS, 3)]."""
-        places = self._by_jaw(pose)
-        places[..., self.bound, :] += self.shares @ (contour - columns._by_jaw(pose))
+        places = self._move_by_jaw(pose)
+        places[..., self.bound, :] += self.shares @ (contour - columns._move_by_jaw(pose))
         spread, roundness, cheek, sneer = (
             np.asarray(number)[..., None] for number in (pose.spread, pose.roundness, pose.mood.cheek, pose.mood.sneer)
         )
@@ -256,7 +258,7 @@ class Binding:
         places[..., : len(self.columns), :] = contour[..., self.columns, :]
         return places
 
-    def _by_jaw(self, pose: CharacterPose) -> Real:
+    def _move_by_jaw(self, pose: CharacterPose) -> Real:
         """Return the places with the jaw of a pose [shape=(..., N, 3)]."""
         turned = move_jaw(self.places, pose.jaw)
         return np.asarray(self.places + self.jaw_weight[:, None] * (turned - self.places))
@@ -272,17 +274,17 @@ class Skin:
     def __init__(self) -> None:
         self.lids_of_eye = Eyelids()
         contour = place_sections(REST, np.zeros(COLUMNS))[0]
-        self.base_z = find_front(measure_head, contour[:, 0], contour[:, 1])
+        self.base_z = find_front(to_head, contour[:, 0], contour[:, 1])
         contour[:, 2] = self.base_z
-        edge = self.lids_of_eye.edge()
+        edge = self.lids_of_eye.find_edge()
         edges = np.concatenate([edge, edge * [-1, 1, 1]])
         fill = _fill(contour, edges)
         self.face = np.concatenate([contour, edges, fill])
         triangles = _list_triangles(self.face, len(contour), len(edges) // 2)
         self._first_lip = len(self.face)
         self._first_lid = self._first_lip + (RINGS - 1) * COLUMNS
-        grids = [_close_grid(self.lip_rows())]
-        grids += [_close_grid(self.lid_rows(0)[::-1]), _close_grid(self.lid_rows(1))]
+        grids = [_close_grid(self.list_lip_rows())]
+        grids += [_close_grid(self.list_lid_rows(0)[::-1]), _close_grid(self.list_lid_rows(1))]
         self.triangles = np.concatenate([triangles, *grids]).astype(np.int32)
         front = 2 * VISIBLE_RINGS * COLUMNS
         wall, lids = len(grids[0]) - front, len(grids[1]) + len(grids[2])
@@ -290,22 +292,22 @@ class Skin:
         self._contour = contour
         self.binding = self._bind(fill)
         self._columns = self.binding.select(np.arange(COLUMNS))
-        self.rest = self.places(REST)
+        self.rest = self.place(REST)
         self._meshed_rest = compute_normals(self.rest, self.triangles)
         self.normals = self._meshed_rest.copy()
-        self.normals[len(contour) + len(edges) : len(self.face)] = find_outward(measure_head, fill)
-        self._before_lips = find_outward(measure_head, contour)
+        self.normals[len(contour) + len(edges) : len(self.face)] = find_outward(to_head, fill)
+        self._before_lips = find_outward(to_head, contour)
         corners = self.rest[[0, _LEFT_CORNER]]
         beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
         self._calm = np.ones((len(self.rest), 1))
         self._calm[: len(self.face), 0] -= 0.85 * np.exp(-((beside / CALM_RADIUS) ** 2))
 
-    def lip_rows(self) -> Index:
+    def list_lip_rows(self) -> Index:
         """Return the vertices of the lips, ring by ring from the skin inwards [shape=(RINGS, COLUMNS)]."""
         inner = self._first_lip + np.arange((RINGS - 1) * COLUMNS).reshape(RINGS - 1, COLUMNS)
         return np.concatenate([np.arange(COLUMNS)[None], inner])
 
-    def lid_rows(self, eye: int) -> Index:
+    def list_lid_rows(self, eye: int) -> Index:
         """Return the vertices of the lids of the left (0) or right (1) eye [shape=(LID_RINGS + 1, LID_COLUMNS)]."""
         outer = COLUMNS + eye * LID_COLUMNS + np.arange(LID_COLUMNS)
         first = self._first_lid + eye * LID_RINGS * LID_COLUMNS
@@ -314,10 +316,10 @@ class Skin:
 
     def pose(self, pose: CharacterPose) -> tuple[Real, Real]:
         """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
-        places = self.places(pose)
+        places = self.place(pose)
         change = compute_normals(places, self.triangles) - self._meshed_rest
         normals = self.normals + self._calm * change
-        rows, closed = self.lip_rows(), measure_closure(pose)
+        rows, closed = self.list_lip_rows(), measure_closure(pose)
         normals[rows[VISIBLE_RINGS - 1]] += closed * (
             normals[rows[VISIBLE_RINGS - 2]] - normals[rows[VISIBLE_RINGS - 1]]
         )
@@ -349,19 +351,19 @@ class Skin:
         out = np.stack([(np.abs(fill[:, 0]) - 0.40) / 0.15, (fill[:, 1] + 0.47) / 0.15], axis=1)
         share = np.exp(-np.sum(out**2, axis=1)) * (fill[:, 2] > -0.75)
         cheeks, nose = np.zeros_like(face), np.zeros_like(face)
-        cheeks[len(face) - len(fill) :] = share[:, None] * (find_outward(measure_head, fill) + np.array([0.0, 0.4, 0.0]))
+        cheeks[len(face) - len(fill) :] = share[:, None] * (find_outward(to_head, fill) + np.array([0.0, 0.4, 0.0]))
         out = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
         nose[:, 1] = np.exp(-out) * (face[:, 2] > -0.5)
         jaw = smooth_step((-0.47 - face[:, 1]) / 0.40) * smooth_step((face[:, 2] + 0.98) / 0.45)
         return Binding(face, np.arange(COLUMNS), jaw, bound, shares, cheeks, nose)
 
-    def places(self, pose: CharacterPose) -> Real:
+    def place(self, pose: CharacterPose) -> Real:
         """Return the places of all vertices [shape=(V, 3)], the head not turned."""
-        lips, face = self.lips_and_face(pose, self.binding)
-        left = self.lids_of_eye.rings(pose).reshape(-1, 3)
+        lips, face = self.place_lips_and_face(pose, self.binding)
+        left = self.lids_of_eye.place_rings(pose).reshape(-1, 3)
         return np.concatenate([face, lips[1:].reshape(-1, 3), left, left * [-1, 1, 1]])
 
-    def lips_and_face(self, pose: CharacterPose, binding: Binding) -> tuple[Real, Real]:
+    def place_lips_and_face(self, pose: CharacterPose, binding: Binding) -> tuple[Real, Real]:
         """Return the places of the rings of the lips [shape=(..., RINGS, COLUMNS, 3)] and of vertices of the face.
 
         pose    : one, or several of ``pose.stacked``
@@ -387,7 +389,7 @@ def _fill(contour: Real, edges: Real) -> Real:
         step = 1 if away < 0.05 else 2
         rings.append(np.stack([x, y], axis=1)[::step])
     near = np.concatenate(rings)
-    near3 = np.column_stack([near, find_front(measure_head, near[:, 0], near[:, 1])])
+    near3 = np.column_stack([near, find_front(to_head, near[:, 0], near[:, 1])])
     count = int(1.75 / SPACING)
     i, j = np.meshgrid(np.arange(-count, count + 1), np.arange(-int(count * 1.2), int(count * 1.2) + 1))
     u, v = SPACING * (i + 0.5 * (j % 2)).ravel(), SPACING * 0.866 * j.ravel()
@@ -396,9 +398,11 @@ def _fill(contour: Real, edges: Real) -> Real:
     radius = np.hypot(u, v)
     angle = radius + 0.11 * radius**3  # on the map of the head, whose middle is the front; its rim is stretched
     flat = np.sin(angle) / np.maximum(radius, 1e-9)
-    places = find_from_middle(measure_head, np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
+    places = find_from_middle(to_head, np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
     close = cKDTree(near3).query(places)[0] < 0.024
-    inside = (np.abs(places[:, 0]) < 0.36) & _mark_within(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
+    inside = (
+        (np.abs(places[:, 0]) < 0.36) & _mark_within(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
+    )
     at_eye = cKDTree(edges).query(places)[0] < 0.02
     for side in (1, -1):
         ring = edges[: len(edges) // 2, :2] * [side, 1]

@@ -54,7 +54,7 @@ SIDED_MOOD_POSES = {
 """The poses of the shapes that moods need, instead of those above and beside them; other files do not have these."""
 _GAZES = {"Out": (FULL_LOOK_RAD, 0.0), "In": (-FULL_LOOK_RAD, 0.0)}
 _GAZES |= {"Up": (0.0, FULL_LOOK_RAD), "Down": (0.0, -FULL_LOOK_RAD)}
-LEAST_DISPLACEMENT = 1e-5
+MIN_DISPLACEMENT = 1e-5
 """Vertices that move less, in eye distances, are left out of a shape."""
 _HALF_WIDTH = 0.12
 """Half the width of the strip in the middle in which both sides move."""
@@ -72,7 +72,7 @@ def build_head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     shapes: list[Blendshape] = []
 
     def add(name: str, start: Real, end: Real) -> None:
-        shapes.append(Blendshape.between(name, start, end, smallest=LEAST_DISPLACEMENT))
+        shapes.append(Blendshape.between(name, start, end, smallest=MIN_DISPLACEMENT))
 
     for name, pose in (POSES | MOOD_POSES if moods else POSES).items():
         start = figure.place(POSES["jawOpen"])[0] if name == "mouthClose" else rest
@@ -125,20 +125,20 @@ class Stage:
         self.figure = make_figure()
         self.canvas = Canvas(camera, None if colour is None else fill_background(camera, colour))
         self._dark = Canvas(camera, fill_background(camera, (0, 0, 0)))
-        still = self.figure.frame(CharacterPose(), camera.place)
+        still = self.figure.shade(CharacterPose(), camera.place)
         first = self.figure.first_still_triangle
-        self._still = self.canvas.picture(still.places, still.light, self.figure.triangles[first:])
+        self._still = self.canvas.draw(still.places, still.light, self.figure.triangles[first:])
 
-    def picture(self, pose: CharacterPose) -> NDArray[np.uint8]:
+    def draw(self, pose: CharacterPose) -> NDArray[np.uint8]:
         """Return the picture of a pose [shape=(H, W, 3)]; only the box around head and neck is drawn anew."""
-        drawn = self.figure.frame(pose, self.canvas.camera.place)
-        return self.canvas.picture(
+        drawn = self.figure.shade(pose, self.canvas.camera.place)
+        return self.canvas.draw(
             drawn.places, drawn.light, self.figure.triangles, onto=self._still, moving=self.figure.head
         )
 
     def cut_out(self, pose: CharacterPose) -> NDArray[np.uint8]:
         """Return the picture of a pose without background, with straight alpha [shape=(H, W, 4)]."""
-        drawn = self.figure.frame(pose, self.canvas.camera.place)
+        drawn = self.figure.shade(pose, self.canvas.camera.place)
         return self._dark.cut_out(drawn.places, drawn.light, self.figure.triangles)
 
 
@@ -155,7 +155,7 @@ COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 
 def fit_mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) -> dict[str, Real]:
     """Return the weights of the shapes of lips, jaw and tongue in every pose, 0 to 1 [each shape=(T,)]."""
-    return _cached_fit(figure, mesh).weights(poses)
+    return _cached_fit(figure, mesh).fit(poses)
 
 
 class _MouthFit:
@@ -166,21 +166,21 @@ class _MouthFit:
         names = [name for name in mesh.shape_names if not name.startswith(_NOT_OF_LIPS)]
         moved = mesh.displacements(np.arange(len(figure.skin.rest)))
         around = np.flatnonzero(figure.skin.lip_weight > 0)[::3]
-        self._around, rings = figure.skin.binding.select(around), figure.skin.lip_rows()
+        self._around, rings = figure.skin.binding.select(around), figure.skin.list_lip_rows()
         every = _stack_rows(moved[:, rings], moved[:, around])
         rows = {name: every[mesh.shape_names.index(name)] for name in (*names, *FROM_POSE)}
         # of targets only what the shapes span counts, so they are projected at once: (T, S) numbers, not (T, vertices)
         self._spanned, self._triangle = np.linalg.qr(np.stack([rows[name] for name in names]).T)
         self._fixed = {name: rows[name] @ self._spanned for name in FROM_POSE}
-        self._rest = figure.skin.lips_and_face(REST, self._around)
+        self._rest = figure.skin.place_lips_and_face(REST, self._around)
         parting = measure_lip_gap(moved[:, rings])[[mesh.shape_names.index(name) for name in names]]
         self._shapes = FaceShapes(tuple(names), tuple(names), np.zeros((len(names), 0, 3)), parting, "arkit")
 
-    def weights(self, poses: Sequence[CharacterPose]) -> dict[str, Real]:
+    def fit(self, poses: Sequence[CharacterPose]) -> dict[str, Real]:
         """Return the weights of ``fit_mouth_weights``."""
         names = self._shapes.names
         fixed = {name: np.array([getattr(pose, field) for pose in poses], float) for name, field in FROM_POSE.items()}
-        parts = [self._wanted(poses[first : first + AT_ONCE]) for first in range(0, len(poses), AT_ONCE)]
+        parts = [self._build_targets(poses[first : first + AT_ONCE]) for first in range(0, len(poses), AT_ONCE)]
         targets, gap = (np.concatenate(column) for column in zip(*parts, strict=True))
         for name, curve in fixed.items():
             targets -= np.outer(curve, self._fixed[name])
@@ -192,11 +192,13 @@ class _MouthFit:
         weights = with_gap(with_gap(weights, self._shapes, gap, others), self._shapes, gap)
         return dict(zip(names, weights.T, strict=True)) | fixed
 
-    def _wanted(self, poses: Sequence[CharacterPose]) -> tuple[Real, Real]:
+    def _build_targets(self, poses: Sequence[CharacterPose]) -> tuple[Real, Real]:
         """Return poses as what the shapes span [shape=(T, S)], and by how much they part the lips [shape=(T,)]."""
         lips, around = (
             places - rest
-            for places, rest in zip(self._skin.lips_and_face(stack_poses(poses), self._around), self._rest, strict=True)
+            for places, rest in zip(
+                self._skin.place_lips_and_face(stack_poses(poses), self._around), self._rest, strict=True
+            )
         )
         return _stack_rows(lips, around) @ self._spanned, measure_lip_gap(lips)
 

@@ -31,8 +31,8 @@ def resample(pictures: Pictures, to_source: Array, size: tuple[int, int]) -> Flo
     size      : h and w
     """
     new = np.empty((len(pictures), *size, COLOURS), np.float32)
-    to_source = _make_contiguous(to_source, np.float64)
-    for picture, made in zip(_make_contiguous(pictures), new, strict=True):
+    to_source = _pack(to_source, np.float64)
+    for picture, made in zip(_pack(pictures), new, strict=True):
         _resample(picture, to_source, made)
     return new
 
@@ -50,10 +50,10 @@ def blend(
     weight   : [shape=(h, w)], interpolated bilinearly
     to_patch : affine map [shape=(2, 3)] from the centre of a pixel of the part to its position in the patch
     """
-    _blend(frame, *corner, size, _make_contiguous(patch), _make_contiguous(weight, np.float32), _make_contiguous(to_patch, np.float64))
+    _blend(frame, *corner, size, _pack(patch), _pack(weight, np.float32), _pack(to_patch, np.float64))
 
 
-def _make_contiguous(values: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
+def _pack(values: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
     """Return an array that is contiguous and may be written to: for other ones numba would compile everything again."""
     return np.require(values, dtype or (None if values.dtype == np.uint8 else np.float32), ["C", "W"])
 
@@ -156,7 +156,9 @@ def _sum_at_edge(
 ) -> np.float32:
     """Return the weighted sum of four pixels of a column around ``row``; outermost pixels repeat."""
     height, column = len(picture), _clamp(column, picture.shape[1])
-    upper = e * Number(picture[_clamp(row - 1, height), column, k]) + f * Number(picture[_clamp(row, height), column, k])
+    upper = e * Number(picture[_clamp(row - 1, height), column, k]) + f * Number(
+        picture[_clamp(row, height), column, k]
+    )
     lower = g * Number(picture[_clamp(row + 1, height), column, k])
     return upper + lower + h * Number(picture[_clamp(row + 2, height), column, k])
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lipmotion.kernels.compiler import compiled
 
 Real = NDArray[np.float64]
-LEAST_FACING_COSINE = -0.35
+MIN_FACING_COSINE = -0.35
 """Vertices that face further away than this (the cosine) are not seen, and stay dark."""
 
 
@@ -37,7 +37,7 @@ def shade(
         far = np.sqrt(ex * ex + ey * ey + ez * ez)
         ex, ey, ez = ex / far, ey / far, ez / far
         faces = nx * ex + ny * ey + nz * ez
-        if faces < LEAST_FACING_COSINE:
+        if faces < MIN_FACING_COSINE:
             light[v] = 0.0
             continue
         grazing = min(max(1.0 - faces, 0.0), 1.0)

@@ -276,7 +276,9 @@ def _resolve(
                 whole = whole and before[i + 1, j] == NO_TRIANGLE and before[i + 1, j + 1] == NO_TRIANGLE
             if whole and t == NO_TRIANGLE:
                 for channel in range(3):
-                    picture[row, column, channel] = tone[_choose_level(np.float64(background[row, column, channel]), most)]
+                    picture[row, column, channel] = tone[
+                        _choose_level(np.float64(background[row, column, channel]), most)
+                    ]
                 opacity[row, column] = 0
                 continue
             if whole:

@@ -74,7 +74,7 @@ def build_scene(performance: Performance, frames: slice | None = None) -> Scene:
     settings, delivery = performance.settings, performance.settings.delivery
     moved = with_drawn_channels(deliver(performance.generation, delivery))
     part = None if delivery.hold_ms else frames
-    scene = settings.face.scene(moved, settings, performance.cached(measure_recorded_prosody), part)
+    scene = settings.face.build_scene(moved, settings, performance.cached(measure_recorded_prosody), part)
     thinning = Thinning(delivery.key_tolerance, tuple(find_closed_times(moved)) if delivery.key_tolerance else ())
     scene = replace(scene, sound_s=delivery.offset_ms / 1000, thinning=thinning)
     weights = scene.weights
@@ -127,7 +127,7 @@ def build_head_scene(
     """
     from lipmotion_faces.head.figure import PIVOT
     from lipmotion_faces.head.pose import pose_head
-    from lipmotion_faces.head.stage import make_figure, make_figure_mesh, fit_mouth_weights
+    from lipmotion_faces.head.stage import fit_mouth_weights, make_figure, make_figure_mesh
 
     motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
@@ -152,7 +152,7 @@ def build_head_scene(
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
     turns = turn_head(np.stack([pose.turn for pose in poses]))[wanted]
-    return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.turning(), turns), split=False)
+    return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.weigh_turn(), turns), split=False)
 
 
 def _select_around(frames: slice | None, margin: int) -> tuple[slice, slice]:

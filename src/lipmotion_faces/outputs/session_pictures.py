@@ -23,7 +23,7 @@ class SessionPictures:
 
     >>> import lipmotion
     >>> pictures = lipmotion.SessionPictures(lipmotion.Session("examples/welcome.flac"))
-    >>> pictures.picture(1.2, lipmotion.Edits().then("set size 64")).shape
+    >>> pictures.draw(1.2, lipmotion.Edits().then("set size 64")).shape
     (64, 64, 3)
     """
 
@@ -32,7 +32,7 @@ class SessionPictures:
         self._one_at_a_time = RLock()
         self._cache = Cache()
 
-    def picture(
+    def draw(
         self, time_s: float, edits: Edits | None = None, *, face: str | Face = "portrait", fps: float = DRAWN_HZ
     ) -> Picture:
         """Return the picture of a drawn face that is shown at a time in a video [shape as of ``Face.render``].
@@ -64,7 +64,7 @@ class SessionPictures:
             frame = frame_of(time_s, len(pictures), fps)
             if frame is None:
                 raise InputError(f"{time_s} s lies outside the video (0 to {(len(pictures) - 1) / fps:.2f} s)")
-            return pictures.picture(frame)
+            return pictures.draw(frame)
 
     @cached_property
     def _prosody(self) -> Prosody:

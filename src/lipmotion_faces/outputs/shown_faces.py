@@ -38,7 +38,7 @@ class _WithHead(ShownFace):
     def check_drawable(self, path: Path, generation: Generation) -> None:
         drawn_video.check_drawable(path, generation.motion)
 
-    def scene(
+    def build_scene(
         self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
     ) -> Scene:
         return build_head_scene(
@@ -80,7 +80,7 @@ class ShownCharacter(ShownDrawing):
         super().__init__(face)
         self.character: DrivenCharacter = face.character
 
-    def scene(  # noqa: D102
+    def build_scene(  # noqa: D102
         self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
     ) -> Scene:
         staging = settings.staging
@@ -109,11 +109,15 @@ class ShownCutOut(_WithHead):
             raise ExportError(f"{path}: {missing}; give them: --units FILE")
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
-        settings, generation, fps = performance.settings, performance.generation, _choose_frame_rate(performance.settings)
+        settings, generation, fps = (
+            performance.settings,
+            performance.generation,
+            _choose_frame_rate(performance.settings),
+        )
         sheet = cues(generation, fps=fps, shapes=self._optional, delivery=settings.delivery)
         count = drawn_video.count_frames(generation, fps)
         shown = list_frame_shapes(sheet)[:count]
-        frames = self.face.frames([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
+        frames = self.face.draw([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
         sound = performance.cached(drawn_video.read_sound_track)
         drawn_video.write_frames(
             path, with_reports(frames, count, filmed_video.RENDERING, performance.monitor), fps, sound
@@ -173,7 +177,7 @@ class ShownPerson(_WithHead):
             options=settings.outputs,
         )
 
-    def other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: D102
+    def find_other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: D102
         return filmed_video.find_other_person(model, self.face, speaker)
 
 
@@ -215,7 +219,9 @@ def _deliver(performance: Performance) -> Generation:
 
 def _measure_played_prosody(performance: Performance) -> Prosody:
     """Return loudness and pitch of the sound track, in the time of the motion."""
-    return shift_prosody(measure_prosody(performance.cached(drawn_video.read_sound_track)), performance.settings.delivery)
+    return shift_prosody(
+        measure_prosody(performance.cached(drawn_video.read_sound_track)), performance.settings.delivery
+    )
 
 
 def _choose_frame_rate(settings: OutputSettings) -> float:

@@ -143,11 +143,14 @@ def outline_lips(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
         half_width=half_width,
         inner_half_width=half_width * inner_share,
         corner_y=float(middle + (1 - 0.7 * out) * _LINE[-1][1] + smile + sag),
-        upper_outer=np.minimum(line - rise * _compute_arch(u, follow) - upper * _compute_thickness("upper", u, out), upper_inner),
+        upper_outer=np.minimum(
+            line - rise * _compute_arch(u, follow) - upper * _compute_thickness("upper", u, out), upper_inner
+        ),
         upper_inner=upper_inner,
         lower_inner=lower_inner,
         lower_outer=np.maximum(
-            line + drop * _compute_arch(u, 0.62 - 0.15 * wide) + lower * _compute_thickness("lower", u, out), lower_inner
+            line + drop * _compute_arch(u, 0.62 - 0.15 * wide) + lower * _compute_thickness("lower", u, out),
+            lower_inner,
         ),
         seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press) * thick,
     )
@@ -264,7 +267,7 @@ class SkinField:
         self._nose = np.exp(-((side / 0.26) ** 4) - ((low + 0.29) / 0.17) ** 4) * np.clip((low + 0.5) / 0.08, 0, 1)
         self._half_width = lips.half_width
 
-    def shifts(self, pose: MouthPose, mood: UpperFace = CALM) -> tuple[Floats, Floats]:
+    def shift(self, pose: MouthPose, mood: UpperFace = CALM) -> tuple[Floats, Floats]:
         """Return the shifts to the right and down, in pixels: to the place that is shown."""
         pulled = np.clip(pose.width - 1, -0.5, 0.3) * self._half_width
         jaw = np.clip(pose.jaw, 0, 0.5)
@@ -303,7 +306,7 @@ class BrowField:
         self._inner, self._outer = (1 - outwards) ** 1.5, np.sin(np.pi * outwards**1.3 * 0.72)
         self._inwards = np.sign(x) * (1 - outwards) * fade * np.clip(np.abs(x) / 0.1, 0, 1)
 
-    def shifts(self, brows: BrowPose) -> tuple[Floats, Floats]:
+    def shift(self, brows: BrowPose) -> tuple[Floats, Floats]:
         """Return the shifts to the right and down, in pixels: to the place that is shown."""
         y = brows.raised / (BROW_STEPS * self._scale) * self._both * self._scale
         if brows == (brows.raised, 0, 0, 0):
@@ -323,7 +326,7 @@ class HeadField:
         self._with_head = smooth_step((NECK_END - y) / (NECK_END - NECK_TOP))
         self._features = np.exp(-((x / 0.62) ** 2) - (((y - 0.35) / 0.85) ** 2)) * self._with_head
 
-    def shifts(self, pose: HeadPlacement) -> tuple[Floats, Floats]:
+    def shift(self, pose: HeadPlacement) -> tuple[Floats, Floats]:
         """Return the shifts to the right and down, in pixels."""
         x = self._with_head * (pose.x - pose.roll * (self._y - PIVOT_Y)) + pose.yaw * self._features
         y = self._with_head * (pose.y + pose.roll * self._x) + pose.pitch * self._features

@@ -34,10 +34,10 @@ class View:
         """The pixel position (x, y) of the point between the eyes."""
         return self.size / 2, 0.4 * self.size
 
-    def window(self, left: float, top: float, right: float, bottom: float) -> Window:
+    def cut_window(self, left: float, top: float, right: float, bottom: float) -> Window:
         """Return the pixels that cover a rectangle given in eye distances, cut at the picture's edges."""
         corners = np.array([[left, top], [right, bottom]])
-        return Window(self, 0, 0, self.size, self.size).around(corners, 0)
+        return Window(self, 0, 0, self.size, self.size).cut_around(corners, 0)
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,12 @@ class Window:
         """The index of these pixels in an image array."""
         return slice(self.y0, self.y1), slice(self.x0, self.x1)
 
-    def area_in(self, outer: Window) -> tuple[slice, slice]:
+    def find_area(self, outer: Window) -> tuple[slice, slice]:
         """Return the index of these pixels in the array of an enclosing window."""
         x, y = outer.x0, outer.y0
         return slice(self.y0 - y, self.y1 - y), slice(self.x0 - x, self.x1 - x)
 
-    def around(self, points: NDArray[np.float64], margin: float) -> Window:
+    def cut_around(self, points: NDArray[np.float64], margin: float) -> Window:
         """Return the part of this window within ``margin`` of the bounding box of points; unit: eye distances."""
         first = np.floor((points.min(axis=0) - margin) * self.view.scale + self.view.origin).astype(int)
         last = np.ceil((points.max(axis=0) + margin) * self.view.scale + self.view.origin).astype(int)
@@ -68,12 +68,12 @@ class Window:
         x1, y1 = np.clip(last, (x0 + 1, y0 + 1), (self.x1, self.y1)).tolist()
         return Window(self.view, x0, y0, x1, y1)
 
-    def columns(self, per_pixel: int = 1) -> Pixels:
+    def list_columns(self, per_pixel: int = 1) -> Pixels:
         """Return the x of ``per_pixel`` evenly spaced columns in every pixel, in eye distances."""
         steps = (np.arange((self.x1 - self.x0) * per_pixel) + 0.5) / per_pixel + self.x0
         return ((steps - self.view.origin[0]) / self.view.scale).astype(np.float32)
 
-    def rows(self) -> Pixels:
+    def list_rows(self) -> Pixels:
         """Return the y of the pixel centres, in eye distances."""
         steps = np.arange(self.y0, self.y1) + 0.5
         return ((steps - self.view.origin[1]) / self.view.scale).astype(np.float32)
@@ -118,15 +118,18 @@ class Layer:
     ) -> None:
         """Paint the inside of an outline, and of ``within`` where that is given."""
         softest = max([blur, *(shade.radius for shade in shades if isinstance(shade, Rim))])
-        window = self.window.around(outline, 3 * softest)  # three standard deviations of the blur
-        pixels = self.pixels[window.area_in(self.window)]
+        window = self.window.cut_around(outline, 3 * softest)  # three standard deviations of the blur
+        pixels = self.pixels[window.find_area(self.window)]
         mask = _mask(window, outline, blur)
         paint: Pixels = np.broadcast_to(np.array(colour, dtype=np.float32), (*mask.shape, 3))
         for shade in shades:
             if isinstance(shade, Rim):
                 strength = shade.strength * (1 - _mask(window, outline, shade.radius))
             else:
-                x, y = (window.columns() - shade.x) / shade.radius_x, (window.rows() - shade.y) / shade.radius_y
+                x, y = (
+                    (window.list_columns() - shade.x) / shade.radius_x,
+                    (window.list_rows() - shade.y) / shade.radius_y,
+                )
                 strength = np.asarray(shade.strength * np.exp(-(x[None, :] ** 2) - y[:, None] ** 2), dtype=np.float32)
             paint = paint + strength[..., None] * (np.array(shade.colour, dtype=np.float32) - paint)
         if within is not None:
@@ -135,7 +138,7 @@ class Layer:
         pixels[..., :3] += cover * (paint - pixels[..., :3])
         pixels[..., 3:] += cover * (1 - pixels[..., 3:])
 
-    def contour(self, outline: Points, width: float, colour: Colour) -> None:
+    def paint_contour(self, outline: Points, width: float, colour: Colour) -> None:
         """Paint a line of even width along a closed outline; nothing where the width is 0."""
         if width > 0:
             closed = np.vstack([outline[-1:], outline, outline[:2]])

@@ -191,7 +191,7 @@ class LayeredFace(Face):
     @cached_property
     def _painter(self) -> Callable[[tuple[FacePose, str]], NDArray[np.uint8]]:
         picture = _LayeredPicture(self.layers, self.staging)
-        return lambda pose: picture.frame(*pose)
+        return lambda pose: picture.draw(*pose)
 
 
 def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float) -> list[str]:
@@ -244,7 +244,7 @@ class _LayeredPicture:
             self._behind = lay_over(self._behind, wall)
         self._heads = lru_cache(maxsize=64)(self._paint_head)
 
-    def frame(self, pose: FacePose, mouth: str) -> NDArray[np.uint8]:
+    def draw(self, pose: FacePose, mouth: str) -> NDArray[np.uint8]:
         """Return one frame [shape=(H, W, 3 or 4)]."""
         unit = EYE_DISTANCE * self._size
         eyes = "closed" if pose.lids > 0.5 else "open"

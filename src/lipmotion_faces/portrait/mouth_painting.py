@@ -38,7 +38,7 @@ class MouthPainter:
     def __init__(self, design: Design, window: Window) -> None:
         self._lips, colours = design.lips, design.palette
         self._textures = _make_textures(colours) if design.flat else _shade_textures(colours)
-        self._x = window.columns(COLUMNS).reshape(-1, COLUMNS).T.astype(np.float64)
+        self._x = window.list_columns(COLUMNS).reshape(-1, COLUMNS).T.astype(np.float64)
         self._scale, self._first_row = window.view.scale, window.y0 - window.view.origin[1]
 
     def paint(self, layer: NDArray[np.float32], pose: geometry.MouthPose) -> None:
@@ -238,7 +238,7 @@ def _shade_textures(colours: Palette) -> MouthTextures:
 def _paint_lips(colours: Palette) -> tuple[Texture, Texture]:
     """Return the upper and the lower lip, with fine creases down them and gloss."""
 
-    def creases(depth: Texture) -> Texture:
+    def draw_creases(depth: Texture) -> Texture:
         lines = np.sin(31 * x + 2.1 * np.sin(7 * x)) * np.sin(17.3 * x + 1.0)
         return np.clip(lines, 0, 1) * np.sin(np.pi * np.clip(depth, 0, 1)) * (1 - x**6)
 
@@ -246,14 +246,14 @@ def _paint_lips(colours: Palette) -> tuple[Texture, Texture]:
     gloss = 0.42 * np.exp(-(((depth - 0.22) / 0.14) ** 2) - ((np.abs(x + 0.03) - 0.2) / 0.17) ** 2)
     paint = _mix(colours.upper_lip_light, colours.upper_lip_dark, depth**1.3 + 0 * x)
     paint = _mix(paint, colours.seam, 0.3 * np.abs(x) ** 4 + 0.35 * np.clip(depth - 0.82, 0, 1) / 0.18)
-    paint = _mix(paint, colours.upper_lip_dark, 0.16 * creases(depth))
+    paint = _mix(paint, colours.upper_lip_dark, 0.16 * draw_creases(depth))
     upper = _make_texture(_mix(paint, colours.gloss, gloss), np.clip(0.25 + depth / 0.12, 0, 1) + 0 * x)
     depth, _ = _make_grid(32, 97)
     gloss = 0.6 * np.exp(-(((depth - 0.36) / 0.17) ** 2) - ((x + 0.08) / 0.33) ** 2)
     gloss += 0.16 * np.exp(-(((depth - 0.3) / 0.12) ** 2) - ((x - 0.42) / 0.12) ** 2)
     paint = _mix(colours.lower_lip_light, colours.lower_lip_dark, (1.9 * depth - 0.75) ** 2 + 0.3 * x**4)
-    paint = _mix(paint, colours.lower_lip_dark, 0.16 * creases(depth))
-    paint = _mix(paint, colours.gloss, gloss * (1 - 0.15 * creases(depth)))
+    paint = _mix(paint, colours.lower_lip_dark, 0.16 * draw_creases(depth))
+    paint = _mix(paint, colours.gloss, gloss * (1 - 0.15 * draw_creases(depth)))
     return upper, _make_texture(paint, np.clip(0.2 + (1 - depth) / 0.14, 0, 1) + 0 * x)
 
 

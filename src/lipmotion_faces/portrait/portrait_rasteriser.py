@@ -21,12 +21,12 @@ from lipmotion_faces.portrait.design import (
     Design,
     Knots,
     Points,
-    mirror_outline,
     close_curve,
+    list_path_points,
     make_ellipse,
+    mirror_outline,
     move_down,
     open_curve,
-    list_path_points,
     stroke,
 )
 from lipmotion_faces.portrait.layer import Glow, Layer, Pixels, Rim, View, Window, lay_over
@@ -252,7 +252,7 @@ def _paint_ears(layer: Layer, design: Design) -> None:
 
 def _fill_outlined(layer: Layer, design: Design, outline: Points, colour: Colour, *shades: Glow | Rim) -> None:
     layer.fill(outline, colour, *(() if design.flat else shades))
-    layer.contour(outline, design.line, design.palette.line)
+    layer.paint_contour(outline, design.line, design.palette.line)
 
 
 def paint_head(window: Window, design: Design) -> Layer:
@@ -268,7 +268,7 @@ def paint_head(window: Window, design: Design) -> Layer:
         layer.fill(make_ellipse(0.03, 0.52, 0.1, 0.06), colours.skin_shade, opacity=0.55)
         nose = open_curve("-0.1 0.5, -0.075 0.565, 0.0 0.585, 0.075 0.565, 0.1 0.5")
         layer.fill(stroke(nose, [0.0, 0.024, 0.026, 0.024, 0.0]), colours.line)
-        layer.contour(skull, design.line, colours.line)
+        layer.paint_contour(skull, design.line, colours.line)
     else:
         glows = [Glow(-0.05, -0.35, 0.5, 0.35, colours.skin_light, 0.55)]
         glows.append(Glow(0.0, 1.24, 0.16, 0.09, colours.skin_light, 0.45))
@@ -328,7 +328,7 @@ def paint_hair(window: Window, design: Design) -> Layer:
         for path in lock.strands:
             strand = stroke(open_curve(path), [0, 0.02, 0.016, 0])
             layer.fill(strand, strand_colour, opacity=strength, blur=soft, within=lock.outline)
-        layer.contour(lock.outline, design.line, colours.line)
+        layer.paint_contour(lock.outline, design.line, colours.line)
     return layer
 
 
@@ -387,14 +387,14 @@ class Rasteriser:
 
     def __init__(self, design: Design, size: int, background: Colour | str | None = SCENE) -> None:
         view, line_y = View(size), design.lips.line_y
-        whole = view.window(-9, -9, 9, 9)
+        whole = view.cut_window(-9, -9, 9, 9)
         self._opaque, self._canvases = background is not None, threading.local()
-        self._jaw = view.window(-0.86, line_y - 0.5, 0.86, line_y + 0.95)
-        self._mouth = view.window(-0.56, line_y - 0.24, 0.56, line_y + 0.7)
-        self._eyes, self._brow = view.window(-0.66, -0.24, 0.66, 0.21), view.window(-0.8, -0.64, 0.8, -0.06)
+        self._jaw = view.cut_window(-0.86, line_y - 0.5, 0.86, line_y + 0.95)
+        self._mouth = view.cut_window(-0.56, line_y - 0.24, 0.56, line_y + 0.7)
+        self._eyes, self._brow = view.cut_window(-0.66, -0.24, 0.66, 0.21), view.cut_window(-0.8, -0.64, 0.8, -0.06)
         # the part of the eyes' window that the brows' does not have
         self._below_brows = Window(view, self._eyes.x0, self._brow.y1, self._eyes.x1, self._eyes.y1)
-        self._head = view.window(-1.3, -9, 1.3, 1.9)
+        self._head = view.cut_window(-1.3, -9, 1.3, 1.9)
         self._skin, self._below, self._shade, self._front, still = paint_still_layers(whole, design, background)
         self._eye_painter = EyePainter(design, self._eyes)
         self._still = (still * (1, 1, 1, 255) + 0.5).astype(np.uint16)
@@ -404,20 +404,20 @@ class Rasteriser:
         self._head_field = geometry.HeadField(self._head)
         self._mouth_painter = MouthPainter(design, self._mouth)
 
-    def canvas(self) -> Canvas:
+    def make_canvas(self) -> Canvas:
         """Return the picture of the resting face without eyes and mouth, to draw on [shape=(size, size, 4)]."""
         return self._still.copy()
 
     def paint(self, pose: FacePose) -> Picture:
-        """Return one frame, drawn on the canvas of the thread that calls; shape as of ``picture``."""
+        """Return one frame, drawn on the canvas of the thread that calls; shape as of ``draw``."""
         if not hasattr(self._canvases, "own"):
-            self._canvases.own = self.canvas()
-        return self.picture(pose, self._canvases.own)
+            self._canvases.own = self.make_canvas()
+        return self.draw(pose, self._canvases.own)
 
-    def picture(self, pose: FacePose, canvas: Canvas) -> Bytes:
+    def draw(self, pose: FacePose, canvas: Canvas) -> Bytes:
         """Return one frame [shape=(size, size, 3), or 4 channels where transparent]; the canvas is changed."""
-        skin = self._move_skin(self._jaw, self._skin_field.shifts(pose.mouth, pose.mood))
-        self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
+        skin = self._move_skin(self._jaw, self._skin_field.shift(pose.mouth, pose.mood))
+        self._mouth_painter.paint(skin[self._mouth.find_area(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])
         canvas[self._brow.area] = self._brows(geometry.pose_brows(pose.brows, pose.mood, self._brow.view.scale))
         canvas[self._below_brows.area] = self._still[self._below_brows.area]
@@ -428,7 +428,7 @@ class Rasteriser:
         canvas[self._eyes.area] = mixed
         frame = self._frame.copy()
         area = self._head.area
-        warp_bytes(canvas[area], *self._head_field.shifts(pose.head), geometry.STEP, frame[area])
+        warp_bytes(canvas[area], *self._head_field.shift(pose.head), geometry.STEP, frame[area])
         if not self._opaque:  # straight alpha, as files store it
             cover = frame[..., 3:].astype(np.uint16)
             edge = (cover[..., 0] > 0) & (cover[..., 0] < 255)
@@ -438,7 +438,7 @@ class Rasteriser:
 
     def _paint_brows(self, brows: geometry.BrowPose) -> Canvas:
         picture = np.empty_like(self._still[self._brow.area])
-        self._lay(self._move_skin(self._brow, self._brow_field.shifts(brows)), self._brow, picture)
+        self._lay(self._move_skin(self._brow, self._brow_field.shift(brows)), self._brow, picture)
         return picture
 
     def _move_skin(self, window: Window, shifts: tuple[NDArray[np.float64], NDArray[np.float64]]) -> Pixels:

@@ -24,9 +24,9 @@ from lipmotion.storage.sources import check_regular
 
 STEPS = 12
 """Points for each Bézier curve, and for a quarter of an ellipse."""
-MOST_POINTS = 400_000
+MAX_POINTS = 400_000
 """Most points of all lines of a drawing; a curve has ``STEPS``, an arc four times as many."""
-MOST_TRANSFORMS = 20
+MAX_TRANSFORMS = 20
 """Most transforms one after another in one attribute."""
 LARGEST_NUMBER = 1e6
 """Largest magnitude of a number in a drawing."""
@@ -38,7 +38,7 @@ _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 
 _POINTS = {"C": STEPS, "S": STEPS, "Q": STEPS, "T": STEPS, "A": 4 * STEPS}
 
 
-def flatten_path(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]]:
+def flatten_path(text: str, most: int = MAX_POINTS) -> list[tuple[Points, bool]]:
     """Return subpaths [shape=(N, 2)], and whether each is closed. Raises InputError: no path, over ``most`` points."""
     lines: list[tuple[Points, bool]] = []
     current: list[Points] = []
@@ -92,7 +92,7 @@ def flatten_path(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]
 def check_points(left: int) -> None:
     """Raise InputError if so many more points are fewer than none."""
     if left < 0:
-        raise InputError(f"more than {MOST_POINTS} points in all its lines; simplify the paths")
+        raise InputError(f"more than {MAX_POINTS} points in all its lines; simplify the paths")
 
 
 def _read_commands(text: str) -> Iterator[tuple[str, list[float]]]:
@@ -137,7 +137,9 @@ def _follow_bezier(points: list[Points]) -> list[Points]:
     return list(levels[0])
 
 
-def _follow_arc(at: Points, end: Points, rx: float, ry: float, turned: float, large: float, sweep: float) -> list[Points]:
+def _follow_arc(
+    at: Points, end: Points, rx: float, ry: float, turned: float, large: float, sweep: float
+) -> list[Points]:
     """Return points along an elliptic arc, without its first one (SVG 1.1, F.6.5)."""
     rx, ry = abs(rx), abs(ry)
     if rx < 1e-9 or ry < 1e-9 or np.allclose(at, end):
@@ -180,7 +182,7 @@ def read_numbers(text: str, most: int, name: str) -> list[float]:
     return numbers
 
 
-def read_points(text: str, most: int = MOST_POINTS) -> Points:
+def read_points(text: str, most: int = MAX_POINTS) -> Points:
     """Return the points of a polygon [shape=(N, 2)]. Raises InputError: an odd count, no numbers, or too many."""
     numbers = read_numbers(text, 2 * most, "points")
     if len(numbers) % 2 or len(numbers) < 4:
@@ -210,9 +212,9 @@ def read_transform(text: str) -> Points:
     """Return the matrix of a ``transform`` [shape=(3, 3)]. Raises InputError: not a transform, or what enlarges more
     than ``LARGEST_NUMBER`` times."""
     matrix = np.eye(3)
-    *calls, rest = text.split(")", MOST_TRANSFORMS)
+    *calls, rest = text.split(")", MAX_TRANSFORMS)
     if rest.strip():
-        raise InputError(f"the transform {shorten(rest)!r} cannot be read, required at most {MOST_TRANSFORMS}")
+        raise InputError(f"the transform {shorten(rest)!r} cannot be read, required at most {MAX_TRANSFORMS}")
     for call in calls:
         name, _, inside = call.strip(", \t\r\n").partition("(")
         try:
@@ -245,9 +247,9 @@ def check_matrix(matrix: Points) -> Points:
 
 Points = NDArray[np.float64]
 LARGEST_SIDE_RATIO = 4.0
-LARGEST_FILE_BYTES, MOST_ELEMENTS, DEEPEST_NESTING = 8 << 20, 20_000, 60
+LARGEST_FILE_BYTES, MAX_ELEMENTS, DEEPEST_NESTING = 8 << 20, 20_000, 60
 """Most bytes of a drawing, elements in it, and elements in one another."""
-MOST_COVERED_PICTURES, LINES_PER_PICTURE = 200.0, 100.0
+MAX_COVERED_PICTURES, LINES_PER_PICTURE = 200.0, 100.0
 """Most that shapes cover, in pictures; lines across the picture that take as long to paint as one picture."""
 LONGEST_VALUE_CHARACTERS = 100
 """Most letters of a number, a colour or another value of a style."""
@@ -321,7 +323,7 @@ def parse_drawing(data: bytes) -> Drawing:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"not text in UTF-8 (byte {error.start}); save it as plain SVG in UTF-8") from error
-    return _DrawingReader().drawing(text)
+    return _DrawingReader().read(text)
 
 
 class _Group(NamedTuple):
@@ -350,7 +352,7 @@ class _DrawingReader:
     points: int = 0
     covered: float = 0.0
 
-    def drawing(self, text: str) -> Drawing:
+    def read(self, text: str) -> Drawing:
         parser = expat.ParserCreate("utf-8")  # overrides what the text declares
         parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
         parser.StartDoctypeDeclHandler, parser.SkippedEntityHandler = _refuse_subset, _refuse_entity
@@ -365,8 +367,8 @@ class _DrawingReader:
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         self.elements, self.depth = self.elements + 1, self.depth + 1
-        if self.elements > MOST_ELEMENTS:
-            raise InputError(f"more than {MOST_ELEMENTS} elements")
+        if self.elements > MAX_ELEMENTS:
+            raise InputError(f"more than {MAX_ELEMENTS} elements")
         if self.depth > DEEPEST_NESTING:
             raise InputError(f"groups in groups, more than {DEEPEST_NESTING} deep")
         if self.passed:
@@ -397,9 +399,9 @@ class _DrawingReader:
 
     def _add(self, tag: str, attributes: Mapping[str, str]) -> None:
         group = _group(attributes, self.groups[-1])
-        lines = _read_lines(attributes, tag, MOST_POINTS - self.points)
+        lines = _read_lines(attributes, tag, MAX_POINTS - self.points)
         self.points += sum(len(points) for points, _ in lines)
-        check_points(MOST_POINTS - self.points)
+        check_points(MAX_POINTS - self.points)
         style, matrix = group.style, group.matrix
         opacities = [_read_number(style.get(f"{kind}-opacity", "1"), "opacity") for kind in ("fill", "stroke")]
         placed = tuple(Line(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in lines)
@@ -416,8 +418,8 @@ class _DrawingReader:
             style.get("fill-rule") == "evenodd",
         )
         self.covered += _measure_cover(shape, self.box or (0, 0, 1, 1))
-        if self.covered > MOST_COVERED_PICTURES:
-            raise InputError(f"its shapes cover more than {MOST_COVERED_PICTURES:g} times the picture; leave some out")
+        if self.covered > MAX_COVERED_PICTURES:
+            raise InputError(f"its shapes cover more than {MAX_COVERED_PICTURES:g} times the picture; leave some out")
         self.shapes.append((self.groups[-1].layers, shape))
 
 
@@ -501,7 +503,7 @@ def _measure_cover(shape: Shape, box: tuple[float, float, float, float]) -> floa
 
 
 def _read_lines(attributes: Mapping[str, str], tag: str, most: int) -> list[tuple[Points, bool]]:
-    def number(name: str, default: str = "0") -> float:
+    def read(name: str, default: str = "0") -> float:
         return _read_number(attributes.get(name, default), name)
 
     if tag == "path":
@@ -509,12 +511,12 @@ def _read_lines(attributes: Mapping[str, str], tag: str, most: int) -> list[tupl
     if tag in ("polygon", "polyline"):
         return [(read_points(attributes.get("points", ""), most), tag == "polygon")]
     if tag == "line":
-        return [(np.array([[number("x1"), number("y1")], [number("x2"), number("y2")]]), False)]
+        return [(np.array([[read("x1"), read("y1")], [read("x2"), read("y2")]]), False)]
     if tag == "rect":
-        radius = number("rx", attributes.get("ry", "0"))
-        return [(make_rectangle(number("x"), number("y"), number("width"), number("height"), radius), True)]
-    radii = (number("r"),) * 2 if tag == "circle" else (number("rx"), number("ry"))
-    return [(make_circle(number("cx"), number("cy"), *radii), True)]
+        radius = read("rx", attributes.get("ry", "0"))
+        return [(make_rectangle(read("x"), read("y"), read("width"), read("height"), radius), True)]
+    radii = (read("r"),) * 2 if tag == "circle" else (read("rx"), read("ry"))
+    return [(make_circle(read("cx"), read("cy"), *radii), True)]
 
 
 def _read_colour(text: str, name: str) -> Colour | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh, Texture
-from lipmotion_faces.characters.textures import TextureTable, decode_srgb, build_texture_table
+from lipmotion_faces.characters.textures import TextureTable, build_texture_table, decode_srgb
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.kernels.textured import (
     CLEAR,
@@ -51,7 +51,7 @@ class Camera:
         if not (self.across > 0 and self.distance > 0):
             raise InputError(f"the camera sees {self.across} from {self.distance} away, required more than 0")
 
-    def on_screen(self, places: Real) -> Real:
+    def project(self, places: Real) -> Real:
         """Return column and row in pixels, and depth, of places in space [shape=(V, 3)]."""
         scale = self.height / self.across * self.distance / np.maximum(self.distance - places[:, 2], 1e-6)
         column = self.width / 2 + (places[:, 0] - self.centre[0]) * scale
@@ -63,8 +63,8 @@ class Camera:
         """The place of the camera [shape=(3,)]."""
         return np.array([*self.centre, self.distance])
 
-    def box(self, screen: Real) -> tuple[int, int, int, int] | None:
-        """Return first column and row, and those behind the last, around what ``on_screen`` returned; None: outside."""
+    def find_box(self, screen: Real) -> tuple[int, int, int, int] | None:
+        """Return first column and row, and those behind the last, around what ``project`` returned; None: outside."""
         size = self.width, self.height
         left, top = (max(0, int(edge - 2)) for edge in screen[:, :2].min(axis=0))
         right, bottom = (
@@ -84,7 +84,7 @@ class Canvas:
         self.empty: NDArray[np.uint8] = self._tone[level.astype(int)]
         """The picture of the background alone [shape=(H, W, 3)]."""
 
-    def picture(
+    def draw(
         self,
         places: Real,
         colours: Colours,
@@ -101,34 +101,36 @@ class Canvas:
         onto      : a picture to which the new one is equal outside the box of ``moving``
         moving    : rows of vertices; only the smallest box of pixels around them is drawn
         """
-        screen = self.camera.on_screen(places)
+        screen = self.camera.project(places)
         picture = (self.empty if onto is None else onto).copy()
-        area = self.camera.box(screen[moving])
+        area = self.camera.find_box(screen[moving])
         if area is not None:
             draw(screen, colours, triangles, area, self.background, self._tone, picture)
         return picture
 
     def cut_out(self, places: Real, colours: Colours, triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
         """Return triangles without background: red, green, blue and straight alpha [shape=(H, W, 4)]."""
-        picture = self.picture(places, colours, triangles)
-        alpha = self._coverage(places, np.ones(len(places), bool), triangles)
+        picture = self.draw(places, colours, triangles)
+        alpha = self._measure_coverage(places, np.ones(len(places), bool), triangles)
         return add_alpha(picture, alpha, self._tone)
 
-    def shown(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
+    def mark_shown(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Return the pixels of which at least half shows marked vertices [shape=(H, W)].
 
         places : of the vertices in space [shape=(V, 3)];  marked : which of them [shape=(V,)]
         triangles : those that are not marked hide what is behind them [shape=(F, 3)]
         """
-        return self._coverage(places, marked, triangles) > LARGEST_GREY // 2
+        return self._measure_coverage(places, marked, triangles) > LARGEST_GREY // 2
 
-    def _coverage(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
+    def _measure_coverage(
+        self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]
+    ) -> NDArray[np.uint8]:
         """Return which part of every pixel shows marked vertices, 0 to 255 [shape=(H, W)]."""
         size = self.camera.height, self.camera.width, 3
         light = np.repeat(marked[:, None], 3, axis=1).astype(np.float32)
         picture, area = np.zeros(size, np.uint8), (0, 0, size[1], size[0])
         tone = np.arange(256).astype(np.uint8)
-        draw(self.camera.on_screen(places), light, triangles, area, np.zeros(size, np.float32), tone, picture)
+        draw(self.camera.project(places), light, triangles, area, np.zeros(size, np.float32), tone, picture)
         return picture[..., 0]
 
 
@@ -172,7 +174,7 @@ class TexturedCanvas:
         self._black = fill_background(camera, (0, 0, 0))
         self._tone = make_tone_table()
 
-    def picture(
+    def draw(
         self, places: Real, light: Colours, shine: Colours, *, onto: Picture | None = None, moving: Real | None = None
     ) -> Picture:
         """Return a new picture of the surface before the background [shape=(H, W, 3)].
@@ -200,8 +202,8 @@ class TexturedCanvas:
         picture: Picture,
         moving: Real | None = None,
     ) -> Picture:
-        opacity, points = np.zeros(picture.shape[:2], np.uint8), self.camera.on_screen(places)
-        area = self.camera.box(points if moving is None else self.camera.on_screen(moving))
+        opacity, points = np.zeros(picture.shape[:2], np.uint8), self.camera.project(places)
+        area = self.camera.find_box(points if moving is None else self.camera.project(moving))
         if area is not None:
             draw_textured(points, light, shine, self.surface, area, behind, self._tone, picture, opacity)
         return opacity
@@ -210,7 +212,7 @@ class TexturedCanvas:
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-LEAST_OPACITY = 0.5
+MIN_OPACITY = 0.5
 """Parts without texture that are clearer than this are not drawn: shells around eyes."""
 SCATTER = (0.3, 0.2, 0.15)
 """How far red, green and blue light reach round into the shade, as in skin."""
@@ -242,7 +244,7 @@ def prepare_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float
     """Return what is drawn of a mesh, with textures reduced to its size, in pixels for the mesh's unit."""
     materials = [part.material for part in mesh.parts]
     part_of = np.repeat(np.arange(len(mesh.parts)), [part.stop - part.first for part in mesh.parts])
-    hidden = np.array([m.texture is None and m.opacity < LEAST_OPACITY for m in materials])
+    hidden = np.array([m.texture is None and m.opacity < MIN_OPACITY for m in materials])
     chosen = np.flatnonzero(shown & ~hidden[part_of])
     double = chosen[np.array([m.two_sided for m in materials])[part_of[chosen]]]
     behind = np.repeat([False, True], [len(chosen), len(double)])
@@ -257,7 +259,9 @@ def prepare_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float
     for material in materials:
         if material.texture is not None:
             textures.setdefault(material.texture, len(textures))
-    looks = _prepare_triangles(mesh, numbers, part_of[numbers], uv, build_texture_table(list(textures)), textures, pixels_per_unit)
+    looks = _prepare_triangles(
+        mesh, numbers, part_of[numbers], uv, build_texture_table(list(textures)), textures, pixels_per_unit
+    )
     visible = looks.looks[:, 1] != EMPTY
     looks = looks._replace(uv=looks.uv[visible], looks=looks.looks[visible], alphas=looks.alphas[visible])
     numbers, corners, behind = numbers[visible], corners[visible], behind[visible]
@@ -299,7 +303,7 @@ def _prepare_triangles(
         looks[mine] = -1, SOLID
         if material.texture is not None:
             kind = {MASK: CUT, BLEND: CLEAR}.get(material.alpha, SOLID)
-            looks[mine, 0] = table.level(textures[material.texture], in_texture[mine], on_screen[mine])
+            looks[mine, 0] = table.choose_level(textures[material.texture], in_texture[mine], on_screen[mine])
             alphas[mine] = material.cutoff, 1.0 if kind == SOLID else material.opacity
             if kind != SOLID:
                 halvings = looks[mine, 0] - table.first[textures[material.texture]]

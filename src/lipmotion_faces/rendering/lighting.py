@@ -66,7 +66,7 @@ class Lighting:
         lamps[4:, :3] = np.array([SKY, GROUND]) / WHITE
         self._lamps = lamps
 
-    def light(
+    def shade(
         self,
         places: Real,
         normals: Real,
@@ -138,7 +138,9 @@ def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hid
     direct = np.zeros(len(places))
     for n in range(LAMPS):
         radius, turn = 0.22 * np.sqrt((n + 0.5) / LAMPS), 2.39996 * n
-        direct += _measure_visibility(places, hiding, normalise(key + radius * (np.cos(turn) * around + np.sin(turn) * above)))
+        direct += _measure_visibility(
+            places, hiding, normalise(key + radius * (np.cos(turn) * around + np.sin(turn) * above))
+        )
     return _smooth(np.stack([sky, direct / LAMPS], axis=1), triangles)
 
 

@@ -31,23 +31,23 @@ FROZEN_S = 0.2
 """Pictures that repeat one another for so long are frozen; single ones are doubled, as by changed frame rates."""
 JUMP = 1.5
 """The picture after frozen ones differs at least so much more than most; after people who stand still it does not."""
-MOST_COMPARED = 4000
+MAX_COMPARED = 4000
 """Mouths of a person that each one is compared with, spread evenly."""
-LEAST_COMPARED = 500
+MIN_COMPARED = 500
 """With fewer mouths, no one can say what is unlike the others."""
 APART_S = 10.0
 """A mouth is compared with other clips, and with its own from so far away on: smears last seconds."""
 SIZE, FINE_PX, COARSE_PX = (24, 18), 1.0, 5.0
 """Size of a compared mouth, and the details in it: between these two standard deviations, px of the mouth region."""
-LEAST_CONTRAST = 20.0
+MIN_CONTRAST = 20.0
 """Mouths with less contrast than this have none: of noise nothing can be compared."""
 UNLIKE, REPAIR = 2.5, 4.5
 """A mouth is unlike all others at this multiple of the median of one less the best correlation; it is smeared, if the
 next one is not, and is lower by the second multiple (GRID s1: 7 clips of 524, each repaired at a key picture of the
 original)."""
-LEAST_USUAL = 0.01
+MIN_USUAL = 0.01
 """Smallest median that counts: in footage of a still mouth it is 0."""
-LEAST_SMEARED = 2
+MIN_SMEARED = 2
 """Pictures that are smeared, at least: a mouth may be unlike others for one."""
 SHARPNESS, BLUR_FRAMES = 0.7, 5
 """Mouths are blurred if the median of so many in a row has less than this share of the person's sharpness (GRID s1:
@@ -95,7 +95,7 @@ def find_damaged(
     if not clips:
         return []
     places = np.array([(n, frame) for n, mask in enumerate(seen) for frame in np.flatnonzero(mask)]).reshape(-1, 2)
-    places = places[choose_evenly(MOST_COMPARED, len(places))]
+    places = places[choose_evenly(MAX_COMPARED, len(places))]
     looks, bank = [], []
     for number, clip in enumerate(clips):
         *look, details = _describe(clip())
@@ -105,7 +105,7 @@ def find_damaged(
     for number, (clip, rate) in enumerate(zip(clips, rate_hz, strict=True)):
         own = np.where(places[:, 0] == number, places[:, 1], -(10**9))
         unlike.append(_measure_unlikeness(_describe(clip())[2], np.concatenate(bank), own, APART_S * rate))
-    usual = max(_find_median(unlike, seen), LEAST_USUAL)
+    usual = max(_find_median(unlike, seen), MIN_USUAL)
     result = []
     for number, (mask, values) in enumerate(zip(seen, unlike, strict=True)):
         others = slice(None) if is_one else slice(number, number + 1)
@@ -128,7 +128,7 @@ def _find_smeared(unlike: Floats) -> Mask:
     """Return which mouths are unlike all others until they are repaired at once."""
     result = np.zeros(len(unlike), bool)
     for start, stop in find_runs(unlike > UNLIKE).tolist():
-        if stop < len(unlike) and stop - start >= LEAST_SMEARED and unlike[stop - 1] - unlike[stop] >= REPAIR:
+        if stop < len(unlike) and stop - start >= MIN_SMEARED and unlike[stop - 1] - unlike[stop] >= REPAIR:
             result[start:stop] = True
     return result
 
@@ -136,7 +136,7 @@ def _find_smeared(unlike: Floats) -> Mask:
 def _measure_unlikeness(mouths: Floats, bank: Floats, frames: NDArray[np.intp], apart: float) -> Floats:
     """Return one less the best correlation of each mouth with those of a bank not near it in its own clip; 0: few."""
     is_near = np.abs(np.arange(len(mouths))[:, None] - frames) < apart
-    if not len(mouths) or (~is_near).sum(axis=1).min() < LEAST_COMPARED:
+    if not len(mouths) or (~is_near).sum(axis=1).min() < MIN_COMPARED:
         return np.zeros(len(mouths), np.float32)
     return np.asarray(1 - np.where(is_near, -1, mouths @ bank.T).max(axis=1))
 
@@ -152,5 +152,5 @@ def _describe(mouths: Pictures) -> tuple[Floats, Floats, Floats]:
         detail -= detail.mean()
         light.append(grey.mean())
         sharpness.append(np.abs(cv2.Laplacian(grey, cv2.CV_32F)).mean() / max(float(grey.mean()), 1.0))
-        details.append(detail / max(float(np.linalg.norm(detail)), LEAST_CONTRAST))
+        details.append(detail / max(float(np.linalg.norm(detail)), MIN_CONTRAST))
     return np.array(light), np.array(sharpness), np.array(details, np.float32)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.tracking import trackers
-from lipmotion_faces.tracking.image_similarity import reduce_face, correlate_images, is_cut, reduce_scene
+from lipmotion_faces.tracking.image_similarity import correlate_images, is_cut, reduce_face, reduce_scene
 from lipmotion_faces.tracking.packages import import_opencv
 
 Image = NDArray[np.uint8]
@@ -33,7 +33,7 @@ class FaceWindow:
     side: int
 
     @staticmethod
-    def around(x: float, y: float, side: float) -> FaceWindow:
+    def place(x: float, y: float, side: float) -> FaceWindow:
         """Return the window whose middle is nearest to a point; of a side given, px."""
         whole = max(1, round(side))
         return FaceWindow(round(x - whole / 2), round(y - whole / 2), whole)
@@ -61,8 +61,8 @@ class WindowedMesh:
     """Follows one face with the mesh of a tracker in a window that goes along with it."""
 
     def __init__(self, box: trackers.FaceBox, tracker: trackers.LandmarkTracker) -> None:
-        self._window = FaceWindow.around(box.x, box.y, REACH * box.side)
-        self._mesh = tracker.points()
+        self._window = FaceWindow.place(box.x, box.y, REACH * box.side)
+        self._mesh = tracker.open_point_finder()
 
     def __enter__(self) -> WindowedMesh:
         return self
@@ -70,19 +70,19 @@ class WindowedMesh:
     def __exit__(self, *_: object) -> None:
         self._mesh.__exit__(None, None, None)
 
-    def faces(self, image: Image) -> list[Array]:
-        """Return the points of the face in the next picture, as ``PointFinder.faces``; none or one."""
-        faces = [self._window.to_picture(face) for face in self._mesh.faces(self._window.cut(image))]
+    def find_faces(self, image: Image) -> list[Array]:
+        """Return the points of the face in the next picture, as ``PointFinder.find_faces``; none or one."""
+        faces = [self._window.to_picture(face) for face in self._mesh.find_faces(self._window.cut(image))]
         if faces:
             low, high = faces[0][:, :2].min(axis=0), faces[0][:, :2].max(axis=0)
             side = REACH * float((high - low).max())
             is_steady = 1 / STEADY_RATIO < side / self._window.side < STEADY_RATIO
             x, y = (low + high) / 2
-            self._window = FaceWindow.around(float(x), float(y), self._window.side if is_steady else side)
+            self._window = FaceWindow.place(float(x), float(y), self._window.side if is_steady else side)
         return faces
 
 
-MOST_FACES = 4
+MAX_FACES = 4
 """The most faces that are searched for where a scene begins."""
 JUMP, GROWTH = 0.6, 1.25
 """Most eye distances that a face moves in a frame (GRID: up to 0.03), and the largest ratio of its sizes (1.06)."""
@@ -96,9 +96,9 @@ LARGE_PX = 1280
 to be small in it, and followed in a window, which takes less time than the mesh of the whole picture."""
 THOROUGH_STEP = 5
 """Where no face is found, the parts of every such frame are searched too, not only the whole picture."""
-THUMBNAIL_STEP, MOST_THUMBNAILS = 5, 20
+THUMBNAIL_STEP, MAX_THUMBNAILS = 5, 20
 """Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at first."""
-NEW_LOOK_CORRELATION, MOST_LOOKS = 0.95, 60
+NEW_LOOK_CORRELATION, MAX_LOOKS = 0.95, 60
 """Later thumbnails are kept when they correlate less than this with all that are kept, and how many at most in all."""
 
 _EYES = [trackers.TRACKED_POINTS.index(index) for index in trackers.EYE_CORNERS]
@@ -116,7 +116,7 @@ class FaceFollower:
     def __init__(self, person: Sequence[Array] = (), tracker: str = trackers.MEDIAPIPE) -> None:
         self._wanted = list(person)
         self._tracker = trackers.make_tracker(tracker)
-        self._finder = self._tracker.boxes()
+        self._finder = self._tracker.open_box_finder()
         self._scenes = [_Scene(self._wanted, self._finder, self._tracker)]
         self._picture: Array | None = None
         self._scene_of_frame: list[int | None] = []  # None: no face was found
@@ -128,8 +128,8 @@ class FaceFollower:
         self._scenes[-1].close()
         self._finder.__exit__(None, None, None)
 
-    def points(self, image: Image) -> Array | None:
-        """Return the points of a face in the next frame, as of ``PointFinder.faces``; None if there is none.
+    def follow(self, image: Image) -> Array | None:
+        """Return the points of a face in the next frame, as of ``PointFinder.find_faces``; None if there is none.
 
         Of several faces it is the one followed so far; where a scene begins, one that was followed before, else the
         largest and most central.
@@ -137,30 +137,30 @@ class FaceFollower:
         before, self._picture = self._picture, reduce_scene(image)
         if is_cut(before, self._picture) or self._scenes[-1].missing_frames > LOST_FRAMES:
             self._begin_scene()
-        face = self._scenes[-1].next_face(image)
+        face = self._scenes[-1].follow(image)
         if face is None and self._scenes[-1].is_lost:
             self._begin_scene()
-            face = self._scenes[-1].next_face(image)
+            face = self._scenes[-1].follow(image)
         self._scene_of_frame.append(None if face is None else len(self._scenes) - 1)
         return face
 
-    def person(self) -> NDArray[np.bool_]:
+    def mark_person(self) -> NDArray[np.bool_]:
         """Return in which frames the face found is that of the person [shape=(T,)]."""
         scenes = self._find_scenes()
         return np.array([scene in scenes for scene in self._scene_of_frame])
 
-    def share_of_person(self) -> float:
+    def measure_share(self) -> float:
         """Return in which share of the frames with a face it is that of the person; 1 if there is no face."""
         with_face = sum(scene is not None for scene in self._scene_of_frame)
-        return float(self.person().sum()) / with_face if with_face else 1.0
+        return float(self.mark_person().sum()) / with_face if with_face else 1.0
 
-    def thumbnails(self) -> list[Array]:
-        """Return thumbnails of the person's face, at most ``MOST_LOOKS`` from all scenes."""
+    def list_thumbnails(self) -> list[Array]:
+        """Return thumbnails of the person's face, at most ``MAX_LOOKS`` from all scenes."""
         scenes = sorted(self._find_scenes())
         looks = [thumbnail for index in scenes for thumbnail in self._scenes[index].thumbnails]
-        return looks[:: -(-len(looks) // MOST_LOOKS)] if looks else []
+        return looks[:: -(-len(looks) // MAX_LOOKS)] if looks else []
 
-    def cuts(self) -> list[int]:
+    def list_cuts(self) -> list[int]:
         """Return the frames at which the camera changes, or the picture changes to or from somebody else."""
         of_person, cuts, last = self._find_scenes(), [], None
         for index, scene in enumerate(self._scenes):
@@ -219,13 +219,13 @@ class _Scene:
     def close(self) -> None:
         self._open.close()
 
-    def next_face(self, image: Image) -> Array | None:
+    def follow(self, image: Image) -> Array | None:
         """Return the points of the followed face in the next frame, None where it is not found."""
         if self._last is None:
             face = self._first = self._choose_face(image)
-        elif faces := self._faces(image):
+        elif faces := self._find_faces(image):
             last = self._last
-            near = [face for face in faces if self._could_be(face, last)]
+            near = [face for face in faces if self._can_be(face, last)]
             self.is_lost = not near and not self._is_crowd
             face = min(near, key=lambda face: _measure_distance(face, last), default=None)
         else:
@@ -233,9 +233,9 @@ class _Scene:
         if face is None:
             self.missing_frames += self._last is not None
             return None
-        if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MOST_LOOKS:
+        if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MAX_LOOKS:
             look = reduce_face(image, face[_EYES, :2])
-            is_early = len(self.thumbnails) < MOST_THUMBNAILS
+            is_early = len(self.thumbnails) < MAX_THUMBNAILS
             if is_early or _find_best_correlation([look], self.thumbnails) < NEW_LOOK_CORRELATION:
                 self.thumbnails.append(look)
         self._frames += 1
@@ -244,7 +244,7 @@ class _Scene:
 
     def is_near(self, before: _Scene) -> bool:
         """Return whether this scene's face begins where the one before ended."""
-        return self._first is not None and before._last is not None and before._could_be(self._first, before._last)
+        return self._first is not None and before._last is not None and before._can_be(self._first, before._last)
 
     def _choose_face(self, image: Image) -> Array | None:
         """Return the face to follow; of several ones all are followed from now on, which takes twice the time."""
@@ -252,41 +252,41 @@ class _Scene:
         face = self._search(image) if is_large else None
         if face is not None:
             return face
-        faces = self._faces(image)
+        faces = self._find_faces(image)
         if not faces:
             return None if is_large else self._search(image)
-        crowd = self._open.enter_context(self._tracker.points(MOST_FACES))
-        several = crowd.faces(image)
+        crowd = self._open.enter_context(self._tracker.open_point_finder(MAX_FACES))
+        several = crowd.find_faces(image)
         if len(several) >= 2:
             self._mesh, self._is_crowd, faces = crowd, True, several
-        return max(faces, key=lambda face: self._priority(image, face))
+        return max(faces, key=lambda face: self._rank_face(image, face))
 
     def _search(self, image: Image, last: Array | None = None) -> Array | None:
         """Return the face that the detector finds, ``last`` if given, and follow it in a window from now on."""
-        boxes = self._finder.boxes(image, thorough=self._searches % THOROUGH_STEP == 0)
+        boxes = self._finder.find_boxes(image, thorough=self._searches % THOROUGH_STEP == 0)
         self._searches += 1
         faces: list[tuple[Array, WindowedMesh]] = []
         with ExitStack() as tried:
-            for box in boxes[:MOST_FACES]:
+            for box in boxes[:MAX_FACES]:
                 mesh = tried.enter_context(WindowedMesh(box, self._tracker))
-                faces += [(face, mesh) for face in mesh.faces(image) if last is None or self._could_be(face, last)]
+                faces += [(face, mesh) for face in mesh.find_faces(image) if last is None or self._can_be(face, last)]
             if not faces:
                 return None
-            face, self._mesh = max(faces, key=lambda pair: self._priority(image, pair[0]))
+            face, self._mesh = max(faces, key=lambda pair: self._rank_face(image, pair[0]))
             self._open.push(tried.pop_all())
         self._is_crowd = False
         return face
 
-    def _could_be(self, face: Array, last: Array) -> bool:
+    def _can_be(self, face: Array, last: Array) -> bool:
         growth = _measure_size(face) / _measure_size(last)
         return _measure_distance(face, last) < JUMP * (1 + self.missing_frames) and 1 / GROWTH < growth < GROWTH
 
-    def _faces(self, image: Image) -> list[Array]:
+    def _find_faces(self, image: Image) -> list[Array]:
         if self._mesh is None:
-            self._mesh = self._open.enter_context(self._tracker.points())
-        return self._mesh.faces(image)
+            self._mesh = self._open.enter_context(self._tracker.open_point_finder())
+        return self._mesh.find_faces(image)
 
-    def _priority(self, image: Image, face: Array) -> tuple[bool, float]:
+    def _rank_face(self, image: Image, face: Array) -> tuple[bool, float]:
         """Return whether a face was followed before, and its size, which counts half at the edge of the picture."""
         is_known = _find_best_correlation([reduce_face(image, face[_EYES, :2])], self._known) > SAME_PERSON_CORRELATION
         return is_known, _measure_size(face) * (1 - abs(float(_find_middle(face)[0]) / image.shape[1] - 0.5))

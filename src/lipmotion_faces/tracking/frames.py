@@ -55,7 +55,7 @@ ROUNDING_S = 1e-4
 """A picture belongs to a span that begins this much later: times of the container are whole ticks."""
 SHORT_S = 0.5
 """Pictures that end more than this before the stated duration are reported."""
-LEAST_SIDE_PX, LONGEST_SIDE_PX = 16, 8192
+MIN_SIDE_PX, LONGEST_SIDE_PX = 16, 8192
 """Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
 
 
@@ -171,8 +171,8 @@ def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None
     if not width or not height:  # FFmpeg gives no size for pictures that it refuses
         raise InputError(f"{path}: pictures of no size, or of more than {MAX_PIXELS} pixels; scale the video")
     shown = round(width * pixel_shape)
-    if not (LEAST_SIDE_PX <= shown <= LONGEST_SIDE_PX and LEAST_SIDE_PX <= height <= LONGEST_SIDE_PX):
-        sides = f"{LEAST_SIDE_PX} to {LONGEST_SIDE_PX}"
+    if not (MIN_SIDE_PX <= shown <= LONGEST_SIDE_PX and MIN_SIDE_PX <= height <= LONGEST_SIDE_PX):
+        sides = f"{MIN_SIDE_PX} to {LONGEST_SIDE_PX}"
         raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {sides}; scale the video")
     if shown * height > MAX_PIXELS:
         most = f"at most {MAX_PIXELS} in all"

@@ -156,7 +156,7 @@ def map_face_to_image(points: Array) -> Array:
 
 
 def map_eyes_to_image(eyes: Array) -> Array:
-    """Return the affine map of ``map_face_to_image`` for one frame [shape=(2, 3)], as if the face turned in its plane only.
+    """Return the map of ``map_face_to_image`` for one frame [shape=(2, 3)], as if the face turned in its plane only.
 
     eyes : array [shape=(2, 2)], x and y of the right and left outer eye corner in the image, px, y down
     """

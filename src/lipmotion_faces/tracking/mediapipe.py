@@ -13,7 +13,7 @@ from typing import Any, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion_faces.tracking.packages import import_opencv, import_solution, explain_missing
+from lipmotion_faces.tracking.packages import explain_missing, import_opencv, import_solution
 from lipmotion_faces.tracking.trackers import MEDIAPIPE, TRACKED_POINTS, FaceBox, LandmarkTracker
 
 GraphT = TypeVar("GraphT", bound="_Graph")
@@ -21,11 +21,11 @@ Image = NDArray[np.uint8]
 
 FULL_RANGE_MODEL = 1
 """MediaPipe's number of the model for faces within five metres; the face mesh's own detector reaches two."""
-LEAST_SCORE = 0.5
+MIN_SCORE = 0.5
 """Detections with a lower score are not returned. Small faces of GRID, VidTIMIT and open speech are at 0.64 or more."""
 LONGEST_PX = 1280
 """A larger picture is reduced to this for the search; the detector itself sees 192 × 192 pixels of each part."""
-LEAST_PART_PX = 480
+MIN_PART_PX = 480
 """Pictures with a shorter side below this are searched as a whole only: parts would show no smaller faces."""
 
 
@@ -60,7 +60,7 @@ class FaceMesh(_Graph):
         module = import_solution("face_mesh")
         super().__init__(lambda: module.FaceMesh(max_num_faces=most, refine_landmarks=True))
 
-    def faces(self, image: Image) -> list[NDArray[np.float64]]:  # noqa: D102
+    def find_faces(self, image: Image) -> list[NDArray[np.float64]]:  # noqa: D102
         height, width = image.shape[:2]
         return [
             np.array([(point.x, point.y, point.z) for point in (face.landmark[index] for index in TRACKED_POINTS)])
@@ -73,13 +73,13 @@ class FaceFinder(_Graph):
     """Finds the faces in single pictures. Raises MissingDependencyError when first used: no MediaPipe."""
 
     def __init__(self) -> None:
-        settings = {"min_detection_confidence": LEAST_SCORE, "model_selection": FULL_RANGE_MODEL}
+        settings = {"min_detection_confidence": MIN_SCORE, "model_selection": FULL_RANGE_MODEL}
         super().__init__(lambda: import_solution("face_detection").FaceDetection(**settings))
 
-    def boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
-        """Return the faces in a picture, those with the highest score first, as ``BoxFinder.boxes``.
+    def find_boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
+        """Return the faces in a picture, those with the highest score first, as ``BoxFinder.find_boxes``.
 
-        thorough : where the whole picture shows none, search the parts of ``list_parts`` too, which takes four times as long
+        thorough : where the whole picture shows none, search ``list_parts`` too, which takes four times as long
         A face needs an eye distance of a fortieth of the picture's longer side; in a part, of the shorter side.
         """
         scale = max(max(image.shape[:2]) / LONGEST_PX, 1.0)
@@ -88,7 +88,7 @@ class FaceFinder(_Graph):
             size = round(image.shape[1] / scale), round(image.shape[0] / scale)
             image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
         boxes = self._find(image)
-        if not boxes and thorough and min(image.shape[:2]) >= LEAST_PART_PX:
+        if not boxes and thorough and min(image.shape[:2]) >= MIN_PART_PX:
             for left, top, side in list_parts(*image.shape[:2]):
                 part = np.ascontiguousarray(image[top : top + side, left : left + side])
                 boxes += [FaceBox(box.x + left, box.y + top, box.side, box.score) for box in self._find(part)]
@@ -139,15 +139,15 @@ def quiet_stderr() -> Iterator[None]:
 class MediaPipe(LandmarkTracker):
     """The face mesh of MediaPipe, whose numbers of points are those of ``trackers``."""
 
-    def versions(self) -> dict[str, str]:  # noqa: D102
+    def list_versions(self) -> dict[str, str]:  # noqa: D102
         try:
             mediapipe = metadata.version("mediapipe")
         except metadata.PackageNotFoundError as error:
             raise explain_missing("MediaPipe", error) from error
         return {MEDIAPIPE: mediapipe, "opencv": str(import_opencv().__version__), "av": metadata.version("av")}
 
-    def points(self, most: int = 1) -> FaceMesh:  # noqa: D102
+    def open_point_finder(self, most: int = 1) -> FaceMesh:  # noqa: D102
         return FaceMesh(most)
 
-    def boxes(self) -> FaceFinder:  # noqa: D102
+    def open_box_finder(self) -> FaceFinder:  # noqa: D102
         return FaceFinder()

@@ -37,7 +37,7 @@ DRIFT_S = 0.4
 REGION = (-42.0, 2.0, 42.0, 44.0)
 """Left, top, right and bottom of nose and cheeks, which speech hardly moves, px of the face that looks straight ahead,
 from the point between the eyes."""
-MOST_SAMPLES = 1.5
+MAX_SAMPLES = 1.5
 """Pixels of the region per px of the face that looks straight ahead are those of the picture, at most so many."""
 MARGIN = 3
 """Pixels at the edge of the region that are not compared."""
@@ -91,7 +91,7 @@ def register_maps(footage: Footage) -> Array:
     """
     maps = footage.face_to_image
     scale = float(np.sqrt(np.abs(np.linalg.det(maps[:, :, :2]))).mean())
-    samples = min(scale, MOST_SAMPLES)
+    samples = min(scale, MAX_SAMPLES)
     steps = np.zeros((len(footage), 2))
     before: list[Floats] = []
     for n, (frame, to_image) in enumerate(zip(decode_footage(footage), maps, strict=True)):

@@ -20,8 +20,8 @@ from lipmotion_faces.tracking.frames import (
     OpenVideo,
     VideoSpan,
     check_rate,
-    damage_notes,
     count_frames,
+    damage_notes,
     find_nearest,
     find_nominal_rate,
     open_video,
@@ -178,12 +178,12 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
     pictures = _Pictures()
     with open_video(path, span) as video, FaceFollower(person, tracker) as follower:
         for frame in video.frames:
-            pictures.add(frame.time_s, frame.image, follower.points(frame.image))
+            pictures.add(frame.time_s, frame.image, follower.follow(frame.image))
     if not pictures.times_s:
         raise InputError(f"{path}: no picture from {span.start_s:.2f} to {span.end_s:.2f} s; give a whole video")
-    others = pictures.mark_unseen(~follower.person()[pictures.seen])
+    others = pictures.mark_unseen(~follower.mark_person()[pictures.seen])
     covered = pictures.mark_unseen(find_occluded_mouths(np.stack(pictures.mouths))) if pictures.mouths else 0
-    times_s, cuts = np.array(pictures.times_s), tuple(follower.cuts())
+    times_s, cuts = np.array(pictures.times_s), tuple(follower.list_cuts())
     rate_hz = find_nominal_rate(times_s, video.stated_rates_hz)
     repeated, frozen = damaged_pictures.find_repeated(pictures.changes, rate_hz)
     found = np.array(pictures.seen)
@@ -283,7 +283,7 @@ def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tr
             if is_cut(before, picture):
                 cuts_s.append(frame.time_s)
             if int(frame.time_s / FACE_STEP_S) != (int(times_s[-1] / FACE_STEP_S) if times_s else -1):
-                follower.points(frame.image)
+                follower.follow(frame.image)
             before = picture
             times_s.append(frame.time_s)
             if len(times_s) % REPORT_STEP == 0 and video.stated_s:
@@ -295,7 +295,7 @@ def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tr
         np.array(times_s),
         np.array(cuts_s),
         rate_hz,
-        tuple([] if follower.share_of_person() >= ALONE_SHARE else follower.thumbnails()),
+        tuple([] if follower.measure_share() >= ALONE_SHARE else follower.list_thumbnails()),
         damage,
     )
 
@@ -457,7 +457,7 @@ def read_video_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:
     if not rates:
         raise InputError(f"{path}: states no frame rate; convert it to a constant one")
 
-    def frames() -> Iterator[NDArray[np.uint8]]:
+    def decode() -> Iterator[NDArray[np.uint8]]:
         shown: NDArray[np.uint8] | None = None
         n = 0
         with open_video(path) as video:
@@ -469,4 +469,4 @@ def read_video_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:
         if shown is not None:
             yield shown
 
-    return frames(), rates[0]
+    return decode(), rates[0]

@@ -77,7 +77,7 @@ class FaceBox:
 class PointFinder(AbstractContextManager["PointFinder"], Protocol):
     """Finds the points of faces in the pictures of one clip, in order; it may follow them from picture to picture."""
 
-    def faces(self, image: Image) -> list[NDArray[np.float64]]:
+    def find_faces(self, image: Image) -> list[NDArray[np.float64]]:
         """Return the points of every face in the next picture.
 
         image : uint8 array [shape=(H, W, 3)], RGB
@@ -89,7 +89,7 @@ class PointFinder(AbstractContextManager["PointFinder"], Protocol):
 class BoxFinder(AbstractContextManager["BoxFinder"], Protocol):
     """Finds faces in single pictures, in any order, small ones too."""
 
-    def boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
+    def find_boxes(self, image: Image, *, thorough: bool = True) -> list[FaceBox]:
         """Return the faces in a picture [shape=(H, W, 3)], best score first; ``thorough``: search longer for any."""
 
 
@@ -101,15 +101,15 @@ class LandmarkTracker(ABC):
     """
 
     @abstractmethod
-    def versions(self) -> dict[str, str]:
+    def list_versions(self) -> dict[str, str]:
         """Return the versions of packages that results depend on. Raises MissingDependencyError: one is missing."""
 
     @abstractmethod
-    def points(self, most: int = 1) -> PointFinder:
+    def open_point_finder(self, most: int = 1) -> PointFinder:
         """Return what finds the points of so many faces in a clip. Raises MissingDependencyError: no package."""
 
     @abstractmethod
-    def boxes(self) -> BoxFinder:
+    def open_box_finder(self) -> BoxFinder:
         """Return what finds faces in single pictures."""
 
 

@@ -85,7 +85,10 @@ def run_info(options: argparse.Namespace) -> None:
     from lipmotion_faces.corpus.sync import measure_offsets
 
     corpus = Corpus.open(options.corpus)
-    for name, value in (*corpus.summary().items(), *(("offset", line) for line in measure_offsets(corpus).lines())):
+    for name, value in (
+        *corpus.summary().items(),
+        *(("offset", line) for line in measure_offsets(corpus).list_lines()),
+    ):
         print_line(f"{name:12} {value}")
 
 
@@ -156,7 +159,7 @@ def run_coverage(options: argparse.Namespace) -> None:
     """Call ``measure_coverage`` and print it."""
     from lipmotion.corpora.store import Corpus
     from lipmotion.units import Lexicon
-    from lipmotion_faces.corpus.coverage import measure_coverage, coverage_to_json, format_coverage
+    from lipmotion_faces.corpus.coverage import coverage_to_json, format_coverage, measure_coverage
 
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
     result = measure_coverage(Corpus.open(options.corpus), options.text, lexicon=lexicon)

@@ -68,7 +68,7 @@ def measure_clips(clips: Sequence[held_out.ComparedClip], recordings: Compared, 
     column = slice(leading, leading + 1)
     led = [clip[:, column] for clip in generated], [clip[:, column] for clip in original]
 
-    def distance(columns: NDArray[np.bool_]) -> float:
+    def measure_distance(columns: NDArray[np.bool_]) -> float:
         return curves.measure_mean_distance(
             [clip[:, columns] for clip in generated], [clip[:, columns] for clip in original]
         )
@@ -76,14 +76,14 @@ def measure_clips(clips: Sequence[held_out.ComparedClip], recordings: Compared, 
     figures = {
         "channels": {name: row for name, row in per_channel.items() if name not in eigenlips},
         "acc": float(measured["acc"][overall].mean()),
-        "amse": distance(overall),
+        "amse": measure_distance(overall),
         "leading": compared[leading],
         "lag_ms": curves.measure_lag(*led, rate_hz),
     }
     if eigenlips:  # means over channels: Xie & Liu 2007, Eq. 21, for the correlation
         rows = list(eigenlips.values())
         means = {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
-        figures["eigenlips"] = means | {"amse": distance(is_eigenlips), "channels": eigenlips}
+        figures["eigenlips"] = means | {"amse": measure_distance(is_eigenlips), "channels": eigenlips}
     if threshold is None:
         return figures
     return figures | _measure_opening(clips, compared.index(held_out.OPENING), threshold, rate_hz, seed)
@@ -209,7 +209,7 @@ def _was_trained_on(model: Model, utterances: Sequence[Utterance], folder: str) 
 
 
 Array = NDArray[np.float64]
-LEAST_DIFFERENCE = 1e-6
+MIN_DIFFERENCE = 1e-6
 """A smaller difference of correlations, or of lengths in eye distances, is rounding."""
 
 
@@ -225,11 +225,11 @@ class ClipStatistic:
         """The statistic over all clips."""
         return self._value(self.sums)
 
-    def interval(self, seed: int) -> tuple[float, float]:
+    def compute_interval(self, seed: int) -> tuple[float, float]:
         """Return the 95 % bootstrap interval over clips."""
         return compute_interval(lambda own, _: self._value(own), self.sums, self.sums, seed)
 
-    def gain(self, other: ClipStatistic, seed: int) -> tuple[float, float]:
+    def compute_gain(self, other: ClipStatistic, seed: int) -> tuple[float, float]:
         """Return the paired 95 % bootstrap interval of this statistic minus that of another system."""
         return compute_interval(
             lambda own, others: self._value(own) - other._value(others), self.sums, other.sums, seed
@@ -249,17 +249,17 @@ def sum_correlations(generated: Clips, original: Clips) -> ClipStatistic:
     middle, everything = np.concatenate(original).mean(axis=0), np.concatenate(generated)
     still = ~varies(everything)
 
-    def moments(g: Array, o: Array) -> Array:
+    def sum_moments(g: Array, o: Array) -> Array:
         a, b = np.where(still, 0, g - middle), o - middle
         return np.stack([np.full(a.shape[1], float(len(a))), *(x.sum(axis=0) for x in (a, b, a * a, b * b, a * b))])
 
-    def mean_correlation(total: Array) -> float:
+    def average_correlation(total: Array) -> float:
         count, a, b, aa, bb, ab = total
         squares = np.maximum(aa - a * a / count, 0) * np.maximum(bb - b * b / count, 0)
         correlations = (ab - a * b / count) / np.where(squares > 0, np.sqrt(squares), np.inf)
         return float(correlations.mean())
 
-    return ClipStatistic([moments(g, o) for g, o in zip(generated, original, strict=True)], mean_correlation)
+    return ClipStatistic([sum_moments(g, o) for g, o in zip(generated, original, strict=True)], average_correlation)
 
 
 def sum_distances(generated: Clips, original: Clips) -> ClipStatistic:
@@ -300,11 +300,11 @@ def list_statistics(recordings: Compared, made: Sequence[held_out.ComparedClip])
 
 
 def find_sign(interval: Sequence[float | None]) -> int:
-    """Return 1 or -1 for a difference whose interval leaves out 0, by ``LEAST_DIFFERENCE`` for rounding, else 0."""
+    """Return 1 or -1 for a difference whose interval leaves out 0, by ``MIN_DIFFERENCE`` for rounding, else 0."""
     low, high = interval
     if low is None or high is None:
         return 0
-    return int(low > LEAST_DIFFERENCE) - int(high < -LEAST_DIFFERENCE)
+    return int(low > MIN_DIFFERENCE) - int(high < -MIN_DIFFERENCE)
 
 
 def mark_significance(gain: Sequence[float | None]) -> str:

@@ -67,13 +67,13 @@ class HeldOutRecordings:
         known = self.speakers.names if self.speakers is not None else ()
         return tuple(sorted({utterance.speaker for utterance in self.utterances} - set(known)))
 
-    def first(self, count: int) -> HeldOutRecordings:
+    def select_first(self, count: int) -> HeldOutRecordings:
         """Return the first recordings alone."""
         conditions = {name: phones[:count] for name, phones in self.conditions.items()}
         parts = {name: getattr(self, name)[:count] for name in ("utterances", "reference", "recognitions")}
         return replace(self, conditions=conditions, **parts)
 
-    def person(self, utterance: Utterance) -> SpeakerMap | None:
+    def find_person(self, utterance: Utterance) -> SpeakerMap | None:
         """Return the map to the motion of an utterance's speaker; None for a stranger."""
         if self.speakers is None or utterance.speaker not in self.speakers.names:
             return None
@@ -205,7 +205,7 @@ def generate_compared(
     """Return recorded and generated motion of all utterances for their speech. Raises CorpusError: other channels."""
     clips, channels = [], recordings.channels
     for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True):
-        generated = generate_for(recordings.person(utterance), engine, learned, spoken).motion
+        generated = generate_for(recordings.find_person(utterance), engine, learned, spoken).motion
         missing = [name for name in channels if name not in generated.names]
         if missing:
             raise CorpusError(

@@ -36,7 +36,7 @@ class _Scale:
     stop: float
 
     @classmethod
-    def of(cls, values: Iterable[float], start: float, stop: float) -> _Scale:
+    def fit(cls, values: Iterable[float], start: float, stop: float) -> _Scale:
         known = list(values) or [0.0, 1.0]
         low, high = min(known), max(known)
         margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
@@ -45,7 +45,7 @@ class _Scale:
     def __call__(self, value: float) -> float:
         return self.start + (value - self.low) / (self.high - self.low) * (self.stop - self.start)
 
-    def ticks(self, count: int = 5) -> list[float]:
+    def list_ticks(self, count: int = 5) -> list[float]:
         """Return round values on the axis, at most so many."""
         smallest = (self.high - self.low) / count
         power = 10.0 ** np.floor(np.log10(smallest))
@@ -57,9 +57,9 @@ class _Scale:
 def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
     """Return a chart with a line for each row: the figure, its interval, and the paper's own as a diamond."""
     values = [v for row in rows for v in (row.value, row.paper, *(row.interval or ())) if v is not None]
-    scale, height = _Scale.of(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 10
+    scale, height = _Scale.fit(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 10
     parts, bottom = [], height - AXIS - 2
-    for tick in scale.ticks():
+    for tick in scale.list_ticks():
         parts.append(_draw_line(scale(tick), 0, scale(tick), bottom, "level"))
         parts.append(_draw_text(scale(tick), bottom + 13, f"{tick:g}", "middle"))
     parts.append(_draw_text(WIDTH - RIGHT, height - 4, unit, "end"))
@@ -88,17 +88,17 @@ def draw_curve(
     """Return recorded (dashed) and generated motion [each shape=(N,)] over time; ``marked``: (start, end, name)."""
     bottom = CURVE_HEIGHT - 18
     across = _Scale(float(time_s[0]), float(time_s[-1]), CURVE_LEFT, WIDTH - 4)
-    up = _Scale.of([*recorded, *generated], bottom, CURVE_TOP)
+    up = _Scale.fit([*recorded, *generated], bottom, CURVE_TOP)
     parts = []
     for start_s, end_s, name in marked:
         left, right = (across(min(max(time, across.low), across.high)) for time in (start_s, end_s))
         shade = {"x": f"{left:.1f}", "width": f"{max(right - left, 1):.1f}"}
         parts.append(element("rect", y=str(CURVE_TOP), height=str(bottom - CURVE_TOP), class_="marked", **shade))
         parts.append(_draw_text((left + right) / 2, CURVE_TOP - 3, name, "middle"))
-    for tick in up.ticks(3):
+    for tick in up.list_ticks(3):
         parts.append(_draw_line(CURVE_LEFT, up(tick), WIDTH - 4, up(tick), "level"))
         parts.append(_draw_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
-    parts += [_draw_text(across(tick), CURVE_HEIGHT - 4, f"{tick:g} s", "middle") for tick in across.ticks(4)]
+    parts += [_draw_text(across(tick), CURVE_HEIGHT - 4, f"{tick:g} s", "middle") for tick in across.list_ticks(4)]
     for values, kind in ((recorded, "recorded"), (generated, "generated")):
         points = " ".join(f"{across(t):.1f},{up(v):.1f}" for t, v in zip(time_s, values, strict=True))
         parts.append(element("polyline", points=points, class_=kind))
@@ -110,10 +110,10 @@ def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float,
     """Return figures with intervals over a number, on a logarithmic axis: a line for each name."""
     height, bottom = 220, 186
     points = [point for line in lines.values() for point in line if point[1].value is not None]
-    up = _Scale.of([v for _, dot in points for v in (dot.value, *(dot.interval or ())) if v is not None], bottom, 10)
-    across = _Scale.of([float(np.log(n)) for n, _ in points], CURVE_LEFT + 4, WIDTH - RIGHT)
+    up = _Scale.fit([v for _, dot in points for v in (dot.value, *(dot.interval or ())) if v is not None], bottom, 10)
+    across = _Scale.fit([float(np.log(n)) for n, _ in points], CURVE_LEFT + 4, WIDTH - RIGHT)
     parts = []
-    for tick in up.ticks():
+    for tick in up.list_ticks():
         parts.append(_draw_line(CURVE_LEFT, up(tick), WIDTH - RIGHT, up(tick), "level"))
         parts.append(_draw_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
     numbers = sorted({number for number, _ in points})
@@ -134,7 +134,9 @@ def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float,
     spoken = "; ".join(
         f"{name}: {', '.join(f'{n:g} {_spell(dot.value)}' for n, dot in line)}" for name, line in lines.items()
     )
-    return _draw_figure(title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
+    return _draw_figure(
+        title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals."
+    )
 
 
 def _draw_figure(title: str, spoken: str, height: int, parts: Sequence[Html], caption: str) -> Html:

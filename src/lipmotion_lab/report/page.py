@@ -55,22 +55,22 @@ class ClipKeeper:
         if condition != AUDIO_ONLY:
             return
 
-        def rounded(values: NDArray[np.float64]) -> Any:
+        def round_values(values: NDArray[np.float64]) -> Any:
             return np.round(values, DECIMALS).tolist()
 
         closings = [sum(phone in BILABIAL for *_, phone in clip.spoken) for clip in clips]
         number = int(np.argmax(closings))
         clip, utterance = clips[number], recordings.utterances[number]
         columns = [recordings.channels.index(name) for name in DISTANCES if name in recordings.channels]
-        content = self.content()
+        content = self.collect()
         if content.get("name") != utterance.name or not content["systems"]:
             content = {"key": self.key, "name": utterance.name, "words": list(utterance.words or ()), "systems": {}}
             content |= {"channels": [recordings.channels[column] for column in columns], "spoken": clip.spoken}
-            content |= {"time_s": rounded(clip.time_s), RECORDED: rounded(clip.original[:, columns])}
-        content["systems"][system] = rounded(clip.generated[:, columns])
+            content |= {"time_s": round_values(clip.time_s), RECORDED: round_values(clip.original[:, columns])}
+        content["systems"][system] = round_values(clip.generated[:, columns])
         write_text(self.path, as_json(content) + "\n")
 
-    def content(self) -> dict[str, Any]:
+    def collect(self) -> dict[str, Any]:
         """Return what is kept; empty: nothing of this run."""
         try:
             content = from_json(self.path.read_bytes())
@@ -193,7 +193,9 @@ def write_html(  # noqa: PLR0913
         entries += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
     warning = [element("p", QUICK_WARNING, class_="warning")] if quick else []
     overview = element("ul", *entries, class_="overview")
-    main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_write_section, finished))
+    main = element(
+        "main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_write_section, finished)
+    )
     footer = element("footer", element("h2", "The corpus and the run"), _list(about))
     return build_page(title, style, header, main, footer, script=SCRIPT)
 

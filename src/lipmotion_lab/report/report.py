@@ -107,7 +107,9 @@ PARTS: dict[str, ReportPart] = {
     "minnis2000": ReportPart(
         ("train", TEST),
         2,
-        lambda run: run_minnis2000(run.corpus, models=run.models, quick=run.quick, work=run.work, settings=run.settings),
+        lambda run: run_minnis2000(
+            run.corpus, models=run.models, quick=run.quick, work=run.work, settings=run.settings
+        ),
         build_minnis_section,
     ),
     "engines": ReportPart(
@@ -197,7 +199,7 @@ def write_report(
         for name, part in zip(missing, parts, strict=True):
             writer.run(name, part)
             writer.write_page(wanted)
-        finished = writer.finished()
+        finished = writer.list_finished()
     verdicts = {part.name: part.section.verdict for part in finished}
     made = [name for name in missing if name not in writer.failed]
     return WrittenReport(folder / PAGE, verdicts, lacking, writer.failed, made)
@@ -227,7 +229,7 @@ class _Writer:
     digest: str
     failed: dict[str, Exception] = field(default_factory=dict)
 
-    def key(self, name: str) -> str:
+    def make_key(self, name: str) -> str:
         """Return a digest of all that the figures of an experiment depend on."""
         return hashlib.sha256(f"{name} {self.digest}".encode()).hexdigest()
 
@@ -235,11 +237,11 @@ class _Writer:
         """Return figures and motion of an experiment that is finished; None: it is not, or was another one."""
         try:
             record, motion = (from_json((self.folder / name / file).read_bytes()) for file in (FIGURES, MOTION))
-            return (record, motion) if record["key"] == self.key(name) else None
+            return (record, motion) if record["key"] == self.make_key(name) else None
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
-    def finished(self) -> list[FinishedPart]:
+    def list_finished(self) -> list[FinishedPart]:
         """Return all experiments that are finished, in the order of the page."""
         finished = []
         for name, part in PARTS.items():
@@ -253,7 +255,7 @@ class _Writer:
 
     def write_page(self, wanted: Sequence[str]) -> None:
         """Write the page, if anything in it has changed."""
-        finished = self.finished()
+        finished = self.list_finished()
         there = {part.name for part in finished}
         left_open = {
             name: self.lacking.get(name, NOT_YET if name in wanted else NOT_CHOSEN)
@@ -262,7 +264,7 @@ class _Writer:
         }
         failed = {name: f"{FAILED}{describe_error(error)}; {AGAIN}" for name, error in self.failed.items()}
         corpus = self.corpus.path.resolve().name
-        about = self.corpus.summary() | {"corpus": corpus, "made with": shlex.join(self._command(wanted))}
+        about = self.corpus.summary() | {"corpus": corpus, "made with": shlex.join(self._build_command(wanted))}
         text = write_html(f"Experiments on {corpus}", about, finished, left_open, failed, quick=self.quick)
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
@@ -280,15 +282,15 @@ class _Writer:
 
     def _run(self, name: str, settings: ExperimentSettings) -> None:
         part, target = PARTS[name], self.folder / name
-        models = self.folder / "models" / self.key("models")[:KEY_DIGITS]  # of other recordings, other models
+        models = self.folder / "models" / self.make_key("models")[:KEY_DIGITS]  # of other recordings, other models
         with locks.keep_unfinished(self.folder / f"{name}.json") as work:
             stamp = Stamp()
-            keeper = ClipKeeper(work / MOTION, self.key(name))
-            running = replace(settings.part(0, 0.95), receive=keeper)
+            keeper = ClipKeeper(work / MOTION, self.make_key(name))
+            running = replace(settings.narrow(0, 0.95), receive=keeper)
             plots = work / "plots" if part.draws and can_draw() else None
             figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
-            section, motion = part.section(figures), keeper.content()
-            made_with = stamp.content(self._command([name]), self.corpus, settings)
+            section, motion = part.section(figures), keeper.collect()
+            made_with = stamp.collect(self._build_command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
             with files.replace_folder(target) as made:
                 videos = []
@@ -299,13 +301,13 @@ class _Writer:
                 for file in captions:
                     shutil.move(work / "plots" / file, made / file)
                 pictures = [{"file": file, "caption": caption} for file, caption in captions.items()]
-                record: dict[str, Any] = {"experiment": name, "key": self.key(name), "stamp": made_with}
+                record: dict[str, Any] = {"experiment": name, "key": self.make_key(name), "stamp": made_with}
                 record |= {"figures": figures, "videos": videos, "pictures": pictures}
                 section.write_tables(made / "tables")
                 for file, content in ((MOTION, motion), (FIGURES, record)):
                     write_text(made / file, as_json(content, indent=1) + "\n")
 
-    def _command(self, wanted: Sequence[str]) -> list[str]:
+    def _build_command(self, wanted: Sequence[str]) -> list[str]:
         words = ["lipmotion", "experiment", "all", self.corpus.path.resolve().name, "-o", self.folder.resolve().name]
         words += ["--only", ",".join(wanted)] if len(wanted) < len(PARTS) else []
         words += ["--lexicon", "FILE"] if self.settings.lexicon else []

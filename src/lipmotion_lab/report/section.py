@@ -55,7 +55,7 @@ class Table:
     head: str = "system"
     heading: str = ""
 
-    def records(self) -> list[dict[str, Any]]:
+    def list_records(self) -> list[dict[str, Any]]:
         """Return the rows as flat records with the same keys in each; intervals as two figures."""
         endings = ((INTERVAL, ""), (DIFFERENCE, "_difference"))
         records = []
@@ -72,7 +72,7 @@ class Table:
 
     def as_csv(self) -> str:
         """Return the records as CSV; what is not defined is empty."""
-        text, records = io.StringIO(), self.records()
+        text, records = io.StringIO(), self.list_records()
         rows = csv.DictWriter(text, list(records[0]) if records else [self.head])
         rows.writeheader()
         for record in records:
@@ -83,7 +83,7 @@ class Table:
         """Return the table as content of a JSON file."""
         columns = {column.key: column.note or column.title for column in self.columns}
         about = {"caption": self.caption, "reference": self.reference or None, "columns": columns}
-        return about | {"rows": self.records()}
+        return about | {"rows": self.list_records()}
 
     @property
     def star(self) -> str:
@@ -245,7 +245,7 @@ class PaperOrder:
     form: str
     is_error: bool = False
 
-    def verdict(self) -> str:
+    def write_verdict(self) -> str:
         """Return in two sentences whether the paper's order held, and which system is best."""
         signs = [pair.sign for pair in self.pairs]
         held, reverse = signs.count(1), signs.count(-1)
@@ -256,13 +256,13 @@ class PaperOrder:
             verdict += "all held" if held == len(signs) else outcomes[(held > reverse) - (held < reverse)]
         else:
             verdict += "these recordings say nothing of its order"
-        here = ", ".join(self._best(self.here)) or "none"
-        return f"{verdict}. Best in print: {self._best(self.paper)[0]}; here: {here}."
+        here = ", ".join(self._list_best(self.here)) or "none"
+        return f"{verdict}. Best in print: {self._list_best(self.paper)[0]}; here: {here}."
 
-    def sentences(self) -> list[str]:
+    def write_sentences(self) -> list[str]:
         """Return what held and what did not, sentence by sentence."""
         found = [f"In print: {self._list(self.paper)}.", f"Here: {self._list(self.here)}."]
-        best, here = self._best(self.paper)[0], self._best(self.here)
+        best, here = self._list_best(self.paper)[0], self._list_best(self.here)
         pair = next((each for each in self.pairs if here and {each.better, each.worse} == {best, here[0]}), None)
         if best not in here and pair is not None and pair.difference is not None:
             low, high = pair.interval
@@ -299,7 +299,7 @@ class PaperOrder:
         known.sort(key=lambda pair: pair[1], reverse=not self.is_error)
         return ", ".join(f"{name} {value:{form}}" for name, value in known)
 
-    def _best(self, values: Mapping[str, float | None]) -> list[str]:
+    def _list_best(self, values: Mapping[str, float | None]) -> list[str]:
         known = {name: value for name, value in values.items() if value is not None}
         best = (min if self.is_error else max)(known.values(), default=None)
         return [name for name, value in known.items() if value == best]

@@ -72,7 +72,7 @@ def _draw_acc(title: str, table: Table) -> Html:
 
 
 def build_hofer_section(figures: Mapping[str, Any]) -> Section:
-    """Return what the figures of ``hofer2008`` say; the paper's own case is audio alone, as printed, most states."""
+    """Return what the figures of ``run_hofer2008`` say; the case of the paper: audio alone, as printed, most states."""
     blocks = list(figures["tables"])
     most = max(block["states"] for block in blocks)
     case = (most, AUDIO_ONLY, AS_PRINTED)
@@ -88,14 +88,14 @@ def build_hofer_section(figures: Mapping[str, Any]) -> Section:
         f"{figures['split']}.{_describe_closings(figures, next(iter(rows.values())))} "
         f"Channels of motion: {figures['channels'] or 'all'}. Shown first: sound alone, {AS_PRINTED}, {most} states."
     )
-    words = warn_of_few(figures["clips"]) | {"The paper's order": order.sentences()}
+    words = warn_of_few(figures["clips"]) | {"The paper's order": order.write_sentences()}
     more = [
-        replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).verdict()}")
+        replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).write_verdict()}")
         for block, other in [(block, _build_hofer_table(block)) for block in blocks if block is not main]
     ]
     shown = [f"{units}, {most} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
-    return Section(title, about, order.verdict(), words, charts, table, more, shown)
+    return Section(title, about, order.write_verdict(), words, charts, table, more, shown)
 
 
 def _build_hofer_order(block: Mapping[str, Any]) -> PaperOrder:
@@ -150,7 +150,7 @@ MINNIS_COLUMNS = (
 
 
 def build_minnis_section(figures: Mapping[str, Any]) -> Section:
-    """Return what the figures of ``minnis2000`` say, on the last of its lists, which is ``test``."""
+    """Return what the figures of ``run_minnis2000`` say, on the last of its lists, which is ``test``."""
     tables: dict[tuple[str, str], Table] = {}
     for split, found in figures["lists"].items():
         for condition, rows in found["conditions"].items():
@@ -239,7 +239,7 @@ MEASURES = (("acc", "ACC", "+.3f"), ("amse", "AMSE", "+.4f"))
 
 
 def build_xie_liu_section(figures: Mapping[str, Any]) -> Section:
-    """Return what the figures of ``xieliu2007`` say, of the largest number of recordings."""
+    """Return what the figures of ``run_xieliu2007`` say, of the largest number of recordings."""
     *smaller, size = figures["rows"]
     cases = [(condition, rows, size) for condition, rows in size["conditions"].items()]
     for each in smaller:
@@ -252,9 +252,12 @@ def build_xie_liu_section(figures: Mapping[str, Any]) -> Section:
         pairs = [pair for pair in size["pairs"] if {pair["better"], pair["worse"]} <= names]
         if pairs:
             by_acc, by_error = (_compare_order(main.rows, pairs, ending, *measure) for measure in MEASURES)
-            words[f"Systems {called}, by ACC"] = [*([by_acc.verdict()] if verdict else []), *by_acc.sentences()]
-            by_amse.append(f"Systems {called}: {by_error.verdict()}")
-            verdict = verdict or by_acc.verdict()
+            words[f"Systems {called}, by ACC"] = [
+                *([by_acc.write_verdict()] if verdict else []),
+                *by_acc.write_sentences(),
+            ]
+            by_amse.append(f"Systems {called}: {by_error.write_verdict()}")
+            verdict = verdict or by_acc.write_verdict()
     words["By AMSE"] = by_amse
     if changed := [_describe_options(name, row["options"]) for name, row in size["training"].items() if row["tried"]]:
         words["Settings, the best on val"] = changed
@@ -330,7 +333,7 @@ ENGINES_OUTCOMES = ("Higher than that", "Lower than that", "Not different for su
 
 
 def build_engines_section(figures: Mapping[str, Any]) -> Section:
-    """Return what the figures of ``engines`` say."""
+    """Return what the figures of ``compare_engines`` say."""
     reference = figures["reference"]
     conditions = {
         condition: {
@@ -346,7 +349,9 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
     acc = format_figure(main.rows[best]["acc"], ".3f")
     verdict = f"Most alike to the recordings: {best} (ACC {acc}); nothing is in print to compare."
     outcomes = [f"{what} of the engine {reference}" for what in ENGINES_OUTCOMES]
-    words = warn_of_few(figures["clips"]) | {"ACC of the opening": _group_by_sign(signs, {n: n for n in signs}, outcomes)}
+    words = warn_of_few(figures["clips"]) | {
+        "ACC of the opening": _group_by_sign(signs, {n: n for n in signs}, outcomes)
+    }
     minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
     about = (
         f"All engines with their defaults, trained on {minutes} minutes, on {figures['clips']} "
@@ -358,7 +363,7 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
 
 
 def build_learning_section(figures: Mapping[str, Any]) -> Section:
-    """Return what the figures of ``learning_curve`` say."""
+    """Return what the figures of ``run_learning_curve`` say."""
     sizes = {str(row["names"]): row for row in figures["rows"]}
     columns = (
         Column("used", "used", ".0f", "recordings that could be used"),
@@ -401,7 +406,7 @@ def build_learning_section(figures: Mapping[str, Any]) -> Section:
 
 
 def build_folds_section(figures: Mapping[str, Any]) -> Section:
-    """Return what the figures of ``folds`` say."""
+    """Return what the figures of ``cross_validate`` say."""
     rows = figures["conditions"]
     original = Column("original_per_minute", "recorded elsewhere", ".1f", "the same of the recordings")
     columns, row = (*OPENING, TIMING, ELSEWHERE, original), rows[AUDIO_ONLY]
@@ -427,7 +432,7 @@ def build_folds_section(figures: Mapping[str, Any]) -> Section:
 
 
 def build_blocks_section(figures: Mapping[str, Any]) -> Section:
-    """Return what the figures of ``folds.cross_validate_blocks`` say: of sound alone, systems by their mean correlation."""
+    """Return what the figures of ``cross_validate_blocks`` say: of sound alone, systems by their mean correlation."""
     rows = {name: {**(row.get("opening") or {}), **row} for name, row in figures["conditions"][AUDIO_ONLY].items()}
     columns = (Column("acc", "ACC, mean", ".3f", "correlation, mean over channels"), SCORE, PRECISION, RECALL, VARIANCE)
     best = max(rows, key=lambda name: rows[name]["acc"])

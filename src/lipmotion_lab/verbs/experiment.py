@@ -90,7 +90,7 @@ def run_experiment(
             corpus = take_quick_part(corpus, settings.seed)
         with keep_unfinished(options.output) if options.output and has_parts else nullcontext() as work:
             figures = experiment(corpus, work=work, settings=settings)
-        return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
+        return {"stamp": stamp.collect(["lipmotion", *options.words], corpus, settings)} | figures
 
     section = PARTS[name].section if blocks is None else build_blocks_section
     report_figures(options, compute, lambda figures: section(figures).as_text())
@@ -136,12 +136,12 @@ def _run_learning_curve(options: argparse.Namespace) -> None:
     from lipmotion.corpora.source_recordings import read_names
     from lipmotion_lab.learning_curve import run_learning_curve
 
-    def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
+    def run(corpus: Corpus, **others: Any) -> dict[str, Any]:
         order = read_names(options.order) if options.order else None
         split, rival = list_or_all(options.split), options.rival
         return run_learning_curve(corpus, order=order, sizes=options.sizes, split=split, rival=rival, **others)
 
-    run_experiment(options, experiment, "learning-curve")
+    run_experiment(options, run, "learning-curve")
 
 
 def _add_folds(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -199,7 +199,7 @@ def _run_xieliu2007(options: argparse.Namespace) -> None:
     if options.blocks and (options.order or options.sizes or options.plots or options.visual != "geometry"):
         raise InputError("--blocks trains on all other blocks, by channels that all have; leave out other options")
 
-    def experiment(corpus: Corpus, **others: Any) -> dict[str, Any]:
+    def run(corpus: Corpus, **others: Any) -> dict[str, Any]:
         usual = QUICK if options.quick else DEFAULT_OPTIONS
         compared = replace(
             usual,
@@ -212,7 +212,7 @@ def _run_xieliu2007(options: argparse.Namespace) -> None:
         split, sizes, plots = list_or_all(options.split), options.sizes, options.plots
         return run_xieliu2007(corpus, compared, split=split, order=order, sizes=sizes, plots=plots, **others)
 
-    run_experiment(options, experiment, "xieliu2007", references=(REFERENCE_SYSTEM, "ph-HMM", BLSTM))
+    run_experiment(options, run, "xieliu2007", references=(REFERENCE_SYSTEM, "ph-HMM", BLSTM))
 
 
 def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -247,10 +247,10 @@ def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -
 def _run_engines(options: argparse.Namespace) -> None:
     from lipmotion_lab.engine_comparison import compare_engines
 
-    def experiment(corpus: Corpus, *, settings: ExperimentSettings, work: None) -> dict[str, Any]:  # noqa: ARG001
+    def run(corpus: Corpus, *, settings: ExperimentSettings, work: None) -> dict[str, Any]:  # noqa: ARG001
         return compare_engines(corpus, split=list_or_all(options.split), models=options.models, settings=settings)
 
-    run_experiment(options, experiment, "engines", has_parts=False)
+    run_experiment(options, run, "engines", has_parts=False)
 
 
 def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

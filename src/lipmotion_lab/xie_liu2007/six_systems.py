@@ -85,7 +85,7 @@ def check_plot_folder(folder: Path) -> None:
 def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Path) -> None:
     """Write pictures of the conversion by EM of the first recordings. Raises MissingDependencyError, ExportError."""
     figure = import_figure()
-    some = recordings.first(CONVERGENCE_RECORDINGS)
+    some = recordings.select_first(CONVERGENCE_RECORDINGS)
     by_em = generate_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))
     by_path = generate_clips(some, AUDIO_ONLY, path_engine, chains.model)
@@ -177,7 +177,7 @@ def run_xieliu2007(  # noqa: PLR0913
 ) -> dict[str, Any]:
     """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
 
-    order, sizes : train on the first N names of a list, as in ``learning_curve``; by default on all of ``train``
+    order, sizes : train on the first N names of a list, as in ``run_learning_curve``; by default on all of ``train``
     The phones in time are computed once for each size and are the same for all systems.
     Raises InputError: no such system, or sizes that the list does not have.
     Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
@@ -203,7 +203,7 @@ def run_xieliu2007(  # noqa: PLR0913
     parts = runner.share_out(settings, [f"{count} clips" for count in steps], sizes=steps)
     for count, part in zip(steps, parts, strict=True):
         trained = setup.train(names, listed[:count], part.monitor)
-        kept = setup.checkpoint(listed[:count], held_out)
+        kept = setup.open_checkpoint(listed[:count], held_out)
         rows.append({"names": count} | _measure_size(trained, options.transcripts, settings, kept))
     recordings = trained.recordings
     if plots is not None:
@@ -234,8 +234,8 @@ class _TrainingSetup:
 
     def train(self, systems: Sequence[str], names: Sequence[str], monitor: Monitor) -> _TrainedSystems:
         """Return systems, trained on the same phones of the utterances ``names``."""
-        examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
-        kept, trained = self.checkpoint(names), dict[str, TrainedSystem]()
+        examples, recordings = self._prepare(names, self.held_out, sub_monitor(monitor, 0, 0.3))
+        kept, trained = self.open_checkpoint(names), dict[str, TrainedSystem]()
         others = [*list_motionless(engine_named("coupled"), self.options.voices)]
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
@@ -253,7 +253,7 @@ class _TrainingSetup:
                 trained[name] = system_from_arrays(found)
         return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
 
-    def _prepared(
+    def _prepare(
         self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
     ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
         """Return the examples of some utterances, and recordings with the phones of models trained on these."""
@@ -261,18 +261,18 @@ class _TrainingSetup:
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
         eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
-        phones, examples = runner.train_phones(utterances, settings.part(0, 0.7), self.checkpoint(names))
+        phones, examples = runner.train_phones(utterances, settings.narrow(0, 0.7), self.open_checkpoint(names))
         parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
         recordings: dict[str, HeldOutRecordings] = {}
         for number, (name, part) in enumerate(parts.items()):
-            reading = settings.part(0.7 + 0.15 * number, 0.85 + 0.15 * number)
+            reading = settings.narrow(0.7 + 0.15 * number, 0.85 + 0.15 * number)
             channels = recordings["held out"].channels if recordings else None
             recordings[name] = runner.recognise_held_out(
                 self.corpus, phones, part, reading, channels=channels, visual=visual, eigenlips=eigenlips
             )
         return examples, recordings
 
-    def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
+    def open_checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
         others = " ".join((str(self.options.mixtures), *(spoken.name for spoken in self.options.voices), *compared))
         everything = (*names, *self.corpus.names("val"))
@@ -340,20 +340,22 @@ def _compare_paper_pairs(
             row: dict[str, Any] = {"better": better, "worse": worse}
             for key in ("acc", "amse"):
                 own, other = statistics[better][key], statistics[worse][key]
-                row |= {key: own.value - other.value, f"{key}_95": own.gain(other, seed)}
+                row |= {key: own.value - other.value, f"{key}_95": own.compute_gain(other, seed)}
             rows.append(row)
     return rows
 
 
-def _make_system_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
+def _make_system_rows(
+    recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int
+) -> dict[str, Any]:
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
     reference, rows = evaluate.list_statistics(recordings, made[REFERENCE_SYSTEM]), {}
     for system, clips in made.items():
         figures = evaluate.measure_clips(clips, recordings, seed)
         row: dict[str, Any] = {}
         for name, statistic in evaluate.list_statistics(recordings, clips).items():
-            row[name], row[f"{name}_95"] = statistic.value, statistic.interval(seed)
-            row[f"{name}_gain_95"] = statistic.gain(reference[name], seed)
+            row[name], row[f"{name}_95"] = statistic.value, statistic.compute_interval(seed)
+            row[f"{name}_gain_95"] = statistic.compute_gain(reference[name], seed)
         still = not varies(np.concatenate([clip.generated for clip in clips])).any()
         row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
         if OPENING in recordings.channels:

@@ -47,12 +47,12 @@ LOG = logging.getLogger("lipmotion")
 def list_parameters(frame: LiveFrame) -> dict[str, float]:
     """Return the parameters of the mouth, and of lids and head, where the frame moves them."""
 
-    def both(name: str) -> float:
+    def sum_sides(name: str) -> float:
         return frame[f"{name}Left"] + frame[f"{name}Right"]
 
-    wide = both("mouthSmile") + both("mouthStretch") + both("mouthDimple") / 2
-    narrow = both("mouthFrown") + frame["mouthPucker"]
-    parted = (both("mouthUpperUp") + both("mouthLowerDown")) / 1.8
+    wide = sum_sides("mouthSmile") + sum_sides("mouthStretch") + sum_sides("mouthDimple") / 2
+    narrow = sum_sides("mouthFrown") + frame["mouthPucker"]
+    parted = (sum_sides("mouthUpperUp") + sum_sides("mouthLowerDown")) / 1.8
     pressed = frame["mouthRollLower"] + frame["mouthRollUpper"]
     living = {}
     if "headYaw" in frame.weights:
@@ -65,8 +65,8 @@ def list_parameters(frame: LiveFrame) -> dict[str, float]:
         "TongueOut": frame["tongueOut"],
         "JawOpen": frame["jawOpen"],
         "MouthFunnel": frame["mouthFunnel"],
-        "MouthShrug": (frame["mouthShrugUpper"] + frame["mouthShrugLower"] + both("mouthPress")) / 4,
-        "MouthPucker": min(max(2 * both("mouthDimple") - frame["mouthPucker"], -1.0), 1.0),
+        "MouthShrug": (frame["mouthShrugUpper"] + frame["mouthShrugLower"] + sum_sides("mouthPress")) / 4,
+        "MouthPucker": min(max(2 * sum_sides("mouthDimple") - frame["mouthPucker"], -1.0), 1.0),
         "MouthPressLipOpen": min(max(parted - pressed, -1.3), 1.3),
     }
 
@@ -89,7 +89,7 @@ class VTubeStudio:
                 self._loop.call_soon_threadsafe(self._is_new.set)
 
     @contextmanager
-    def connected(self) -> Iterator[None]:
+    def connect(self) -> Iterator[None]:
         """Send frames until the end of the block."""
         with run_in_background(self.work()) as self._loop:
             yield
@@ -178,8 +178,10 @@ def open_vtube(to: str, sound: LiveSound) -> Iterator[Consumer]:  # noqa: ARG001
     """
     check_installed(to)
     host, port = read_address(to, PORT)
-    studio = VTubeStudio(f"ws://{f'[{host}]' if ':' in host else host}:{port}", find_cache_folder() / "vtube-studio.token")
-    with studio.connected():
+    studio = VTubeStudio(
+        f"ws://{f'[{host}]' if ':' in host else host}:{port}", find_cache_folder() / "vtube-studio.token"
+    )
+    with studio.connect():
         yield studio
 
 

@@ -103,7 +103,7 @@ def _make_head(head: Future[bytes]) -> None:
     from lipmotion_studio import meshes
 
     try:
-        head.set_result(meshes.Faces({}).mesh(meshes.HEAD))
+        head.set_result(meshes.Faces({}).load_mesh(meshes.HEAD))
     except Exception as error:
         head.set_exception(error)  # the page is told
         raise

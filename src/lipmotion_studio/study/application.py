@@ -26,7 +26,15 @@ from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, list_ques
 from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, name_rater
 from lipmotion_studio.web.listening import read_page
-from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, find_foreign_refusal, reply_json, read_json
+from lipmotion_studio.web.replies import (
+    ERRORS,
+    FRESH,
+    Guard,
+    SecurityHeaders,
+    find_foreign_refusal,
+    read_json,
+    reply_json,
+)
 
 
 class RateLimit:
@@ -78,7 +86,7 @@ def check_sheet(study: Study, trials: list[StudyTrial], rater: int, content: Any
     trial, seconds = trials[sheet["trial"]], sheet["seconds"]
     if len(sheet["plays"]) != len(trial.videos):
         raise InputError(f"required the plays of {len(trial.videos)} videos")
-    lasts_s = sum(video.seconds for video in study.shown(trial))
+    lasts_s = sum(video.seconds for video in study.list_shown(trial))
     if seconds < SHARE_PLAYED * lasts_s:
         raise InputError(f"{seconds:.1f} s for videos of {lasts_s:.1f} s; play all of them to their ends")
     answers, count = sheet["values"], len(list_questions(study, trial))
@@ -118,32 +126,32 @@ def create_application(
         except ValueError:  # neither a known name nor an address of numbers
             return False
 
-    def refusal(_method: str, path: str, _query: bytes, headers: Mapping[str, str]) -> tuple[int, str] | None:
+    def find_refusal(_method: str, path: str, _query: bytes, headers: Mapping[str, str]) -> tuple[int, str] | None:
         return find_foreign_refusal(path, headers, is_own, names)
 
     replies = _Replies(study, store)
     page = dict(read_page(files("lipmotion_studio.study") / "page"))
 
-    async def packaged(request: Request) -> Response:
+    async def send_packaged(request: Request) -> Response:
         content, kind = page[request.url.path.removeprefix("/") or FIRST]
         return Response(content, headers=FRESH | {"content-type": kind})
 
-    async def video(request: Request) -> Response:
+    async def send_video(request: Request) -> Response:
         path = videos.get(request.path_params["name"])
         if path is None or not path.is_file():
             raise HTTPException(404, "no such video")
         return FileResponse(path, media_type="video/mp4", headers=WELL_KEPT)
 
-    routes = [Route(f"/{name}".removesuffix(FIRST), packaged) for name in page]
+    routes = [Route(f"/{name}".removesuffix(FIRST), send_packaged) for name in page]
     routes += [
-        Route(f"/{VIDEOS}/{{name}}", video),
+        Route(f"/{VIDEOS}/{{name}}", send_video),
         Route("/api/study", replies.describe),
         Route("/api/raters", replies.join, methods=["POST"]),
-        Route("/api/state", replies.state),
+        Route("/api/state", replies.send_state),
         Route("/api/answers", replies.answer, methods=["POST"]),
     ]
     application = Starlette(routes=routes, exception_handlers=ERRORS)
-    application.add_middleware(Guard, refusal=refusal)
+    application.add_middleware(Guard, refusal=find_refusal)
     application.add_middleware(SecurityHeaders)
     return application
 
@@ -170,37 +178,37 @@ class _Replies:
         if not self._joins.allows():
             raise HTTPException(429, "too many raters join at the same time; try again", {"retry-after": "2"})
         number, token = await asyncio.wrap_future(self._store.add_rater())
-        return reply_json({"token": token, **self._place(number, 0)}, 201)
+        return reply_json({"token": token, **self._describe_place(number, 0)}, 201)
 
-    async def state(self, request: Request) -> Response:
+    async def send_state(self, request: Request) -> Response:
         """The trial that a rater is at."""
-        rater = self._rater(request)
-        return reply_json(self._place(rater, self._store.next_trial(rater)))
+        rater = self._find_rater(request)
+        return reply_json(self._describe_place(rater, self._store.find_next_trial(rater)))
 
     async def answer(self, request: Request) -> Response:
         """The answers to the next trial, or again those to one that was answered; replied to once they are stored."""
-        rater = self._rater(request)
+        rater = self._find_rater(request)
         sheet = check_sheet(self._study, self._trials(rater), rater, await read_json(request))
-        following = self._store.next_trial(rater)
+        following = self._store.find_next_trial(rater)
         if sheet.trial > following:
             raise HTTPException(409, f"trial {sheet.trial} comes after trial {following}")
         if sheet.trial == following:
             if not await asyncio.wrap_future(self._store.record(sheet)):
                 raise HTTPException(401, "the rater has been forgotten")
             following += 1
-        return reply_json({"stored": sheet.trial, **self._place(rater, following)})
+        return reply_json({"stored": sheet.trial, **self._describe_place(rater, following)})
 
-    def _rater(self, request: Request) -> int:
+    def _find_rater(self, request: Request) -> int:
         """Return the rater of a request. Raises HTTPException: unknown, or too many requests."""
         scheme, _, token = request.headers.get("authorization", "").partition(" ")
-        rater = self._store.rater_of(token) if scheme.lower() == "bearer" else None
+        rater = self._store.find_rater(token) if scheme.lower() == "bearer" else None
         if rater is None:
             raise HTTPException(401, "this link is not known", {"www-authenticate": "Bearer"})
         if not self._answers.allows(rater):
             raise HTTPException(429, "too many requests; try again", {"retry-after": "2"})
         return rater
 
-    def _place(self, rater: int, number: int) -> dict[str, Any]:
+    def _describe_place(self, rater: int, number: int) -> dict[str, Any]:
         """Return what the page shows: a trial of a rater, and the videos of the one after it."""
         trials = self._trials(rater)
         place = {"rater": name_rater(rater), "trial": number, "trials": len(trials)}
@@ -208,7 +216,7 @@ class _Replies:
             return place
         study, trial = self._study, trials[number]
         videos, ahead = (
-            [f"/{VIDEOS}/{video.file}" for each in some for video in study.shown(each)]
+            [f"/{VIDEOS}/{video.file}" for each in some for video in study.list_shown(each)]
             for some in ([trial], trials[number + 1 : number + 2])
         )
         page: dict[str, Any] = {"practice": trial.practice, "note": trial.note, "videos": videos}

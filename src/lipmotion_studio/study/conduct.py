@@ -46,12 +46,12 @@ def collect_answers(folder: Path) -> list[Answer]:
     """Return the judgements of a study by rater and trial. Raises InputError: no study, or nobody has answered."""
     study = read_study(folder)
     with closing(StudyStore(folder, create=False)) as store:
-        sheets = store.sheets()
+        sheets = store.list_sheets()
     orders = {number: order_trials(study, number) for number in sorted({sheet.rater for sheet in sheets})}
     answers = []
     for sheet in sheets:
         trial = orders[sheet.rater][sheet.trial]
-        rater, sentence = name_rater(sheet.rater), study.shown(trial)[0].sentence
+        rater, sentence = name_rater(sheet.rater), study.list_shown(trial)[0].sentence
         for (question, condition, other), value in zip(list_questions(study, trial), sheet.values, strict=True):
             judged = (question, condition, other, value, sheet.seconds, sheet.plays, trial.practice, trial.expected)
             answers.append(Answer(rater, study.kind, sheet.trial, sentence, *judged))

@@ -104,7 +104,7 @@ class Study:
             if trial.expected and not is_possible(self.kind, trial.expected):
                 raise ValueError(f"a trial expects {trial.expected!r}, which nobody can answer")
 
-    def shown(self, trial: StudyTrial) -> list[StudyVideo]:
+    def list_shown(self, trial: StudyTrial) -> list[StudyVideo]:
         """Return the videos of a trial, in the order in which they are shown."""
         return [self.videos[number] for number in trial.videos]
 
@@ -246,7 +246,7 @@ def order_trials(study: Study, rater: int) -> list[StudyTrial]:
 
 def list_questions(study: Study, trial: StudyTrial) -> list[tuple[str, str, str]]:
     """Return what a trial asks, in the order of its answers: question, condition and other condition of each."""
-    conditions = [video.condition for video in study.shown(trial)]
+    conditions = [video.condition for video in study.list_shown(trial)]
     if study.kind == PAIRED:
         return [(PREFERENCE, conditions[0], conditions[1])]
     if study.kind == MOS:

@@ -63,7 +63,7 @@ MIN_REGION_PX = 16
 class Region:
     """A part of pictures, as shares from the upper left. Raises InputError: not inside.
 
-    >>> Region.parsed("0.25,0.5,0.5,0.4")
+    >>> Region.parse("0.25,0.5,0.5,0.4")
     Region(left=0.25, top=0.5, width=0.5, height=0.4)
     """
 
@@ -83,7 +83,7 @@ class Region:
             )
 
     @classmethod
-    def parsed(cls, text: str) -> Region:
+    def parse(cls, text: str) -> Region:
         """Return the region of a text, or the whole picture. Raises InputError: not four numbers inside."""
         if not text:
             return cls()
@@ -154,4 +154,4 @@ class StudySettings(Configuration):
     @property
     def shown_region(self) -> Region:
         """The part of the pictures that is shown. Raises InputError: not a region."""
-        return Region.parsed(self.region)
+        return Region.parse(self.region)

@@ -110,12 +110,12 @@ class StudyStore:
 
         return self._submit(work)
 
-    def rater_of(self, token: str) -> int | None:
+    def find_rater(self, token: str) -> int | None:
         """Return the number of the rater with a token; None: nobody has it."""
         row = self._reader.execute("SELECT number FROM raters WHERE token_sha256 = ?", [_digest(token)]).fetchone()
         return None if row is None else int(row[0])
 
-    def next_trial(self, rater: int) -> int:
+    def find_next_trial(self, rater: int) -> int:
         """Return the number of the trial that a rater has not answered yet, which may be one more than there are."""
         (last,) = self._reader.execute("SELECT max(trial) FROM answers WHERE rater = ?", [rater]).fetchone()
         return 0 if last is None else int(last) + 1
@@ -134,7 +134,7 @@ class StudyStore:
 
         return self._submit(work)
 
-    def sheets(self) -> list[AnswerSheet]:
+    def list_sheets(self) -> list[AnswerSheet]:
         """Return all answers, in the order of raters and trials."""
         found: dict[tuple[int, int], list[tuple[str, float, int]]] = {}
         order = "SELECT rater, trial, value, seconds, plays FROM answers ORDER BY rater, trial, item"

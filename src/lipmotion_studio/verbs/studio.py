@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> None:
 
     from lipmotion_studio.serve import serve_studio
 
-    def started(address: str) -> None:
+    def announce(address: str) -> None:
         print_line(f"the studio is at {address} (Ctrl-C ends; every edit is on the disk)")
         flush_output()
         if not options.no_browser:
@@ -47,4 +47,4 @@ def run(options: argparse.Namespace) -> None:
     characters: dict[str, Path] = {path.stem: path for path in (*options.character, *options.face)}
     given = {"out": options.output, "model": options.model, "port": options.port}
     given |= {"recordings": options.recordings, "against": options.against}
-    serve_studio(options.source, characters=characters, started=started, **given)
+    serve_studio(options.source, characters=characters, started=announce, **given)

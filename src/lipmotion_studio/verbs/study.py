@@ -95,11 +95,11 @@ def run_serve(options: argparse.Namespace) -> None:
     """Call ``serve_study``; print the address of the page."""
     from lipmotion_studio.study.conduct import serve_study
 
-    def started(address: str) -> None:
+    def announce(address: str) -> None:
         print_line(f"raters begin at {address} (Ctrl-C ends; answers are kept in {options.study})")
         flush_output()
 
-    serve_study(options.study, host=options.host, port=options.port, names=options.name, started=started)
+    serve_study(options.study, host=options.host, port=options.port, names=options.name, started=announce)
 
 
 def run_export(options: argparse.Namespace) -> None:

@@ -11,7 +11,7 @@ from lipmotion_faces.appearance.person import APPEARANCE, PARTS
 from lipmotion_faces.coded_video import STORED_VIDEO
 from lipmotion_faces.filmed.face import (
     BACKGROUND,
-    MOST_TAKES,
+    MAX_TAKES,
     TAKE,
     VERSION,
     FilmedFace,
@@ -205,7 +205,7 @@ HEADERS: list[tuple[dict[str, object], str]] = [
     ({"version": VERSION + 1}, f"face version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
     ({"version": None}, "face version None"),
     ({"format": "lipmotion.model"}, "not a face; give a file that `lipmotion face build` wrote"),
-    ({"takes": 10**9}, f"1000000000 takes, required 0 to {MOST_TAKES}"),
+    ({"takes": 10**9}, f"1000000000 takes, required 0 to {MAX_TAKES}"),
     ({"takes": "two"}, "the face is damaged"),
     ({"takes": 1}, "undeclared 'take1/"),
     ({"takes": 3}, "is missing"),

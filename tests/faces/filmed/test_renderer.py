@@ -190,7 +190,7 @@ def test_too_few_frames_of_background(appearance: Appearance, backgrounds: list[
         list(frames)
     nothing = FaceCodes(np.zeros((0, 90), np.float32), np.zeros((0, 36), np.float32), np.zeros(0, np.float32))
     assert list(Stitcher(appearance).stitch(nothing, [])) == []
-    assert list(Stitcher(appearance).mouths(nothing)) == []
+    assert list(Stitcher(appearance).draw_mouths(nothing)) == []
 
 
 def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
@@ -200,7 +200,7 @@ def test_mouths_of_chosen_codes(appearance: Appearance) -> None:
     zeros = np.zeros((len(chosen), appearance.jaw_codes.shape[1]), np.float32)
     codes = FaceCodes(appearance.mouth_codes[chosen], zeros, zeros[:, 0])
     assert len(chosen) > BATCH
-    made = np.stack(list(Stitcher(appearance, options).mouths(codes))).astype("i4")
+    made = np.stack(list(Stitcher(appearance, options).draw_mouths(codes))).astype("i4")
     assert np.abs(made - appearance.mouths[chosen]).max() <= 1
-    blurred = np.stack(list(Stitcher(appearance, StitchingOptions(mouth=None, noise=False)).mouths(codes)))
+    blurred = np.stack(list(Stitcher(appearance, StitchingOptions(mouth=None, noise=False)).draw_mouths(codes)))
     assert np.array_equal(blurred, appearance.mouth.restore(codes.mouth))

@@ -27,17 +27,17 @@ def steady(phones: tuple[str, ...], values: float = 0.08, duration_s: float = 0.
 
 def mouth_rows(figure: Figure) -> dict[str, np.ndarray]:
     """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
-    lips, every = figure.skin.lip_rows(), np.arange(len(figure.turning()))
+    lips, every = figure.skin.list_lip_rows(), np.arange(len(figure.weigh_turn()))
     inner = {name: every[figure.rows[name]] for name in ("tongue", "teeth", "upper teeth")}
     return {"lips": lips[1 : VISIBLE_RINGS + 1].ravel(), "wall": lips[VISIBLE_RINGS + 1 : RINGS].ravel(), **inner}
 
 
 def parts_seen(stage: Stage, pose: CharacterPose) -> dict[str, np.ndarray]:
     """Return which pixels show lips, wall, tongue, teeth (lower) and upper teeth [each shape=(H, W)]."""
-    drawn = stage.figure.frame(pose, stage.canvas.camera.place)
+    drawn = stage.figure.shade(pose, stage.canvas.camera.place)
     seen = {}
     for name, rows in mouth_rows(stage.figure).items():
         marked = np.zeros(len(drawn.places), bool)
         marked[rows] = True
-        seen[name] = stage.canvas.shown(drawn.places, marked, stage.figure.triangles)
+        seen[name] = stage.canvas.mark_shown(drawn.places, marked, stage.figure.triangles)
     return seen

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from faces.head.motions import mouth_rows
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.base import rotate_head
-from lipmotion_faces.head.inside import LOWER_EDGE, measure_drop, make_lower_teeth, make_upper_teeth
-from lipmotion_faces.head.part import MOUTH_Y, measure_head
+from lipmotion_faces.head.inside import LOWER_EDGE, make_lower_teeth, make_upper_teeth, measure_drop
+from lipmotion_faces.head.part import MOUTH_Y, to_head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import (
     ARCH,
@@ -16,11 +16,11 @@ from lipmotion_faces.head.skin import (
     TEETH_EDGE,
     TEETH_Z,
     VISIBLE_RINGS,
-    place_lips,
     move_jaw,
+    place_lips,
     place_sections,
 )
-from lipmotion_faces.head.stage import POSES, SIDED_POSES, make_camera, make_figure, build_head_mesh, fit_mouth_weights
+from lipmotion_faces.head.stage import POSES, SIDED_POSES, build_head_mesh, fit_mouth_weights, make_camera, make_figure
 from meshes.heads import shaped
 
 VIEWER = make_camera(640, 360).place
@@ -32,7 +32,7 @@ def rows(name: str) -> np.ndarray:
 
 
 def test_eyes_are_one_eye_distance_apart_at_their_outer_corners_and_normals_of_length_one():
-    corners = [make_figure().place(REST)[0][make_figure().skin.lid_rows(eye)[1]] for eye in (0, 1)]
+    corners = [make_figure().place(REST)[0][make_figure().skin.list_lid_rows(eye)[1]] for eye in (0, 1)]
     assert corners[0][:, 0].max() - corners[1][:, 0].min() == pytest.approx(1.0, abs=0.02)
     places, normals = make_figure().place(OPEN)
     assert np.isfinite(places).all()
@@ -50,7 +50,7 @@ def test_the_head_is_the_same_on_both_sides():
 def test_the_skin_at_rest_lies_on_its_form():
     skin = make_figure().skin
     fill = skin.face[(skin.face[:, 1] > MOUTH_Y + 0.4) & (np.abs(skin.face[:, 0]) > 0.02)]
-    assert np.abs(measure_head(fill)).max() < 2e-3
+    assert np.abs(to_head(fill)).max() < 2e-3
 
 
 def test_opening_moves_chin_and_lips_but_neither_forehead_nor_eyes():
@@ -63,7 +63,7 @@ def test_opening_moves_chin_and_lips_but_neither_forehead_nor_eyes():
 
 def test_shut_eyes_cover_the_eyeballs():
     def apart(**pose) -> np.ndarray:
-        height = make_figure().skin.lids_of_eye.opening(CharacterPose(**pose))[1]
+        height = make_figure().skin.lids_of_eye.place_opening(CharacterPose(**pose))[1]
         return height[1:32] - height[:32:-1]
 
     assert apart(shut=0.0).max() > 0.15
@@ -74,7 +74,7 @@ def test_shut_eyes_cover_the_eyeballs():
 
 def test_turning_moves_the_head_and_not_the_body_and_keeps_lengths():
     turns = (0, 0, 0), (0.3, 0.1, 0.05)
-    straight, aside = (make_figure().frame(CharacterPose(turn=turn), VIEWER).places for turn in turns)
+    straight, aside = (make_figure().shade(CharacterPose(turn=turn), VIEWER).places for turn in turns)
     body = make_figure().rows["clothing"]
     assert np.array_equal(straight[body], aside[body])
     nose = int(np.argmax(straight[make_figure().rows["skin"], 2]))
@@ -88,11 +88,11 @@ def test_turning_moves_the_head_and_not_the_body_and_keeps_lengths():
 
 def test_the_mouth_is_darker_in_its_depth_and_when_it_closes_and_light_is_at_most_white():
     def brightness(pose: CharacterPose, name: str) -> float:
-        return float(make_figure().frame(pose, VIEWER).light[mouth_rows(make_figure())[name]].mean())
+        return float(make_figure().shade(pose, VIEWER).light[mouth_rows(make_figure())[name]].mean())
 
     assert brightness(OPEN, "wall") < 0.3 * brightness(OPEN, "lips")
     assert brightness(OPEN._replace(roundness=1), "upper teeth") < brightness(OPEN, "upper teeth")
-    light = make_figure().frame(OPEN, VIEWER).light
+    light = make_figure().shade(OPEN, VIEWER).light
     seen = np.delete(light, np.r_[make_figure().rows["catchlights"], make_figure().rows["right catchlights"]], axis=0)
     assert light.min() >= 0
     assert np.quantile(seen, 0.999) < 1.0
@@ -113,7 +113,7 @@ def test_a_shape_at_full_weight_is_its_pose(mesh):
 
 
 def test_mouth_close_brings_the_lips_of_an_open_jaw_together_and_sided_shapes_leave_the_other_side_alone(mesh):
-    lips = make_figure().skin.lip_rows()[9]
+    lips = make_figure().skin.list_lip_rows()[9]
     apart, together = (shaped(mesh, {"jawOpen": 1.0, "mouthClose": closed})[lips] for closed in (0.0, 1.0))
     assert apart[20, 1] - apart[60, 1] > 0.25
     assert together[20, 1] - together[60, 1] < 0.03
@@ -160,12 +160,12 @@ def places(mesh: Mesh) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     for number, (name, pose) in enumerate(SAID.items()):
         weights = {each: float(curve[10 * number + 5]) for each, curve in curves.items()}
         added = sum(weight * moved[mesh.shape_names.index(each)] for each, weight in weights.items())
-        found[name] = (mesh.vertices[rows] + added, make_figure().skin.places(pose))
+        found[name] = (mesh.vertices[rows] + added, make_figure().skin.place(pose))
     return found
 
 
 def test_the_lips_are_where_they_are_drawn(places: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
-    rings = make_figure().skin.lip_rows()
+    rings = make_figure().skin.list_lip_rows()
     lips, ring = rings[:10].ravel(), rings[VISIBLE_RINGS - 1]
     for name, (summed, drawn) in places.items():
         assert np.abs(summed - drawn)[lips].max() < 0.07, name
@@ -177,7 +177,7 @@ def test_the_lips_are_where_they_are_drawn(places: dict[str, tuple[np.ndarray, n
 def test_closed_lips_are_those_of_the_rest_pose(mesh: Mesh) -> None:
     closed = [CharacterPose(gap=0.0, jaw=jaw, width=width) for jaw in (0.0, 0.06, 0.1) for width in (0.9, 1.0, 1.05)]
     curves = fit_mouth_weights(make_figure(), mesh, closed)
-    ring = make_figure().skin.lip_rows()[VISIBLE_RINGS - 1]
+    ring = make_figure().skin.list_lip_rows()[VISIBLE_RINGS - 1]
     moved = mesh.displacements(ring[[20, 60]])[:, :, 1]
     table = np.stack(list(curves.values()), axis=1)
     change = table @ np.stack([moved[mesh.shape_names.index(name)] for name in curves])

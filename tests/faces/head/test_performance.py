@@ -199,7 +199,7 @@ def test_the_tongue_of_th_is_seen_and_is_narrower_than_the_mouth():
 @pytest.mark.parametrize("pose", [CharacterPose(), CharacterPose(press=1, bite=1)])
 def test_the_seam_of_closed_lips_is_a_smooth_line(pose):
     """The darkest place, three pixels high, changes little from column to column, in a picture of 720 lines."""
-    mouth = Stage(make_camera(1280, 720)).picture(pose)[490:540, 600:680].mean(axis=2)
+    mouth = Stage(make_camera(1280, 720)).draw(pose)[490:540, 600:680].mean(axis=2)
     darkest = ((mouth[:-2] + mouth[1:-1] + mouth[2:]) / 3).min(axis=0)
     assert np.abs(np.diff(darkest)).mean() < 1.3
     assert darkest.mean() < 0.75 * mouth.mean()
@@ -232,15 +232,15 @@ def test_the_mouth_does_not_come_through_the_skin_above_protruded_lips():
     close = Stage(Camera(300, 220, (0.0, -0.71), 0.6))
     for gap in (0.0, 0.004, 0.008):
         pose = CharacterPose(gap=gap, upper_rise=0.48 * gap, width=0.82, roundness=1.0, protrusion=0.1)
-        skin = close.picture(pose._replace(jaw=0.4 * gap, fullness=1.08))[50:75, 140:160].astype(int).sum(axis=2)
+        skin = close.draw(pose._replace(jaw=0.4 * gap, fullness=1.08))[50:75, 140:160].astype(int).sum(axis=2)
         assert skin.min() > np.median(skin) - 120
 
 
 def test_a_picture_of_the_moving_part_is_the_whole_picture():
     stage, pose = Stage(make_camera(320, 240)), CharacterPose(gap=0.1, turn=(0.2, 0.05, 0.0))
-    drawn = stage.figure.frame(pose, stage.canvas.camera.place)
-    whole = stage.canvas.picture(drawn.places, drawn.light, stage.figure.triangles)
-    assert np.array_equal(stage.picture(pose), whole)
+    drawn = stage.figure.shade(pose, stage.canvas.camera.place)
+    whole = stage.canvas.draw(drawn.places, drawn.light, stage.figure.triangles)
+    assert np.array_equal(stage.draw(pose), whole)
 
 
 def first(motion=None, **settings: Any) -> np.ndarray:

@@ -132,7 +132,7 @@ def read(folder: Path, _: Good) -> None:
     character = load_character(path, points=found.get("points.csv"), binding=binding)
     for vertices in islice(character.vertices(motion(), units(), np.array([0.55, 0.75, 1.15])), 3):
         require(bool(np.isfinite(vertices).all()), "vertices that are not finite")
-    picture = MeshStage(character, 64, 64).picture(character.mesh.vertices, (0.1, 0.05, 0.0), (0.1, 0.0))
+    picture = MeshStage(character, 64, 64).draw(character.mesh.vertices, (0.1, 0.05, 0.0), (0.1, 0.0))
     require(picture.shape == (64, 64, 3), "a picture of another size")
     if character.shapes is not None:
         weights = character.weights(motion(), units()).values

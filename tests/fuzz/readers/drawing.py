@@ -32,7 +32,7 @@ def seeds(_: Good) -> list[Files]:
 def read(folder: Path, _: Good) -> None:
     """Read a drawing; draw two frames."""
     if not (folder / "face.svg").exists():
-        for frame in read_cut_out(folder).frames("A", Staging(size=64)):
+        for frame in read_cut_out(folder).draw("A", Staging(size=64)):
             require(frame.shape[0] == 64 and frame.shape[2] == 3, "a frame of another shape")
         return
     motion = Motion(np.array([[0.0], [0.2]]), 25.0, (Channel("opening"),))

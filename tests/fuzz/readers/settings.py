@@ -21,8 +21,8 @@ from lipmotion_studio.project import (
     ExportRecord,
     Project,
     ProjectRecording,
-    parse_project,
     describe_project,
+    parse_project,
 )
 from lipmotion_studio.study.answers import COLUMNS, read_answers
 from lipmotion_studio.study.manifest import MANIFEST, read_study
@@ -103,12 +103,12 @@ def _read_one(path: Path, name: str, folder: Path) -> None:
         with TemporaryDirectory() as own:  # a good copy is put beside the file
             (Path(own) / TRAINING).parent.mkdir()
             copyfile(path, Path(own) / TRAINING)
-            Trainer(ProjectFolder(Path(own))).document()
+            Trainer(ProjectFolder(Path(own))).describe()
     elif name == PROJECT:
         project = ProjectFolder(folder).project
         require(parse_project(from_json(json.dumps(describe_project(project)))) == project, "another project")
         for line in project.lines.values():
-            require(not ProjectFolder(folder).edits(line).exists(), "edits that nobody wrote")
+            require(not ProjectFolder(folder).locate_edits(line).exists(), "edits that nobody wrote")
     elif name.startswith("answers"):
         read_answers(path)
     elif name.startswith("job"):

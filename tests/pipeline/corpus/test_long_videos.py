@@ -28,14 +28,14 @@ from lipmotion.types import (
 from lipmotion_faces.corpus import long_videos
 from lipmotion_faces.corpus import sync as module
 from lipmotion_faces.corpus.long_videos import (
-    LEAST_S,
     LONGEST_S,
     MARGIN_S,
+    MIN_S,
     SHORTEST_S,
     SpokenPart,
     find_transcript,
-    list_spoken_lines,
     find_utterances,
+    list_spoken_lines,
 )
 from lipmotion_faces.corpus.sync import measure_offsets, remove_offsets
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
@@ -239,7 +239,7 @@ def edges(found: list[SpokenPart]) -> list[tuple[float, float]]:
         ([(0, 30)], [], [(0, 7.5), (7.5, 15), (15, 22.5), (22.5, 30)]),  # or where it is quietest
         ([(1, 9)], [4.0], [(0.7, 4.0), (4.0, 9.3)]),  # a cut divides even in speech
         ([(1, 4), (4.4, 8)], [4.1], [(0.7, 4.1), (4.1, 8.3)]),  # and bounds both sides in a pause
-        ([(1, 9)], [4.0, 4.0 + LEAST_S / 2], [(0.7, 4.0), (4.4, 9.3)]),  # what is between two may be too short
+        ([(1, 9)], [4.0, 4.0 + MIN_S / 2], [(0.7, 4.0), (4.4, 9.3)]),  # what is between two may be too short
         ([(1, 2), (2.9, 6)], [], [(0.7, 6.3)]),  # short ones join a neighbour within a second
         ([(1, 2), (3.5, 6.5)], [], [(0.7, 2.3), (3.2, 6.8)]),
         ([], [], []),
@@ -289,7 +289,7 @@ def test_any_recording():
             for part in found
             for stretch in stretches
         )
-        assert kept_s > said_s - LEAST_S * (len(stretches) + len(cuts_s))
+        assert kept_s > said_s - MIN_S * (len(stretches) + len(cuts_s))
         assert min(SHORTEST_S, said_s) <= max(part.duration_s for part in found)
 
 
@@ -395,8 +395,8 @@ def test_each_collection_has_its_own(corpus):
     assert set(found.clips) == set(corpus.names())
     assert found.collections["there"].late_s - found.collections["here"].late_s == pytest.approx(0.12, abs=0.01)
     assert found.collections["there"].known
-    assert [line.split(":")[0] for line in found.lines()] == ["here", "there"]
-    assert "ms), by 4 clips together, which corpus sync removes; 4 tell alone: median +1" in found.lines()[1]
+    assert [line.split(":")[0] for line in found.list_lines()] == ["here", "there"]
+    assert "ms), by 4 clips together, which corpus sync removes; 4 tell alone: median +1" in found.list_lines()[1]
 
 
 def test_sync_moves_what_is_late_once(corpus):
@@ -449,7 +449,7 @@ def test_lips_that_do_not_follow_are_left_alone(corpus):
     for name, other in zip(names, [*still[1:], still[0]], strict=True):
         corpus.add(replace(corpus.utterance(name), track=other.track), {})
     assert not measure_offsets(corpus).collections["there"].known
-    line = measure_offsets(corpus).lines()[1]
+    line = measure_offsets(corpus).list_lines()[1]
     assert line.startswith("there: not measured: 4 clips of this voice cannot tell whether the sound is late. Training")
     assert line.endswith("give corpus prepare --offset-ms")
     before = corpus.utterance(names[0]).audio.samples.copy()

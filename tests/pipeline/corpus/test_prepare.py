@@ -19,7 +19,7 @@ from lipmotion.pipeline.training.prompts import cover_greedily, find_units, prom
 from lipmotion.storage.locks import lock_folder
 from lipmotion.types import Channel, Item, Motion, Progress, Span, Timeline, Track, Unit
 from lipmotion.units import PHONES, Lexicon, find_similar_lips
-from lipmotion_faces.corpus.coverage import measure_coverage, coverage_to_json, format_coverage, measure_phone_distances
+from lipmotion_faces.corpus.coverage import coverage_to_json, format_coverage, measure_coverage, measure_phone_distances
 from pipeline.made import replace_tracking, write_noise
 from testing.toy import toy_utterances
 
@@ -326,7 +326,9 @@ def test_counts_and_shares(tmp_path):
 def test_what_stands_in(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab pab tib")
     lexicon = Lexicon(WORDS.user | {"bad": (("b", "aa", "d"),), "dib": (("d", "iy", "m"),)})
-    phones, diphones, triphones = measure_coverage(corpus, format_moods(tmp_path / "text", "bad dib"), lexicon=lexicon).kinds
+    phones, diphones, triphones = measure_coverage(
+        corpus, format_moods(tmp_path / "text", "bad dib"), lexicon=lexicon
+    ).kinds
     stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
     assert stand_ins["d"] == ("t", 1)
     assert stand_ins["m"][0] == find_similar_lips("m", {"p", "aa", "b", "t", "iy"}) == "p"

@@ -13,7 +13,7 @@ from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
 from lipmotion_faces.film import build
 from lipmotion_faces.film import build as takes
-from lipmotion_faces.film.build import MOST_FOOTAGE_S, Take, choose_takes
+from lipmotion_faces.film.build import MAX_FOOTAGE_S, Take, choose_takes
 from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from lipmotion_faces.tracking.track import Footage
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video, write_videos
@@ -51,7 +51,7 @@ def test_one_video(make_videos):
     video = make_videos("a") / "a.mkv"
     (take,) = choose_takes(video)
     assert (take.name, take.file, take.collection, take.speaker) == ("a", video, "filmed/anna", "")
-    assert (take.span.start_s, take.span.end_s) == (0.0, MOST_FOOTAGE_S)
+    assert (take.span.start_s, take.span.end_s) == (0.0, MAX_FOOTAGE_S)
 
 
 def test_of_a_folder_with_lists_the_training_list(make_videos):
@@ -113,10 +113,10 @@ def test_a_corpus_with_its_videos(tmp_path, make_videos):
     ],
 )
 def test_footage_of_a_folder_is_bounded(make_videos, monkeypatch, durations_s, used_s):
-    monkeypatch.setattr(takes, "_duration_s", lambda take: durations_s[int(take.name)])
+    monkeypatch.setattr(takes, "_read_duration", lambda take: durations_s[int(take.name)])
     found = choose_takes(make_videos(*(f"{number:02}" for number in range(len(durations_s)))))
     used = {each.name: min(each.span.end_s - each.span.start_s, durations_s[int(each.name)]) for each in found}
-    assert sum(used.values()) == pytest.approx(MOST_FOOTAGE_S)
+    assert sum(used.values()) == pytest.approx(MAX_FOOTAGE_S)
     assert used == pytest.approx(used_s)
 
 

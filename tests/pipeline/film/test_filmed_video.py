@@ -21,7 +21,7 @@ from lipmotion_faces.film.background import (
     open_background,
     open_stored_background,
 )
-from lipmotion_faces.film.filmed_video import predict_codes, is_person_of, make_film, find_other_person, write_film
+from lipmotion_faces.film.filmed_video import find_other_person, is_person_of, make_film, predict_codes, write_film
 from lipmotion_faces.filmed.renderer import AS_PRINTED, Background, Stitcher
 from lipmotion_faces.outputs.shown_faces import shown_face
 from lipmotion_faces.tracking.frames import WHOLE
@@ -83,7 +83,7 @@ def test_the_jaw_follows_what_it_is_told(filmed_face, brief, toy_sentence):
     below = (slice(None), slice(212, 240), slice(90, 134))  # the chin
     assert np.abs(films["motion"][below] - films["energy"][below]).mean() > 0.3
     assert np.abs(films["motion"][below] - films["none"][below]).mean() > 0.3
-    shown = np.stack([each.copy() for each in filmed_face.background.video.frames(range(20))])
+    shown = np.stack([each.copy() for each in filmed_face.background.video.decode(range(20))])
     assert np.array_equal(films["none"][:20][:, 225:], shown[:, 225:])  # the background's own jaw
     with pytest.raises(InputError, match="a jaw that follows the energy needs the sound; give the recording"):
         make_film(filmed_face, brief, options=Outputs(jaw="energy"))
@@ -102,7 +102,7 @@ def test_the_refinement_as_printed(filmed_face, brief):
     """Eqs. 14-16 of Xie & Liu 2007, colour by colour, of the mean of three pictures."""
     codes = predict_codes(filmed_face, brief, Timeline(()), 5, 25.0)
     options = replace(AS_PRINTED, noise=False)
-    made = np.stack(list(Stitcher(filmed_face.appearance, options).mouths(codes))).astype(float)
+    made = np.stack(list(Stitcher(filmed_face.appearance, options).draw_mouths(codes))).astype(float)
     space, mouths = filmed_face.appearance.mouth, filmed_face.appearance.mouths
     wanted = np.stack([codes.mouth[max(n - 1, 0) : n + 2].mean(axis=0) for n in (1, 2, 3)])
     known, kept = space.project(mouths), mouths - space.expand(space.project(mouths))
@@ -258,7 +258,7 @@ def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(filmed_face, bri
     own = open_background(video.path)
     assert film.rate_hz == pytest.approx(25.0)
     assert film.covered == pytest.approx(own.enlarge(1.3).face_box)
-    for frame, filmed in zip(film.frames, own.frames(film.count, 25.0), strict=True):
+    for frame, filmed in zip(film.frames, own.decode(film.count, 25.0), strict=True):
         assert np.array_equal(frame[225:], filmed.frame[225:])  # the speaker's own jaw
 
 
@@ -291,8 +291,8 @@ def test_without_speech_nothing_is_mapped(filmed_face, caplog):
     assert "built from footage without sound" in caplog.text
     assert find_other_person(model_of("ben"), face) is face
     assert find_other_person(model_of("anna"), face) is None
-    assert shown_face(face).other_person(model_of("ben")) is face
-    assert shown_face("portrait").other_person(model_of("ben")) is None
+    assert shown_face(face).find_other_person(model_of("ben")) is face
+    assert shown_face("portrait").find_other_person(model_of("ben")) is None
 
 
 def test_mouth_pictures_cannot_be_mapped_onto_another_person(filmed_face):
@@ -320,7 +320,7 @@ def numbers(sequence: BackgroundSequence, shown: list[Background]) -> list[int]:
 
 def test_short_speech_shows_the_beginning(sequence):
     for count in (1, 50):
-        shown = list(sequence.frames(count, 25.0))
+        shown = list(sequence.decode(count, 25.0))
         assert numbers(sequence, shown) == list(range(count))
         assert [each.chin_px for each in shown] == pytest.approx(sequence.chin_px[:count])
 
@@ -328,7 +328,7 @@ def test_short_speech_shows_the_beginning(sequence):
 def test_any_length(sequence):
     """It goes on without a jump: neither the picture nor the place of the face."""
     count = 130
-    shown = list(sequence.frames(count, 25.0))
+    shown = list(sequence.decode(count, 25.0))
     assert len(shown) == count
     steps = [np.abs(a.frame.astype(int) - b.frame).mean() for a, b in pairwise(shown)]
     assert max(steps) < 8
@@ -339,7 +339,7 @@ def test_any_length(sequence):
 
 def test_heads_lie_upon_one_another_where_a_frame_fades(sequence):
     """A head in two places is shown once, between them, and not twice."""
-    (first,) = sequence.frames(1, 25.0)
+    (first,) = sequence.decode(1, 25.0)
     moved, place = np.roll(first.frame, (4, 6), axis=(0, 1)), first.face_to_frame.copy()
     place[:, 2] += (6, 4)
     half = background.mix_frames(first, replace(first, frame=moved, face_to_frame=place), 0.5)
@@ -353,7 +353,7 @@ def test_heads_lie_upon_one_another_where_a_frame_fades(sequence):
 
 def test_a_background_at_any_rate(sequence):
     for rate_hz, frames in ((29.97, 58), (60.0, 60), (12.5, 24)):
-        shown = numbers(sequence, list(sequence.frames(frames, rate_hz)))
+        shown = numbers(sequence, list(sequence.decode(frames, rate_hz)))
         assert len(shown) == frames
         assert np.abs(np.array(shown) - np.arange(frames) / rate_hz * 25).max() <= 0.5 + 1e-6
 
@@ -381,8 +381,8 @@ def test_a_video_as_a_background(video, monkeypatch):
     count = len(opened.chin_px)
     assert count == len(video.motion.values)
     assert opened.usable.all()
-    assert numbers(opened, list(opened.frames(count, 25.0))) == list(range(count))
-    assert len(list(opened.frames(2 * count, 25.0))) == 2 * count
+    assert numbers(opened, list(opened.decode(count, 25.0))) == list(range(count))
+    assert len(list(opened.decode(2 * count, 25.0))) == 2 * count
     assert opened.face_to_frame[:, :, 2] == pytest.approx(toy_places(count)[:, :, 2], abs=1.0)
 
 
@@ -394,7 +394,7 @@ def test_frames_of_odd_sizes_are_cut(sequence):
             return np.zeros((101, 75, 3), np.uint8)
 
     odd = BackgroundSequence(OddGroups, 25.0, sequence.face_to_frame, sequence.chin_px, sequence.usable)  # type: ignore[arg-type]
-    assert {each.frame.shape for each in odd.frames(3, 25.0)} == {(100, 74, 3)}
+    assert {each.frame.shape for each in odd.decode(3, 25.0)} == {(100, 74, 3)}
 
 
 def without(sequence: BackgroundSequence, unseen: Iterable[int], **more: object) -> BackgroundSequence:
@@ -404,7 +404,7 @@ def without(sequence: BackgroundSequence, unseen: Iterable[int], **more: object)
 
 
 def shown(sequence: BackgroundSequence, count: int) -> list[int]:
-    return [int(number) for number in sequence.order(sequence.groups(), count).first]
+    return [int(number) for number in sequence.find_order(sequence.groups(), count).first]
 
 
 @pytest.mark.parametrize("count", [5, 80])
@@ -414,7 +414,7 @@ def test_frames_without_a_face_are_not_shown(sequence, count):
     found = shown(without(sequence, gap), count)
     assert len(found) == count
     assert not set(found) & set(gap)
-    assert all(each.has_face for each in without(sequence, gap).frames(count, 25.0))
+    assert all(each.has_face for each in without(sequence, gap).decode(count, 25.0))
 
 
 def test_no_cut_is_shown(sequence):
@@ -429,7 +429,7 @@ def test_the_video_of_the_speech_keeps_its_time(sequence):
     speech = without(sequence, range(10, 20), in_time=True, cuts=(30,))
     assert shown(speech, total) == list(range(total))
     assert shown(speech, total + 2) == [*range(total), total - 1, total - 1]
-    seen = [each.has_face for each in speech.frames(total, 25.0)]
+    seen = [each.has_face for each in speech.decode(total, 25.0)]
     assert [n for n, face in enumerate(seen) if not face] == list(range(10, 20))
 
 

@@ -68,7 +68,7 @@ def install(
     monkeypatch: pytest.MonkeyPatch,
     videos: Mapping[Path, ToyVideo],
     seen: Mapping[Path, np.ndarray],
-    least_s: float = build.LEAST_FOOTAGE_S,
+    least_s: float = build.MIN_FOOTAGE_S,
 ) -> None:
     """Let the tracker know these videos, and so many seconds be enough for a face."""
 
@@ -77,7 +77,7 @@ def install(
             raise InputError(f"{path}: no face in 60 of 60 frames")
         return footage_of(videos[path.resolve()], span, seen.get(path.resolve()))
 
-    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", least_s)
+    monkeypatch.setattr(build, "MIN_FOOTAGE_S", least_s)
     for module in (build, background):
         monkeypatch.setattr(module, "track_footage", track_footage)
     monkeypatch.setattr(background, "register_maps", lambda footage: footage.face_to_image)  # needs OpenCV

@@ -306,9 +306,9 @@ def test_single_pictures_are_those_of_the_video(session, request_):
         stage = stage_face("portrait", edits.staging(), measure_prosody(read_sound_track(performance)))
         frames = dict(enumerate(islice(stage.render(seen.motion, seen.units, fps=25.0), 26)))
         for number in (25, 3):
-            assert np.array_equal(pictures.picture(number / 25, edits), frames[number])
+            assert np.array_equal(pictures.draw(number / 25, edits), frames[number])
     with pytest.raises(InputError, match="9 s lies outside the video"):
-        pictures.picture(9)
+        pictures.draw(9)
 
 
 def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model, toy_sentence):

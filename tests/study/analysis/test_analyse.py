@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.storage.json_text import as_json, replace_nan
-from lipmotion_studio.study.analysis.analyse import RULES, analyse_study, format_analysis, select_counting, screen
+from lipmotion_studio.study.analysis.analyse import RULES, analyse_study, format_analysis, screen, select_counting
 from lipmotion_studio.study.answers import Answer, write_answers
 from study.simulated import Effects, comparisons, pair_answer, paired_answers, rated_answers, rating, ratings
 
@@ -144,7 +144,7 @@ def test_an_attentive_panel_stays():
     screening = screen(panel())
     assert len(screening.raters) == 10
     assert not screening.found
-    assert screening.figures() == {"rules": RULES, "raters": 10, "kept": 10, "left_out": []}
+    assert screening.list_figures() == {"rules": RULES, "raters": 10, "kept": 10, "left_out": []}
 
 
 @pytest.mark.parametrize(("rule", "change", "text"), CASES, ids=[case[0] for case in CASES])
@@ -154,9 +154,9 @@ def test_a_rule_finds_its_rater(rule, change, text):
     assert set(screening.found) == {"r3"}
     assert rule in screening.found["r3"]
     assert re.search(text, screening.found["r3"][rule])
-    row = next(row for row in screening.figures()["left_out"] if row["rule"] == rule)
+    row = next(row for row in screening.list_figures()["left_out"] if row["rule"] == rule)
     assert row["rater"] == "r3"
-    assert {each.rater for each in screening.kept(answers)} == set(screening.raters) - {"r3"}
+    assert {each.rater for each in screening.select_kept(answers)} == set(screening.raters) - {"r3"}
 
 
 def test_too_few_answers():

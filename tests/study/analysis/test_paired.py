@@ -26,7 +26,7 @@ def test_a_table_is_counted_right():
         pair_answer(("r2", "s1"), ("b", "a"), True),
     ]
     table = paired.build_pair_table(answers)
-    first, second = table.wins()
+    first, second = table.count_wins()
     assert first.tolist() == [[0, 2], [1, 0]]
     assert second.tolist() == [[0, 0], [1, 0]]
     (pair,) = paired.analyse_pairs(table)["pairs"]

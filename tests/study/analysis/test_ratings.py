@@ -2,7 +2,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lipmotion_studio.study.analysis.analyse import compute_power, find_raters_needed, list_rating_power, list_share_power
+from lipmotion_studio.study.analysis.analyse import (
+    compute_power,
+    find_raters_needed,
+    list_rating_power,
+    list_share_power,
+)
 from lipmotion_studio.study.analysis.crossed import (
     BOTH,
     RANKS,
@@ -11,10 +16,10 @@ from lipmotion_studio.study.analysis.crossed import (
     SENTENCES,
     Components,
     RatingTable,
-    estimate_crossed_mean,
-    correct_p_values,
     analyse_ratings,
     build_rating_table,
+    correct_p_values,
+    estimate_mean,
     measure_improvement,
 )
 from lipmotion_studio.study.answers import MOS
@@ -43,7 +48,7 @@ def test_improvement_is_that_of_the_paper():
 def test_improvement_has_an_interval_around_it():
     table = simulated((30, 12))
     row = measure_improvement(table, "c2", "c0")
-    c0, c2 = (table.of(name).mean() for name in ("c0", "c2"))
+    c0, c2 = (table.select_condition(name).mean() for name in ("c0", "c2"))
     assert row["percent"] == pytest.approx(100 * (c2 - c0) / c0)
     assert row["low"] < row["percent"] < row["high"]
     expected = [expected_rating(mean, Effects()) for mean in MEANS]
@@ -56,7 +61,8 @@ def test_answers_survive_the_table():
     assert again.conditions == table.conditions
     assert np.array_equal(again.values, table.values)
     assert (
-        build_rating_table(rated_answers(ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), RANKS))).scale == RANKS
+        build_rating_table(rated_answers(ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), RANKS))).scale
+        == RANKS
     )
 
 
@@ -71,7 +77,7 @@ def test_known_means_are_found():
 
 def test_a_difference_of_few_raters_on_one_sentence_is_the_paired_t_test():
     table = simulated((12, 1))
-    usual = stats.ttest_rel(table.of("c1")[:, 0], table.of("c0")[:, 0])
+    usual = stats.ttest_rel(table.select_condition("c1")[:, 0], table.select_condition("c0")[:, 0])
     row = next(row for row in analyse_ratings(table, None)["pairs"] if row["other"] == "c1")
     assert row["p"] == pytest.approx(usual.pvalue)
     assert (-row["high"], -row["low"]) == pytest.approx(tuple(usual.confidence_interval()))
@@ -83,7 +89,7 @@ def test_what_raters_add_to_all_conditions_leaves_differences():
     table = simulated((10, 6), means=np.array([2.5, 3.0]))
     strict = table.values + np.linspace(-1, 1, 10)[:, None]
     moved = RatingTable(table.conditions, strict, table.count, table.scale)
-    assert moved.difference("c1", "c0").interval == pytest.approx(table.difference("c1", "c0").interval)
+    assert moved.compare_conditions("c1", "c0").interval == pytest.approx(table.compare_conditions("c1", "c0").interval)
 
 
 def test_the_anchor_is_shown_but_not_tested():
@@ -135,7 +141,7 @@ def told(components: Components, difference: float, raters: int, sentences: int,
     for _ in range(studies):
         values = difference + rest * draw.normal(size=(raters, sentences))
         values += rater * draw.normal(size=(raters, 1)) + sentence * draw.normal(size=(1, sentences))
-        found += estimate_crossed_mean(values, 4.0).p_value < 0.05
+        found += estimate_mean(values, 4.0).p_value < 0.05
     return found / studies
 
 
@@ -180,7 +186,12 @@ def test_tables_of_raters():
     assert [row["share"] for row in shares] == [0.55, 0.6, 0.65, 0.7, 0.75]
     needed = [row["raters"] for row in shares if row["raters"]]
     assert needed == sorted(needed, reverse=True)
-    assert list_rating_power(None, "mos", 12, 0.8) == list_share_power(None, 12, 0.8) == list_rating_power(USUAL, "mos", 1, 0.8) == []
+    assert (
+        list_rating_power(None, "mos", 12, 0.8)
+        == list_share_power(None, 12, 0.8)
+        == list_rating_power(USUAL, "mos", 1, 0.8)
+        == []
+    )
 
 
 TABLE = np.random.default_rng(4).normal(3, 1, (7, 5)) + np.random.default_rng(5).normal(size=(7, 1))
@@ -204,7 +215,7 @@ SCORES = [
 
 def test_components_are_those_of_a_mixed_model():
     """Source: statsmodels 0.15.0, MixedLM by REML, with variance components of rows and columns."""
-    found = estimate_crossed_mean(np.array(SCORES), 9.0)
+    found = estimate_mean(np.array(SCORES), 9.0)
     assert found.mean == pytest.approx(np.mean(SCORES))
     assert found.over == BOTH
     assert found.components == pytest.approx((0.629217, 2.113677, 1.422465), abs=2e-4)
@@ -214,7 +225,7 @@ def test_components_are_those_of_a_mixed_model():
 def test_the_variance_is_that_of_the_mean_squares():
     table = TABLE + np.arange(5)
     by_rater, by_sentence, rest = mean_squares(table)
-    found = estimate_crossed_mean(table, 4.0)
+    found = estimate_mean(table, 4.0)
     variance = (by_rater + by_sentence - rest) / 35
     assert found.error**2 == pytest.approx(variance)
     doubt = by_rater**2 / 6 + by_sentence**2 / 4 + rest**2 / 24
@@ -224,12 +235,12 @@ def test_the_variance_is_that_of_the_mean_squares():
 def test_an_effect_estimated_as_nothing_leaves_the_degrees_of_freedom():
     table = TABLE - TABLE.mean(axis=0)  # sentences differ less than by chance
     by_rater, _, rest = mean_squares(table)
-    found = estimate_crossed_mean(table, 4.0)
+    found = estimate_mean(table, 4.0)
     assert found.components is not None
     assert found.components.sentence == 0
     assert found.error**2 == pytest.approx(by_rater / 35)
     assert found.degrees == pytest.approx(6)
-    even = estimate_crossed_mean(table - table.mean(axis=1, keepdims=True), 4.0)
+    even = estimate_mean(table - table.mean(axis=1, keepdims=True), 4.0)
     assert even.degrees == pytest.approx(24)
     assert even.error**2 == pytest.approx(rest / 35)
 
@@ -237,7 +248,7 @@ def test_an_effect_estimated_as_nothing_leaves_the_degrees_of_freedom():
 @pytest.mark.parametrize("by_rater", [True, False])
 def test_one_sentence_or_one_rater_is_the_usual_t_interval(by_rater):
     values = TABLE[:, 0]
-    found = estimate_crossed_mean(values[:, None] if by_rater else values[None], 4.0)
+    found = estimate_mean(values[:, None] if by_rater else values[None], 4.0)
     usual = stats.ttest_1samp(values, 0)
     assert found.over == (RATERS if by_rater else SENTENCES)
     assert found.interval == pytest.approx(tuple(usual.confidence_interval()))
@@ -248,18 +259,18 @@ def test_one_sentence_or_one_rater_is_the_usual_t_interval(by_rater):
 def test_who_shares_no_sentence_is_grouped_by_what_is_shared():
     table = np.full((6, 3), np.nan)
     table[np.arange(6), np.arange(6) % 3] = TABLE[:6, 0]  # every rater judges one sentence
-    found = estimate_crossed_mean(table, 4.0)
+    found = estimate_mean(table, 4.0)
     groups = np.array([TABLE[:6, 0][place::3].mean() for place in range(3)])
     assert found.over == SENTENCES
     assert found.interval == pytest.approx(tuple(stats.ttest_1samp(groups, 0).confidence_interval()))
-    assert estimate_crossed_mean(table.T, 4.0).over == RATERS
-    assert estimate_crossed_mean(table.T, 4.0).error == pytest.approx(found.error)
+    assert estimate_mean(table.T, 4.0).over == RATERS
+    assert estimate_mean(table.T, 4.0).error == pytest.approx(found.error)
 
 
 def test_gaps_leave_rows_and_columns_out():
     wider = np.full((9, 8), np.nan)
     wider[1:8, 2:7] = TABLE
-    assert estimate_crossed_mean(wider, 4.0) == estimate_crossed_mean(TABLE, 4.0)
+    assert estimate_mean(wider, 4.0) == estimate_mean(TABLE, 4.0)
 
 
 def test_components_are_right_in_tables_with_gaps():
@@ -267,7 +278,7 @@ def test_components_are_right_in_tables_with_gaps():
     for _ in range(300):
         table = draw.normal(size=(20, 1)) + 0.5 * draw.normal(size=(1, 12)) + 0.8 * draw.normal(size=(20, 12))
         table[draw.random(table.shape) < 0.4] = np.nan
-        found.append(estimate_crossed_mean(table, 4.0).components)
+        found.append(estimate_mean(table, 4.0).components)
     assert np.mean(found, axis=0) == pytest.approx([1, 0.25, 0.64], rel=0.1)  # type: ignore[arg-type]
 
 
@@ -276,7 +287,7 @@ def test_equal_judgements_have_no_interval(level):
     """What rounding leaves of their differences is not divided by."""
     table = np.full((4, 3), level)
     table[0] += np.spacing(level)
-    found = estimate_crossed_mean(table, 4.0)
+    found = estimate_mean(table, 4.0)
     assert found.error == 0
     assert np.isnan(found.interval).all()
     assert np.isnan(found.p_value)
@@ -284,17 +295,17 @@ def test_equal_judgements_have_no_interval(level):
 
 def test_intervals_within_a_scale_stay_there():
     table = np.array([[5, 5, 5], [5, 5, 4], [5, 4, 5], [5, 5, 5.0]])
-    found = estimate_crossed_mean(table, 4.0)
-    low, high = found.interval_within(1, 5)
+    found = estimate_mean(table, 4.0)
+    low, high = found.compute_interval_within(1, 5)
     assert found.interval.high > 5 > high > found.mean > low
-    assert np.isnan(estimate_crossed_mean(np.full((2, 2), 5.0), 4.0).interval_within(1, 5)).all()
+    assert np.isnan(estimate_mean(np.full((2, 2), 5.0), 4.0).compute_interval_within(1, 5)).all()
 
 
 def test_a_scale_of_any_place_and_size_has_the_same_interval():
-    share = estimate_crossed_mean((TABLE - TABLE.min() + 1) / 10, 1.0)
-    moved = estimate_crossed_mean((TABLE - TABLE.min() + 1) / 10 * 100 - 20, 100.0)
-    expected = np.array(share.interval_within(0, 1)) * 100 - 20
-    assert moved.interval_within(-20, 80) == pytest.approx(tuple(expected))
+    share = estimate_mean((TABLE - TABLE.min() + 1) / 10, 1.0)
+    moved = estimate_mean((TABLE - TABLE.min() + 1) / 10 * 100 - 20, 100.0)
+    expected = np.array(share.compute_interval_within(0, 1)) * 100 - 20
+    assert moved.compute_interval_within(-20, 80) == pytest.approx(tuple(expected))
 
 
 def test_the_correction_of_holm():
@@ -308,6 +319,6 @@ def test_intervals_cover_the_truth():
     draw, hits = np.random.default_rng(1), 0
     for _ in range(2000):
         table = 0.5 * draw.normal(size=(12, 1)) + 0.3 * draw.normal(size=(1, 6)) + 0.8 * draw.normal(size=(12, 6))
-        low, high = estimate_crossed_mean(table, 4.0).interval
+        low, high = estimate_mean(table, 4.0).interval
         hits += low <= 0 <= high
     assert 0.93 < hits / 2000 < 0.97

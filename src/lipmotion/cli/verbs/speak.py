@@ -74,7 +74,7 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
         model=model,
         lexicon=read_lexicon(request) if request.lexicon else None,
         speaker=request.speaker,
-        onto=request.onto or face.other_person(model, request.speaker),
+        onto=request.onto or face.find_other_person(model, request.speaker),
         onto_speaker=request.onto_speaker,
         pauses=request.pauses,
         asymmetry=request.asymmetry,

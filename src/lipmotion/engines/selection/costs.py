@@ -150,7 +150,7 @@ POINTS = 5
 FRACTIONS = (np.arange(POINTS) + 0.5) / POINTS
 PER_S = 10.0
 """Costs of the guide are given for a tenth of a second."""
-LEAST_S = 0.01
+MIN_S = 0.01
 ABUTTING_JOIN, JOIN_BEFORE, JOIN_AFTER, NO_JOIN = 0, 1, 2, 3
 """Kinds of a join: units abut, overlap in the phone before or after it, or were recorded in succession."""
 _CONSONANTS = frozenset(PHONES) - frozenset(CLASSES["vowel"]) - frozenset(CLASSES["silence"])
@@ -222,8 +222,8 @@ class Costs:
         """Return the cost of each of some units for one phone [shape=(N,)]."""
         config, windows = self.config, self.inventory.windows
         costs = np.zeros(len(units)) if target.by_sound else self._context_costs(target, number, units)
-        duration_s = max(float(target.windows.durations_s[number]), LEAST_S)
-        costs += config.duration * np.abs(np.log(np.maximum(windows.durations_s[units], LEAST_S) / duration_s))
+        duration_s = max(float(target.windows.durations_s[number]), MIN_S)
+        costs += config.duration * np.abs(np.log(np.maximum(windows.durations_s[units], MIN_S) / duration_s))
         is_shown = target.by_sound or target.symbol(number) != INVISIBLE_SYMBOL
         if is_shown and target.guided is not None and target.predicted is not None and self._recorded is not None:
             distance = np.square(self._recorded[units] - target.guided[number]).mean(axis=1).sum(axis=1)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import GAP, LEAST_GAP, gap_to_opening
+from lipmotion.articulation.contact import GAP, MIN_GAP, gap_to_opening
 from lipmotion.articulation.lip_points import (
     CHIN,
     FACING,
@@ -182,7 +182,7 @@ def with_mouth(motion: Motion) -> Motion:
     rows[:, close] = np.minimum(rows[:, close], rows[:, jaw])
     places = template.places + (rows @ mouth.moved.reshape(len(mouth.known), -1)).reshape(-1, *template.places.shape)
     gap = np.maximum(rows @ mouth.gap, 0.0)
-    gap[gap < LEAST_GAP / 2] = 0.0
+    gap[gap < MIN_GAP / 2] = 0.0
     added = {"opening": (gap_to_opening(gap), EYE_DISTANCE), GAP: (gap, EYE_DISTANCE)}
     for name, one, other in (("width", LEFT_CORNER, RIGHT_CORNER), ("outer", UPPER_EDGE, LOWER_EDGE)):
         across = places[:, template.row(one), :2] - places[:, template.row(other), :2]

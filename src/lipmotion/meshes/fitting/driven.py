@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import LEAST_GAP, sample_pictures
+from lipmotion.articulation.contact import MIN_GAP, sample_pictures
 from lipmotion.articulation.expression import read_moods
 from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import SpokenMouth
@@ -62,7 +62,7 @@ def _solve_with_table(
         before, after = weights @ shapes.gap, weights @ parting
         share = np.clip(after / np.maximum(before, 1e-9), min(gains), max(gains))
         # Closed after the gains where they closed the lips before.
-        wanted = np.maximum(share * before, np.minimum(before, LEAST_GAP))
+        wanted = np.maximum(share * before, np.minimum(before, MIN_GAP))
         weights = with_gap(weights, scaled, np.where(before > 0, wanted, before))
     moved = apply_rig(rows, dict(zip(shapes.names, weights.T, strict=True)), solved.rate_hz)
     return replace(moved, channels=tuple(Channel(name, WEIGHT) for name in moved.names))
@@ -164,7 +164,7 @@ class DrivenCharacter:
             if name in moods:
                 curve = self.table.get(shape, make_plain_row(shape, name)).alone(moods[name])
                 moved = self.placement.to_motion(self.mesh.displacements(np.array([upper, lower]), (shape,)))[0]
-                curves[shape] = curve * mouth.free if moved[0, 1] - moved[1, 1] > LEAST_GAP / 2 else curve
+                curves[shape] = curve * mouth.free if moved[0, 1] - moved[1, 1] > MIN_GAP / 2 else curve
         return curves
 
     @cached_property

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import LEAST_GAP, read_gap
+from lipmotion.articulation.contact import MIN_GAP, read_gap
 from lipmotion.articulation.lip_points import FACING, LEFT_CORNER, RIGHT_CORNER, build_mouth
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.articulation.phone_targets import crossfade_phones
@@ -408,11 +408,11 @@ def _close_own_weights(
     """Return weights that a motion has with the lips of the mesh in contact where the mouth's are [shape=(T, S)]."""
     gap, motion_gap = weights @ shapes.gap, read_gap(motion)
     share = np.clip(mouth.gap / np.maximum(motion_gap, 1e-9), 0, 1)
-    wanted = np.where(motion_gap > LEAST_GAP, share * gap, gap)
-    touching, contact = gap < LEAST_GAP / 2, mouth.contact
-    wanted = np.where(contact, np.where(touching, gap, 0.0), np.where(touching, LEAST_GAP, wanted))
+    wanted = np.where(motion_gap > MIN_GAP, share * gap, gap)
+    touching, contact = gap < MIN_GAP / 2, mouth.contact
+    wanted = np.where(contact, np.where(touching, gap, 0.0), np.where(touching, MIN_GAP, wanted))
     if mood is not None:
-        wanted = np.where(contact, wanted, wanted + np.maximum(mouth.gap - np.maximum(motion_gap, LEAST_GAP), 0))
+        wanted = np.where(contact, wanted, wanted + np.maximum(mouth.gap - np.maximum(motion_gap, MIN_GAP), 0))
         weights = _add_mood(weights, mood)
         gap = weights @ shapes.gap
     changed = np.abs(wanted - gap) > 1e-9

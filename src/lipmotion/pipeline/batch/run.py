@@ -170,7 +170,7 @@ def _write_line(work: LineWork) -> Generation:
     request = replace(given, recording=Path(line.recording), speaker=speaker, lexicon=lexicon)
     request = read_request(request, words_beside=not line.transcript)
     request = replace(request, transcript=line.transcript or request.transcript)
-    other = face.other_person(model, speaker) if given.onto is None else None
+    other = face.find_other_person(model, speaker) if given.onto is None else None
     if other is not None:
         request = replace(request, onto=_map_onto(model, other, speaker))
     job = replace(work.job.of(None, staged), request=request)
@@ -261,7 +261,7 @@ def check_line_job(job: Job, of_run: str) -> None:
     files = tuple(str(anywhere / f"line.{kind}") for kind in job.outputs.kinds)
     check_outputs(job.of(anywhere, files), face)
     kinds = [kind for kind in job.outputs.kinds if find_suffix(Path(f"line.{kind}")) and not kind.startswith(CUES)]
-    if not kinds or face.other_person(model, job.request.speaker) is not None:
+    if not kinds or face.find_other_person(model, job.request.speaker) is not None:
         return
     silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)
     units = Timeline((Span(0.0, SILENCE_S, Unit("sil")),))

@@ -61,7 +61,7 @@ class ShownFace(ABC):
         """Write a video, or pictures. Raises InputError: the motion lacks channels. Raises ExportError: as writers."""
 
     @abstractmethod
-    def scene(
+    def build_scene(
         self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
     ) -> Any:
         """Return the character of files for 3D programs, with its animation.
@@ -69,7 +69,7 @@ class ShownFace(ABC):
         frames : of the motion: the only ones that are wanted; None: all
         """
 
-    def other_person(self, model: Model, speaker: str = "") -> Any:  # noqa: ARG002
+    def find_other_person(self, model: Model, speaker: str = "") -> Any:  # noqa: ARG002
         """Return the person (as of ``Request.onto``) onto whom the motion of a model must be mapped; None: nobody.
 
         speaker : of the people of the model whose motion is generated

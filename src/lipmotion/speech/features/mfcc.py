@@ -220,7 +220,7 @@ BANDS = SPECTRUM_BANDS, 60.0, 7600.0
 """The bands of spectra: their number, lowest and highest frequency in Hz."""
 DYNAMIC_RANGE_DB = 60.0
 """Powers are floored this far below the loudest of the recording: what is under the noise of most rooms is the same."""
-LEAST_DEVIATION = 1e-3
+MIN_DEVIATION = 1e-3
 
 
 def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
@@ -235,7 +235,7 @@ def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
     powers = np.maximum(powers, powers.max() - np.float32(DYNAMIC_RANGE_DB / 10 * np.log(10)))
     powers -= powers.mean(axis=0, dtype=float).astype(np.float32)
     squares = np.square(powers).mean(axis=0, dtype=float)
-    powers /= (np.sqrt(squares) / 2 + np.sqrt(squares.mean()) / 2 + LEAST_DEVIATION).astype(np.float32)
+    powers /= (np.sqrt(squares) / 2 + np.sqrt(squares.mean()) / 2 + MIN_DEVIATION).astype(np.float32)
     return powers
 
 

@@ -15,12 +15,17 @@ from lipmotion_studio.study.analysis.crossed import (
     BOTH,
     CONFIDENCE,
     Components,
-    estimate_difference_components,
     analyse_ratings,
     build_rating_table,
     combine_variances,
+    estimate_difference_components,
 )
-from lipmotion_studio.study.analysis.paired import measure_order_agreement, build_pair_table, analyse_pairs, estimate_share_components
+from lipmotion_studio.study.analysis.paired import (
+    analyse_pairs,
+    build_pair_table,
+    estimate_share_components,
+    measure_order_agreement,
+)
 from lipmotion_studio.study.answers import ANCHOR, FIRST, MOS, PAIRED, RECORDING, Answer, read_answers
 
 MIN_ATTENTION = 2 / 3
@@ -59,11 +64,11 @@ class Screening:
     raters: tuple[str, ...]
     found: Mapping[str, Mapping[str, str]]
 
-    def kept(self, answers: Sequence[Answer]) -> list[Answer]:
+    def select_kept(self, answers: Sequence[Answer]) -> list[Answer]:
         """Return the answers of the raters that are kept."""
         return [answer for answer in answers if answer.rater not in self.found]
 
-    def figures(self) -> Figures:
+    def list_figures(self) -> Figures:
         """Return the rules, and whom they leave out."""
         return {
             "rules": dict(RULES),
@@ -179,7 +184,7 @@ Figures = dict[str, Any]
 
 
 def compute_power(components: Components, difference: float, raters: int, sentences: int) -> float:
-    """Return the probability that the test of ``crossed_mean`` tells a mean difference from 0, at the 5 % level."""
+    """Return the probability that the test of ``estimate_mean`` tells a mean difference from 0, at the 5 % level."""
     from scipy.special import ndtr, stdtrit
 
     rater, sentence, rest = components.rater / raters, components.sentence / sentences, components.residual
@@ -196,7 +201,9 @@ def compute_power(components: Components, difference: float, raters: int, senten
     return float((ndtr((difference - limit) / truth) + ndtr((-difference - limit) / truth)).mean())
 
 
-def find_raters_needed(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
+def find_raters_needed(
+    components: Components, difference: float, sentences: int, power: float = USUAL_POWER
+) -> int | None:
     """Return the least number of raters that tells a difference; None: ``MAX_RATERS`` do not, for want of sentences."""
     low, high = 1, 2  # the power grows with the raters; one rater is no panel
     while compute_power(components, difference, high, sentences) < power:
@@ -273,7 +280,7 @@ def analyse_study(
     if sentences is not None and sentences < 2:
         raise InputError(f"{sentences} sentences of planned studies, required at least 2")
     screening = screen(given)
-    kept = screening.kept(counted)
+    kept = screening.select_kept(counted)
     plan = (baseline, power, sentences)
     everybody = _analyse_parts(counted, *plan)
     screened = everybody if len(kept) == len(counted) else _analyse_parts(kept, *plan)
@@ -281,13 +288,15 @@ def analyse_study(
         "answers": len(counted),
         "left_aside": len(given) - len(counted),
         "power": power,
-        "screening": screening.figures(),
+        "screening": screening.list_figures(),
         "screened": screened or None,
         "all": everybody,
     }
 
 
-def _analyse_parts(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> list[Figures]:
+def _analyse_parts(
+    answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None
+) -> list[Figures]:
     parts = []
     for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
         mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
@@ -360,12 +369,22 @@ def _format_ratings(part: Figures, everybody: Figures | None) -> list[str]:
     rows = [["condition", "mean", "95 %", "deviation", f"% over {part['baseline']}", "95 %", "all raters"]]
     for row in part["conditions"]:
         better = relative.get(row["condition"], {"percent": None, "low": None, "high": None})
-        mean = [row["condition"], _format_number(row["mean"], ".2f"), _format_limits(row, ".2f"), _format_number(row["deviation"], ".2f")]
-        gain = [_format_number(better["percent"], "+.1f"), _format_limits(better, "+.1f")]
-        rows.append([*mean, *gain, _format_number(before.get(row["condition"]), ".2f")])
+        mean = [
+            row["condition"],
+            _format(row["mean"], ".2f"),
+            _format_limits(row, ".2f"),
+            _format(row["deviation"], ".2f"),
+        ]
+        gain = [_format(better["percent"], "+.1f"), _format_limits(better, "+.1f")]
+        rows.append([*mean, *gain, _format(before.get(row["condition"]), ".2f")])
     pairs = [["pair", "difference", "95 %", "p", "p (Holm)"]]
     pairs += [
-        [f"{row['condition']} - {row['other']}", _format_number(row["difference"], "+.2f"), _format_limits(row, "+.2f"), *_format_tests(row)]
+        [
+            f"{row['condition']} - {row['other']}",
+            _format(row["difference"], "+.2f"),
+            _format_limits(row, "+.2f"),
+            *_format_tests(row),
+        ]
         for row in part["pairs"]
     ]
     return [*_align(_without_last(rows, bool(before))), *_format_scope(part["conditions"]), *_align(pairs)]
@@ -378,25 +397,32 @@ def _format_pairs(part: Figures, everybody: Figures | None) -> list[str]:
     before = {(row["condition"], row["other"]): row["share"] for row in everybody.get("pairs", ())} if everybody else {}
     scores = [["condition", "preferred", "share", "95 %"]]
     scores += [
-        [row["condition"], f"{row['wins']} of {row['answers']}", _format_number(row["share"], ".1%"), _format_limits(row, ".1%")]
+        [
+            row["condition"],
+            f"{row['wins']} of {row['answers']}",
+            _format(row["share"], ".1%"),
+            _format_limits(row, ".1%"),
+        ]
         for row in part["conditions"]
     ]
     pairs = [["pair", "preferred", "share", "95 %", "p", "p (Holm)", "p (binomial)", "all raters"]]
     for row in part["pairs"]:
         name = f"{row['condition']} over {row['other']}"
-        share = [f"{row['wins']} of {row['answers']}", _format_number(row["share"], ".1%"), _format_limits(row, ".1%")]
-        all_raters = _format_number(before.get((row["condition"], row["other"])), ".1%")
+        share = [f"{row['wins']} of {row['answers']}", _format(row["share"], ".1%"), _format_limits(row, ".1%")]
+        all_raters = _format(before.get((row["condition"], row["other"])), ".1%")
         pairs.append([name, *share, *_format_tests(row), _format_p(row["p_binomial"]), all_raters])
     first, both = part["first_preferred"], part["consistency"]
-    orders = f"  the first was preferred in {_format_number(first['share'], '.1%')} ({_format_limits(first, '.1%')}); "
-    orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_format_number(both['share'], '.1%')})"
+    orders = f"  the first was preferred in {_format(first['share'], '.1%')} ({_format_limits(first, '.1%')}); "
+    orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_format(both['share'], '.1%')})"
     lines = [*_align(scores), *_align(_without_last(pairs, bool(before))), *_format_scope(part["pairs"]), orders]
     model = part["bradley_terry"]
     if "missing" in model:
         return [*lines, f"  no Bradley–Terry strengths: {model['missing']}"]
     rows = [["Bradley–Terry", "log odds", "95 %"]]
-    rows += [[row["condition"], _format_number(row["strength"], "+.2f"), _format_limits(row, "+.2f")] for row in model["conditions"]]
-    rows.append(["shown first", _format_number(model["order"]["strength"], "+.2f"), _format_limits(model["order"], "+.2f")])
+    rows += [
+        [row["condition"], _format(row["strength"], "+.2f"), _format_limits(row, "+.2f")] for row in model["conditions"]
+    ]
+    rows.append(["shown first", _format(model["order"]["strength"], "+.2f"), _format_limits(model["order"], "+.2f")])
     lines += _align(rows)
     if model["is_shrunk"]:
         lines.append("  a strength would be infinite: half a win was given to both sides of each comparison")
@@ -434,7 +460,7 @@ def _format_tests(row: Figures) -> list[str]:
 
 
 def _format_p(p: float | None) -> str:
-    return "<0.001" if p is not None and p < 0.001 else _format_number(p, ".3f")
+    return "<0.001" if p is not None and p < 0.001 else _format(p, ".3f")
 
 
 def _format_limits(row: Figures, form: str) -> str:
@@ -443,7 +469,7 @@ def _format_limits(row: Figures, form: str) -> str:
     return f"{row['low']:{form}} to {row['high']:{form}}"
 
 
-def _format_number(value: float | None, form: str) -> str:
+def _format(value: float | None, form: str) -> str:
     return NO_FIGURE if value is None or _is_missing(value) else format(value, form)
 
 

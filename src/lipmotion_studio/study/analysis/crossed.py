@@ -81,21 +81,21 @@ class CrossedMean:
 
         return float(2 * stdtr(self.degrees, -abs(self.mean) / self.error)) if self.is_known else float("nan")
 
-    def log_odds(self, low: float, high: float) -> CrossedMean:
+    def to_log_odds(self, low: float, high: float) -> CrossedMean:
         """Return the logarithm of (mean - low) / (high - mean), with its error to first order; low < mean < high."""
         slope = (high - low) / ((self.mean - low) * (high - self.mean))
         odds = float(np.log((self.mean - low) / (high - self.mean)))
         return CrossedMean(odds, self.error * slope, self.degrees, self.over, None)
 
-    def interval_within(self, low: float, high: float) -> Interval:
+    def compute_interval_within(self, low: float, high: float) -> Interval:
         """Return the interval that is symmetric in log odds: it leaves no scale, and is right near its ends, too."""
         if not low < self.mean < high:
             return UNKNOWN
-        shares = 1 / (1 + np.exp(-np.array(self.log_odds(low, high).interval)))
+        shares = 1 / (1 + np.exp(-np.array(self.to_log_odds(low, high).interval)))
         return Interval(*(low + (high - low) * shares).tolist())
 
 
-def estimate_crossed_mean(values: Array, width: float) -> CrossedMean:
+def estimate_mean(values: Array, width: float) -> CrossedMean:
     """Return the mean of a table of judgements, and its standard error for other raters and other sentences.
 
     values : a row for each rater, a column for each sentence; NaN where there is no judgement [shape=(R, S)]
@@ -193,17 +193,17 @@ class RatingTable:
         """How far apart the ends of the scale are."""
         return self.scale[1] - self.scale[0]
 
-    def of(self, condition: str) -> Array:
+    def select_condition(self, condition: str) -> Array:
         """Return the judgements of a condition [shape=(R, S)]."""
         return self.values[self.conditions.index(condition)]
 
-    def compared(self) -> list[tuple[str, str]]:
+    def list_pairs(self) -> list[tuple[str, str]]:
         """Return all pairs of conditions without the anchor, in the order of the table."""
         return list(combinations([name for name in self.conditions if name != ANCHOR], 2))
 
-    def difference(self, condition: str, other: str) -> CrossedMean:
+    def compare_conditions(self, condition: str, other: str) -> CrossedMean:
         """Return the mean difference of two conditions, of the same rater on the same sentence."""
-        return estimate_crossed_mean(self.of(condition) - self.of(other), self.width)
+        return estimate_mean(self.select_condition(condition) - self.select_condition(other), self.width)
 
 
 def build_rating_table(answers: Sequence[Answer]) -> RatingTable:
@@ -226,12 +226,12 @@ def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
     """Return means, differences of all pairs, and improvement on a baseline (None: the lowest mean) of one scale."""
     means = []
     for number, name in enumerate(table.conditions):
-        values = table.of(name)
-        mean, seen = estimate_crossed_mean(values, table.width), np.isfinite(values)
+        values = table.select_condition(name)
+        mean, seen = estimate_mean(values, table.width), np.isfinite(values)
         row = {
             "condition": name,
             "mean": mean.mean,
-            **mean.interval_within(*table.scale)._asdict(),
+            **mean.compute_interval_within(*table.scale)._asdict(),
             "deviation": float(values[seen].std(ddof=1)) if seen.sum() > 1 else np.nan,
             "answers": int(table.count[number].sum()),
             "raters": int(seen.any(axis=1).sum()),
@@ -240,8 +240,8 @@ def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
         }
         means.append(row)
     base = baseline if baseline in table.conditions else find_lowest(table)
-    pairs = table.compared()
-    differences = [table.difference(*pair) for pair in pairs]
+    pairs = table.list_pairs()
+    differences = [table.compare_conditions(*pair) for pair in pairs]
     p_values = [each.p_value for each in differences]
     return {
         "conditions": sorted(means, key=lambda row: -row["mean"]),
@@ -261,7 +261,7 @@ def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
 def find_lowest(table: RatingTable) -> str | None:
     """Return the condition with the lowest mean but anchor and recording; None: there is no other."""
     names = [name for name in table.conditions if name not in (ANCHOR, RECORDING)]
-    return min(names, key=lambda name: float(np.nanmean(table.of(name))), default=None)
+    return min(names, key=lambda name: float(np.nanmean(table.select_condition(name))), default=None)
 
 
 def measure_improvement(table: RatingTable, condition: str, base: str) -> Figures:
@@ -271,7 +271,7 @@ def measure_improvement(table: RatingTable, condition: str, base: str) -> Figure
     100 (y - r b) / B, where y and b are judgements, B is the mean of the other condition, and r the ratio of the means.
     Source: Xie & Liu 2007, Tables 4 and 5 ("%RI").
     """
-    values, others = table.of(condition), table.of(base)
+    values, others = table.select_condition(condition), table.select_condition(base)
     both = np.isfinite(values) & np.isfinite(others)
     row: Figures = {"condition": condition, "percent": np.nan, "low": np.nan, "high": np.nan}
     level = float(others[both].mean()) if both.any() else 0.0
@@ -279,11 +279,13 @@ def measure_improvement(table: RatingTable, condition: str, base: str) -> Figure
         return row
     ratio = float(values[both].mean()) / level
     percent = 100 * (ratio - 1)
-    interval = estimate_crossed_mean(100 * (values - ratio * others) / level, 100 * table.width / level).interval
+    interval = estimate_mean(100 * (values - ratio * others) / level, 100 * table.width / level).interval
     return row | {"percent": percent, "low": percent + interval.low, "high": percent + interval.high}
 
 
 def estimate_difference_components(table: RatingTable) -> Components | None:
     """Return the mean variances of the effects on differences over all pairs; None: they cannot be told apart."""
-    found = [mean.components for mean in (table.difference(*pair) for pair in table.compared()) if mean.components]
+    found = [
+        mean.components for mean in (table.compare_conditions(*pair) for pair in table.list_pairs()) if mean.components
+    ]
     return Components(*np.mean(found, axis=0).tolist()) if found else None

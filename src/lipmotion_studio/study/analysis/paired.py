@@ -14,7 +14,7 @@ from lipmotion.errors import InputError
 from lipmotion_studio.study.analysis import crossed
 from lipmotion_studio.study.answers import FIRST, Answer
 
-MOST_STEPS = 20_000
+MAX_STEPS = 20_000
 SMALLEST_STEP = 1e-12
 """Iteration ends when no strength changes by a larger share."""
 HALF_WIN = 0.5
@@ -36,7 +36,7 @@ class Strengths:
     covariance: crossed.Array
     is_shrunk: bool
 
-    def probability(self) -> crossed.Array:
+    def compute_probability(self) -> crossed.Array:
         """Return the probability that i, shown first, is preferred to j [shape=(C, C)]."""
         return _apply_logistic(self.strengths[:, None] - self.strengths + self.order)
 
@@ -58,7 +58,7 @@ def fit_strengths(first_wins: crossed.Array, second_wins: crossed.Array) -> Stre
     comparisons = first_wins + second_wins
     wins = first_wins.sum(axis=1) + second_wins.sum(axis=0)
     worth, place = np.ones(len(wins)), 1.0
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         before = np.append(worth, place)
         weight = comparisons / (place * worth[:, None] + worth)
         worth = wins / (place * weight.sum(axis=1) + weight.sum(axis=0))
@@ -115,7 +115,7 @@ def compute_deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDAr
     Their sum over all answers is 0 at the maximum of the likelihood; how it varies with raters and sentences is how
     sure the strengths are (Liang & Zeger 1986).
     """
-    expected = model.probability()[pairs[:, 0], pairs[:, 1]]
+    expected = model.compute_probability()[pairs[:, 0], pairs[:, 1]]
     return (_build_contrasts(pairs, len(model.strengths)) * (is_first - expected)[:, None]) @ model.covariance
 
 
@@ -141,17 +141,17 @@ class PairTable:
     rater: Indices
     sentence: Indices
 
-    def cells(self, values: crossed.Array, chosen: NDArray[np.bool_]) -> crossed.Array:
+    def average_cells(self, values: crossed.Array, chosen: NDArray[np.bool_]) -> crossed.Array:
         """Return the mean of the chosen answers' values for each rater and sentence [shape=(R, S)]; NaN: no answer."""
-        count = self._sums(np.ones(len(values)), chosen)
-        return np.where(count > 0, self._sums(values, chosen) / np.maximum(count, 1), np.nan)
+        count = self._sum_cells(np.ones(len(values)), chosen)
+        return np.where(count > 0, self._sum_cells(values, chosen) / np.maximum(count, 1), np.nan)
 
-    def _sums(self, values: crossed.Array, chosen: NDArray[np.bool_]) -> crossed.Array:
+    def _sum_cells(self, values: crossed.Array, chosen: NDArray[np.bool_]) -> crossed.Array:
         sums = np.zeros((len(self.raters), len(self.sentences)))
         np.add.at(sums, (self.rater[chosen], self.sentence[chosen]), values[chosen])
         return sums
 
-    def between(self, condition: int, other: int) -> NDArray[np.bool_]:
+    def mark_between(self, condition: int, other: int) -> NDArray[np.bool_]:
         """Return which answers compare two conditions, in whatever order [shape=(N,)]."""
         return (self.shown == (condition, other)).all(axis=1) | (self.shown == (other, condition)).all(axis=1)
 
@@ -159,7 +159,7 @@ class PairTable:
         """Return which answers prefer a condition [shape=(N,)]."""
         return np.where(self.is_first, self.shown[:, 0], self.shown[:, 1]) == condition
 
-    def wins(self) -> tuple[crossed.Array, crossed.Array]:
+    def count_wins(self) -> tuple[crossed.Array, crossed.Array]:
         """Return how often i, shown first, was preferred to j, and j to it [each shape=(C, C)]."""
         first, second = (np.zeros((len(self.conditions),) * 2) for _ in range(2))
         np.add.at(first, tuple(self.shown[self.is_first].T), 1)
@@ -192,10 +192,10 @@ def build_pair_table(answers: Sequence[Answer]) -> PairTable:
 def analyse_pairs(table: PairTable) -> Figures:
     """Return the figures of paired comparisons."""
     everything = np.full(len(table.is_first), True)
-    first = analyse_shares(table.cells(table.is_first.astype(float), everything))
+    first = analyse_shares(table.average_cells(table.is_first.astype(float), everything))
     rows = []
     for i, j, cells in _pair_cells(table):
-        chosen = table.between(i, j)
+        chosen = table.mark_between(i, j)
         wins, count = int((table.is_preferred(i) & chosen).sum()), int(chosen.sum())
         names: Figures = {"condition": table.conditions[i], "other": table.conditions[j]}
         counts = {"wins": wins, "answers": count, "p_binomial": compute_binomial_p(wins, count)}
@@ -204,7 +204,7 @@ def analyse_pairs(table: PairTable) -> Figures:
     scores = []
     for place, name in enumerate(table.conditions):  # how often each was preferred: Hofer 2008, Fig. 6
         chosen, preferred = (table.shown == place).any(axis=1), table.is_preferred(place)
-        share = analyse_shares(table.cells(preferred.astype(float), chosen))
+        share = analyse_shares(table.average_cells(preferred.astype(float), chosen))
         counts = {"wins": int((preferred & chosen).sum()), "answers": int(chosen.sum())}
         scores.append({"condition": name} | counts | {key: share[key] for key in ("share", "low", "high")})
     return {
@@ -223,13 +223,13 @@ def analyse_shares(cells: crossed.Array) -> Figures:
     The interval is symmetric in log odds. Where all answers agree, it is the exact one of so many independent answers
     as there are raters (Clopper & Pearson 1934), and so is the test.
     """
-    share = crossed.estimate_crossed_mean(cells, 1.0)
+    share = crossed.estimate_mean(cells, 1.0)
     raters = int(np.isfinite(cells).any(axis=1).sum())
     if share.mean in (0.0, 1.0):
         wins = int(share.mean) * raters
         interval, p, over = compute_exact_interval(wins, raters), compute_binomial_p(wins, raters), ALL_EQUAL
     else:
-        interval, p = share.interval_within(0, 1), share.log_odds(0, 1).p_value
+        interval, p = share.compute_interval_within(0, 1), share.to_log_odds(0, 1).p_value
         over = share.over if share.is_known else crossed.NOTHING
     return {"share": share.mean, "low": interval.low, "high": interval.high, "p": p, "over": over}
 
@@ -274,7 +274,7 @@ def measure_order_agreement(table: PairTable) -> Indices:
 
 def analyse_strengths(table: PairTable) -> Figures:
     """Return strengths of all conditions with intervals, and the effect of the order; or why there are none."""
-    first, second = table.wins()
+    first, second = table.count_wins()
     groups = link_groups(first + second)
     if len(groups) > 1:
         texts = (", ".join(table.conditions[place] for place in group) for group in groups)
@@ -283,24 +283,24 @@ def analyse_strengths(table: PairTable) -> Figures:
     moved = compute_deviations(model, table.shown, table.is_first)
     names = table.conditions
 
-    def row(value: float, change: crossed.Array) -> Figures:
-        count = table._sums(np.ones(len(change)), np.full(len(change), True))
-        sums = table._sums(change, np.full(len(change), True))
-        error = crossed.estimate_crossed_mean(np.where(count > 0, sums * int((count > 0).sum()), np.nan), 1.0)
+    def make_row(value: float, change: crossed.Array) -> Figures:
+        count = table._sum_cells(np.ones(len(change)), np.full(len(change), True))
+        sums = table._sum_cells(change, np.full(len(change), True))
+        error = crossed.estimate_mean(np.where(count > 0, sums * int((count > 0).sum()), np.nan), 1.0)
         interval = crossed.CrossedMean(value, error.error, error.degrees, error.over, None).interval
         low, high = (np.nan, np.nan) if model.is_shrunk else interval
         return {"strength": value, "low": low, "high": high}
 
     strengths = model.strengths
-    rows = [{"condition": name, **row(float(strengths[i]), moved[:, i])} for i, name in enumerate(names)]
+    rows = [{"condition": name, **make_row(float(strengths[i]), moved[:, i])} for i, name in enumerate(names)]
     return {
         "conditions": sorted(rows, key=lambda each: -each["strength"]),
         "pairs": [
             {"condition": names[i], "other": names[j]}
-            | row(float(strengths[i] - strengths[j]), moved[:, i] - moved[:, j])
+            | make_row(float(strengths[i] - strengths[j]), moved[:, i] - moved[:, j])
             for i, j in combinations(range(len(names)), 2)
         ],
-        "order": row(model.order, moved[:, -1]),
+        "order": make_row(model.order, moved[:, -1]),
         "is_shrunk": model.is_shrunk,
     }
 
@@ -309,7 +309,7 @@ def estimate_share_components(table: PairTable) -> crossed.Components | None:
     """Return the mean variances of effects on shares, by that of one answer; None: they cannot be told apart."""
     found = []
     for _, _, cells in _pair_cells(table):
-        share = crossed.estimate_crossed_mean(cells, 1.0)
+        share = crossed.estimate_mean(cells, 1.0)
         if share.components and share.error > 0:
             found.append(np.array(share.components) / (share.mean * (1 - share.mean)))
     return crossed.Components(*np.mean(found, axis=0).tolist()) if found else None
@@ -319,7 +319,7 @@ def _pair_cells(table: PairTable) -> list[tuple[int, int, crossed.Array]]:
     """Return all pairs that were compared, and the share of the first for each rater and sentence."""
     found = []
     for i, j in combinations(range(len(table.conditions)), 2):
-        chosen = table.between(i, j)
+        chosen = table.mark_between(i, j)
         if chosen.any():
-            found.append((i, j, table.cells(table.is_preferred(i).astype(float), chosen)))
+            found.append((i, j, table.average_cells(table.is_preferred(i).astype(float), chosen)))
     return found

@@ -24,7 +24,7 @@ from lipmotion.engines.coupled.chains.product import JointState, Transitions, cr
 from lipmotion.engines.coupled.chains.structures import list_unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert, sum_precisions
 from lipmotion.engines.coupled.training.chain_training import (
-    LEAST_FRAMES,
+    MIN_FRAMES,
     with_joint_state_densities,
 )
 from lipmotion.errors import InputError
@@ -407,7 +407,7 @@ def test_densities_integrate_to_1_without_a_loss(loss):
     """As printed, those of every joint state; with the option, rare ones lose that share, and frequent ones nothing."""
     of = replace(structure(FACTORIAL, (THREE, TWO), limit=None), unseen_loss=loss)
     listed = chains(of, sizes=(1, 1))
-    visits = np.where(np.arange(len(listed.transitions.product.joint_states)) < 4, LEAST_FRAMES, LEAST_FRAMES - 1)
+    visits = np.where(np.arange(len(listed.transitions.product.joint_states)) < 4, MIN_FRAMES, MIN_FRAMES - 1)
     free = with_joint_state_densities(listed, listed.transitions, visits, of)
     assert len(free.transitions.own_density_states) == 4
     grid = np.linspace(-15, 15, 3001, dtype=np.float32)[:, None]

@@ -221,7 +221,7 @@ class Inference:
 
 
 Array = NDArray[np.float64]
-LEAST_DEVIATION = 1e-6
+MIN_DEVIATION = 1e-6
 GEOMETRY, EIGENLIPS = "geometry", "eigenlips"
 
 
@@ -278,7 +278,7 @@ def fit_visual_streams(
         rows = np.concatenate(
             [stream_rows(x[:, columns], dynamic)[mask] for x, mask in zip(values, valid, strict=True)]
         )
-        deviation = np.maximum(rows.std(axis=0), LEAST_DEVIATION)
+        deviation = np.maximum(rows.std(axis=0), MIN_DEVIATION)
         name = EIGENLIPS if kind == GREY else GEOMETRY
         streams.append(VisualStream(name, columns, dynamic, rows.mean(axis=0), deviation))
     return tuple(streams)

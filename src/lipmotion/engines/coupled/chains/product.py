@@ -198,7 +198,7 @@ class _Successors:
 Array = NDArray[np.float64]
 INITIAL_ADVANCE = 0.2
 """Probability of moving on in a frame before training: a state lasts 50 ms on average."""
-LEAST_FRAMES = 50.0
+MIN_FRAMES = 50.0
 """A joint state with fewer frames in training shares its row with all that have the same own state and asynchrony."""
 LEAST_ADVANCE = 1e-5
 """Least probability of moving on, and of staying."""
@@ -275,7 +275,7 @@ class Transitions:
         for chain, own in enumerate(self.rows):
             blocks = self.advance[chain].reshape(self._blocks(chain), -1)
             key, count = own.copy(), blocks.shape[1]
-            rare = frames < LEAST_FRAMES
+            rare = frames < MIN_FRAMES
             parts: Sequence[Index] = [self.product.chain_states[chain], *(self.product.lead - self.product.lead[chain])]
             _, number = np.unique(np.stack(parts), axis=1, return_inverse=True)
             key[rare] = count + np.asarray(number, np.intp).reshape(-1)[rare]

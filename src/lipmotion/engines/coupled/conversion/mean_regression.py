@@ -38,7 +38,7 @@ OWN_RIDGE = 5.0
 """Strength of the ridges towards the regression of the viseme, and towards that of all."""
 LEAST_WEIGHT = 0.01
 """A regression with less weight in a frame is left out there."""
-LEAST_FRAMES = 20.0
+MIN_FRAMES = 20.0
 """The variance of all states counts as so many frames in that of each."""
 
 
@@ -189,7 +189,7 @@ def _variances(
         squares += posterior.T @ np.square(error)
         counts += posterior.sum(axis=0)
     overall = squares.sum(axis=0) / counts.sum()
-    variances = (squares + LEAST_FRAMES * overall) / (counts + LEAST_FRAMES)[:, None]
+    variances = (squares + MIN_FRAMES * overall) / (counts + MIN_FRAMES)[:, None]
     return np.maximum(variances, 1e-6).astype(np.float32)
 
 

@@ -157,7 +157,7 @@ def _shard_sums(job: tuple[Chains, Sequence[LatticeUtterance]]) -> Sums:
     return sums
 
 
-LEAST_FRAMES = 10
+MIN_FRAMES = 10
 """A joint state with at least so many frames in training has densities of its own."""
 
 
@@ -171,7 +171,7 @@ def with_joint_state_densities(
     structure   : of the returned chains: that of ``chains``, or the same without a limit of asynchrony
     """
     product = transitions.product
-    frequent = np.unique(product.chain_states[:, visits >= LEAST_FRAMES].T, axis=0)
+    frequent = np.unique(product.chain_states[:, visits >= MIN_FRAMES].T, axis=0)
     new_transitions: Transitions | FactorialTransitions = transitions
     chain_states = product.chain_states
     if structure.limit is None:
