@@ -204,8 +204,8 @@ class ProjectFolder:
                 raise self._damage(recording, error) from error
         if recording.sha256 and file.sha256 not in ("", recording.sha256):
             raise InputError(
-                f"{self.locate_edits(recording)}: are edits of another recording than {self.locate_sound(recording)}; put "
-                "the right file in its place, or add the recording again, under another name"
+                f"{self.locate_edits(recording)}: are edits of another recording than {self.locate_sound(recording)}; "
+                "put the right file in its place, or add the recording again, under another name"
             )
         return file
 

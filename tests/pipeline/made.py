@@ -63,7 +63,7 @@ def replace_tracking(monkeypatch: pytest.MonkeyPatch, track: Callable[..., Track
             raise MissingDependencyError("pip install")
         return {"mediapipe": "0", "opencv": "4", "av": "1"}
 
-    monkeypatch.setattr(prepare, "make_tracker", lambda _: SimpleNamespace(versions=versions))
+    monkeypatch.setattr(prepare, "make_tracker", lambda _: SimpleNamespace(list_versions=versions))
     monkeypatch.setattr(prepare, "track", track)
 
 
