@@ -25,7 +25,7 @@ from scipy.special import ndtr, ndtri, stdtrit
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from lipmotion_studio.study.analysis import crossed
-from lipmotion_studio.study.analysis.analyse import compute_power, find_raters_needed
+from lipmotion_studio.study.analysis.analyse import compute_power, count_raters
 from lipmotion_studio.study.analysis.crossed import RANKS, Components, Interval, RatingTable, analyse_ratings
 from lipmotion_studio.study.analysis.paired import analyse_pairs, fit_strengths
 from study.simulated import Effects, comparisons, expected_preference, expected_rating, ratings
@@ -177,7 +177,7 @@ def power(studies: int) -> list[dict[str, Any]]:
     for rater, sentence, difference in ((0.4, 0.1, 0.5), (0.4, 0.3, 0.5), (0.2, 0.1, 0.3), (0.0, 0.0, 0.2)):
         for sentences in (6, 20):
             components = Components(rater**2, sentence**2, 1.0)
-            raters = find_raters_needed(components, difference, sentences)
+            raters = count_raters(components, difference, sentences)
             if raters is None:
                 continue
             draw, told = np.random.default_rng([studies, raters, sentences]), 0

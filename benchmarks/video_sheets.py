@@ -41,7 +41,7 @@ class Sheets:
 def face_crop(frame: Pictures, to_image: NDArray[np.float64]) -> Pictures:
     """Return the face in a frame [shape=(270, 225, 3)], as it is turned, but always of one size.
 
-    to_image : map from the plane of the lips, as of ``map_face_to_image``
+    to_image : map from the plane of the lips, as of ``map_face``
     """
     scale = float(np.sqrt(abs(np.linalg.det(to_image[:, :2]))))
     x, y = to_image[:, 2]

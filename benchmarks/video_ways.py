@@ -20,7 +20,7 @@ from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import Motion, Timeline, Utterance
 from lipmotion_faces.appearance import lower_face
-from lipmotion_faces.appearance.candidates import measure_squared_distances
+from lipmotion_faces.appearance.candidates import square_distances
 from lipmotion_faces.appearance.placing import invert_map, place
 from lipmotion_faces.film import filmed_video
 from lipmotion_faces.film.background import open_background, steady_face
@@ -156,7 +156,7 @@ class RecordedMouths:
 
     def nearest(self, motion: Array) -> NDArray[np.intp]:
         """Return the number of the picture whose lip points are nearest, in each frame [shape=(T,)]."""
-        found = measure_squared_distances(motion.astype(np.float32), self.lips.astype(np.float32)).argmin(axis=1)
+        found = square_distances(motion.astype(np.float32), self.lips.astype(np.float32)).argmin(axis=1)
         return np.asarray(found)
 
     def frame(self, number: int) -> tuple[Pictures, Array]:

@@ -47,8 +47,7 @@ class DrawnMotion(Generic[PoseT]):
     """The pictures of a motion as a face draws them: all in order, or single ones.
 
     poses   : of every frame
-    painter : returns what draws the picture of a pose; called when the first picture is asked for. Several threads use
-              what it returns
+    painter : returns what draws the picture of a pose, in several threads; called for the first picture
     ahead   : pictures that are drawn before they are asked for, by ``THREADS`` threads
     The same pose gives the same pixels, whatever was drawn before.
     """

@@ -22,7 +22,7 @@ from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces import base
-from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, fill_background, prepare_surface
+from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, fill, prepare_surface
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -140,9 +140,7 @@ class MeshStage:
         near = np.linalg.norm(self._rest, axis=1) < DRAWN_HEIGHTS * across
         shown = np.asarray(near[mesh.triangles].any(axis=1))
         self._drawn = prepare_surface(mesh, shown, height / across / placement.scale)
-        self._canvas = TexturedCanvas(
-            camera, self._drawn.triangles, None if colour is None else fill_background(camera, colour)
-        )
+        self._canvas = TexturedCanvas(camera, self._drawn.triangles, None if colour is None else fill(camera, colour))
         self._joined, self._moving = surface.places, character.moving
         # what must be lit again when the moving vertices move: the places (of vertices that files split) around them,
         # their triangles, and for each vertex whose normal changes its place among these, and the vertex

@@ -46,8 +46,7 @@ def compare(reference: Source, *others: Source, monitor: Monitor = silent_monito
     """Return how far other motion is from that of a reference, by name (docs/compare.md).
 
     reference, others : motion files, videos that show a face (they are tracked), or motion
-    Motion is compared at the slower of its two rates, where both last; ``notes`` say what was done for it. Figures that
-    do not exist are None.
+    Motion is compared at the slower rate, where both last; ``notes`` say what was done. Missing figures are None.
     Raises InputError: a file that cannot be read, values that are not finite, no common channel, too few frames.
     Raises MissingDependencyError: videos without the extra ``video``.
 

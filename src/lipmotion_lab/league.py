@@ -351,8 +351,7 @@ def choose(
 def count_closings(recording: Recording, made: Array, shut: float) -> tuple[Array, Array]:
     """Return matched, missed and false closings, of all and of p, b and m [each shape=(3,)].
 
-    Of p, b and m: missed are the speaker's closings there, false are generated ones in other phones, where the speaker
-    does not close.
+    Of p, b and m: missed are the speaker's closings there, false are generated ones in phones without one.
     """
     opening, own = recording.original[:, 0], find_threshold([recording.original[:, 0]])
     original, generated = find_closings(opening, own), find_closings(made[:, 0], shut)
@@ -360,15 +359,13 @@ def count_closings(recording: Recording, made: Array, shut: float) -> tuple[Arra
     matched = [o for _, o in pairs]
     frame_s = float(np.median(np.diff(recording.time_s)))
 
-    def mark_inside(
-        frames: NDArray[np.intp], spans: Sequence[tuple[float, float]], margin_s: float
-    ) -> NDArray[np.bool_]:
+    def mark_in(frames: NDArray[np.intp], spans: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
         return ~is_away_from_speech(recording.time_s[frames], spans, margin_s)
 
     lips, other = recording.list_spans(lips=True), recording.list_spans(lips=False)
-    wanted = original[mark_inside(original, lips, frame_s)]
+    wanted = original[mark_in(original, lips, frame_s)]
     false = np.setdiff1d(generated, [g for g, _ in pairs]).astype(int)
-    false = false[mark_inside(false, other, 0.0) & ~mark_inside(false, lips, frame_s)]
+    false = false[mark_in(false, other, 0.0) & ~mark_in(false, lips, frame_s)]
     hits = int(np.isin(wanted, matched).sum())
     everything = np.array([len(pairs), len(original) - len(pairs), len(generated) - len(pairs)], float)
     return everything, np.array([hits, len(wanted) - hits, len(false)], float)
@@ -474,7 +471,7 @@ class League:
         return others[0] if others else None
 
 
-def measure_league(  # noqa: PLR0913
+def run_rivals(  # noqa: PLR0913
     corpus: Corpus,
     adapters: Path,
     work: Path,
@@ -487,7 +484,7 @@ def measure_league(  # noqa: PLR0913
 ) -> League:
     """Return how rivals, and our engines, move the lips of the same recordings.
 
-    adapters : the folder ``extras/measure_league``, with a table of rivals
+    adapters : the folder ``extras/run_rivals``, with a table of rivals
     work     : answers are kept there: a run that was stopped goes on
     choosing : another corpus, on whose list ``val`` (without one: on all) settings are chosen. None: the corpus's own
                ``val``, and its ``test`` is reported; without both lists, in folds over its recordings

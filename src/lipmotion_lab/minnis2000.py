@@ -131,7 +131,7 @@ _ROW, _SUMS, _OVERLAP = "row", "correlation", "overlap"
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 
-def list_configurations(*, guided: bool = True) -> dict[str, SelectionConfig]:
+def list_rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
     """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged.
 
     guided : with the rows whose models learn from the sound, a guide or phones of the speaker's own
@@ -162,7 +162,7 @@ def run_minnis2000(
     models : folder of the model ``selection.lipmotion`` (``train_engines``), so that a second run does not train
              again; None: it is trained and not kept
     quick  : only see that it runs: few epochs
-    guided : as of ``list_configurations``; without, training takes a minute instead of twenty, and no model is kept
+    guided : as of ``list_rows``; without, training takes a minute instead of twenty, and no model is kept
     work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
              after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
@@ -185,17 +185,15 @@ def run_minnis2000(
         trained = train_engines(corpus, kept_in, training, [ENGINE])[ENGINE]
     found = {}
     for (split, names), part in zip(lists.items(), runner.share_out(settings, [*lists], 0.6), strict=True):
-        key = runner.PartKey(
-            trained.model.engine, names, model=trained.model, others=str(list_configurations(guided=guided))
-        )
+        key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(list_rows(guided=guided)))
         kept = runner.open_parts(work and work / split, corpus, settings, key)
-        found[split] = _measure_list(corpus, names, trained.model, list_configurations(guided=guided), kept, part)
+        found[split] = _measure_list(corpus, names, trained.model, list_rows(guided=guided), kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
     printed = vars(SelectionConfig.parsed(MINNIS_2000))
     about["rows"] = {
         name: {key: value for key, value in vars(config).items() if value != printed[key]}
-        for name, config in list_configurations(guided=guided).items()
+        for name, config in list_rows(guided=guided).items()
     }
     return replace_nan(about | {"lists": found})
 

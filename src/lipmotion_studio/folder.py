@@ -243,10 +243,7 @@ class ProjectFolder:
     def remove_edits(self, recording: ProjectRecording) -> None:
         """Remove a recording's file of edits, and its copy. Raises ExportError: it cannot be removed."""
         with self.lock:
-            for path in (
-                self._copy(recording),
-                self.locate_edits(recording),
-            ):  # a copy without its file would be a damage
+            for path in (self._copy(recording), self.locate_edits(recording)):  # a copy without its file is a damage
                 remove(path)
                 if path.exists():
                     raise ExportError(f"{path}: cannot be removed")
@@ -306,7 +303,7 @@ class ProjectFolder:
             listed = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
             sources = [(Path(each.recording), each.name, each.transcript) for each in listed]
             known = {os.path.realpath(self.locate_sound(each)) for each in self.project.lines.values()}
-            taken, file = self._list_taken_names(), self.path.absolute() / PROJECT
+            taken, file = self._list_taken(), self.path.absolute() / PROJECT
             added: list[ProjectRecording] = []
             for sound, name, transcript in sources or [(source, make_portable(source.stem), "")]:
                 if os.path.realpath(sound) not in known:
@@ -330,9 +327,7 @@ class ProjectFolder:
         with self.lock:
             folder = self.path / SOUNDS
             make_folder(folder)
-            taken = self._list_taken_names() | {
-                file_key(each.stem) for each in folder.iterdir()
-            }  # also of what was removed
+            taken = self._list_taken() | {file_key(each.stem) for each in folder.iterdir()}  # also of what was removed
             number = self.project.next_number
             recording = ProjectRecording(number, clean_name(Path(name).stem), "", digest, transcript)
             recording = self._choose_name(recording, taken)
@@ -343,7 +338,7 @@ class ProjectFolder:
             self.change(lambda project: project.with_recordings([recording]))
             return number
 
-    def _list_taken_names(self) -> set[str]:
+    def _list_taken(self) -> set[str]:
         return {file_key(recording.name) for recording in self.project.lines.values()}
 
     def _choose_name(self, recording: ProjectRecording, taken: set[str]) -> ProjectRecording:

@@ -29,13 +29,13 @@ from lipmotion_studio.recording import OpenRecording
 from lipmotion_studio.requests import (
     Access,
     read_content,
-    take_member,
+    take,
+    take_int,
     take_objects,
     take_stretch,
     take_text,
     take_texts,
     take_time,
-    take_whole,
 )
 from lipmotion_studio.studio import Studio
 from lipmotion_studio.trainer import MAX_LISTED
@@ -68,7 +68,7 @@ class RecordingReplies:
     async def edit(self, request: Request) -> Response:
         """Edits to be made."""
         number, content, revision = await self._read_change(request)
-        steps, instead = take_texts(content, "steps", most=MAX_STEPS), take_whole(content, "instead", 0)
+        steps, instead = take_texts(content, "steps", most=MAX_STEPS), take_int(content, "instead", 0)
         commands = self._studio.add_phones(steps)
         return await self._reply_after(number, lambda recording: recording.edit(revision, commands, instead))
 
@@ -77,7 +77,7 @@ class RecordingReplies:
 
         async def reply(request: Request) -> Response:
             number, content, revision = await self._read_change(request)
-            count = take_whole(content, "count", 1, least=1)
+            count = take_int(content, "count", 1, least=1)
             return await self._reply_after(number, lambda recording: step(recording, revision, count))
 
         return reply
@@ -121,7 +121,7 @@ class RecordingReplies:
         """Which of two motions somebody found better."""
         number, content, revision = await self._read_change(request)
         shown = [take_text(side, "by", "") for side in take_objects(content, "shown")]
-        better = None if content.get("better") is None else take_whole(content, "better", most=1)
+        better = None if content.get("better") is None else take_int(content, "better", most=1)
 
         def add() -> dict[str, Any]:
             with self._studio.folder.check_out(number, revision) as recording:
@@ -250,7 +250,7 @@ class RecordingReplies:
     async def _read_change(self, request: Request) -> tuple[int, dict[str, Any], int]:
         """Return the recording of a change, what it brings, and the revision that its author saw."""
         content = await read_content(request)
-        return self._find_number(request), content, take_whole(content, "revision")
+        return self._find_number(request), content, take_int(content, "revision")
 
     async def _change_versions(
         self, number: int, revision: int, changed: Callable[[ProjectRecording, OpenRecording], ProjectRecording]
@@ -320,7 +320,7 @@ class ProjectReplies:
     async def list_recordings(self, request: Request) -> Response:
         """The recordings, page by page, and what forms need."""
         query = request.query_params
-        first, count = take_whole(query, "from", 0), take_whole(query, "count", 200, most=2000)
+        first, count = take_int(query, "from", 0), take_int(query, "count", 200, most=2000)
         chosen = {name: take_text(query, name, "") for name in ("order", "status", "mark")}
         document = await self._run_apart(lambda: self._studio.list_recordings(first, count, **chosen))
         return reply_json(document | {"largest_upload_bytes": MAX_UPLOAD_BYTES})
@@ -333,7 +333,7 @@ class ProjectReplies:
         """Recordings that are to be analysed."""
         content = await read_content(request)
         known = self._studio.folder.project.lines
-        numbers = list(known) if content.get("lines") == ALL else take_member(content, "lines", None, items(NUMBER))
+        numbers = list(known) if content.get("lines") == ALL else take(content, "lines", None, items(NUMBER))
         if not set(numbers) <= known.keys():
             raise HTTPException(404, "no such recording")
         return reply_json({"waiting": self._studio.workspace.queue(numbers)})
@@ -355,13 +355,13 @@ class ProjectReplies:
     async def mark(self, request: Request) -> Response:
         """A mark of a recording."""
         number, content = self._find_number(request), await read_content(request)
-        mark, revision = take_text(content, "mark"), take_whole(content, "revision")
+        mark, revision = take_text(content, "mark"), take_int(content, "revision")
         return reply_json(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
 
     async def remove(self, request: Request) -> Response:
         """A recording that leaves the project; its files stay."""
         number, folder = self._find_number(request), self._studio.folder
-        with folder.check_out(number, take_whole(await read_content(request), "revision")):
+        with folder.check_out(number, take_int(await read_content(request), "revision")):
             folder.change(lambda project: project.without_recording(number))
             self._studio.workspace.forget(number)
         return reply_json({"removed": number})
@@ -401,11 +401,8 @@ class ProjectReplies:
     async def pronounce(self, request: Request) -> Response:
         """A pronunciation that the project keeps."""
         content = await read_content(request)
-        word, phones, revision = (
-            _take_word(content),
-            take_texts(content, "phones", most=MAX_PHONES),
-            take_whole(content, "revision"),
-        )
+        word, phones = _take_word(content), take_texts(content, "phones", most=MAX_PHONES)
+        revision = take_int(content, "revision")
         if not phones or not set(phones) <= set(PHONES):
             raise InputError(f"the phones of a word are some of: {' '.join(PHONES)}")
         await self._run_apart(lambda: self._studio.folder.add_pronunciation(word, phones, revision))
@@ -426,7 +423,7 @@ class ProjectReplies:
         """A voice or a face that is to be made."""
         content = await read_content(request)
         kind, name = take_text(content, "kind"), take_text(content, "name", "")
-        numbers = list(dict.fromkeys(take_member(content, "lines", [], items(NUMBER, most=MAX_RECORDINGS))))
+        numbers = list(dict.fromkeys(take(content, "lines", [], items(NUMBER, most=MAX_RECORDINGS))))
         options = check_options(content.get("options", {}))
         await self._run_apart(lambda: self._trainer.begin(kind, name, numbers, options))
         return await self._reply_training(201)
@@ -444,7 +441,7 @@ class ProjectReplies:
     async def choose_voice(self, request: Request) -> Response:
         """The voice that the project uses from now on."""
         content = await read_content(request)
-        name, revision = take_text(content, "voice"), take_whole(content, "revision")
+        name, revision = take_text(content, "voice"), take_int(content, "revision")
         path, voice = await self._run_apart(lambda: self._studio.load_voice(name))
         self._studio.use_voice(path, voice, revision)
         return await self._reply_training()

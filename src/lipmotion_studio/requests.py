@@ -16,7 +16,7 @@ from starlette.requests import Request
 from lipmotion.errors import InputError
 from lipmotion.types import values
 from lipmotion.types.values import Schema, any_members, items, number_or_text, parse_number, parse_whole, require
-from lipmotion_studio.web.replies import find_foreign_refusal, read_json
+from lipmotion_studio.web.replies import read_json, refuse_foreign
 
 TOKEN_HEADER = "x-lipmotion-token"  # noqa: S105 # its name
 API = "/api"
@@ -40,7 +40,7 @@ class Access:
 
     def find_refusal(self, method: str, path: str, query: bytes, headers: dict[str, str]) -> tuple[int, str] | None:
         """Return why a request is refused, with a status; None: it is not."""
-        foreign = find_foreign_refusal(path, headers, self.hosts.__contains__)
+        foreign = refuse_foreign(path, headers, self.hosts.__contains__)
         if foreign or (path != API and not path.startswith(f"{API}/")):
             return foreign
         if hmac.compare_digest(headers.get(TOKEN_HEADER, "").encode(), self.token.encode()):
@@ -63,28 +63,24 @@ async def read_content(request: Request) -> dict[str, Any]:
     return content
 
 
-def take_member(given: Mapping[str, Any], name: str, usual: Any, schema: Schema) -> Any:
+def take(given: Mapping[str, Any], name: str, usual: Any, schema: Schema) -> Any:
     """Return a member of a request, checked. Raises InputError: there is none, and no usual value; or another one."""
     return require(schema, given.get(name, usual), name)
 
 
-def take_whole(
+def take_int(
     given: Mapping[str, Any], name: str, usual: int | None = None, *, least: int = 0, most: int = 1 << 31
 ) -> int:
-    """Return a whole number of a request, also from its text in an address. Raises as ``take_member``."""
+    """Return a whole number of a request, also from its text in an address. Raises as ``take``."""
     return int(
-        take_member(
-            given, name, usual, number_or_text(partial(parse_whole, what=f"{name} is"), values.whole(least, most))
-        )
+        take(given, name, usual, number_or_text(partial(parse_whole, what=f"{name} is"), values.whole(least, most)))
     )
 
 
 def take_time(given: Mapping[str, Any], name: str, usual: float | None = None) -> float:
-    """Return a time of a request in seconds, also from its text in an address. Raises as ``take_member``."""
+    """Return a time of a request in seconds, also from its text in an address. Raises as ``take``."""
     return float(
-        take_member(
-            given, name, usual, number_or_text(partial(parse_number, what=f"{name} is"), values.number(0, LATEST_S))
-        )
+        take(given, name, usual, number_or_text(partial(parse_number, what=f"{name} is"), values.number(0, LATEST_S)))
     )
 
 
@@ -99,15 +95,15 @@ def take_stretch(given: Mapping[str, Any], rate_hz: float, frames: int) -> slice
 
 
 def take_text(given: Mapping[str, Any], name: str, usual: str | None = None, *, longest: int = 200) -> str:
-    """Return a text of a request. Raises as ``take_member``."""
-    return str(take_member(given, name, usual, values.text(longest)))
+    """Return a text of a request. Raises as ``take``."""
+    return str(take(given, name, usual, values.text(longest)))
 
 
 def take_texts(given: Mapping[str, Any], name: str, *, most: int, longest: int = 2000) -> tuple[str, ...]:
-    """Return a list of texts of a request. Raises as ``take_member``."""
-    return tuple(take_member(given, name, None, items(values.text(longest), most=most)))
+    """Return a list of texts of a request. Raises as ``take``."""
+    return tuple(take(given, name, None, items(values.text(longest), most=most)))
 
 
 def take_objects(given: Mapping[str, Any], name: str, *, most: int = 2) -> list[dict[str, Any]]:
-    """Return a list of objects of a request. Raises as ``take_member``."""
-    return list(take_member(given, name, None, items(any_members(lambda value: value), most=most)))
+    """Return a list of objects of a request. Raises as ``take``."""
+    return list(take(given, name, None, items(any_members(lambda value: value), most=most)))

@@ -248,14 +248,12 @@ class Studio:
             restorable = status == FAILED and self.folder.is_restorable(recording)
             return document | {"status": status, "progress": None, "error": error, "restorable": restorable}
         status = WORKING if work.status == READY and work.recording is None else work.status
-        return document | {"status": status, "progress": _describe_work(work), "error": work.error}
+        return document | {"status": status, "progress": _describe(work), "error": work.error}
 
     def describe_progress(self) -> dict[str, Any]:
         """Return which recordings wait, or are at work, or were until a short while ago."""
         works = self.workspace.list_current()
-        rows = [
-            {"id": work.number, "status": work.status, **_describe_work(work), "error": work.error} for work in works
-        ]
+        rows = [{"id": work.number, "status": work.status, **_describe(work), "error": work.error} for work in works]
         waiting = sum(work.status == WAITING for work in works)
         document = {"lines": rows, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
         return document | {"training": self.trainer.summarise()}
@@ -263,9 +261,8 @@ class Studio:
     def list_voices(self) -> dict[str, str]:
         """Return the models that the project may use by the names of their files, as paths from its folder."""
         project = self.folder.project
-        made = {
-            name: path.relative_to(self.folder.path).as_posix() for name, path in self.trainer.list_files(VOICE).items()
-        }
+        files = self.trainer.list_files(VOICE)
+        made = {name: path.relative_to(self.folder.path).as_posix() for name, path in files.items()}
         others = [path for path in (project.given_model, project.model) if path and path not in made.values()]
         return {"": ""} | {Path(path).name: path for path in others} | made
 
@@ -411,9 +408,8 @@ class Studio:
         Raises InputError: there is no such version or model, or it cannot make an edit.
         """
         if by not in ("", OTHER):
-            return self.vary(
-                number, recording.with_edits(self.folder.find_recording(number).find_version(by).steps), "", face
-            )
+            steps = self.folder.find_recording(number).find_version(by).steps
+            return self.vary(number, recording.with_edits(steps), "", face)
         model = self._find_model(by).model
         onto = self.faces.open_face(face).find_other_person(model, recording.file.named.speaker) if face else None
         return recording if model is self.used.model and onto is None else recording.with_model(model, onto)
@@ -489,5 +485,5 @@ class Studio:
         return {"exported": exported, "failed": failed}
 
 
-def _describe_work(work: Work) -> dict[str, Any]:
+def _describe(work: Work) -> dict[str, Any]:
     return {"stage": work.stage, "share": round(work.share, 3)}

@@ -73,12 +73,10 @@ class Trainer:
     """Makes voices and faces of a project, one at a time; may be used by several threads.
 
     The last job is shown until there is another; and besides, the last voice and the last face that were made. All is
-    kept in the folder of the project, so that one that a killed studio was making is shown as interrupted, and can be
-    made again.
+    kept in the folder of the project: what a killed studio was making is shown as interrupted, and can be made again.
 
     clock  : returns seconds, and only grows
-    damage : why the file that keeps it cannot be read, and how it is restored; until then nothing is made. Empty: it
-             can be read
+    damage : why the file of jobs cannot be read, and how to restore it; empty: it can. Until then nothing is made.
     """
 
     def __init__(self, folder: ProjectFolder, clock: Callable[[], float] = time.monotonic) -> None:

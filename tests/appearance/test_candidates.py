@@ -20,8 +20,8 @@ from lipmotion_faces.appearance.candidates import (
     find_best_sequence,
     make_candidates,
     measure_details,
-    measure_squared_distances,
     sharpen,
+    square_distances,
 )
 from oracles.components import components, share
 
@@ -91,7 +91,7 @@ def test_what_nothing_can_be_chosen_from() -> None:
 def test_squared_distances_are_those_of_the_definition() -> None:
     some, others = mouths(1)[:9], mouths(2)[:5]
     expected = [[float(np.square(a.astype(float) - b).sum()) for b in others] for a in some]
-    assert measure_squared_distances(some, others) == pytest.approx(np.array(expected), rel=1e-4, abs=1e-2)
+    assert square_distances(some, others) == pytest.approx(np.array(expected), rel=1e-4, abs=1e-2)
 
 
 def test_a_candidate_is_its_eigenlips_and_its_detail(space: Eigenlips) -> None:

@@ -9,7 +9,7 @@ from lipmotion.storage.archive import read_archive, write_archive
 from lipmotion_faces.appearance import camera_noise, looping
 
 RATE_HZ = 25.0
-FADE_FRAMES = looping.count_fade_frames(RATE_HZ)
+FADE_FRAMES = looping.count_fade(RATE_HZ)
 
 
 def background(path, blinks=(), noise: float = 0.02) -> looping.FrameDescriptors:
@@ -180,7 +180,7 @@ def distances_of(frames: np.ndarray, moves=None) -> np.ndarray:
     count = len(frames)
     descriptors = looping.describe_frames(frames, maps(np.zeros((count, 2)) if moves is None else moves))
     assert len(descriptors) == count
-    return looping.measure_row_distances(descriptors.standardise([(0, count)]))
+    return looping.compare_rows(descriptors.standardise([(0, count)]))
 
 
 def test_equal_frames_have_no_distance_and_the_mouth_does_not_count():

@@ -138,9 +138,8 @@ def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
     dimmed = replace(footage, clips=(footage.clips[0], lower_face.relight(footage.clips[1], lamp), *footage.clips[2:]))
     found, wanted = learn_appearance(dimmed), learn_appearance(footage)
     assert found.light == pytest.approx(wanted.light, abs=0.5)
-    assert lower_face.measure_cheek_light(found.mouths) == pytest.approx(
-        np.tile(found.light, (len(found.mouths), 1)), abs=0.5
-    )
+    light = np.tile(found.light, (len(found.mouths), 1))
+    assert lower_face.measure_cheek_light(found.mouths) == pytest.approx(light, abs=0.5)
     motion = types.Motion(footage.motion[::5], 25.0, footage.channels)
     pictures = [each.mouth.restore(each.predict_codes(motion).mouth).astype(int) for each in (found, wanted)]
     assert np.abs(pictures[0] - pictures[1]).mean() < 1.0

@@ -2,8 +2,7 @@
 
 ``python signalled.py NUMBER STEP ARGUMENT ...``: the number of the signal; the number of function calls after which it
 is sent, counted from the installation of the handlers (0: never; -1: after ``main``; -2: when Python clears its
-modules, at the very end); and the arguments of ``lipmotion``. Without a signal it writes the number of calls to the
-file ``steps``.
+modules, at the very end); and the arguments of ``lipmotion``. Without a signal the file ``steps`` gets their number.
 """
 
 import os

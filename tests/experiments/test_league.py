@@ -15,15 +15,7 @@ import pytest
 from lipmotion import Corpus
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Channel, Motion, Track
-from lipmotion_lab.league import (
-    League,
-    Rival,
-    count_closings,
-    load_recordings,
-    measure_league,
-    read_rivals,
-    write_league,
-)
+from lipmotion_lab.league import League, Rival, count_closings, load_recordings, read_rivals, run_rivals, write_league
 
 ADAPTERS = Path(__file__).parents[2] / "extras" / "league"
 STANDIN = """
@@ -71,7 +63,7 @@ def hold(adapters: Path, corpus: Corpus, rows: dict[str, dict[str, Any]], **opti
     python = {"run": ["{NOT_SET:python}", "standin.py"], "needs": "install it"}
     table = {name: {"title": name.upper(), **python, **row} for name, row in rows.items()}
     (adapters / "rivals.json").write_text(json.dumps(table))
-    return measure_league(corpus, adapters, adapters.parent / "work", **options)
+    return run_rivals(corpus, adapters, adapters.parent / "work", **options)
 
 
 def does(*what: str, **more: Any) -> dict[str, Any]:
@@ -176,10 +168,10 @@ def test_audio2face_is_asked_as_its_network_wants(toy_corpus, tmp_path, monkeypa
     (tmp_path / "network.onnx").touch()
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]))
     monkeypatch.setenv("LIPMOTION_AUDIO2FACE", str(tmp_path))
-    found = measure_league(toy_corpus, ADAPTERS, tmp_path / "work", only=["audio2face"])
+    found = run_rivals(toy_corpus, ADAPTERS, tmp_path / "work", only=["audio2face"])
     assert (found.failed, found.absent) == ({}, {})
     (tmp_path / "network.onnx").unlink()
-    absent = measure_league(toy_corpus, ADAPTERS, tmp_path / "other", only=["audio2face"]).absent
+    absent = run_rivals(toy_corpus, ADAPTERS, tmp_path / "other", only=["audio2face"]).absent
     assert "network.onnx" in absent["Audio2Face-3D"]
 
 
@@ -197,7 +189,7 @@ INSTALLED = {
 def test_real_adapters_answer(name, toy_corpus, tmp_path):
     if not INSTALLED[name]():
         pytest.skip(f"{name} is not installed")
-    found = measure_league(toy_corpus, ADAPTERS, tmp_path, only=[name])
+    found = run_rivals(toy_corpus, ADAPTERS, tmp_path, only=[name])
     assert not found.failed
     assert not found.absent
     assert np.isfinite(found.standings[0].figures["acc"].value)

@@ -22,8 +22,8 @@ from lipmotion_lab.minnis2000 import (
     ADDITIONS,
     EVERYTHING,
     PRINTED,
-    list_configurations,
     list_overlaps,
+    list_rows,
     measure_velocity_change,
     run_minnis2000,
 )
@@ -35,19 +35,19 @@ LONG = pytest.mark.long
 
 def test_all_additions_together_are_the_default():
     """Each row has an option of its own; without a row, an addition would be hidden in another one."""
-    printed, everything = list_configurations()[PRINTED], list_configurations()[EVERYTHING]
+    printed, everything = list_rows()[PRINTED], list_rows()[EVERYTHING]
     pair = ("candidates", "beam")
     options = {key for keys in ADDITIONS.values() if len(keys) == 1 or keys == pair for key in keys}
     alone = {key: getattr(everything, key) for key in options}
     assert replace(printed, **alone) == everything == SelectionConfig(closures=False)
-    assert len({str(config) for config in list_configurations().values()}) == len(list_configurations())
+    assert len({str(config) for config in list_rows().values()}) == len(list_rows())
 
 
 def test_without_a_guide_nothing_is_learned_from_the_sound():
-    alone = list_configurations(guided=False)
+    alone = list_rows(guided=False)
     assert (PRINTED in alone, EVERYTHING in alone) == (True, False)
     assert {(config.guide, config.joint_recogniser) for config in alone.values()} == {(0.0, False)}
-    assert alone.items() <= list_configurations().items()
+    assert alone.items() <= list_rows().items()
 
 
 def test_overlaps_count_where_table_1_leaves_the_middle():
@@ -94,7 +94,7 @@ def test_a_second_run_does_not_train(figures, toy_corpus, folder):
     settings = replace(SETTINGS, receive=receive)
     again = run_minnis2000(toy_corpus, models=folder, settings=settings)
     conditions = {(split, c, 2) for split, found in again["lists"].items() for c in found["conditions"]}
-    assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in list_configurations())
+    assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in list_rows())
     assert (figures["seconds"] > 0, again["seconds"]) == (True, None)
     assert again["lists"] == figures["lists"]
 

@@ -259,10 +259,9 @@ def test_every_table_and_chart_is_whole(name):
     names = [table.name for table in section.tables]
     assert len(names) == len(set(names))
     for table in section.tables:
-        assert all(
-            record[column.key] is not None for record in table.list_records()[:1] for column in table.columns[:1]
-        )
-        keys = {tuple(record) for record in table.list_records()}
+        records = table.list_records()
+        assert all(record[column.key] is not None for record in records[:1] for column in table.columns[:1])
+        keys = {tuple(record) for record in records}
         assert len(keys) == 1
     for chart in section.charts:
         assert ElementTree.fromstring(chart).find("svg").attrib["role"] == "img"  # noqa: S314 (our own)
@@ -390,13 +389,13 @@ def order(here: dict[str, float | None], signs: dict[str, int], is_error: bool =
 )
 def test_the_verdict_counts_pairs(signs, outcome):
     found = order({"a": 0.3, "b": 0.2, "c": 0.1}, dict(zip(("ab", "ac", "bc"), signs, strict=True)))
-    assert found.write_verdict() == f"ACC: of the paper's 3 pairs {outcome}. Best in print: a; here: a."
+    assert found.judge() == f"ACC: of the paper's 3 pairs {outcome}. Best in print: a; here: a."
 
 
 def test_the_smallest_error_is_the_best():
     found = order({"a": 0.1, "b": None, "c": 0.3}, {"ab": 1, "ac": 1, "bc": 1}, is_error=True)
-    assert found.write_verdict().endswith("Best in print: c; here: a.")
-    assert found.write_sentences()[1] == "Here: a 0.1, c 0.3."
+    assert found.judge().endswith("Best in print: c; here: a.")
+    assert found.describe()[1] == "Here: a 0.1, c 0.3."
 
 
 ROWS = {

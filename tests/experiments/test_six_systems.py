@@ -220,6 +220,4 @@ def test_what_cannot_be_chosen(toy_corpus, tmp_path):
     with pytest.raises(CorpusError, match="are in the split that is compared with"):
         run_xieliu2007(toy_corpus, order=toy_corpus.names("val"))
     with pytest.raises(CorpusError, match="no utterances of split 'val'"):
-        run_xieliu2007(
-            copied(toy_corpus, tmp_path / "b", lambda u: replace(u, split="test") if u.split == "val" else u)
-        )
+        run_xieliu2007(copied(toy_corpus, tmp_path / "b", lambda u: replace(u, split=u.split.replace("val", "test"))))

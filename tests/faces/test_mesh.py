@@ -73,8 +73,7 @@ def test_a_colour_is_the_background_and_a_transparent_one_has_alpha(character):
 
 
 def test_bones_say_what_follows_the_head(character):
-    """With a head bone that holds all of the sheet, it turns as a whole; where it holds nothing but the neck's share,
-    less."""
+    """A head bone that holds the whole sheet turns it as a whole; one that holds the neck's share turns it less."""
     mesh = character.mesh
     rows = np.arange(len(mesh.vertices))
     place = np.array([0.0, -6.0, -9.0])

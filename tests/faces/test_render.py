@@ -238,9 +238,8 @@ def test_upper_teeth_stay_with_the_skull_and_lower_teeth_go_with_the_jaw():
         within = outline_interior(LIPS, drawn, X, outline_lips(LIPS, drawn, X))
         assert within.teeth_upper[MIDDLE] == pytest.approx(LIPS.line_y + TEETH_EDGE)
         assert within.teeth_lower[MIDDLE] >= within.teeth_upper[MIDDLE]
-    low, high = (
-        outline_interior(LIPS, p, X, outline_lips(LIPS, p, X)) for p in (pose(0.1, teeth=1), pose(0.3, teeth=1))
-    )
+    poses = pose(0.1, teeth=1), pose(0.3, teeth=1)
+    low, high = (outline_interior(LIPS, p, X, outline_lips(LIPS, p, X)) for p in poses)
     assert high.teeth_lower[MIDDLE] > low.teeth_lower[MIDDLE]
 
 

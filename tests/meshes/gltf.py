@@ -115,8 +115,7 @@ def data_uri(binary: bytes) -> str:
 
 
 def packed_attributes(elements: np.ndarray) -> bytes:
-    """Elements [shape=(N, stride), uint8] as a meshopt stream of attributes, every group stored as whole bytes or
-    zeros."""
+    """Elements [shape=(N, stride), uint8] as a meshopt stream of attributes, in whole bytes or zeros."""
     count, stride = elements.shape
     rows = min((8192 // stride) & ~15, 256)
     out, baseline = bytearray([0xA0]), elements[0].copy()

@@ -101,8 +101,7 @@ def _shapes(mesh: Mesh):
 
 
 def _under(mesh: Mesh):
-    """Whether each vertex is of the lower lip or below: those of the cut are the last ones of the sheet, but for
-    teeth."""
+    """Whether each vertex is of the lower lip or below: the last ones of the sheet but for teeth are of the cut."""
     sheet = len(COLUMNS) * len(ROWS)
     under = mesh.vertices[:, 1] < SEAM - 1e-9
     under[sheet:] = True

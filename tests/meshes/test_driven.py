@@ -408,9 +408,8 @@ def test_eyes_hold_their_target_under_a_head_that_is_given() -> None:
 
 def test_the_3d_head_shows_what_was_captured() -> None:
     curves = {f"{name}{side}": 0.9 for name in ("eyeBlink", "cheekSquint", "mouthSmile") for side in ("Left", "Right")}
-    pose = list_head_poses(with_mouth(captured({**curves, "headRoll": 0.2, "noseSneerLeft": 1.0})), Timeline(()), 30.0)[
-        30
-    ]
+    poses = list_head_poses(with_mouth(captured({**curves, "headRoll": 0.2, "noseSneerLeft": 1.0})), Timeline(()), 30.0)
+    pose = poses[30]
     assert (pose.shut, pose.mood.cheek, pose.mood.sneer, pose.turn[2]) == pytest.approx((0.9, 0.9, 0.5, 0.2))
     assert pose.smile > 0.04
 

@@ -83,7 +83,7 @@ def weights(name: str = "jawOpen") -> types.Motion:
 
 
 def test_weights_are_in_the_order_of_the_mesh_and_what_is_no_shape_is_refused() -> None:
-    table = Scene(head(), weights()).tabulate_weights()
+    table = Scene(head(), weights()).tabulate()
     column = head().shape_names.index("jawOpen")
     assert table[:, column] == pytest.approx(np.linspace(0, 1, 4))
     assert np.delete(table, column, axis=1) == pytest.approx(np.zeros((4, table.shape[1] - 1)))

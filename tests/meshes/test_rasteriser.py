@@ -9,14 +9,7 @@ from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, Mes
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.characters import character_files, gltf_scene, textures
 from lipmotion_faces.characters.textures import decode_srgb
-from lipmotion_faces.rendering.drawn_surface import (
-    Camera,
-    Canvas,
-    TexturedCanvas,
-    fill_background,
-    prepare_surface,
-    shade_background,
-)
+from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, TexturedCanvas, fill, fill_gradient, prepare_surface
 from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach
 from meshes.gltf import UV, document, glb, textured_document, with_colours
 
@@ -53,7 +46,7 @@ def test_the_height_of_the_picture_is_as_stated_and_nearer_things_are_larger():
     assert low[1] - high[1] == pytest.approx(100)
     assert near[1] < high[1]
     assert near[2] < high[2]
-    light = shade_background(Camera(100, 100))  # the background is brightest in the middle
+    light = fill_gradient(Camera(100, 100))  # the background is brightest in the middle
     assert light[42, 50].sum() > light[5, 5].sum()
     for size in ((63, 100), (120, 62), (120, 101)):
         with pytest.raises(InputError, match="even number of at least 64"):
@@ -80,7 +73,7 @@ def test_a_mesh_is_seen_in_its_colour_at_its_place():
 def test_the_edge_of_what_is_cut_out_is_as_light_as_its_middle():
     """Straight alpha: over black, a pixel that is covered in part has its part of the light."""
     mesh, camera = ball(), Camera(100, 100, across=2.0)
-    canvas = Canvas(camera, fill_background(camera, (0, 0, 0)))
+    canvas = Canvas(camera, fill(camera, (0, 0, 0)))
     light = np.full((len(mesh.vertices), 3), 0.5, np.float32)
     seen = canvas.cut_out(mesh.vertices, light, mesh.triangles).astype(int)
     inside, edge = seen[..., 3] == 255, (seen[..., 3] > 60) & (seen[..., 3] < 255)
@@ -149,7 +142,7 @@ def square_picture(mesh: Mesh) -> np.ndarray:
     """The square from (0, 0) to (1, 1), 40 pixels wide, under even light, before black."""
     camera = Camera(64, 64, (0.5, 0.5), across=1.6, distance=50.0)
     drawn = prepare_surface(mesh, np.ones(len(mesh.triangles), bool), 40.0)
-    canvas = TexturedCanvas(camera, drawn.triangles, fill_background(camera, (0, 0, 0)))
+    canvas = TexturedCanvas(camera, drawn.triangles, fill(camera, (0, 0, 0)))
     light = np.tile(drawn.colours.astype(np.float32), (1, 1))
     return canvas.draw(mesh.vertices[drawn.rows], light, np.zeros_like(light))
 
@@ -221,10 +214,10 @@ def test_far_away_a_chequered_picture_is_grey():
 
 
 def test_reductions_end_with_one_pixel_and_clear_pixels_do_not_colour_them():
-    table = textures.build_texture_table([Texture(np.repeat(np.repeat(QUARTERS, 3, axis=0), 2, axis=1))])
+    table = textures.reduce_textures([Texture(np.repeat(np.repeat(QUARTERS, 3, axis=0), 2, axis=1))])
     assert table.levels[:, 1:].tolist() == [[4, 6], [2, 3], [1, 1]]
     clear = Texture(np.array([[[255, 0, 0, 255], [0, 255, 0, 0]]], np.uint8))
-    last = textures.build_texture_table([clear]).texels[-1]
+    last = textures.reduce_textures([clear]).texels[-1]
     assert last.tolist() == [65535, 0, 0, 32768]
 
 

@@ -46,7 +46,7 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 
 
 def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head):
-    table, mesh = own_head.tabulate_weights(), own_head.mesh
+    table, mesh = own_head.tabulate(), own_head.mesh
     ring = make_figure().skin.list_lip_rows()[VISIBLE_RINGS - 1]
     upper, lower = ring[20], ring[60]
     places = mesh.vertices[[upper, lower], 1]
@@ -146,21 +146,17 @@ def test_keys_that_others_give_are_left_out(generation, tmp_path):
     assert scene.thinning.tolerance == 0.02
     assert len(scene.thinning.closed_s) == 2  # m and p
     write_scene(tmp_path / "a.glb", scene)
-    stored, rotation = GltfArrays(read_gltf_document(tmp_path / "a.glb")), len(scene.tabulate_weights())
+    stored, rotation = GltfArrays(read_gltf_document(tmp_path / "a.glb")), len(scene.tabulate())
     weights, turned = read_gltf_document(tmp_path / "a.glb").json["animations"][0]["samplers"]
     time_s = stored.read_floats(weights["input"], 1)[:, 0]
     values = stored.read_floats(weights["output"], 1).reshape(len(time_s), -1)
-    assert (
-        len(time_s)
-        < rotation
-        == len(stored.read_floats(turned["input"], 1))
-        == len(stored.read_floats(turned["output"], 4))
-    )
+    turns = len(stored.read_floats(turned["input"], 1)), len(stored.read_floats(turned["output"], 4))
+    assert len(time_s) < rotation == turns[0] == turns[1]
     shown = np.stack([np.interp(scene.weights.time_s, time_s, column) for column in values.T], axis=1)
-    assert np.abs(shown - scene.tabulate_weights()).max() < 0.0201
+    assert np.abs(shown - scene.tabulate()).max() < 0.0201
     closed = [round(each_s * scene.weights.rate_hz) for each_s in scene.thinning.closed_s]
     assert closed
-    assert shown[closed] == pytest.approx(scene.tabulate_weights()[closed], abs=1e-6)
+    assert shown[closed] == pytest.approx(scene.tabulate()[closed], abs=1e-6)
 
 
 def test_the_shapes_of_the_head_are_those_of_its_mesh(own_head):

@@ -164,7 +164,7 @@ def test_talking_head_gets_sound_with_its_blendshapes(capsys):
 def token(monkeypatch, tmp_path):
     """Returns where the token of VTube Studio is kept, which is asked again soon."""
     monkeypatch.setattr(vtube, "AGAIN_S", 0.01)
-    monkeypatch.setattr(vtube, "find_cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(vtube, "find_cache", lambda: tmp_path)
     return tmp_path / "vtube-studio.token"
 
 

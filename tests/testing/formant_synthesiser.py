@@ -5,8 +5,7 @@ A glottal pulse train and noise excite five resonances in cascade; a second nois
 smooth tracks. It needs no recordings, so tests have speech whose phone times are exactly known.
 
 Source: D. H. Klatt, "Software for a cascade/parallel formant synthesizer", JASA 67 (1980): resonators, and most figures
-of the table. D. H. and L. C. Klatt, JASA 87 (1990): the glottal pulse. Deviations: no nasal zero; one resonance of
-frication.
+of the table. D. H. and L. C. Klatt, JASA 87 (1990): glottal pulse. Deviations: no nasal zero; one frication resonance.
 """
 
 from collections.abc import Sequence

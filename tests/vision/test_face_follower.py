@@ -287,7 +287,8 @@ def square(x: int, side: int) -> NDArray[np.uint8]:
 
 def test_the_window_goes_along_and_grows_with_the_face():
     with face_follower.WindowedMesh(
-        trackers.FaceBox(230, 330, 60, 0.9), cast(trackers.LandmarkTracker, SimpleNamespace(open_point_finder=BrightMesh))
+        trackers.FaceBox(230, 330, 60, 0.9),
+        cast(trackers.LandmarkTracker, SimpleNamespace(open_point_finder=BrightMesh)),
     ) as mesh:
         for n in range(40):  # it moves much further than a window's side, and becomes twice as large
             x, side = 200 + 20 * n, 60 + 2 * n

@@ -95,16 +95,14 @@ def test_an_upright_face_of_the_right_size_is_cut_out_as_it_is():
     eyes = np.array([[60.0, 50.0], [150.0, 50.0]])  # 90 px apart, the middle at 105, 50
     image = ramp(256, 200)
     np.testing.assert_array_equal(
-        head_pose.crop_mouth(image, head_pose.map_eyes_to_image(eyes)), image[98 : 98 + 56, 69 : 69 + 72]
+        head_pose.crop_mouth(image, head_pose.map_eyes(eyes)), image[98 : 98 + 56, 69 : 69 + 72]
     )
 
 
 def test_the_eyes_of_the_turned_head_become_level():
     angle = np.deg2rad(20)
     half = 45 * np.array([np.cos(angle), np.sin(angle)])
-    crop = head_pose.crop_mouth(
-        ramp(256, 200), head_pose.map_eyes_to_image(np.array([130, 80]) + np.stack([-half, half]))
-    )
+    crop = head_pose.crop_mouth(ramp(256, 200), head_pose.map_eyes(np.array([130, 80]) + np.stack([-half, half])))
     along = np.diff(crop[28].astype(int), axis=0).mean(axis=0)
     np.testing.assert_allclose(along[:2], [np.cos(angle), np.sin(angle)], atol=0.03)
 
@@ -112,14 +110,12 @@ def test_the_eyes_of_the_turned_head_become_level():
 def test_a_large_face_is_averaged_not_skipped_and_outside_of_the_image_its_edge_repeats():
     image = np.random.default_rng(0).integers(0, 256, (2000, 2000, 3)).astype(np.uint8)
     crop = head_pose.crop_mouth(
-        image, head_pose.map_eyes_to_image(np.array([[600.0, 600.0], [1320.0, 600.0]]))
+        image, head_pose.map_eyes(np.array([[600.0, 600.0], [1320.0, 600.0]]))
     )  # eight times the size
     assert crop.shape == (56, 72, 3)
     assert crop.std() < 20  # of noise with a deviation of 74
     flat = np.full((100, 160, 3), 77, np.uint8)
-    assert (
-        head_pose.crop_mouth(flat, head_pose.map_eyes_to_image(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77
-    ).all()
+    assert (head_pose.crop_mouth(flat, head_pose.map_eyes(np.array([[20.0, 80.0], [110.0, 80.0]]))) == 77).all()
 
 
 def nodding(frames: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -146,7 +142,7 @@ def test_the_lips_are_found_whatever_the_head_does():
     head, turns, sizes, places = nodding()
     points = (sizes[:, None, None] * head @ turns.transpose(0, 2, 1) + places[:, None]) * (1, -1, -1)
     depth = head[:, [trackers.TRACKED_POINTS.index(index) for index in trackers.LIP_POINTS], 2].mean()
-    maps = head_pose.map_face_to_image(points)
+    maps = head_pose.map_face(points)
     for turn, size, place, to_image in zip(turns, sizes, places, maps, strict=True):
         for x, y in ((0, 0), (-36, 48), (36, 104), (12, 70)):  # px of the region, y down
             seen = size * turn @ np.array([x / 90, -y / 90, depth]) + place
@@ -157,11 +153,10 @@ def test_a_face_straight_ahead_is_cut_out_as_by_its_eyes():
     head, *_ = nodding()
     points = (head * 75 + (120, -90, 0)) * (1, -1, -1)
     eyes = points[0][[trackers.TRACKED_POINTS.index(33), trackers.TRACKED_POINTS.index(263)], :2]
-    np.testing.assert_allclose(head_pose.map_face_to_image(points)[0], head_pose.map_eyes_to_image(eyes), atol=1e-9)
+    np.testing.assert_allclose(head_pose.map_face(points)[0], head_pose.map_eyes(eyes), atol=1e-9)
     image = np.random.default_rng(1).integers(0, 256, (220, 260, 3)).astype(np.uint8)
     crops = [
-        head_pose.crop_mouth(image, to_image)
-        for to_image in (head_pose.map_face_to_image(points)[0], head_pose.map_eyes_to_image(eyes))
+        head_pose.crop_mouth(image, to_image) for to_image in (head_pose.map_face(points)[0], head_pose.map_eyes(eyes))
     ]
     assert np.abs(np.subtract(*crops, dtype=int)).max() <= 1
 

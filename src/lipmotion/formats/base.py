@@ -378,7 +378,7 @@ def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any
     """
     members: dict[str, Any] = {}
 
-    def take_member(at: int) -> int:
+    def take(at: int) -> int:
         name, at = _DECODER.raw_decode(text, at)
         at = find_next_at(text, _pass(text, find_next_at(text, at), ":"))
         if text[at : at + 1] != "[":
@@ -399,7 +399,7 @@ def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any
 
         return _read_each(text, at, "[]", take_item)
 
-    end = find_next_at(text, _read_each(text, find_next_at(text, 0), "{}", take_member))
+    end = find_next_at(text, _read_each(text, find_next_at(text, 0), "{}", take))
     if end < len(text):
         raise json.JSONDecodeError("Extra data", text, end)
     return members

@@ -68,7 +68,7 @@ class Candidates:
         distances = []
         for number in range(len(COLOURS)):  # of a large face one colour of 500 details has 130 MB
             colour = self.details[..., number].reshape(len(self), -1).astype(np.float32)
-            distances.append(measure_squared_distances(colour, colour))
+            distances.append(square_distances(colour, colour))
         return np.stack(distances)
 
 
@@ -166,7 +166,7 @@ def draw_to_recorded(wanted: Values, recorded: Values) -> Values:
     result = np.empty(wanted.shape, np.float32)
     for start in range(0, len(wanted), BLOCK):
         some = wanted[start : start + BLOCK]
-        distances = measure_squared_distances(some, recorded)
+        distances = square_distances(some, recorded)
         near = np.argpartition(distances, count - 1, axis=1)[:, :count]
         steps = recorded[near] - some[:, None]
         products = (steps @ steps.swapaxes(1, 2)).astype(np.float64)
@@ -181,7 +181,7 @@ def draw_to_recorded(wanted: Values, recorded: Values) -> Values:
     return result
 
 
-def measure_squared_distances(some: Values, others: Values) -> Values:
+def square_distances(some: Values, others: Values) -> Values:
     """Return the squared distances between rows of two tables [shape=(M, D) and (N, D)]: float32 [shape=(M, N)]."""
     products = some @ others.T
     lengths = np.einsum("nd,nd->n", some, some)[:, None] + np.einsum("nd,nd->n", others, others)
@@ -197,15 +197,13 @@ def _find_nearest(values: Values, others: Values) -> Index:
     if len(others) > len(values):  # blocks of the longer table
         best, number = np.full(len(values), np.inf, np.float32), np.zeros(len(values), np.intp)
         for start in range(0, len(others), BLOCK):
-            distances = measure_squared_distances(values, others[start : start + BLOCK])
+            distances = square_distances(values, others[start : start + BLOCK])
             least = distances.min(axis=1)
             nearer = least < best
             best[nearer], number[nearer] = least[nearer], distances.argmin(axis=1)[nearer] + start
         return number
     starts = range(0, len(values), BLOCK)
-    return np.concatenate(
-        [measure_squared_distances(values[start : start + BLOCK], others).argmin(axis=1) for start in starts]
-    )
+    return np.concatenate([square_distances(values[start : start + BLOCK], others).argmin(axis=1) for start in starts])
 
 
 Levels = NDArray[np.floating[Any]]
@@ -249,8 +247,7 @@ half axes and this edge, px of the face."""
 def sharpen(pictures: Pictures, share: float, scale: int) -> Pictures:
     """Return pictures [shape=(T, H, W, 3)] that are sharper in lightness; colours would have fringes.
 
-    share : of the difference between the lightness and its blurred picture that is added to all colours, outside the
-            lips
+    share : of the difference between lightness and blurred lightness, added to all colours outside the lips
     scale : samples a pixel of the face
     """
     from scipy.ndimage import gaussian_filter
@@ -351,7 +348,7 @@ class Refiner:
         for start in range(0, frames, BLOCK):
             part = slice(start, start + BLOCK)
             pairs = zip(wanted[:, part], self.candidates.by_colour, strict=True)
-            distances = np.stack([measure_squared_distances(frame, candidate) for frame, candidate in pairs])
+            distances = np.stack([square_distances(frame, candidate) for frame, candidate in pairs])
             if self.options.together:
                 distances = distances.sum(axis=0, keepdims=True)
             least = np.argpartition(distances, count - 1, axis=2)[:, :, :count]

@@ -77,8 +77,7 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
     """Return descriptors of the frames of a background.
 
     frames        : uint8 RGB, all of one size [shape=(H, W, 3)]; taken one at a time
-    face_to_image : the affine map of each frame, from px of the face that looks straight ahead to px of the frame
-                    [shape=(T, 2, 3)]
+    face_to_image : affine map of each frame [shape=(T, 2, 3)], from px of a face that looks ahead to px of the frame
     Raises InputError: another number of frames, or frames of several sizes.
     """
     whole, face, eyes = [], [], []
@@ -112,7 +111,7 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
     return FrameDescriptors(shown.astype(np.float64), alike, eye_levels, place)
 
 
-def measure_row_distances(rows: Array) -> Array:
+def compare_rows(rows: Array) -> Array:
     """Return the distance between every two rows, such as of ``FrameDescriptors.standardised`` [shape=(T, T)]."""
     rows = rows - rows.mean(axis=0)
     power = np.square(rows).sum(axis=1)
@@ -286,13 +285,13 @@ class _Plan:
         self._least = max(1, round(MIN_RUN_S * rate_hz))
         self._usual = USUAL_RUN_S * rate_hz
         self._repeat = REPEAT_S * rate_hz
-        self._fade = count_fade_frames(rate_hz)
+        self._fade = count_fade(rate_hz)
         count = len(descriptors)
         if count > MAX_COMPARED_FRAMES:
             none = np.full((count, 1), -1), np.full((count, 1), np.inf)
             self._jumps = {1: none, -1: none}
         else:
-            distance = measure_row_distances(descriptors.standardise(self.scenes, self._fade))
+            distance = compare_rows(descriptors.standardise(self.scenes, self._fade))
             self._jumps = {way: self._find_jumps(distance, way) for way in (1, -1)}
 
     def find_order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
@@ -369,7 +368,7 @@ class _Plan:
         return np.where(np.isfinite(least), best, -1), least
 
 
-def count_fade_frames(rate_hz: float) -> int:
+def count_fade(rate_hz: float) -> int:
     """Return the number of frames over which a jump is cross-faded, even."""
     return max(2, 2 * round(FADE_S * rate_hz / 2))
 

@@ -62,7 +62,7 @@ def map_region(face_to_frame: Array, scale: float) -> Array:
     """Return the affine maps from a pixel of a picture of the lower face to its position in the frame.
 
     face_to_frame : maps from px of the face to those of the frame [shape=(..., 2, 3)], of
-                    ``tracking.head_pose.map_face_to_image``
+                    ``tracking.head_pose.map_face``
     scale         : samples a pixel
     Pixel (0, 0) is a centre. Returns an array of the same shape.
     """
@@ -137,7 +137,7 @@ SAME_PERSON_LIKENESS = 0.78
 between those of different people up to 0.76, and 0.83 twice in 228 pairs: GRID, and three open talkers."""
 
 
-def compute_signature(pictures: NDArray[Any]) -> NDArray[np.float32]:
+def find_signature(pictures: NDArray[Any]) -> NDArray[np.float32]:
     """Return what is compared of the lower faces [shape=(N,)], from pictures [shape=(T, 128, 128, 3)] or their mean."""
     mean = pictures.reshape(-1, HEIGHT, WIDTH, 3).mean(axis=(0, 3), dtype=np.float64)
     part = mean[:110:3, 20:108:3].ravel()  # nose, cheeks and mouth, without neck and background
@@ -145,7 +145,7 @@ def compute_signature(pictures: NDArray[Any]) -> NDArray[np.float32]:
     return (centred / max(float(np.linalg.norm(centred)), 1e-9)).astype(np.float32)
 
 
-def compare_signatures(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+def compare_faces(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
     """Return the correlation of two signatures, -1 to 1; below ``SAME_PERSON_LIKENESS`` probably of two people."""
     return float(one @ other)
 

@@ -12,7 +12,7 @@ from lipmotion.errors import InputError
 from lipmotion.stats.trees import create_statistics, ridge
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
-from lipmotion_faces.appearance.candidates import choose_candidates, measure_squared_distances
+from lipmotion_faces.appearance.candidates import choose_candidates, square_distances
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -65,7 +65,7 @@ class MotionMap:
     def _stack_regressors(self, values: Array) -> Floats:
         components = np.clip((values - self.mean) / self.scale @ self.basis, *self.limits).astype(np.float32)
         near = np.ascontiguousarray(components[:, : self.centres.shape[1]])
-        likeness = WEIGHT * np.exp(measure_squared_distances(near, self.centres) / (-2 * WIDTH**2))
+        likeness = WEIGHT * np.exp(square_distances(near, self.centres) / (-2 * WIDTH**2))
         return np.concatenate([np.ones((len(values), 1), np.float32), components, likeness], axis=1)
 
 

@@ -181,7 +181,7 @@ class Appearance:
             if stop - first > max(1, LONGEST_CLOSURE_S * motion.rate_hz):
                 continue
             closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
-            apart = candidates.measure_squared_distances(sought[first:stop], recorded).mean(axis=0)
+            apart = candidates.square_distances(sought[first:stop], recorded).mean(axis=0)
             pressed = self.mouth_codes[np.argmin(np.where(closed, apart, np.inf))]
             around = slice(max(first - 1, 0), stop + 1)
             mouths[around] += contact[around, None].astype(np.float32) * (pressed - mouths[around])

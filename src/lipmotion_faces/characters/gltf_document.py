@@ -85,7 +85,7 @@ def build_schema(json: Mapping[str, Any]) -> Schema:
 
         return check
 
-    def make_vector(size: int) -> Schema:
+    def list_of(size: int) -> Schema:
         return items(_NUMBER, size, size)
 
     target = members({"POSITION": to("accessors")})
@@ -101,12 +101,7 @@ def build_schema(json: Mapping[str, Any]) -> Schema:
     mesh = {"name": _NAME, "primitives": items(members(primitive, ["attributes"])), "extras": primitive["extras"]}
     node = {
         **{"name": _NAME, "mesh": to("meshes"), "skin": to("skins"), "children": items(to("nodes"))},
-        **{
-            "matrix": make_vector(16),
-            "translation": make_vector(3),
-            "rotation": make_vector(4),
-            "scale": make_vector(3),
-        },
+        **{"matrix": list_of(16), "translation": list_of(3), "rotation": list_of(4), "scale": list_of(3)},
     }
     place = {"bufferView": to("bufferViews"), "byteOffset": _SIZE}
     indices = {**place, "componentType": one_of([5121, 5123, 5125])}
@@ -126,7 +121,7 @@ def build_schema(json: Mapping[str, Any]) -> Schema:
         "buffers": members({"uri": text(_LARGEST_INTEGER), "byteLength": _SIZE}),
         "bufferViews": members(_build_view_schema(to("buffers")), ["buffer", "byteLength"]),
         "images": members({"uri": text(_LARGEST_INTEGER), "bufferView": to("bufferViews")}),
-        "materials": members(_build_material_schema(to("textures"), make_vector)),
+        "materials": members(_build_material_schema(to("textures"), list_of)),
         "meshes": members(mesh, ["primitives"]),
         "nodes": members(node),
         "scenes": members({"nodes": items(to("nodes"))}),
@@ -163,11 +158,11 @@ def _build_view_schema(buffer: Schema) -> dict[str, Schema]:
     }
 
 
-def _build_material_schema(texture: Schema, make_vector: Any) -> dict[str, Schema]:
-    moved = members({"offset": make_vector(2), "scale": make_vector(2), "rotation": _NUMBER})
+def _build_material_schema(texture: Schema, list_of: Any) -> dict[str, Schema]:
+    moved = members({"offset": list_of(2), "scale": list_of(2), "rotation": _NUMBER})
     placed = {"index": texture, "extensions": members({"KHR_texture_transform": moved})}
     look = {
-        **{"baseColorFactor": make_vector(4), "roughnessFactor": _NUMBER},
+        **{"baseColorFactor": list_of(4), "roughnessFactor": _NUMBER},
         "baseColorTexture": members(placed, ["index"]),
     }
     return {
@@ -205,7 +200,7 @@ class GltfDocument:
     budget: Budget
     buffers: dict[int, memoryview] = field(default_factory=dict)
 
-    def list_items(self, name: str) -> list[dict[str, Any]]:
+    def get(self, name: str) -> list[dict[str, Any]]:
         """Return a list of objects of the document; none if it is missing."""
         return self.parts.get(name, [])
 
@@ -256,7 +251,7 @@ def read_gltf_document(path: Path) -> GltfDocument:
             raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
         if name not in READABLE and not name.startswith("KHR_materials_"):
             raise InputError(f"it requires the extension {shorten(name)!r}, which is not read; export without it")
-    for index, buffer in enumerate(document.list_items("buffers")):
+    for index, buffer in enumerate(document.get("buffers")):
         if "uri" in buffer:
             document.buffers[index] = memoryview(document.read_link(buffer["uri"], "buffer"))
         elif index == 0 and binary is not None:
@@ -312,7 +307,7 @@ class GltfArrays:
 
     def count(self, number: int) -> int:
         """Return the number of elements of an accessor, as the document says."""
-        return int(self._document.list_items("accessors")[number]["count"])
+        return int(self._document.get("accessors")[number]["count"])
 
     def read_floats(self, number: int, width: int, count: int | None = None) -> NDArray[np.float64]:
         """Return an accessor as numbers [shape=(N, width)]; normalised whole numbers become -1 to 1 or 0 to 1.
@@ -323,13 +318,13 @@ class GltfArrays:
         raw = self._read_raw(number, width, count)
         with np.errstate(invalid="ignore"):  # signalling NaN; refused below
             values = raw.astype(np.float64)
-        if self._document.list_items("accessors")[number].get("normalized") and raw.dtype.kind in "iu":
+        if self._document.get("accessors")[number].get("normalized") and raw.dtype.kind in "iu":
             values = np.maximum(values / np.iinfo(raw.dtype).max, -1.0)
         if not (np.abs(values) <= LARGEST_NUMBER).all():
             raise InputError(f"it has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}; export it again")
         return values
 
-    def read_integers(self, number: int, width: int, count: int | None = None) -> NDArray[np.int64]:
+    def read_ints(self, number: int, width: int, count: int | None = None) -> NDArray[np.int64]:
         """Return an accessor of whole numbers [shape=(N, width)]. Raises InputError: as ``read_floats``; fractions."""
         raw = self._read_raw(number, width, count)
         if raw.dtype.kind not in "iu":
@@ -341,7 +336,7 @@ class GltfArrays:
         return self._read_view(number)[0]
 
     def _read_raw(self, number: int, width: int, wanted: int | None) -> NDArray[Any]:
-        accessor = self._document.list_items("accessors")[number]
+        accessor = self._document.get("accessors")[number]
         count, kind = accessor["count"], accessor["type"]
         if WIDTHS[kind] != width:
             raise InputError(f"an array of {kind}, required {width} numbers each; export it again")
@@ -379,7 +374,7 @@ class GltfArrays:
 
     def _read_view(self, number: int) -> tuple[memoryview, int]:
         """Return the bytes of a buffer view, and the distance of its elements (0: none apart)."""
-        view = self._document.list_items("bufferViews")[number]
+        view = self._document.get("bufferViews")[number]
         packed = next((view["extensions"][name] for name in COMPRESSION if name in view.get("extensions", {})), None)
         if packed is None:
             return self._slice(view), view.get("byteStride", 0)
@@ -427,7 +422,7 @@ class PlacedNode:
 
 def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
     """Return the nodes of the scene, or all roots', by number. Raises InputError: one is twice, too deep, too far."""
-    nodes, scenes = document.list_items("nodes"), document.list_items("scenes")
+    nodes, scenes = document.get("nodes"), document.get("scenes")
     if scenes:
         roots = scenes[document.parts.get("scene", 0)].get("nodes", [])
     else:

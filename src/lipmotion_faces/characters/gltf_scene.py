@@ -74,12 +74,12 @@ class _Materials:
         if number is None:
             return Material()
         if number not in self._materials:
-            stored = self._document.list_items("materials")[number]
+            stored = self._document.get("materials")[number]
             look, alpha = stored.get("pbrMetallicRoughness", {}), stored.get("alphaMode", OPAQUE)
             factor = np.clip(look.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)), 0, 1)
             colour, texture = encode_srgb(factor[:3]), None
             if "baseColorTexture" in look:
-                texture = self._read_texture(self._document.list_items("textures")[look["baseColorTexture"]["index"]])
+                texture = self._read_texture(self._document.get("textures")[look["baseColorTexture"]["index"]])
                 colour = colour if texture else np.array(UNKNOWN)
             red, green, blue = np.clip(colour, 0, 1).tolist()
             self._materials[number] = Material(
@@ -96,7 +96,7 @@ class _Materials:
 
     def move_uv(self, number: int | None, uv: Array) -> Array:
         """Return places in a material's texture, v down [shape=(N, 2)], as ``KHR_texture_transform`` moves them."""
-        look = {} if number is None else self._document.list_items("materials")[number].get("pbrMetallicRoughness", {})
+        look = {} if number is None else self._document.get("materials")[number].get("pbrMetallicRoughness", {})
         how = look.get("baseColorTexture", {}).get("extensions", {}).get("KHR_texture_transform")
         if not how:
             return uv
@@ -109,7 +109,7 @@ class _Materials:
         if source is None:
             _warn("is in a format (KTX2, AVIF) that is not read; export it as PNG or JPEG")
             return None
-        image = self._document.list_items("images")[source]
+        image = self._document.get("images")[source]
         place = image.get("bufferView", image.get("uri", ""))
         if place not in self._textures:
             self._textures[place] = None
@@ -131,7 +131,7 @@ def _warn(what: str) -> None:
 
 def _read_tints(document: GltfDocument, arrays: GltfArrays, number: int, count: int) -> Array:
     """Return the light and the opacity by which those of a material are multiplied, 0 to 1 [shape=(N, 4)]."""
-    accessor = document.list_items("accessors")[number]
+    accessor = document.get("accessors")[number]
     width, kind = WIDTHS[accessor["type"]], np.dtype(COMPONENTS[accessor["componentType"]])
     if width not in {3, 4} or not (kind.kind == "f" or (kind.kind == "u" and kind.itemsize < 4)):
         raise InputError(
@@ -159,7 +159,7 @@ class _Skin:
         for group in range(MAX_GROUPS):
             if f"JOINTS_{group}" not in attributes or f"WEIGHTS_{group}" not in attributes:
                 break
-            numbers = arrays.read_integers(attributes[f"JOINTS_{group}"], 4, count)
+            numbers = arrays.read_ints(attributes[f"JOINTS_{group}"], 4, count)
             if count and not 0 <= numbers.min() <= numbers.max() < len(self.joints):
                 raise InputError(f"vertices follow joint {numbers.max()} of {len(self.joints)}; export it again")
             joints.append(numbers)
@@ -238,9 +238,9 @@ class _SceneSurface:
     def build_mesh(self) -> Mesh:
         """Return the whole surface. Raises InputError: it is damaged or too large, or there are no triangles."""
         for number in sorted(self._nodes):
-            node = self._document.list_items("nodes")[number]
+            node = self._document.get("nodes")[number]
             if "mesh" in node:
-                mesh = self._document.list_items("meshes")[node["mesh"]]
+                mesh = self._document.get("meshes")[node["mesh"]]
                 name = clean_name(node.get("name") or mesh.get("name", "")) or f"mesh {node['mesh']}"
                 self._budget.spend("parts", len(mesh["primitives"]))
                 for primitive in mesh["primitives"]:
@@ -276,9 +276,7 @@ class _SceneSurface:
         attributes, count = primitive["attributes"], len(block.vertices)
         size = self._arrays.count(primitive["indices"]) if "indices" in primitive else count
         self._budget.spend("triangles", -(-size // 3))
-        corners = (
-            self._arrays.read_integers(primitive["indices"], 1)[:, 0] if "indices" in primitive else np.arange(count)
-        )
+        corners = self._arrays.read_ints(primitive["indices"], 1)[:, 0] if "indices" in primitive else np.arange(count)
         if size % 3 or (size and not 0 <= corners.min() <= corners.max() < count):
             raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
         if not corners.size:
@@ -311,7 +309,7 @@ class _SceneSurface:
 
     def _share_vertices(self, number: int, mesh: dict[str, Any], primitive: dict[str, Any]) -> _SharedVertices:
         """Return the vertices of a primitive at their places in the scene; keep its bones and morph targets."""
-        node, attributes = self._document.list_items("nodes")[number], primitive["attributes"]
+        node, attributes = self._document.get("nodes")[number], primitive["attributes"]
         moved = tuple(target.get("POSITION") for target in primitive.get("targets", []))
         shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
         if shared in self._blocks:
@@ -339,7 +337,7 @@ class _SceneSurface:
     def _read_skin(self, number: int) -> _Skin:
         """Return a skin at rest. Raises InputError: a joint is not in the scene, or matrices are missing."""
         if number not in self._skins:
-            skin = self._document.list_items("skins")[number]
+            skin = self._document.get("skins")[number]
             listed, inverse = skin["joints"], skin.get("inverseBindMatrices")
             count = len(listed) if inverse is None else self._arrays.count(inverse)
             self._budget.spend("joints", max(count, len(listed)))
@@ -390,7 +388,7 @@ def _map_vectors(linear: Array, vectors: Array) -> Array:
 def name_targets(document: GltfDocument, mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
     """Return the names of the targets of a primitive, of its mesh or arrays; missing and repeated ones are numbered."""
     targets = primitive.get("targets", [])
-    accessors = document.list_items("accessors")
+    accessors = document.get("accessors")
     arrays = [accessors[target["POSITION"]].get("name", "") if "POSITION" in target else "" for target in targets]
     holders = [holder.get("extras", {}).get("targetNames", []) for holder in (mesh, primitive)]
     stored: list[str] = next((names for names in (*holders, arrays) if any(names)), [])
@@ -418,7 +416,7 @@ def _build_expression_shapes(
         name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else clean_name(group.get("name", ""))
         expressions[name] = [_read_bind(each["mesh"], each, FULL_WEIGHT) for each in group.get("binds", [])]
     kinds = extensions.get("VRMC_vrm", {}).get("expressions", {})
-    meshes = dict(enumerate(node.get("mesh", -1) for node in document.list_items("nodes")))
+    meshes = dict(enumerate(node.get("mesh", -1) for node in document.get("nodes")))
     for kind in ("preset", "custom"):
         for name, expression in kinds.get(kind, {}).items():
             binds = expression.get("morphTargetBinds", [])

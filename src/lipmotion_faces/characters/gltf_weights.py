@@ -103,9 +103,7 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     document = read_gltf_document(path)
     arrays = GltfArrays(document)
     animations = [
-        (each, tracks)
-        for each in document.list_items("animations")
-        if (tracks := list(_read_tracks(document, arrays, each)))
+        (each, tracks) for each in document.get("animations") if (tracks := list(_read_tracks(document, arrays, each)))
     ]
     if not animations:
         raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
@@ -123,7 +121,7 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
         LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(named), listed, named[which])
     turns: dict[str, tuple[int, _Track]] = {}  # of the first neck and the first head, with the numbers of their nodes
     for number, target, sampler in _list_targets(document, animation):
-        kind = find_bone_kind(document.list_items("nodes")[number].get("name", ""))
+        kind = find_bone_kind(document.get("nodes")[number].get("name", ""))
         if target == "rotation" and kind in TURNING and kind not in turns:
             turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
     ordered = dict(turns[kind] for kind in TURNING if kind in turns)
@@ -157,7 +155,7 @@ def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Arra
     try:
         for number, track in turns.items():
             if number in placed:
-                local = Rotation.from_quat(document.list_items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
+                local = Rotation.from_quat(document.get("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
                 at_rest = Rotation.from_matrix(placed[number].matrix[:3, :3])
                 turned = turned * (at_rest * local.inv() * Rotation.from_quat(track.sample(time_s)) * at_rest.inv())
     except ValueError as error:  # a quaternion of zeros, a bone without size
@@ -184,10 +182,10 @@ def _list_targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator
         if path == "pointer" and pointer:
             node, path = int(pointer[2]), pointer[3] + (pointer[4] or "")
             if pointer[1] == "meshes":
-                node = next((n for n, each in enumerate(document.list_items("nodes")) if each.get("mesh") == node), -1)
+                node = next((n for n, each in enumerate(document.get("nodes")) if each.get("mesh") == node), -1)
         if (
             0 <= number < len(samplers)
-            and 0 <= node < len(document.list_items("nodes"))
+            and 0 <= node < len(document.get("nodes"))
             and {"input", "output"} <= samplers[number].keys()
         ):
             yield node, path, samplers[number]
@@ -204,8 +202,8 @@ def _read_tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str
     }
     for node, path, sampler in _list_targets(document, animation):
         if path.startswith("weights"):
-            owner, one = document.list_items("nodes")[node].get("mesh", -1), path.partition("/")[2]
-            names = name_mesh_targets(document, document.list_items("meshes")[owner]) if owner >= 0 else ()
+            owner, one = document.get("nodes")[node].get("mesh", -1), path.partition("/")[2]
+            names = name_mesh_targets(document, document.get("meshes")[owner]) if owner >= 0 else ()
             names = names[int(one) :][:1] if one else names
             if names:
                 yield _track(arrays, sampler, names, 1)

@@ -266,21 +266,16 @@ def write_animated_gltf(
     """
     document = read_gltf_document(original)
     binary = document.buffers.get(0)
-    if (
-        binary is None
-        or "uri" in document.list_items("buffers")[0]
-        or len(document.buffers) > 1
-        or not len(weights.values)
-    ):
+    if binary is None or "uri" in document.get("buffers")[0] or len(document.buffers) > 1 or not len(weights.values):
         return False
     moved: dict[int, tuple[str, ...]] = {}  # the nodes whose mesh has morph targets that move, with all targets' names
-    for number, node in enumerate(document.list_items("nodes")):
-        names = name_mesh_targets(document, document.list_items("meshes")[node["mesh"]] if "mesh" in node else {})
+    for number, node in enumerate(document.get("nodes")):
+        names = name_mesh_targets(document, document.get("meshes")[node["mesh"]] if "mesh" in node else {})
         if set(names) & set(weights.names):
             moved[number] = names
     if not set(weights.names) <= {name for names in moved.values() for name in names}:
         return False
-    json, body = document.json, bytes(binary[: document.list_items("buffers")[0].get("byteLength", len(binary))])
+    json, body = document.json, bytes(binary[: document.get("buffers")[0].get("byteLength", len(binary))])
     buffer = GltfBuffer(json.setdefault("bufferViews", []), json.setdefault("accessors", []))
     buffer.chunks = [body + b"\0" * (-len(body) % 4)]
     buffer.size = len(buffer.chunks[0])

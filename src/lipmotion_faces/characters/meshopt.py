@@ -1,8 +1,7 @@
 """Decoding of EXT_meshopt_compression, as gltfpack and glTF-Transform write it.
 
 Source: the glTF extension EXT_meshopt_compression (Khronos vendor extension, 2021): modes ATTRIBUTES, TRIANGLES and
-INDICES; of its filters, EXPONENTIAL.  Deviation: filters of normals and rotations are refused: no mesh of ours needs
-either.
+INDICES; of its filters, EXPONENTIAL.  Deviation: filters of normals and rotations are refused: no mesh needs them.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ class Scene:
                 f"required ({len(self.mesh.vertices)},) and ({frames}, 4)"
             )
 
-    def tabulate_weights(self) -> Array:
+    def tabulate(self) -> Array:
         """Return the weights of all blendshapes of the mesh, in their order [shape=(T, S)]; T is 0 without weights."""
         weights, names = self.weights, self.mesh.shape_names
         if weights is None:
@@ -91,9 +91,8 @@ class Scene:
         Between two keys weights lie on a straight line: where some are stepped, there is a key just before a change.
         """
         time_s = self.weights.time_s if self.weights else np.zeros(0)
-        return place_keys(
-            time_s, self.tabulate_weights(), [name in self.stepped for name in self.mesh.shape_names], self.thinning
-        )
+        stepped = [name in self.stepped for name in self.mesh.shape_names]
+        return place_keys(time_s, self.tabulate(), stepped, self.thinning)
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,9 +70,7 @@ class TextureTable:
     levels: NDArray[np.int64]
     first: tuple[int, ...]
 
-    def choose_level(
-        self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]
-    ) -> NDArray[np.int32]:
+    def pick(self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]) -> NDArray[np.int32]:
         """Return the row of ``levels`` that suits triangles, by areas in texture and on screen [each shape=(F,)]."""
         first = self.first[texture]
         last = (*self.first, len(self.levels))[texture + 1] - 1
@@ -81,7 +79,7 @@ class TextureTable:
         return (first + np.clip(np.rint(halvings), 0, last - first)).astype(np.int32)
 
 
-def build_texture_table(textures: Sequence[Texture]) -> TextureTable:
+def reduce_textures(textures: Sequence[Texture]) -> TextureTable:
     """Return textures with their reductions; each pixel of a reduction is the mean of four, weighted by opacity."""
     texels: list[NDArray[np.uint16]] = []
     levels: list[tuple[int, int, int]] = []

@@ -24,7 +24,7 @@ INDENT = "    "
 _CONTROL = re.compile("[\x00-\x1f\x7f]")
 
 
-def write_prim(
+def list_prim(
     schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str
 ) -> Iterator[str]:
     """Yield the lines of a prim.
@@ -35,7 +35,7 @@ def write_prim(
     schemas : API schemas that are applied to it
     about   : further metadata, as ``kind``
 
-    >>> print("\\n".join(write_prim("Scope", "Looks", ["token purpose"], kind="group")))
+    >>> print("\\n".join(list_prim("Scope", "Looks", ["token purpose"], kind="group")))
     def Scope "Looks" (
         kind = "group"
     )
@@ -98,11 +98,11 @@ def format_asset(path: str) -> str:
     return mark + ("" if absolute else "./") + path.replace("@@@", "\\@@@") + mark
 
 
-def _format_integers(values: NDArray[np.integer]) -> str:
+def _join(values: NDArray[np.integer]) -> str:
     return "[" + ", ".join(map(str, values.tolist())) + "]"
 
 
-def _format_numbers(values: NDArray[np.floating]) -> str:
+def _format(values: NDArray[np.floating]) -> str:
     """Return numbers as an array, or rows of three as an array of tuples, with the seven digits of single precision."""
     if values.ndim == 1:
         return "[" + ", ".join([f"{value:.7g}" for value in (values + 0.0).tolist()]) + "]"
@@ -137,7 +137,7 @@ def write_usda(path: Path, scene: Scene) -> None:
     """
     normals = compute_shading_normals(scene.mesh, split=scene.split)
     last_code = max(len(scene.weights.values) - 1, 0) * _count_codes_per_key(scene) if scene.weights else 0.0
-    rate, last, bound = f"{_choose_codes_hz(scene):.9g}", f"{last_code:.9g}", ("SkelBindingAPI",)
+    rate, last, bound = f"{_find_rate(scene):.9g}", f"{last_code:.9g}", ("SkelBindingAPI",)
     places = [np.eye(4), np.eye(4)][: len(_list_joints(scene))]
     if scene.turn is not None:
         places[1][3, :3] = scene.turn.pivot
@@ -154,14 +154,14 @@ def write_usda(path: Path, scene: Scene) -> None:
         f"uniform asset filePath = {format_asset(scene.sound)}" if scene.sound else "",
         *([f"uniform double mediaOffset = {-scene.sound_s:.9g}"] if scene.sound_s < 0 else []),
         'uniform token playbackMode = "onceFromStart"',
-        f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _choose_codes_hz(scene):.9g}",
+        f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _find_rate(scene):.9g}",
     ]
     character = chain(  # line by line: a long motion takes no memory for its text
-        write_prim("Skeleton", "Skeleton", skeleton, schemas=bound),
-        write_prim("SkelAnimation", "Animation", _list_animation(scene)),
-        write_prim("Mesh", "Face", _list_mesh(scene, normals), schemas=(*bound, "MaterialBindingAPI")),
-        write_prim("Scope", "Looks", _list_looks(scene.mesh)),
-        write_prim("SpatialAudio", "Sound", sound) if scene.sound else (),
+        list_prim("Skeleton", "Skeleton", skeleton, schemas=bound),
+        list_prim("SkelAnimation", "Animation", _list_animation(scene)),
+        list_prim("Mesh", "Face", _list_mesh(scene, normals), schemas=(*bound, "MaterialBindingAPI")),
+        list_prim("Scope", "Looks", _list_looks(scene.mesh)),
+        list_prim("SpatialAudio", "Sound", sound) if scene.sound else (),
     )
     head = [
         *("#usda 1.0", "(", f'    defaultPrim = "{ROOT}"', '    doc = "Written by lipmotion"'),
@@ -169,7 +169,7 @@ def write_usda(path: Path, scene: Scene) -> None:
         *("    startTimeCode = 0", f"    timeCodesPerSecond = {rate}", '    upAxis = "Y"', ")", ""),
     ]
     with atomic_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
-        root = write_prim("SkelRoot", ROOT, character, schemas=bound, kind="component")
+        root = list_prim("SkelRoot", ROOT, character, schemas=bound, kind="component")
         file.writelines(line + "\n" for line in chain(head, root))
 
 
@@ -177,11 +177,9 @@ def _list_animation(scene: Scene) -> Iterator[str]:
     joints, (time_s, table) = _list_joints(scene), scene.list_keys()
     yield f"uniform token[] blendShapes = {format_tokens(scene.mesh.shape_names)}"
     if len(table):
-        yield from _list_samples(
-            "float[] blendShapeWeights", map(_format_numbers, table), time_s * _choose_codes_hz(scene)
-        )
+        yield from _list_samples("float[] blendShapeWeights", map(_format, table), time_s * _find_rate(scene))
     else:
-        yield f"float[] blendShapeWeights = {_format_numbers(np.zeros(len(scene.mesh.shapes)))}"
+        yield f"float[] blendShapeWeights = {_format(np.zeros(len(scene.mesh.shapes)))}"
     yield f"uniform token[] joints = {format_tokens(joints)}"
     if scene.turn is not None:
         rotations = (
@@ -208,20 +206,20 @@ def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
     names = name_prims(mesh.shape_names)
     yield "uniform bool doubleSided = 1"
     yield 'uniform token subdivisionScheme = "none"'
-    yield f"float3[] extent = {_format_numbers(np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]))}"
-    yield f"int[] faceVertexCounts = {_format_integers(np.full(len(mesh.triangles), 3))}"
-    yield f"int[] faceVertexIndices = {_format_integers(mesh.triangles.reshape(-1))}"
-    yield f"normal3f[] normals = {_format_numbers(normals.rest)} ({PER_VERTEX})"
-    yield f"point3f[] points = {_format_numbers(mesh.vertices)}"
+    yield f"float3[] extent = {_format(np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]))}"
+    yield f"int[] faceVertexCounts = {_join(np.full(len(mesh.triangles), 3))}"
+    yield f"int[] faceVertexIndices = {_join(mesh.triangles.reshape(-1))}"
+    yield f"normal3f[] normals = {_format(normals.rest)} ({PER_VERTEX})"
+    yield f"point3f[] points = {_format(mesh.vertices)}"
     if mesh.colours is not None:
-        yield f"color3f[] primvars:displayColor = {_format_numbers(decode_srgb(mesh.colours))} ({PER_VERTEX})"
+        yield f"color3f[] primvars:displayColor = {_format(decode_srgb(mesh.colours))} ({PER_VERTEX})"
     count, joints = len(mesh.vertices), len(_list_joints(scene))
     share = np.zeros(count) if scene.turn is None else scene.turn.share
     weights = np.stack([1 - share, share], axis=1)[:, :joints]
     hints = f"(elementSize = {joints}\n            {PER_VERTEX})"
     yield f"matrix4d primvars:skel:geomBindTransform = {_format_matrix(np.eye(4))}"
-    yield f"int[] primvars:skel:jointIndices = {_format_integers(np.tile(np.arange(joints), count))} {hints}"
-    yield f"float[] primvars:skel:jointWeights = {_format_numbers(weights.reshape(-1))} {hints}"
+    yield f"int[] primvars:skel:jointIndices = {_join(np.tile(np.arange(joints), count))} {hints}"
+    yield f"float[] primvars:skel:jointWeights = {_format(weights.reshape(-1))} {hints}"
     if names:
         yield f"uniform token[] skel:blendShapes = {format_tokens(mesh.shape_names)}"
         yield f"rel skel:blendShapeTargets = [{', '.join(f'<{FACE}/{name}>' for name in names)}]"
@@ -232,21 +230,16 @@ def _list_mesh(scene: Scene, normals: ShadingNormals) -> Iterator[str]:
         offsets = np.zeros((2, len(rows), 3))
         for values, (of, added) in zip(offsets, ((shape.rows, shape.displacements), turned), strict=True):
             values[np.searchsorted(rows, of)] = added
-        moved = [
-            f"uniform vector3f[] offsets = {_format_numbers(offsets[0])}",
-            f"uniform int[] pointIndices = {_format_integers(rows)}",
-        ]
-        yield from write_prim(
-            "BlendShape", name, [f"uniform vector3f[] normalOffsets = {_format_numbers(offsets[1])}", *moved]
-        )
+        moved = [f"uniform vector3f[] offsets = {_format(offsets[0])}", f"uniform int[] pointIndices = {_join(rows)}"]
+        yield from list_prim("BlendShape", name, [f"uniform vector3f[] normalOffsets = {_format(offsets[1])}", *moved])
     for name, part in _list_parts(mesh):
         subset = [
             'uniform token elementType = "face"',
             'uniform token familyName = "materialBind"',
-            f"int[] indices = {_format_integers(np.arange(part.first, part.stop))}",
+            f"int[] indices = {_join(np.arange(part.first, part.stop))}",
             f"rel material:binding = <{LOOKS}/{name}>",
         ]
-        yield from write_prim("GeomSubset", f"{name}_faces", subset, schemas=("MaterialBindingAPI",))
+        yield from list_prim("GeomSubset", f"{name}_faces", subset, schemas=("MaterialBindingAPI",))
 
 
 def _list_looks(mesh: Mesh) -> Iterator[str]:
@@ -264,19 +257,19 @@ def _list_looks(mesh: Mesh) -> Iterator[str]:
         reader = ['uniform token info:id = "UsdPrimvarReader_float3"', 'string inputs:varname = "displayColor"']
         shaders = [
             f"token outputs:surface.connect = <{place}/Surface.outputs:surface>",
-            *write_prim("Shader", "Surface", surface),
-            *(write_prim("Shader", "Colour", [*reader, "float3 outputs:result"]) if painted else ()),
+            *list_prim("Shader", "Surface", surface),
+            *(list_prim("Shader", "Colour", [*reader, "float3 outputs:result"]) if painted else ()),
         ]
-        yield from write_prim("Material", name, shaders)
+        yield from list_prim("Material", name, shaders)
 
 
-def _choose_codes_hz(scene: Scene) -> float:
+def _find_rate(scene: Scene) -> float:
     return scene.weights.rate_hz if scene.weights and scene.weights.rate_hz <= FASTEST_HZ else USUAL_HZ
 
 
 def _count_codes_per_key(scene: Scene) -> float:
     """Return how many time codes a key is after the one before."""
-    return _choose_codes_hz(scene) / scene.weights.rate_hz if scene.weights else 1.0
+    return _find_rate(scene) / scene.weights.rate_hz if scene.weights else 1.0
 
 
 def _list_joints(scene: Scene) -> Sequence[str]:

@@ -79,8 +79,7 @@ def measure_coverage(corpus: Corpus, text: str | Path | None = None, *, lexicon:
     lexicon : pronunciations of words, ahead of those of the dictionary
     For a phone, the nearest one is that of ``find_similar_lips``, which the engines take; for sequences it is the one
     with the least sum of distances of phones (``measure_phone_distances``), the most recorded one of several.
-    Raises InputError: no such file, or no sentence that can be used. Raises CorpusError: no utterance has words or
-    phones.
+    Raises InputError: no such file, or no usable sentence. Raises CorpusError: no utterance has words or phones.
     """
     lexicon = lexicon or Lexicon()
     usable, left_out = pronounce_sentences(text, lexicon)

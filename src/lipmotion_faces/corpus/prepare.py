@@ -117,10 +117,8 @@ def prepare(
     offset_ms : by how much the sound of every recording is late against its motion; None: it is in step, or a
                 recorder's sound beside it (``take.recorder.wav``) says it. ``offsets.csv`` in the folder goes before
     tracker   : name of the tracker that finds faces in videos (docs/corpora.md)
-    Recordings that cannot be used are reported and left out. The corpus depends neither on ``workers`` nor on
-    interruptions.
-    Raises InputError, CorpusError: no recordings, none that can be used, or ``output`` is not a corpus; no tracker of
-    that name.
+    Unusable recordings are reported and left out. The corpus depends neither on ``workers`` nor on interruptions.
+    Raises InputError, CorpusError: no usable recordings; ``output`` is not a corpus; no tracker of that name.
     Raises MissingDependencyError: there are videos, and MediaPipe, or what another tracker needs, is not installed.
     Raises ExportError: the disk is full, or another process is preparing the same corpus.
 
@@ -190,7 +188,7 @@ def _make_job(
     part: VideoPart | None,
 ) -> _Job:
     name = make_portable(recording.name)
-    stored = _read_stored_source(corpus.folder(name))
+    stored = _read_source(corpus.folder(name))
     if (  # speakers of GRID share file names
         stored is not None
         and stored.get("collection") != collection
@@ -221,9 +219,7 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
     """Log a warning if the corpus holds utterances of recordings that are gone, or that cannot be used any longer."""
     good = {outcome.name for outcome in outcomes if not outcome.problem}
     others = [name for name in corpus.names() if name not in good]
-    older = [
-        name for name in others if (_read_stored_source(corpus.folder(name)) or {}).get("collection") == collection
-    ]
+    older = [name for name in others if (_read_source(corpus.folder(name)) or {}).get("collection") == collection]
     if older:
         shown = ", ".join(older[:NAMED_UTTERANCES]) + (", ..." if len(older) > NAMED_UTTERANCES else "")
         LOG.warning(
@@ -235,7 +231,7 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
         )
 
 
-def _read_stored_source(folder: Path) -> dict[str, Any] | None:
+def _read_source(folder: Path) -> dict[str, Any] | None:
     """Return the source of the utterance in a folder; None if there is none."""
     with suppress(CorpusError):
         return dict(read_entry(folder).get("source", {}))

@@ -133,8 +133,7 @@ def find_best_background(footages: Sequence[Footage]) -> StoredBackground:
     frames = (frame[:height, :width] for part in chosen for frame in decode_footage(*part))
     video = encode_video(frames, chosen[0][0].rate_hz)
     maps, chins = (
-        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen])
-        for of in (steady_face, measure_chin)
+        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen]) for of in (steady_face, find_chin)
     )
     return StoredBackground(video, maps, chins, tuple(start for start, _ in _list_spans(chosen)[1:]))
 
@@ -173,9 +172,7 @@ def _order_parts(parts: Sequence[_Part]) -> list[_Part]:
         missing = max(0.0, 1 - (scene[1] - scene[0]) / rate_hz / SHORT_S)
         blemishes.append(max((join.cost for join in order.joins), default=0.0) + SHORT_COST * missing)
     part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in scenes])[::COMPARED_STEP]
-    distances = looping.measure_row_distances(
-        descriptors.standardise(scenes, looping.count_fade_frames(rate_hz))[::COMPARED_STEP]
-    )
+    distances = looping.compare_rows(descriptors.standardise(scenes, looping.count_fade(rate_hz))[::COMPARED_STEP])
     chosen = [int(np.argmin(blemishes))]
     while True:
         nearest = distances[np.isin(part_of, chosen)].min(axis=0)
@@ -234,9 +231,7 @@ def open_background(path: Path, appearance: Appearance | None = None, *, in_time
             shown, lower_face.map_region(footage.face_to_image[frame], 1), (lower_face.HEIGHT, lower_face.WIDTH)
         )
         recorded = appearance.jaw.mean.T.reshape(lower_face.HEIGHT, lower_face.WIDTH, 3)
-        likely = lower_face.compare_signatures(
-            lower_face.compute_signature(picture), lower_face.compute_signature(recorded)
-        )
+        likely = lower_face.compare_faces(lower_face.find_signature(picture), lower_face.find_signature(recorded))
         if likely < lower_face.SAME_PERSON_LIKENESS:
             warning = (
                 "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
@@ -245,11 +240,11 @@ def open_background(path: Path, appearance: Appearance | None = None, *, in_time
             LOG.warning(warning, footage.path, likely, lower_face.SAME_PERSON_LIKENESS)
     groups, maps = partial(open_footage, footage), steady_face(footage)
     return BackgroundSequence(
-        groups, footage.rate_hz, maps, measure_chin(footage), _mark_usable(footage), footage.cuts, in_time
+        groups, footage.rate_hz, maps, find_chin(footage), _mark_usable(footage), footage.cuts, in_time
     )
 
 
-def measure_chin(footage: Footage) -> NDArray[np.float64]:
+def find_chin(footage: Footage) -> NDArray[np.float64]:
     """Return how far the tip of the chin is below the eyes in every frame, px of the face [shape=(T,)]."""
     from scipy.ndimage import gaussian_filter1d
 

@@ -26,7 +26,7 @@ from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
-from lipmotion_faces.film.background import find_best_background, measure_chin
+from lipmotion_faces.film.background import find_best_background, find_chin
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
 from lipmotion_faces.tracking.frames import VideoSpan
@@ -62,8 +62,7 @@ class Take:
 def choose_takes(source: Path, recordings: Path | None = None, speaker: str = "") -> list[Take]:
     """Return recordings of one person, about ``MAX_FOOTAGE_S`` in all, spread evenly; long ones are shortened first.
 
-    source     : a video, of which the beginning is used; a folder of recordings, or a prepared corpus: of these the
-                 training list
+    source     : a video (its beginning is used); a folder of recordings; or a prepared corpus (its training list)
     A take that cannot be read may be among them: where it is tracked, the reason is reported.
     Raises InputError: no such file, several people, no such person, no videos, or a corpus without ``recordings``.
     """
@@ -265,7 +264,7 @@ def _film_all(takes: Sequence[Take], workers: int, monitor: Monitor) -> list[_Fi
                 filmed.append(result)
     if not filmed:
         raise InputError(f"none of {len(takes)} recordings can be used; the first: {problems[0]}")
-    signatures = np.stack([lower_face.compute_signature(take.pictures) for take in filmed])
+    signatures = np.stack([lower_face.find_signature(take.pictures) for take in filmed])
     alike = signatures @ signatures.T
     person = int((alike >= lower_face.SAME_PERSON_LIKENESS).sum(axis=1).argmax())
     of_person = []
@@ -359,7 +358,7 @@ def _gather_pictures(filmed: Sequence[_Filmed]) -> FootagePictures:
     used = [n for n, channel in enumerate(channels) if not channel.name.startswith(UNUSED_AXIS)]
     names = [channel.name for channel in channels]
     right, left = (motion[:, names.index(name)] for name in JAW_ENDS)
-    chin = np.concatenate([measure_chin(take.footage)[take.used] for take in filmed])
+    chin = np.concatenate([find_chin(take.footage)[take.used] for take in filmed])
     maps = np.concatenate([take.footage.face_to_image[take.used] for take in filmed])
     scale = lower_face.choose_scale(maps)
     starts = np.cumsum([0, *(len(take.used) for take in filmed)])

@@ -1,8 +1,7 @@
 """A three-dimensional head: a friendly character made by this code, drawn without a graphics card.
 
 The spoken mouth and what moves beside it (``articulation``) become poses (``pose``); a pose moves the surfaces
-(``skin`` with ``lips``, ``inside``, ``eyes``), which ``make_figure`` joins, lights and gives to the rasteriser. The
-forms are made once.
+(``skin`` with ``lips``, ``inside``, ``eyes``), which ``make_figure`` makes once, lights and gives to the rasteriser.
 """
 
 from __future__ import annotations

@@ -127,7 +127,7 @@ def make_eyeball() -> part.Part:
             colours[n] = palette.IRIS_RIM
         else:
             colours[n] = palette.EYE_WHITE
-    triangles = part.list_grid_triangles(len(angle), _SIDES, closed=True)
+    triangles = part.make_grid(len(angle), _SIDES, closed=True)
     return part.make_part("eye", places, triangles, colours.reshape(-1, 3), palette.EYE_FINISH)
 
 
@@ -141,13 +141,13 @@ def make_catchlights() -> part.Part:
         z = np.sqrt(away**2 - (flat**2).sum(axis=1))
         fan = np.stack([np.zeros(16, int), 1 + np.arange(16), 1 + (np.arange(16) + 1) % 16], axis=1).astype(np.int32)
         discs.append(part.make_part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))
-    lights = part.join_parts("catchlights", discs)
+    lights = part.join("catchlights", discs)
     return replace(lights, colours=CATCHLIGHT * lights.colours)
 
 
 def list_lash_triangles() -> NDArray[np.int32]:
     """Return the triangles of the lashes, two rows of ``LASHES`` vertices, seen from both sides [shape=(F, 3)]."""
-    front = part.list_grid_triangles(3, LASHES)
+    front = part.make_grid(3, LASHES)
     return np.concatenate([front, front[:, ::-1]])
 
 

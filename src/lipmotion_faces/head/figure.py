@@ -13,37 +13,10 @@ from lipmotion.articulation.contact import smooth_step
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.base import rotate_head
 from lipmotion_faces.characters.textures import decode_srgb
-from lipmotion_faces.head import palette
-from lipmotion_faces.head.eyes import (
-    LASHES,
-    LID_SIDE,
-    list_lash_triangles,
-    make_brow,
-    make_catchlights,
-    make_eyeball,
-    place_lashes,
-    shift_brow,
-)
-from lipmotion_faces.head.inside import (
-    list_tongue_triangles,
-    make_lower_teeth,
-    make_upper_teeth,
-    measure_drop,
-    place_tongue,
-)
-from lipmotion_faces.head.part import (
-    EYE,
-    MIDDLE,
-    Part,
-    find_from_middle,
-    join_parts,
-    list_grid_triangles,
-    make_part,
-    make_tube,
-    to_head,
-)
+from lipmotion_faces.head import eyes, inside, palette
+from lipmotion_faces.head.part import EYE, MIDDLE, Part, find_around, join, make_grid, make_part, make_tube, to_head
 from lipmotion_faces.head.pose import CharacterPose
-from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, measure_closure, move_jaw
+from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, find_closure, move_jaw
 from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach, normalise
 
 BUN = np.array([0.0, 1.40, -0.98])
@@ -81,7 +54,7 @@ def make_hair() -> Part:
             (1.02 * x, y - 0.06, z - 0.06, 0.035),
         ]
         fringe.append(_make_lock(points, wide, 0.05, 0.22 * (-1) ** n))
-    return join_parts("hair", [_make_cap(), _make_bun(), *fringe, *locks])
+    return join("hair", [_make_cap(), _make_bun(), *fringe, *locks])
 
 
 def _make_cap() -> Part:
@@ -89,12 +62,12 @@ def _make_cap() -> Part:
     loop = np.concatenate([half_loop, half_loop[-2:0:-1] * [-1, 1, 1], half_loop[:1]])
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))])
     curve = CubicSpline(length, loop, bc_type="periodic")(np.arange(_COLUMNS) / _COLUMNS * length[-1])
-    line = find_from_middle(to_head, normalise(curve - MIDDLE))  # where the hair begins, clockwise from above
+    line = find_around(to_head, normalise(curve - MIDDLE))  # where the hair begins, clockwise from above
     start, pole = normalise(line - MIDDLE), normalise(BUN - MIDDLE)
     share = np.linspace(0, 1, _ROWS)[:, None, None] ** 1.15
     angle = np.arccos(np.clip(start @ pole, -1, 1))[None, :, None]
     ways = (np.sin((1 - share) * angle) * start + np.sin(share * angle) * pole) / np.sin(angle)
-    skin = find_from_middle(to_head, ways.reshape(-1, 3)).reshape(ways.shape)
+    skin = find_around(to_head, ways.reshape(-1, 3)).reshape(ways.shape)
     phase = 2 * np.pi * np.arange(_COLUMNS) / _COLUMNS
     share = share[..., 0]
     wave = 0.5 * np.sin(23 * phase + 2 * np.sin(3 * phase)) + 0.3 * np.sin(41 * phase + 1.3) + 0.2 * np.sin(67 * phase)
@@ -103,12 +76,12 @@ def _make_cap() -> Part:
     rise = rise + 0.026 * ridge * np.clip(share / 0.1, 0, 1) * np.clip((1 - share) / 0.1, 0.3, 1)
     places = skin + rise[..., None] * ways - 0.015 * (1 - np.clip(share / 0.05, 0, 1))[..., None] * ways
     along = normalise(np.gradient(places, axis=0).reshape(-1, 3))
-    colours = _draw_streaks(np.broadcast_to(ridge, rise.shape).ravel())
-    triangles = list_grid_triangles(_ROWS, _COLUMNS, closed=True)[:, ::-1]
+    colours = _streak(np.broadcast_to(ridge, rise.shape).ravel())
+    triangles = make_grid(_ROWS, _COLUMNS, closed=True)[:, ::-1]
     return make_part("cap", places.reshape(-1, 3), triangles, colours, palette.HAIR_FINISH, along)
 
 
-def _draw_streaks(height: Real) -> Real:
+def _streak(height: Real) -> Real:
     light = np.clip(0.5 + 0.5 * height, 0, 1)[:, None]
     deep, middle, bright = (np.array(c) for c in (palette.HAIR_DEEP, palette.HAIR, palette.HAIR_LIGHT))
     shaded, lit = deep + 2 * light * (middle - deep), middle + (2 * light - 1) * 0.55 * (bright - middle)
@@ -123,10 +96,9 @@ def _make_bun() -> Part:
     x, z = 0.40 * radius * np.sin(down) * np.cos(around), 0.38 * radius * np.sin(down) * np.sin(around)
     places = np.stack([x, 0.33 * radius * np.cos(down), z], axis=-1)
     strands = normalise(np.stack([-np.sin(around), 0.6 * np.ones_like(around), np.cos(around)], axis=-1).reshape(-1, 3))
-    triangles = list_grid_triangles(36, 128, closed=True)[:, ::-1]
-    return make_part(
-        "bun", places.reshape(-1, 3) + BUN, triangles, _draw_streaks(height.ravel()), palette.HAIR_FINISH, strands
-    )
+    triangles = make_grid(36, 128, closed=True)[:, ::-1]
+    colours = _streak(height.ravel())
+    return make_part("bun", places.reshape(-1, 3) + BUN, triangles, colours, palette.HAIR_FINISH, strands)
 
 
 def _make_lock(points: Sequence[Sequence[float]], wide: float, thick: float, shade: float) -> Part:
@@ -135,11 +107,11 @@ def _make_lock(points: Sequence[Sequence[float]], wide: float, thick: float, sha
     share = np.linspace(0, 1, 36)
     curve = CubicSpline(np.linspace(0, 1, len(knots)), knots)(share)
     ways = normalise(curve[:, :3] - MIDDLE)
-    path = find_from_middle(to_head, ways) + curve[:, 3:] * ways
+    path = find_around(to_head, ways) + curve[:, 3:] * ways
     taper = np.clip(1.15 * np.sin(np.pi * np.clip(0.12 + 0.87 * share, 0, 1)), 0.015, 1) ** 0.7
     places, triangles, strands = make_tube(path, wide * taper, thick * taper, ways, sides=16)
     across = np.tile(np.cos(2 * np.pi * np.arange(16) / 16), 36)
-    colours = _draw_streaks(shade + 0.35 * np.cos(9 * across))
+    colours = _streak(shade + 0.35 * np.cos(9 * across))
     return make_part("lock", places, triangles, colours, palette.HAIR_FINISH, strands)
 
 
@@ -166,7 +138,7 @@ def make_ear() -> Part:
     colours = np.broadcast_to(np.array(palette.SKIN), places.shape).copy()
     warm = np.exp(-(((ring - 0.4) / 0.3) ** 2))[:, None, None] * 0.35 + 0.15
     colours = (1 - warm) * colours + warm * np.array(palette.BLUSH)
-    triangles = list_grid_triangles(len(ring), 48, closed=True)
+    triangles = make_grid(len(ring), 48, closed=True)
     return make_part("ear", places.reshape(-1, 3), triangles, colours.reshape(-1, 3), palette.SKIN_FINISH)
 
 
@@ -175,14 +147,10 @@ def make_earring() -> Part:
     down, around = np.meshgrid(np.linspace(0, np.pi, 12), 2 * np.pi * np.arange(20) / 20, indexing="ij")
     ball = np.stack([np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)], axis=-1)
     places = 0.035 * ball.reshape(-1, 3) + np.array([0.835, -0.455, -0.74])
-    return make_part(
-        "earring", places, list_grid_triangles(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH
-    )
+    return make_part("earring", places, make_grid(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH)
 
 
-def _make_rings(
-    name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish
-) -> Part:
+def _lathe(name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish) -> Part:
     """Return a part of rings about the body from rows (height, half width, half depth, middle z, squareness)."""
     at = np.linspace(0, len(table) - 1, count)
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
@@ -191,7 +159,7 @@ def _make_rings(
     for y, wide, deep, z, square in PchipInterpolator(np.arange(len(table)), np.array(table))(at).tolist():
         x, forward = np.sign(c) * np.abs(c) ** (2 / square), np.sign(s) * np.abs(s) ** (2 / square)
         rows.append(np.stack([wide * x, np.full(_SIDES, y), z + deep * forward], axis=1))
-    triangles = list_grid_triangles(count, _SIDES, closed=True)[:, ::-1]
+    triangles = make_grid(count, _SIDES, closed=True)[:, ::-1]
     return make_part(name, np.concatenate(rows), triangles, colour, finish)
 
 
@@ -201,7 +169,7 @@ def make_neck() -> Part:
         (-0.55, 0.33, 0.30, -0.98, 2), (-1.0, 0.355, 0.34, -0.96, 2), (-1.45, 0.375, 0.36, -0.98, 2),
         (-1.75, 0.47, 0.40, -1.0, 2), (-1.95, 0.75, 0.45, -1.0, 2),
     ]  # fmt: skip
-    return _make_rings("neck", table, 26, palette.SKIN, palette.SKIN_FINISH)
+    return _lathe("neck", table, 26, palette.SKIN, palette.SKIN_FINISH)
 
 
 def make_clothing() -> Part:
@@ -211,7 +179,7 @@ def make_clothing() -> Part:
         (-1.92, 1.28, 0.60, -1.02, 2.1), (-2.08, 1.58, 0.62, -1.03, 2.15), (-2.35, 1.74, 0.66, -1.03, 2.2),
         (-2.8, 1.80, 0.72, -1.03, 2.2), (-3.4, 1.80, 0.75, -1.03, 2.2),
     ]  # fmt: skip
-    return _make_rings("clothing", table, 28, palette.CLOTH, palette.CLOTH_FINISH)
+    return _lathe("clothing", table, 28, palette.CLOTH, palette.CLOTH_FINISH)
 
 
 def make_collar() -> Part:
@@ -259,7 +227,7 @@ def paint_skin(skin: Skin) -> Real:
         colour[lids[0]] = palette.EYE_CORNER
         colour[lids[1]] = 0.5 * np.array(palette.EYE_CORNER) + 0.5 * np.array(palette.SKIN)
         for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
-            upper = lids[ring, LID_SIDE > 0]
+            upper = lids[ring, eyes.LID_SIDE > 0]
             colour[upper] = (1 - share) * np.array(palette.SKIN) + share * np.array(palette.SKIN_DEEP)
     return decode_srgb(colour)
 
@@ -299,16 +267,17 @@ class Figure:
 
     def __init__(self) -> None:
         self.skin = skin = Skin()
-        self._eye, self._light = make_eyeball(), make_catchlights()
-        left_brow, left_ear, ring, tongue_at_rest = make_brow(), make_ear(), make_earring(), place_tongue(REST)
-        lash = np.zeros((3 * LASHES, 3))
+        self._eye, self._light = eyes.make_eyeball(), eyes.make_catchlights()
+        left_brow, left_ear = eyes.make_brow(), make_ear()
+        ring, tongue_at_rest = make_earring(), inside.place_tongue(REST)
+        lash = np.zeros((3 * eyes.LASHES, 3))
         parts = [
             Part("skin", skin.rest, skin.triangles, paint_skin(skin), palette.SKIN_FINISH, skin.normals),
-            make_part("tongue", tongue_at_rest, list_tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
-            make_lower_teeth(), make_upper_teeth(),
+            make_part("tongue", tongue_at_rest, inside.list_tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
+            inside.make_lower_teeth(), inside.make_upper_teeth(),
             self._eye, self._eye.mirror("right eye"), self._light, replace(self._light, name="right catchlights"),
-            make_part("lashes", lash, list_lash_triangles(), palette.LASH, palette.BROW_FINISH),
-            make_part("right lashes", lash, list_lash_triangles(), palette.LASH, palette.BROW_FINISH),
+            make_part("lashes", lash, eyes.list_lash_triangles(), palette.LASH, palette.BROW_FINISH),
+            make_part("right lashes", lash, eyes.list_lash_triangles(), palette.LASH, palette.BROW_FINISH),
             left_brow, left_brow.mirror("right brow"),
             make_hair(), left_ear, left_ear.mirror("right ear"), ring, ring.mirror("right earring"),
             make_neck(), make_clothing(), make_collar(),
@@ -352,21 +321,21 @@ class Figure:
         """Return places and normals of all vertices in a pose, the head not turned [shape=(V, 3), both]."""
         places, normals = self._places.copy(), self._normals.copy()
         places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.pose(pose)
-        places[self.rows["tongue"]] = place_tongue(pose)
-        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], list_tongue_triangles())
-        places[self.rows["teeth"]] = move_jaw(places[self.rows["teeth"]], measure_drop(pose))
+        places[self.rows["tongue"]] = inside.place_tongue(pose)
+        normals[self.rows["tongue"]] = compute_normals(places[self.rows["tongue"]], inside.list_tongue_triangles())
+        places[self.rows["teeth"]] = move_jaw(places[self.rows["teeth"]], inside.measure_drop(pose))
         for name in ("brow", "right brow"):
-            places[self.rows[name]] += shift_brow(places[self.rows[name]], pose)
+            places[self.rows[name]] += eyes.shift_brow(places[self.rows[name]], pose)
             places[self.rows[name], 1] += pose.brows
         look, half = rotate_head(*pose.gaze), rotate_head(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
-        lid = places[self.skin.list_lid_rows(0)[1][:LASHES]]
+        lid = places[self.skin.list_lid_rows(0)[1][: eyes.LASHES]]
         for side, name in _EYES:
             flip = np.array([side, 1.0, 1.0])
             eye = self.rows[name + "eye"]
             places[eye] = places[eye] @ look.T + EYE * flip
             normals[eye] = normals[eye] @ look.T
             places[self.rows[name + "catchlights"]] = self._light.places @ half.T + EYE * flip
-            places[self.rows[name + "lashes"]] = place_lashes(lid, pose.shut) * flip
+            places[self.rows[name + "lashes"]] = eyes.place_lashes(lid, pose.shut) * flip
             normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
         return places, normals
 
@@ -397,7 +366,7 @@ class Figure:
         x, y = self.skin.lids_of_eye.place_opening(pose)
         for side, name in _EYES:
             eye = self.rows[name + "eye"]
-            upper = np.interp(side * places[eye, 0], x[:LASHES], y[:LASHES])
+            upper = np.interp(side * places[eye, 0], x[: eyes.LASHES], y[: eyes.LASHES])
             under = np.clip((upper - places[eye, 1] + 0.01) / 0.085, 0, 1)
             colours[eye] *= (0.6 + 0.4 * under)[:, None]
         ring = places[self.rows["skin"]][self.skin.list_lip_rows()[VISIBLE_RINGS - 1]]
@@ -415,7 +384,7 @@ class Figure:
             arrives[rows] = lit[:, None]
         licked = TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
         arrives[self.rows["tongue"]] = np.minimum(1.0, licked)
-        lips, closed = self.skin.list_lip_rows(), measure_closure(pose)
+        lips, closed = self.skin.list_lip_rows(), find_closure(pose)
         for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE_RINGS - len(SEAM_LIGHT)):
             shaded = np.maximum(closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER)
             arrives[lips[ring]] *= 1 - (1 - part_of) * shaded

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion_faces.head import palette
-from lipmotion_faces.head.part import MOUTH_Y, Part, join_parts, list_grid_triangles, make_part
+from lipmotion_faces.head.part import MOUTH_Y, Part, join, make_grid, make_part
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import ARCH, TEETH_EDGE, TEETH_Z, move_jaw
 
@@ -45,9 +45,9 @@ def _make_row(name: str, edges: tuple[float, ...], edge_y: float, height: float,
     y = edge_y + up * height * np.array([0.72, 0.86, 1.3, 1.9])
     depth = np.array([-0.02, 0.004, 0.008, 0.0])
     grid = np.stack([np.tile(x, 4), np.repeat(y, 41), np.concatenate([front - ARCH * x**2 + d for d in depth])], axis=1)
-    triangles = list_grid_triangles(4, 41)
+    triangles = make_grid(4, 41)
     gum = make_part("gum", grid, triangles[:, ::-1] if up > 0 else triangles, palette.GUM, palette.TOOTH_FINISH)
-    return join_parts(name, [*teeth, gum])
+    return join(name, [*teeth, gum])
 
 
 def _make_tooth(a: float, b: float, number: int, edge_y: float, height: float, up: float, front: float) -> Part:
@@ -69,7 +69,7 @@ def _make_tooth(a: float, b: float, number: int, edge_y: float, height: float, u
     root = (0.25 * level**3)[..., None]
     colours = (1 - shade) * colour + shade * np.array(palette.TOOTH_GAP)
     colours = (1 - root) * colours + root * np.array(palette.TOOTH_GAP)
-    triangles = list_grid_triangles(9, 9)
+    triangles = make_grid(9, 9)
     return make_part(
         "tooth", places, triangles if up > 0 else triangles[:, ::-1], colours.reshape(-1, 3), palette.TOOTH_FINISH
     )
@@ -82,7 +82,7 @@ def measure_drop(pose: CharacterPose) -> float:
 
 def list_tongue_triangles() -> NDArray[np.int32]:
     """Return the triangles of the tongue [shape=(F, 3)]."""
-    return list_grid_triangles(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
+    return make_grid(_TONGUE_RINGS, _TONGUE_SIDES, closed=True)[:, ::-1]
 
 
 def place_tongue(pose: CharacterPose) -> Real:

@@ -53,7 +53,7 @@ def make_part(
     return Part(name, places, triangles, colours, finish, compute_normals(places, triangles), strands)
 
 
-def join_parts(name: str, parts: list[Part]) -> Part:
+def join(name: str, parts: list[Part]) -> Part:
     """Return several parts of one finish as one."""
     offsets = np.cumsum([0, *(len(each.places) for each in parts)])
     triangles = [each.triangles + offset for each, offset in zip(parts, offsets, strict=False)]
@@ -69,7 +69,7 @@ def join_parts(name: str, parts: list[Part]) -> Part:
     )
 
 
-def list_grid_triangles(rows: int, columns: int, *, closed: bool = False) -> Triangles:
+def make_grid(rows: int, columns: int, *, closed: bool = False) -> Triangles:
     """Return the triangles of a grid of vertices, row by row; ``closed``: the last column is joined to the first."""
     index = np.arange(rows * columns).reshape(rows, columns)
     if closed:
@@ -96,7 +96,7 @@ def make_tube(path: Real, across: Real, thick: Real, upward: Real, *, sides: int
         + thick[:, None, None] * np.sin(angle)[None, :, None] * up[:, None]
     )
     strands = np.repeat(along, sides, axis=0)
-    return rings.reshape(-1, 3), list_grid_triangles(len(path), sides, closed=True), strands
+    return rings.reshape(-1, 3), make_grid(len(path), sides, closed=True), strands
 
 
 Form = Callable[[Real], Real]
@@ -175,7 +175,7 @@ def find_front(form: Form, x: Real, y: Real) -> Real:
     return np.asarray(1 - trace_rays(form, start, np.broadcast_to([0.0, 0.0, -1.0], start.shape)))
 
 
-def find_from_middle(form: Form, directions: Real) -> Real:
+def find_around(form: Form, directions: Real) -> Real:
     """Return the places of a form in directions from ``MIDDLE`` [shape=(N, 3)]."""
     far = trace_rays(form, MIDDLE + 3 * directions, -directions, steps=90)
     return np.asarray(MIDDLE + (3 - far)[:, None] * directions)

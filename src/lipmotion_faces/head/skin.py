@@ -18,7 +18,7 @@ from scipy.spatial import Delaunay, cKDTree
 from lipmotion.articulation.contact import MIN_GAP, smooth_step
 from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
-from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, find_from_middle, find_front, find_outward, to_head
+from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, find_around, find_front, find_outward, to_head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.rendering.lighting import normalise
 
@@ -96,9 +96,7 @@ def place_sections(pose: CharacterPose, base_z: Real) -> Real:
     middle = _find_between(pose)
     # how much nearer to the middle than the corners the inner edge of the lips lies
     hole_share = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
-    as_ring = (
-        np.maximum(1 - hole_share, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * measure_closure(pose, RING_GAP))
-    )
+    as_ring = np.maximum(1 - hole_share, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * find_closure(pose, RING_GAP))
     squeeze = as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
     rounded = _ENVELOPE ** (1 + np.minimum(2 * pose.roundness, 1.0))
     belly = rounded + squeeze * (1 - rounded)
@@ -121,7 +119,7 @@ def place_sections(pose: CharacterPose, base_z: Real) -> Real:
     teeth = TEETH_Z - ARCH * inner_x**2
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
-    contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * measure_closure(pose)
+    contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * find_closure(pose)
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
     below_upper = np.minimum(BITTEN_EDGE_Y - middle, rise - MIN_GAP)  # the teeth part the lips
     on_teeth = np.minimum(middle + below_upper * hole, inner_y + 0.08)
@@ -154,7 +152,7 @@ def _find_meeting(pose: CharacterPose, base_z: Real, inwards: Any) -> Real:
     return np.asarray(between + pose.protrusion - (0.45 * pose.protrusion + curved) * across**2)
 
 
-def measure_closure(pose: CharacterPose, apart: float = SEAM_GAP) -> Any:
+def find_closure(pose: CharacterPose, apart: float = SEAM_GAP) -> Any:
     """Return how nearly the lips are closed: 1 where they touch, 0 from a gap of ``apart`` on [shape of the gap]."""
     return smooth_step(np.asarray(1 - pose.gap / apart))
 
@@ -163,7 +161,7 @@ def _find_between(pose: CharacterPose) -> Real:
     """Return the height of the line between the lips, closed, at every column [shape=(..., COLUMNS)]."""
     line = (1 - pose.roundness - 0.6 * pose.spread) * _LINE
     lowered = 0.22 * pose.gap * (1 - 0.6 * pose.spread) * (1 - 0.75 * pose.roundness)
-    still = np.maximum(measure_closure(pose, SMILE_GAP), pose.tuck)
+    still = np.maximum(find_closure(pose, SMILE_GAP), pose.tuck)
     at_rest = REST_SMILE * still * (1 - pose.press) * (1 - pose.roundness)
     raised = (pose.smile + at_rest - lowered) * ACROSS**2
     bowed = ROUND_BOW * (1 - ACROSS**2) - ROUND_DROP - 0.2 * pose.gap
@@ -319,7 +317,7 @@ class Skin:
         places = self.place(pose)
         change = compute_normals(places, self.triangles) - self._meshed_rest
         normals = self.normals + self._calm * change
-        rows, closed = self.list_lip_rows(), measure_closure(pose)
+        rows, closed = self.list_lip_rows(), find_closure(pose)
         normals[rows[VISIBLE_RINGS - 1]] += closed * (
             normals[rows[VISIBLE_RINGS - 2]] - normals[rows[VISIBLE_RINGS - 1]]
         )
@@ -359,11 +357,11 @@ class Skin:
 
     def place(self, pose: CharacterPose) -> Real:
         """Return the places of all vertices [shape=(V, 3)], the head not turned."""
-        lips, face = self.place_lips_and_face(pose, self.binding)
+        lips, face = self.place_both(pose, self.binding)
         left = self.lids_of_eye.place_rings(pose).reshape(-1, 3)
         return np.concatenate([face, lips[1:].reshape(-1, 3), left, left * [-1, 1, 1]])
 
-    def place_lips_and_face(self, pose: CharacterPose, binding: Binding) -> tuple[Real, Real]:
+    def place_both(self, pose: CharacterPose, binding: Binding) -> tuple[Real, Real]:
         """Return the places of the rings of the lips [shape=(..., RINGS, COLUMNS, 3)] and of vertices of the face.
 
         pose    : one, or several of ``pose.stacked``
@@ -398,15 +396,13 @@ def _fill(contour: Real, edges: Real) -> Real:
     radius = np.hypot(u, v)
     angle = radius + 0.11 * radius**3  # on the map of the head, whose middle is the front; its rim is stretched
     flat = np.sin(angle) / np.maximum(radius, 1e-9)
-    places = find_from_middle(to_head, np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
+    places = find_around(to_head, np.stack([u * flat, v * flat, np.cos(angle)], axis=1))
     close = cKDTree(near3).query(places)[0] < 0.024
-    inside = (
-        (np.abs(places[:, 0]) < 0.36) & _mark_within(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
-    )
+    inside = (np.abs(places[:, 0]) < 0.36) & _mark_in(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
     at_eye = cKDTree(edges).query(places)[0] < 0.02
     for side in (1, -1):
         ring = edges[: len(edges) // 2, :2] * [side, 1]
-        at_eye |= _mark_within(places[:, :2], ring) & (places[:, 2] > -0.6)
+        at_eye |= _mark_in(places[:, :2], ring) & (places[:, 2] > -0.6)
     return np.concatenate([near3, places[~(close | inside | at_eye)]])
 
 
@@ -419,9 +415,9 @@ def _list_triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
     middle = flat[triangles].mean(axis=1)
     x, y, z = face[triangles].mean(axis=1).T
     under_hair = (y > 1.0 - 0.6 * np.maximum(np.abs(x) - 0.2, 0)) | ((y > 0.1) & (z < -0.75)) | (z < -1.2)
-    hole = _mark_within(middle, flat[:contour]) | under_hair
+    hole = _mark_in(middle, flat[:contour]) | under_hair
     for eye in range(2):
-        hole |= _mark_within(middle, flat[contour + eye * edge : contour + (eye + 1) * edge])
+        hole |= _mark_in(middle, flat[contour + eye * edge : contour + (eye + 1) * edge])
     triangles = triangles[~hole]
     a, b, c = (flat[triangles[:, n]] for n in range(3))
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
@@ -429,7 +425,7 @@ def _list_triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
     return triangles.astype(np.int32)
 
 
-def _mark_within(points: Real, polygon: Real) -> NDArray[np.bool_]:
+def _mark_in(points: Real, polygon: Real) -> NDArray[np.bool_]:
     following = np.roll(polygon, -1, axis=0)
     inside = np.zeros(len(points), bool)
     for (xa, ya), (xb, yb) in zip(polygon.tolist(), following.tolist(), strict=True):

@@ -17,7 +17,7 @@ from lipmotion_faces.characters.textures import encode_srgb
 from lipmotion_faces.head.figure import Figure
 from lipmotion_faces.head.pose import CharacterPose, stack_poses
 from lipmotion_faces.head.skin import COLUMNS, REST, VISIBLE_RINGS
-from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, fill_background
+from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, fill
 
 Real = NDArray[np.float64]
 
@@ -123,8 +123,8 @@ class Stage:
 
     def __init__(self, camera: Camera, colour: tuple[int, int, int] | None = None) -> None:
         self.figure = make_figure()
-        self.canvas = Canvas(camera, None if colour is None else fill_background(camera, colour))
-        self._dark = Canvas(camera, fill_background(camera, (0, 0, 0)))
+        self.canvas = Canvas(camera, None if colour is None else fill(camera, colour))
+        self._dark = Canvas(camera, fill(camera, (0, 0, 0)))
         still = self.figure.shade(CharacterPose(), camera.place)
         first = self.figure.first_still_triangle
         self._still = self.canvas.draw(still.places, still.light, self.figure.triangles[first:])
@@ -172,7 +172,7 @@ class _MouthFit:
         # of targets only what the shapes span counts, so they are projected at once: (T, S) numbers, not (T, vertices)
         self._spanned, self._triangle = np.linalg.qr(np.stack([rows[name] for name in names]).T)
         self._fixed = {name: rows[name] @ self._spanned for name in FROM_POSE}
-        self._rest = figure.skin.place_lips_and_face(REST, self._around)
+        self._rest = figure.skin.place_both(REST, self._around)
         parting = measure_lip_gap(moved[:, rings])[[mesh.shape_names.index(name) for name in names]]
         self._shapes = FaceShapes(tuple(names), tuple(names), np.zeros((len(names), 0, 3)), parting, "arkit")
 
@@ -196,9 +196,7 @@ class _MouthFit:
         """Return poses as what the shapes span [shape=(T, S)], and by how much they part the lips [shape=(T,)]."""
         lips, around = (
             places - rest
-            for places, rest in zip(
-                self._skin.place_lips_and_face(stack_poses(poses), self._around), self._rest, strict=True
-            )
+            for places, rest in zip(self._skin.place_both(stack_poses(poses), self._around), self._rest, strict=True)
         )
         return _stack_rows(lips, around) @ self._spanned, measure_lip_gap(lips)
 

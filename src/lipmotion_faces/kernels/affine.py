@@ -155,12 +155,10 @@ def _sum_at_edge(
     picture: Pictures, row: int, column: int, k: int, e: np.float32, f: np.float32, g: np.float32, h: np.float32
 ) -> np.float32:
     """Return the weighted sum of four pixels of a column around ``row``; outermost pixels repeat."""
-    height, column = len(picture), _clamp(column, picture.shape[1])
-    upper = e * Number(picture[_clamp(row - 1, height), column, k]) + f * Number(
-        picture[_clamp(row, height), column, k]
-    )
-    lower = g * Number(picture[_clamp(row + 1, height), column, k])
-    return upper + lower + h * Number(picture[_clamp(row + 2, height), column, k])
+    height, column = len(picture), _clip(column, picture.shape[1])
+    upper = e * Number(picture[_clip(row - 1, height), column, k]) + f * Number(picture[_clip(row, height), column, k])
+    lower = g * Number(picture[_clip(row + 1, height), column, k])
+    return upper + lower + h * Number(picture[_clip(row + 2, height), column, k])
 
 
 @compiled
@@ -169,8 +167,8 @@ def _share(weight: Floats, whole: Index, fractions: Floats, share: Floats) -> No
     height, width = weight.shape
     for c in range(len(share)):
         x, y = fractions[0, c], fractions[1, c]
-        above, below = _clamp(whole[1, c], height), _clamp(whole[1, c] + 1, height)
-        left, right = _clamp(whole[0, c], width), _clamp(whole[0, c] + 1, width)
+        above, below = _clip(whole[1, c], height), _clip(whole[1, c] + 1, height)
+        left, right = _clip(whole[0, c], width), _clip(whole[0, c] + 1, width)
         before = (ONE - y) * weight[above, left] + y * weight[below, left]
         share[c] = (ONE - x) * before + x * ((ONE - y) * weight[above, right] + y * weight[below, right])
 
@@ -185,5 +183,5 @@ def _mix(row: NDArray[np.uint8], new: Floats, share: Floats) -> None:
 
 
 @compiled
-def _clamp(index: int, length: int) -> int:
+def _clip(index: int, length: int) -> int:
     return min(max(index, 0), length - 1)

@@ -60,8 +60,7 @@ def stack_arrays(below: Layer, shade: Layer, skin: Layer, above: Layer, target: 
 def paint_band(layer: Layer, top: Floats, bottom: Floats, across: Floats, texture: Floats) -> None:
     """Paint a texture from ``top`` down to ``bottom`` on a layer, in place; nothing where they meet.
 
-    top, bottom : heights at C evenly spaced places in each column of pixels [shape=(C, W)]; along each the covered part
-                  of a pixel is exact
+    top, bottom : heights at C evenly spaced places in each column of pixels [shape=(C, W)]; cover is exact along each
     across      : 0 to 1, where each column lies in the texture [shape=(W,)]
     texture     : colour 0..255 and opacity 0..1 [shape=(D, U, 4)]; the first row lies at the top of the band, the last
                   one at its bottom; values between are interpolated

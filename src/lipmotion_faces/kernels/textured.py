@@ -34,8 +34,7 @@ class TexturedTriangles(NamedTuple):
     triangles : counterclockwise from outside [shape=(F, 3)]
     uv        : place of every corner in the texture, v downwards, repeated beyond 0 to 1 [shape=(F, 3, 2)]
     looks     : the row of ``levels`` or -1 for no texture, and the kind: ``SOLID``, ``CUT``, ``CLEAR`` [shape=(F, 2)]
-    alphas    : the opacity below which there is a hole, and the opacity by which that of the texture is multiplied
-                [shape=(F, 2)]
+    alphas    : opacity below which there is a hole; factor of the texture's opacity [shape=(F, 2)]
     texels    : light that is reflected, and opacity, 0 to 65535 [shape=(N, 4)]
     levels    : first texel, width and height of each texture [shape=(L, 3)]
     """
@@ -63,8 +62,7 @@ def draw_textured(
     tone    : the grey level of light from 0 to 1, in even steps [shape=(L,)]
     picture : is changed in the area alone [shape=(H, W, 3)]
     opacity : becomes the part of each pixel that triangles hide, 0 to 255, in the area alone [shape=(H, W)]
-    Of surfaces that are blended, the nearest one is seen before what is solid. A texture is sampled once a pixel and
-    triangle, bilinearly.
+    The nearest blended surface is seen before solid ones. A texture is sampled once a pixel and triangle, bilinearly.
     """
     x, y, z = np.rint(2 * GRID * points[:, 0]) / GRID, np.rint(2 * GRID * points[:, 1]) / GRID, points[:, 2].copy()
     triangles, uv, looks, alphas, texels, levels = surface
@@ -276,23 +274,21 @@ def _resolve(
                 whole = whole and before[i + 1, j] == NO_TRIANGLE and before[i + 1, j + 1] == NO_TRIANGLE
             if whole and t == NO_TRIANGLE:
                 for channel in range(3):
-                    picture[row, column, channel] = tone[
-                        _choose_level(np.float64(background[row, column, channel]), most)
-                    ]
+                    picture[row, column, channel] = tone[_quantise(np.float64(background[row, column, channel]), most)]
                 opacity[row, column] = 0
                 continue
             if whole:
                 red, green, blue, _ = _shade(t, 2 * column + 1.0, 2 * row + 1.0, planes, looks[t, 0], texels, levels)
-                picture[row, column, 0] = tone[_choose_level(red, most)]
-                picture[row, column, 1] = tone[_choose_level(green, most)]
-                picture[row, column, 2] = tone[_choose_level(blue, most)]
+                picture[row, column, 0] = tone[_quantise(red, most)]
+                picture[row, column, 1] = tone[_quantise(green, most)]
+                picture[row, column, 2] = tone[_quantise(blue, most)]
                 opacity[row, column] = 255
                 continue
             _mix(shown, before, layered, i, j, row, column, planes, looks, alphas, texels, levels, background, colours,
                  covered, ids)  # fmt: skip
             for channel in range(3):
                 total = (colours[0, channel] + colours[1, channel]) + (colours[2, channel] + colours[3, channel])
-                picture[row, column, channel] = tone[_choose_level(0.25 * total, most)]
+                picture[row, column, channel] = tone[_quantise(0.25 * total, most)]
             hidden = (covered[0] + covered[1]) + (covered[2] + covered[3])
             opacity[row, column] = np.uint8(63.75 * hidden + 0.5)
 
@@ -329,7 +325,7 @@ def _mix(
 
 
 @compiled
-def _choose_level(light: float, most: float) -> int:
+def _quantise(light: float, most: float) -> int:
     return int(min(max(light, 0.0), 1.0) * most)
 
 

@@ -75,7 +75,7 @@ class PicturesOutput(VideoOutput):
         return is_picture_sequence(path)
 
 
-def read_sound_track(performance: Performance) -> Audio:
+def load_track(performance: Performance) -> Audio:
     """Return the sound of videos. Raises InputError: the recording cannot be read."""
     return read_sound(performance.sound or performance.settings.recording)
 

@@ -39,8 +39,7 @@ class SessionPictures:
 
         edits : of the motion, its delivery and its staging; None: there are none
         fps   : frames a second of the video
-        Raises InputError: as ``Session.generate``; a time outside the recording, or a face that cannot draw single
-        pictures.
+        Raises InputError: as ``Session.generate``; a time outside the recording; a face that draws no single pictures.
         """
         edits = edits or Edits()
         staging, delivery = edits.staging(), edits.delivery()

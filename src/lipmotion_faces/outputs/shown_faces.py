@@ -60,13 +60,13 @@ class ShownDrawing(_WithHead):
         drawn_video.check_background(path, settings.staging)
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
-        settings, played = performance.settings, performance.cached(drawn_video.read_sound_track)
+        settings, played = performance.settings, performance.cached(drawn_video.load_track)
         others = {edit.channel for edit in performance.generation.curve_edits} - {*WEIGHTS, ""}
         if others and self.character is None:
             named = ", ".join(sorted(others))
             LOG.warning("%s: %s is of a rig that this face has not, and does not show; pin jawOpen", path, named)
         seen, prosody = performance.cached(_deliver), performance.cached(_measure_played_prosody)
-        monitor, hertz = performance.monitor, _choose_frame_rate(settings)
+        monitor, hertz = performance.monitor, _find_rate(settings)
         drawn_video.write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
 
     def load(self) -> None:  # noqa: D102
@@ -100,7 +100,7 @@ class ShownCutOut(_WithHead):
 
     def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
         drawn_video.check_background(path, settings.staging)
-        check_cue_options(_choose_frame_rate(settings), None, self._optional)
+        check_cue_options(_find_rate(settings), None, self._optional)
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
         """Raise ExportError if a generation has no phones, from which shapes are chosen."""
@@ -109,16 +109,12 @@ class ShownCutOut(_WithHead):
             raise ExportError(f"{path}: {missing}; give them: --units FILE")
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
-        settings, generation, fps = (
-            performance.settings,
-            performance.generation,
-            _choose_frame_rate(performance.settings),
-        )
+        settings, generation, fps = performance.settings, performance.generation, _find_rate(performance.settings)
         sheet = cues(generation, fps=fps, shapes=self._optional, delivery=settings.delivery)
         count = drawn_video.count_frames(generation, fps)
         shown = list_frame_shapes(sheet)[:count]
         frames = self.face.draw([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
-        sound = performance.cached(drawn_video.read_sound_track)
+        sound = performance.cached(drawn_video.load_track)
         drawn_video.write_frames(
             path, with_reports(frames, count, filmed_video.RENDERING, performance.monitor), fps, sound
         )
@@ -160,7 +156,7 @@ class ShownPerson(_WithHead):
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings = performance.settings
-        film, sound = self.film(performance), performance.cached(drawn_video.read_sound_track)
+        film, sound = self.film(performance), performance.cached(drawn_video.load_track)
         filmed_video.write_film(path, film, sound, mark=settings.outputs.mark, monitor=performance.monitor)
 
     def film(self, performance: Performance) -> filmed_video.Film:
@@ -170,7 +166,7 @@ class ShownPerson(_WithHead):
             self.face,
             seen.motion,
             speech=settings.recording,
-            sound=performance.cached(drawn_video.read_sound_track),
+            sound=performance.cached(drawn_video.load_track),
             model=performance.model,
             units=seen.units,
             fps=settings.outputs.fps,
@@ -213,16 +209,14 @@ def _deliver(performance: Performance) -> Generation:
     if performance.generation.curve_edits:
         character = character or settings.face.character
     prosody = performance.cached(_measure_played_prosody) if performance.generation.curve_edits else None
-    hertz, staging = _choose_frame_rate(settings), settings.staging
+    hertz, staging = _find_rate(settings), settings.staging
     return deliver_to_face(performance.generation, settings.delivery, hertz, character, staging, prosody)
 
 
 def _measure_played_prosody(performance: Performance) -> Prosody:
     """Return loudness and pitch of the sound track, in the time of the motion."""
-    return shift_prosody(
-        measure_prosody(performance.cached(drawn_video.read_sound_track)), performance.settings.delivery
-    )
+    return shift_prosody(measure_prosody(performance.cached(drawn_video.load_track)), performance.settings.delivery)
 
 
-def _choose_frame_rate(settings: OutputSettings) -> float:
+def _find_rate(settings: OutputSettings) -> float:
     return settings.outputs.fps or drawn_video.DRAWN_HZ

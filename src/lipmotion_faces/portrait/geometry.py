@@ -129,8 +129,8 @@ def outline_lips(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     free = wide * (1 - pose.tuck)
     upper_power = 0.7 - 0.22 * open_share * max(out, 1 - wide) - 0.26 * free
     lower_power = 0.6 - 0.12 * max(out, pose.oval) - 0.26 * free
-    upper_inner = line - rise * _compute_arch(inner, upper_power + pose.tuck * (0.85 - upper_power))
-    lower_inner = line + drop * _compute_arch(inner, lower_power + pose.tuck * (0.85 - lower_power))
+    upper_inner = line - rise * _bend(inner, upper_power + pose.tuck * (0.85 - upper_power))
+    lower_inner = line + drop * _bend(inner, lower_power + pose.tuck * (0.85 - lower_power))
     thin = 1 - 0.28 * pose.press * (1 - out)
     upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck + 0.2 * out - 0.14 * wide)
     lower = lips.lower * pose.fullness * thin * (1 - 0.5 * pose.tuck + 0.16 * out - 0.16 * wide * (1 - pose.tuck))
@@ -143,14 +143,11 @@ def outline_lips(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
         half_width=half_width,
         inner_half_width=half_width * inner_share,
         corner_y=float(middle + (1 - 0.7 * out) * _LINE[-1][1] + smile + sag),
-        upper_outer=np.minimum(
-            line - rise * _compute_arch(u, follow) - upper * _compute_thickness("upper", u, out), upper_inner
-        ),
+        upper_outer=np.minimum(line - rise * _bend(u, follow) - upper * _thicken("upper", u, out), upper_inner),
         upper_inner=upper_inner,
         lower_inner=lower_inner,
         lower_outer=np.maximum(
-            line + drop * _compute_arch(u, 0.62 - 0.15 * wide) + lower * _compute_thickness("lower", u, out),
-            lower_inner,
+            line + drop * _bend(u, 0.62 - 0.15 * wide) + lower * _thicken("lower", u, out), lower_inner
         ),
         seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press) * thick,
     )
@@ -168,7 +165,7 @@ def outline_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: Lip
     met += max(0.86 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
     top, bottom = _outline_tongue(pose, x, edge, low_lip)
-    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.009 * _compute_arch(x / min(0.09, 0.9 * outlines.inner_half_width), 0.5)
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.009 * _bend(x / min(0.09, 0.9 * outlines.inner_half_width), 0.5)
     cut = outlines.upper_inner, outlines.lower_inner
     return MouthInterior(
         np.clip(upper, cut[0], cut[1]),
@@ -194,13 +191,13 @@ def measure_far_open(pose: MouthPose) -> float:
     return min(max((pose.gap - 0.06 - 0.05 * pose.protrusion) / 0.05, 0), 1)
 
 
-def _compute_thickness(lip: str, u: Heights, out: float) -> Heights:
+def _thicken(lip: str, u: Heights, out: float) -> Heights:
     """Return the thickness of a lip along its half width; rounded lips stay thick towards their corners."""
     round_ = min(1.15 * out, 1)
-    return (1 - round_) * np.interp(u, *_CURVES[lip]) + round_ * _compute_arch(u, 0.5)
+    return (1 - round_) * np.interp(u, *_CURVES[lip]) + round_ * _bend(u, 0.5)
 
 
-def _compute_arch(u: Heights, power: float) -> Heights:
+def _bend(u: Heights, power: float) -> Heights:
     """Return an arch over -1 <= u <= 1: 1 in the middle, 0 at the ends and beyond."""
     return np.maximum(1 - u * u, 0) ** power
 

@@ -126,10 +126,8 @@ class Layer:
             if isinstance(shade, Rim):
                 strength = shade.strength * (1 - _mask(window, outline, shade.radius))
             else:
-                x, y = (
-                    (window.list_columns() - shade.x) / shade.radius_x,
-                    (window.list_rows() - shade.y) / shade.radius_y,
-                )
+                x = (window.list_columns() - shade.x) / shade.radius_x
+                y = (window.list_rows() - shade.y) / shade.radius_y
                 strength = np.asarray(shade.strength * np.exp(-(x[None, :] ** 2) - y[:, None] ** 2), dtype=np.float32)
             paint = paint + strength[..., None] * (np.array(shade.colour, dtype=np.float32) - paint)
         if within is not None:

@@ -58,8 +58,7 @@ class LidPose(NamedTuple):
 class EyePainter:
     """Paints both eyes of a character, with the lids.
 
-    lids : returns what is under the irises, the openings between the lids, and what is over the irises, by the pose of
-           the lids
+    lids : by the pose of the lids: what is under the irises, the openings between the lids, what is over the irises
     """
 
     def __init__(self, design: Design, window: Window) -> None:

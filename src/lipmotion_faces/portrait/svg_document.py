@@ -76,12 +76,12 @@ def flatten_path(text: str, most: int = MAX_POINTS) -> list[tuple[Points, bool]]
             current.append(end)
             start = end if kind == "M" else start
         elif kind == "A":
-            current.extend(_follow_arc(at, end, *numbers[:5]))
+            current.extend(_trace_arc(at, end, *numbers[:5]))
         else:
             smooth = 2 * at - control if before in ("CS" if kind == "S" else "QT") else at
             points = [at, *([smooth] if kind in "ST" else []), *values.reshape(-1, 2)]
             control = points[-2]
-            current.extend(_follow_bezier(points))
+            current.extend(_trace_bezier(points))
         if kind not in "CSQT":
             control = end
         at, before = end, kind
@@ -128,7 +128,7 @@ def _end_of_blanks(text: str, place: int) -> int:
     return match.end() if match else place
 
 
-def _follow_bezier(points: list[Points]) -> list[Points]:
+def _trace_bezier(points: list[Points]) -> list[Points]:
     """Return points along a quadratic or cubic Bézier curve, without its first one."""
     t = np.linspace(0, 1, STEPS + 1)[1:, None]
     levels = [points[k][None] + 0 * t for k in range(len(points))]
@@ -137,7 +137,7 @@ def _follow_bezier(points: list[Points]) -> list[Points]:
     return list(levels[0])
 
 
-def _follow_arc(
+def _trace_arc(
     at: Points, end: Points, rx: float, ry: float, turned: float, large: float, sweep: float
 ) -> list[Points]:
     """Return points along an elliptic arc, without its first one (SVG 1.1, F.6.5)."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh, Texture
-from lipmotion_faces.characters.textures import TextureTable, build_texture_table, decode_srgb
+from lipmotion_faces.characters.textures import TextureTable, decode_srgb, reduce_textures
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.kernels.textured import (
     CLEAR,
@@ -78,7 +78,7 @@ class Canvas:
 
     def __init__(self, camera: Camera, background: Colours | None = None) -> None:
         self.camera = camera
-        self.background = shade_background(camera) if background is None else background
+        self.background = fill_gradient(camera) if background is None else background
         self._tone = make_tone_table()
         level = np.clip(self.background, 0, 1) * np.float32(LEVELS - 1)
         self.empty: NDArray[np.uint8] = self._tone[level.astype(int)]
@@ -111,7 +111,7 @@ class Canvas:
     def cut_out(self, places: Real, colours: Colours, triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
         """Return triangles without background: red, green, blue and straight alpha [shape=(H, W, 4)]."""
         picture = self.draw(places, colours, triangles)
-        alpha = self._measure_coverage(places, np.ones(len(places), bool), triangles)
+        alpha = self._cover(places, np.ones(len(places), bool), triangles)
         return add_alpha(picture, alpha, self._tone)
 
     def mark_shown(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.bool_]:
@@ -120,11 +120,9 @@ class Canvas:
         places : of the vertices in space [shape=(V, 3)];  marked : which of them [shape=(V,)]
         triangles : those that are not marked hide what is behind them [shape=(F, 3)]
         """
-        return self._measure_coverage(places, marked, triangles) > LARGEST_GREY // 2
+        return self._cover(places, marked, triangles) > LARGEST_GREY // 2
 
-    def _measure_coverage(
-        self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]
-    ) -> NDArray[np.uint8]:
+    def _cover(self, places: Real, marked: NDArray[np.bool_], triangles: NDArray[np.int32]) -> NDArray[np.uint8]:
         """Return which part of every pixel shows marked vertices, 0 to 255 [shape=(H, W)]."""
         size = self.camera.height, self.camera.width, 3
         light = np.repeat(marked[:, None], 3, axis=1).astype(np.float32)
@@ -142,13 +140,13 @@ def add_alpha(picture: NDArray[np.uint8], alpha: NDArray[np.uint8], tone: NDArra
     return np.concatenate([picture, alpha[..., None]], axis=2)
 
 
-def fill_background(camera: Camera, colour: tuple[int, int, int]) -> Colours:
+def fill(camera: Camera, colour: tuple[int, int, int]) -> Colours:
     """Return a background of one colour (sRGB, 0 to 255), as parts of ``WHITE`` [shape=(H, W, 3)]."""
     level = np.searchsorted(make_tone_table(), np.array(colour)) / (LEVELS - 1)
     return np.broadcast_to(np.asarray(level, np.float32), (camera.height, camera.width, 3)).copy()
 
 
-def shade_background(
+def fill_gradient(
     camera: Camera,
     middle: tuple[float, float, float] = (0.86, 0.89, 0.9),
     edge: tuple[float, float, float] = (0.56, 0.65, 0.7),
@@ -171,7 +169,7 @@ class TexturedCanvas:
         self.camera, self.surface = camera, surface
         canvas = Canvas(camera, background)
         self._background, self.empty = canvas.background, canvas.empty
-        self._black = fill_background(camera, (0, 0, 0))
+        self._black = fill(camera, (0, 0, 0))
         self._tone = make_tone_table()
 
     def draw(
@@ -259,9 +257,7 @@ def prepare_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float
     for material in materials:
         if material.texture is not None:
             textures.setdefault(material.texture, len(textures))
-    looks = _prepare_triangles(
-        mesh, numbers, part_of[numbers], uv, build_texture_table(list(textures)), textures, pixels_per_unit
-    )
+    looks = _texture(mesh, numbers, part_of[numbers], uv, reduce_textures(list(textures)), textures, pixels_per_unit)
     visible = looks.looks[:, 1] != EMPTY
     looks = looks._replace(uv=looks.uv[visible], looks=looks.looks[visible], alphas=looks.alphas[visible])
     numbers, corners, behind = numbers[visible], corners[visible], behind[visible]
@@ -279,7 +275,7 @@ def prepare_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float
     )
 
 
-def _prepare_triangles(
+def _texture(
     mesh: Mesh,
     numbers: Rows,
     parts: Rows,
@@ -303,7 +299,7 @@ def _prepare_triangles(
         looks[mine] = -1, SOLID
         if material.texture is not None:
             kind = {MASK: CUT, BLEND: CLEAR}.get(material.alpha, SOLID)
-            looks[mine, 0] = table.choose_level(textures[material.texture], in_texture[mine], on_screen[mine])
+            looks[mine, 0] = table.pick(textures[material.texture], in_texture[mine], on_screen[mine])
             alphas[mine] = material.cutoff, 1.0 if kind == SOLID else material.opacity
             if kind != SOLID:
                 halvings = looks[mine, 0] - table.first[textures[material.texture]]

@@ -130,7 +130,7 @@ def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hid
     for way in towards:
         weight = np.maximum(normals @ way + 0.1, 0) * (1.2 + way[1])
         total += weight
-        seen += weight * _measure_visibility(places, hiding, way)
+        seen += weight * _find_visible(places, hiding, way)
     sky = seen / np.maximum(total, 1e-9)
     key = normalise(np.array(KEY.towards))
     around = np.cross(key, [0.0, 1.0, 0.0])
@@ -138,7 +138,7 @@ def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hid
     direct = np.zeros(len(places))
     for n in range(LAMPS):
         radius, turn = 0.22 * np.sqrt((n + 0.5) / LAMPS), 2.39996 * n
-        direct += _measure_visibility(
+        direct += _find_visible(
             places, hiding, normalise(key + radius * (np.cos(turn) * around + np.sin(turn) * above))
         )
     return _smooth(np.stack([sky, direct / LAMPS], axis=1), triangles)
@@ -157,7 +157,7 @@ def _smooth(values: Real, triangles: NDArray[np.int32], times: int = 4) -> Real:
     return values
 
 
-def _measure_visibility(places: Real, hiding: NDArray[np.bool_], way: Real) -> Real:
+def _find_visible(places: Real, hiding: NDArray[np.bool_], way: Real) -> Real:
     """Return how far every vertex can be seen from a direction, 0 to 1 [shape=(V,)]."""
     side = normalise(np.cross(way, [0.31, 0.9, 0.27]))
     flat = np.stack([places @ side, places @ np.cross(side, way)], axis=1) / CELL

@@ -77,8 +77,7 @@ def remove_head_motion(points: Array, layout: Sequence[int]) -> Array:
 
     points, layout : as in ``estimate_head_pose``
     The origin lies between the outer eye corners of the mean face, the unit is their distance, x points to the
-    speaker's left, y up, z out of the face. Every frame is rotated, translated and scaled as a whole, which keeps the
-    motion of speech.
+    speaker's left, y up, z out of the face. Each frame moves as a whole, which keeps the motion of speech.
     """
     return estimate_head_pose(points, layout).to_head_coordinates(points)
 
@@ -106,7 +105,7 @@ def crop_mouth(image: NDArray[np.uint8], to_image: Array) -> NDArray[np.uint8]:
     """Return the mouth picture of one frame: uint8 array [shape=(56, 72, 3)].
 
     image    : uint8 array [shape=(H, W, 3)]
-    to_image : affine map [shape=(2, 3)] of ``map_face_to_image`` or ``map_eyes_to_image``
+    to_image : affine map [shape=(2, 3)] of ``map_face`` or ``map_eyes``
     Pixels outside the image repeat its edge.
     """
     cv2 = import_opencv()
@@ -135,7 +134,7 @@ def map_region_to_image(to_image: Array, samples: int = 1) -> Array:
     return np.concatenate([turn / samples, (to_image[:, 2] - 0.5 + turn @ first)[:, None]], axis=1)
 
 
-def map_face_to_image(points: Array) -> Array:
+def map_face(points: Array) -> Array:
     """Return the affine maps of every frame from the plane of the lips, without head motion, to the image.
 
     points : array [shape=(T, len(TRACKED_POINTS), 3)] of one person, px, x to the right, y down, z away from the camera
@@ -155,8 +154,8 @@ def map_face_to_image(points: Array) -> Array:
     return maps
 
 
-def map_eyes_to_image(eyes: Array) -> Array:
-    """Return the map of ``map_face_to_image`` for one frame [shape=(2, 3)], as if the face turned in its plane only.
+def map_eyes(eyes: Array) -> Array:
+    """Return the map of ``map_face`` for one frame [shape=(2, 3)], as if the face turned in its plane only.
 
     eyes : array [shape=(2, 2)], x and y of the right and left outer eye corner in the image, px, y down
     """

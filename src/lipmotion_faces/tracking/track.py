@@ -27,7 +27,7 @@ from lipmotion_faces.tracking.frames import (
     open_video,
     resample_to_constant_rate,
 )
-from lipmotion_faces.tracking.head_pose import crop_mouth, map_eyes_to_image, map_face_to_image, remove_head_motion
+from lipmotion_faces.tracking.head_pose import crop_mouth, map_eyes, map_face, remove_head_motion
 from lipmotion_faces.tracking.image_similarity import find_occluded_mouths, is_cut, reduce_mouth, reduce_scene
 from lipmotion_faces.tracking.trackers import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, MEDIAPIPE, TRACKED_POINTS
 
@@ -71,10 +71,8 @@ def track(
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the start of the container, or
     of the span, not smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth
     is occluded, are interpolated, False in ``seen``, and have the mouth picture of the nearest frame that is seen. Of
-    several people the largest and most central is followed. ``notes`` reports damage, cuts, other faces, and a face
-    that is very small.
-    Raises InputError: not a video, damaged or cut short before half of it, or the face in too few of the frames; no
-    tracker of that name.
+    several people the largest and most central is followed. ``notes``: damage, cuts, other faces, a very small face.
+    Raises InputError: not a video, damaged, cut short before its half, too few frames with the face; no such tracker.
     Raises MissingDependencyError: MediaPipe, or what another tracker needs, or OpenCV is not installed.
     """
     return make_track(path, span, track_frames(path, span, person, tracker), crops=crops)
@@ -84,7 +82,7 @@ def make_track(path: Path, span: VideoSpan, frames: TrackedFrames, *, crops: boo
     """Return the motion of lips and jaw in tracked frames of a video, as ``track`` does."""
     mouths = None
     if crops:  # decoded once more: the head pose depends on all frames, and the frames do not fit into memory
-        maps = iter(map_face_to_image(frames.points))
+        maps = iter(map_face(frames.points))
         with open_video(path, span) as video:
             shown = zip(frames.seen, video.frames, strict=False)
             mouths = np.stack([crop_mouth(frame.image, next(maps)) for seen, frame in shown if seen])
@@ -161,7 +159,7 @@ class _Pictures:
         self.before = now
         if points is not None:
             self.points.append(points)
-            self.mouths.append(reduce_mouth(crop_mouth(image, map_eyes_to_image(points[_EYES, :2]))))
+            self.mouths.append(reduce_mouth(crop_mouth(image, map_eyes(points[_EYES, :2]))))
 
     def mark_unseen(self, wrong: NDArray[np.bool_]) -> int:
         """Mark some of the frames that show a face as if they did not [shape=(number of them,)]; return how many."""
@@ -314,7 +312,7 @@ class Footage:
     path          : the video
     span          : the part of the video that was tracked
     track         : motion of the lips and jaw, T frames, and which of them are seen; as ``track.track`` finds it
-    face_to_image : affine maps of ``head_pose.map_face_to_image``, from px of the face that looks ahead to
+    face_to_image : affine maps of ``head_pose.map_face``, from px of the face that looks ahead to
                     px of the frame [shape=(T, 2, 3)]; in frames that are not seen, interpolated within their scene
     pictures_s    : time of the picture that frame n shows, the one nearest to its time, s since the start of ``span``
                     [shape=(T,)]; equal times in a row are a picture shown again
@@ -352,7 +350,7 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -
         raise InputError(f"{path}: pictures of {several} pixels in one video; export the video in one size")
     wanted_s = np.arange(frames.count) / frames.rate_hz
     times_s, rate_hz, count = frames.seen_s, frames.rate_hz, frames.count
-    maps = map_face_to_image(frames.points).reshape(-1, 6)
+    maps = map_face(frames.points).reshape(-1, 6)
     result = maps[find_nearest(times_s, np.arange(count) / rate_hz)]  # in scenes in which the person is not seen
     ends = [0, *_list_cut_frames(frames), count]
     for start, stop in pairwise(ends):

@@ -85,10 +85,8 @@ def run_info(options: argparse.Namespace) -> None:
     from lipmotion_faces.corpus.sync import measure_offsets
 
     corpus = Corpus.open(options.corpus)
-    for name, value in (
-        *corpus.summary().items(),
-        *(("offset", line) for line in measure_offsets(corpus).list_lines()),
-    ):
+    offsets = [("offset", line) for line in measure_offsets(corpus).list_lines()]
+    for name, value in (*corpus.summary().items(), *offsets):
         print_line(f"{name:12} {value}")
 
 

@@ -229,8 +229,7 @@ def write_with_alpha(path: Path, frames: Iterable[Frame], *, fps: float, audio: 
 
     frames : RGB or RGBA with straight alpha [shape=(H, W, 3 or 4)], even sizes, at least one; taken one at a time
     After a failure there is no partial file.
-    Raises ExportError: another suffix, no frames, unsuitable frames, no sound, fps not positive, or the file cannot be
-    written.
+    Raises ExportError: another suffix; no or unsuitable frames; no sound; fps not positive; the file cannot be written.
     """
     if path.suffix.lower() not in _CONTAINERS:
         raise ExportError(f"{path}: required one of: {' '.join(_CONTAINERS)}")

@@ -79,7 +79,7 @@ def draw_dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
     legend = "Dot and line: here, with its 95 % interval."
     if any(row.paper is not None for row in rows):
         legend += " Diamond: the paper's own figure, of another speaker and other recordings."
-    return _draw_figure(title, f"{title}: {spoken}", height, parts, legend)
+    return _frame(title, f"{title}: {spoken}", height, parts, legend)
 
 
 def draw_curve(
@@ -103,7 +103,7 @@ def draw_curve(
         points = " ".join(f"{across(t):.1f},{up(v):.1f}" for t, v in zip(time_s, values, strict=True))
         parts.append(element("polyline", points=points, class_=kind))
     spoken = f"{title}: recorded and generated opening of the mouth over {time_s[-1] - time_s[0]:.1f} s"
-    return _draw_figure(title, spoken, CURVE_HEIGHT, parts, title)
+    return _frame(title, spoken, CURVE_HEIGHT, parts, title)
 
 
 def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]]]) -> Html:
@@ -134,12 +134,10 @@ def draw_rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float,
     spoken = "; ".join(
         f"{name}: {', '.join(f'{n:g} {_spell(dot.value)}' for n, dot in line)}" for name, line in lines.items()
     )
-    return _draw_figure(
-        title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals."
-    )
+    return _frame(title, f"{title}: {spoken}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
 
 
-def _draw_figure(title: str, spoken: str, height: int, parts: Sequence[Html], caption: str) -> Html:
+def _frame(title: str, spoken: str, height: int, parts: Sequence[Html], caption: str) -> Html:
     drawing = element(
         "svg",
         element("title", title),

@@ -193,14 +193,12 @@ def write_html(  # noqa: PLR0913
         entries += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
     warning = [element("p", QUICK_WARNING, class_="warning")] if quick else []
     overview = element("ul", *entries, class_="overview")
-    main = element(
-        "main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_write_section, finished)
-    )
+    main = element("main", *warning, overview, element("p", how_to_read, class_="quiet"), *map(_write_part, finished))
     footer = element("footer", element("h2", "The corpus and the run"), _list(about))
     return build_page(title, style, header, main, footer, script=SCRIPT)
 
 
-def _write_section(part: FinishedPart) -> Html:
+def _write_part(part: FinishedPart) -> Html:
     section, heading = part.section, f"{part.name}-heading"
     words = [
         joined(element("h3", title), element("ul", *(element("li", sentence) for sentence in sentences)))

@@ -245,7 +245,7 @@ class PaperOrder:
     form: str
     is_error: bool = False
 
-    def write_verdict(self) -> str:
+    def judge(self) -> str:
         """Return in two sentences whether the paper's order held, and which system is best."""
         signs = [pair.sign for pair in self.pairs]
         held, reverse = signs.count(1), signs.count(-1)
@@ -259,7 +259,7 @@ class PaperOrder:
         here = ", ".join(self._list_best(self.here)) or "none"
         return f"{verdict}. Best in print: {self._list_best(self.paper)[0]}; here: {here}."
 
-    def write_sentences(self) -> list[str]:
+    def describe(self) -> list[str]:
         """Return what held and what did not, sentence by sentence."""
         found = [f"In print: {self._list(self.paper)}.", f"Here: {self._list(self.here)}."]
         best, here = self._list_best(self.paper)[0], self._list_best(self.here)

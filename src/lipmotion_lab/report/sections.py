@@ -88,14 +88,14 @@ def build_hofer_section(figures: Mapping[str, Any]) -> Section:
         f"{figures['split']}.{_describe_closings(figures, next(iter(rows.values())))} "
         f"Channels of motion: {figures['channels'] or 'all'}. Shown first: sound alone, {AS_PRINTED}, {most} states."
     )
-    words = warn_of_few(figures["clips"]) | {"The paper's order": order.write_sentences()}
+    words = warn_of_few(figures["clips"]) | {"The paper's order": order.describe()}
     more = [
-        replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).write_verdict()}")
+        replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).judge()}")
         for block, other in [(block, _build_hofer_table(block)) for block in blocks if block is not main]
     ]
     shown = [f"{units}, {most} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
-    return Section(title, about, order.write_verdict(), words, charts, table, more, shown)
+    return Section(title, about, order.judge(), words, charts, table, more, shown)
 
 
 def _build_hofer_order(block: Mapping[str, Any]) -> PaperOrder:
@@ -208,10 +208,10 @@ def _list_effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
     printed = rows[PRINTED]["acc"]
     described = {name: f"{name} ({format_figure(subtract(rows[name]['acc'], printed), '+.3f')})" for name in signs}
     outcomes = ("ACC is higher", "ACC is lower", "The interval of the difference contains 0")
-    return _group_by_sign(signs, described, outcomes)
+    return _group(signs, described, outcomes)
 
 
-def _group_by_sign(signs: Mapping[str, int], described: Mapping[str, str], outcomes: Sequence[str]) -> list[str]:
+def _group(signs: Mapping[str, int], described: Mapping[str, str], outcomes: Sequence[str]) -> list[str]:
     """Return which differences are positive, negative, and neither for sure, each in a sentence."""
     return [
         f"{what}: {', '.join(described[name] for name, each in signs.items() if each == sign) or 'none'}."
@@ -252,12 +252,9 @@ def build_xie_liu_section(figures: Mapping[str, Any]) -> Section:
         pairs = [pair for pair in size["pairs"] if {pair["better"], pair["worse"]} <= names]
         if pairs:
             by_acc, by_error = (_compare_order(main.rows, pairs, ending, *measure) for measure in MEASURES)
-            words[f"Systems {called}, by ACC"] = [
-                *([by_acc.write_verdict()] if verdict else []),
-                *by_acc.write_sentences(),
-            ]
-            by_amse.append(f"Systems {called}: {by_error.write_verdict()}")
-            verdict = verdict or by_acc.write_verdict()
+            words[f"Systems {called}, by ACC"] = [*([by_acc.judge()] if verdict else []), *by_acc.describe()]
+            by_amse.append(f"Systems {called}: {by_error.judge()}")
+            verdict = verdict or by_acc.judge()
     words["By AMSE"] = by_amse
     if changed := [_describe_options(name, row["options"]) for name, row in size["training"].items() if row["tried"]]:
         words["Settings, the best on val"] = changed
@@ -349,9 +346,7 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
     acc = format_figure(main.rows[best]["acc"], ".3f")
     verdict = f"Most alike to the recordings: {best} (ACC {acc}); nothing is in print to compare."
     outcomes = [f"{what} of the engine {reference}" for what in ENGINES_OUTCOMES]
-    words = warn_of_few(figures["clips"]) | {
-        "ACC of the opening": _group_by_sign(signs, {n: n for n in signs}, outcomes)
-    }
+    words = warn_of_few(figures["clips"]) | {"ACC of the opening": _group(signs, {n: n for n in signs}, outcomes)}
     minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
     about = (
         f"All engines with their defaults, trained on {minutes} minutes, on {figures['clips']} "

@@ -1,4 +1,4 @@
-"""``lipmotion compare``, ``evaluate`` and ``measure_league``: figures of motion, of a model, of rivals."""
+"""``lipmotion compare``, ``evaluate`` and ``run_rivals``: figures of motion, of a model, of rivals."""
 
 from __future__ import annotations
 
@@ -92,15 +92,15 @@ def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 
 
 def run_league(options: argparse.Namespace) -> None:
-    """Call ``measure_league``, write its page, and print its table."""
+    """Call ``run_rivals``, write its page, and print its table."""
     from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora.store import Corpus
     from lipmotion.storage.locks import lock_folder
-    from lipmotion_lab.league import describe_league, measure_league, write_league
+    from lipmotion_lab.league import describe_league, run_rivals, write_league
 
     corpus, choosing = Corpus.open(options.recordings), options.choose and Corpus.open(options.choose)
     with report_progress(options) as report, lock_folder(options.output):
-        found = measure_league(
+        found = run_rivals(
             corpus,
             Path(options.adapters),
             options.output / "work",

@@ -302,7 +302,7 @@ def _measure_size(
     return {
         "used": len(trained.used),
         "training": training,
-        "conditions": {condition: _make_system_rows(recordings, clips, seed) for condition, clips in generated.items()},
+        "conditions": {condition: _make_rows(recordings, clips, seed) for condition, clips in generated.items()},
         "pairs": _compare_paper_pairs(recordings, generated[AUDIO_ONLY], seed),
     }
 
@@ -345,9 +345,7 @@ def _compare_paper_pairs(
     return rows
 
 
-def _make_system_rows(
-    recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int
-) -> dict[str, Any]:
+def _make_rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
     """Return the figures of what all systems generate for the same recordings, and differences from the reference."""
     reference, rows = evaluate.list_statistics(recordings, made[REFERENCE_SYSTEM]), {}
     for system, clips in made.items():

@@ -3,8 +3,7 @@
 Every message is JSON, ``{"call": NAME, "argument": {…}}``, and a page calls the method of that name: ``streamStart``,
 ``streamAudio``, whose ``audio`` is base64 of samples of 16 bits, ``streamInterrupt``.
 Source: TalkingHead 1.7 (npm ``@met4citizen/talkinghead``), appendix G of its README, and ``animFactory``: an animation
-of the type ``blendshapes`` begins at ``delay`` after the sound has begun to play, in ms, and reaches its values ``vs``
-after ``dt``.
+of the type ``blendshapes`` begins ``delay`` ms after the sound has begun, and reaches its values ``vs`` after ``dt``.
 """
 
 from __future__ import annotations

@@ -178,14 +178,12 @@ def open_vtube(to: str, sound: LiveSound) -> Iterator[Consumer]:  # noqa: ARG001
     """
     check_installed(to)
     host, port = read_address(to, PORT)
-    studio = VTubeStudio(
-        f"ws://{f'[{host}]' if ':' in host else host}:{port}", find_cache_folder() / "vtube-studio.token"
-    )
+    studio = VTubeStudio(f"ws://{f'[{host}]' if ':' in host else host}:{port}", find_cache() / "vtube-studio.token")
     with studio.connect():
         yield studio
 
 
-def find_cache_folder() -> Path:
+def find_cache() -> Path:
     """Return the folder of what this user's programs keep, for lipmotion."""
     home = Path.home()
     if sys.platform == "win32":

@@ -26,15 +26,7 @@ from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial, list_ques
 from lipmotion_studio.study.settings import ASKED, POINTS, SCALES
 from lipmotion_studio.study.store import AnswerSheet, StudyStore, name_rater
 from lipmotion_studio.web.listening import read_page
-from lipmotion_studio.web.replies import (
-    ERRORS,
-    FRESH,
-    Guard,
-    SecurityHeaders,
-    find_foreign_refusal,
-    read_json,
-    reply_json,
-)
+from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, read_json, refuse_foreign, reply_json
 
 
 class RateLimit:
@@ -113,8 +105,7 @@ def create_application(
     """Return the application.
 
     names  : by which raters reach the server, besides addresses of numbers and the names of this machine
-    Requests by other names, and of other sites' pages, are refused. Addresses of numbers are not: no other site can let
-    a browser state one.
+    Requests by other names and of other sites' pages are refused; addresses of numbers are not: no site can fake one.
     """
     machine = gethostname().lower()
     known = {"localhost", machine, f"{machine}.local", *(name.lower().partition(":")[0] for name in names)}
@@ -127,7 +118,7 @@ def create_application(
             return False
 
     def find_refusal(_method: str, path: str, _query: bytes, headers: Mapping[str, str]) -> tuple[int, str] | None:
-        return find_foreign_refusal(path, headers, is_own, names)
+        return refuse_foreign(path, headers, is_own, names)
 
     replies = _Replies(study, store)
     page = dict(read_page(files("lipmotion_studio.study") / "page"))

@@ -62,8 +62,7 @@ def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
     """Write the answers of a study as CSV (``write_answers``); return how many there are.
 
     rater : name of the only rater whose answers are written, as the page shows it; None: all raters
-    Raises InputError: as ``collect_answers``, or no answers of this rater. Raises ExportError: the file cannot be
-    written.
+    Raises InputError: as ``collect_answers``; no answers of this rater. Raises ExportError: the file is not written.
     """
     answers = collect_answers(folder)
     if rater is not None:

@@ -68,8 +68,7 @@ class StudyStore:
     process, or the machine, stops the moment after. The raters' tokens are stored as digests.
 
     create : whether to create the database; otherwise a study without answers is an error
-    Raises InputError: no answers yet, answers of another study, or no such database. Raises ExportError: it cannot be
-    opened.
+    Raises InputError: no answers yet, answers of another study, no such database. Raises ExportError: cannot be opened.
     """
 
     def __init__(self, folder: Path, *, create: bool = True) -> None:

@@ -83,7 +83,7 @@ class Guard:
         await self._application(scope, receive, send)
 
 
-def find_foreign_refusal(
+def refuse_foreign(
     path: str, headers: Mapping[str, str], is_own: Callable[[str], bool], names: Container[str] = ()
 ) -> tuple[int, str] | None:
     """Return why a request is refused that another site's page sends, or that came by a foreign name; None: it is not.

@@ -326,9 +326,8 @@ def test_counts_and_shares(tmp_path):
 def test_what_stands_in(tmp_path):
     corpus = corpus_of(tmp_path / "corpus", "pab pab tib")
     lexicon = Lexicon(WORDS.user | {"bad": (("b", "aa", "d"),), "dib": (("d", "iy", "m"),)})
-    phones, diphones, triphones = measure_coverage(
-        corpus, format_moods(tmp_path / "text", "bad dib"), lexicon=lexicon
-    ).kinds
+    text = format_moods(tmp_path / "text", "bad dib")
+    phones, diphones, triphones = measure_coverage(corpus, text, lexicon=lexicon).kinds
     stand_ins = {unit.unit: (unit.stand_in, unit.recorded) for unit in phones.missing}
     assert stand_ins["d"] == ("t", 1)
     assert stand_ins["m"][0] == find_similar_lips("m", {"p", "aa", "b", "t", "iy"}) == "p"

@@ -17,7 +17,7 @@ from lipmotion_faces.film import background
 from lipmotion_faces.film.background import (
     HEAD_PX,
     BackgroundSequence,
-    measure_chin,
+    find_chin,
     open_background,
     open_stored_background,
 )
@@ -370,7 +370,7 @@ def test_the_face_box_holds_the_head_in_every_frame(sequence):
 
 
 def test_the_chin_is_where_the_tracker_sees_it(video):
-    found, drawn = measure_chin(footage_of(video)), toy_chin_px(video.motion)
+    found, drawn = find_chin(footage_of(video)), toy_chin_px(video.motion)
     assert np.abs(found - drawn).max() < 4  # it is smoothed over about a frame
     assert np.corrcoef(found, drawn)[0, 1] > 0.95
 
@@ -390,7 +390,7 @@ def test_frames_of_odd_sizes_are_cut(sequence):
     """H.264 with half the colours takes even sizes only."""
 
     class OddGroups:
-        def frame(self, _: int) -> np.ndarray:
+        def decode(self, _: int) -> np.ndarray:
             return np.zeros((101, 75, 3), np.uint8)
 
     odd = BackgroundSequence(OddGroups, 25.0, sequence.face_to_frame, sequence.chin_px, sequence.usable)  # type: ignore[arg-type]

@@ -22,7 +22,7 @@ from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import measure_prosody
 from lipmotion.types import Audio, Constraints, Generation, Outlook, Span, Speech, Timeline, Unit
 from lipmotion.units import group_words
-from lipmotion_faces.outputs.drawn_video import read_sound_track
+from lipmotion_faces.outputs.drawn_video import load_track
 from lipmotion_faces.registry import stage_face
 from pipeline.made import performed, write_sound
 from testing.toy import ToySentence
@@ -303,7 +303,7 @@ def test_single_pictures_are_those_of_the_video(session, request_):
         shown = performed(session.generate(edits), "portrait", sounded=True, staging=edits.staging())
         performance = replace(shown, sound=request_.recording)
         seen = deliver_to_face(performance.generation, Delivery(), 25.0)
-        stage = stage_face("portrait", edits.staging(), measure_prosody(read_sound_track(performance)))
+        stage = stage_face("portrait", edits.staging(), measure_prosody(load_track(performance)))
         frames = dict(enumerate(islice(stage.render(seen.motion, seen.units, fps=25.0), 26)))
         for number in (25, 3):
             assert np.array_equal(pictures.draw(number / 25, edits), frames[number])

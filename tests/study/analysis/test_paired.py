@@ -25,20 +25,20 @@ def test_a_table_is_counted_right():
         pair_answer(("r1", "s2"), ("a", "b"), True),
         pair_answer(("r2", "s1"), ("b", "a"), True),
     ]
-    table = paired.build_pair_table(answers)
+    table = paired.tabulate_pairs(answers)
     first, second = table.count_wins()
     assert first.tolist() == [[0, 2], [1, 0]]
     assert second.tolist() == [[0, 0], [1, 0]]
     (pair,) = paired.analyse_pairs(table)["pairs"]
     assert (pair["condition"], pair["other"], pair["wins"], pair["answers"]) == ("a", "b", 3, 4)
     assert pair["share"] == pytest.approx(2 / 3)  # of three cells: the one in both orders counts once
-    assert paired.measure_order_agreement(table).tolist() == [[1, 1], [0, 0]]
+    assert paired.compare_orders(table).tolist() == [[1, 1], [0, 0]]
     assert paired.measure_consistency(table) == {"pairs": 1, "consistent": 1, "share": 1.0}
 
 
 def test_answers_survive_the_table():
     table = comparisons(np.random.default_rng(0), np.array([0, 0.5, 1]), (3, 2), USUAL)
-    again = paired.build_pair_table(paired_answers(table))
+    again = paired.tabulate_pairs(paired_answers(table))
     assert again.conditions == table.conditions
     for name in ("shown", "is_first", "rater", "sentence"):
         assert np.array_equal(getattr(again, name), getattr(table, name)), name
@@ -47,7 +47,7 @@ def test_answers_survive_the_table():
 @pytest.mark.parametrize("other", ["a", ""])
 def test_a_pair_has_two_conditions(other):
     with pytest.raises(InputError, match=f"'a' compared with '{other}', required two conditions"):
-        paired.build_pair_table([pair_answer(("r", "s"), ("a", other), True)])
+        paired.tabulate_pairs([pair_answer(("r", "s"), ("a", other), True)])
 
 
 def test_known_preferences_are_found():
@@ -91,7 +91,7 @@ def test_raters_who_prefer_one_side_have_a_share_of_one_half_and_no_interval():
         for s in range(2)
         for shown in (("a", "b"), ("b", "a"))
     ]
-    figures = paired.analyse_pairs(paired.build_pair_table(answers))
+    figures = paired.analyse_pairs(paired.tabulate_pairs(answers))
     (pair,) = figures["pairs"]
     assert pair["share"] == 0.5
     assert np.isnan([pair["low"], pair["high"], pair["p"], pair["p_holm"]]).all()

@@ -16,16 +16,11 @@ from lipmotion_studio.study.analysis.crossed import (
     CONFIDENCE,
     Components,
     analyse_ratings,
-    build_rating_table,
+    average_difference_effects,
     combine_variances,
-    estimate_difference_components,
+    tabulate_ratings,
 )
-from lipmotion_studio.study.analysis.paired import (
-    analyse_pairs,
-    build_pair_table,
-    estimate_share_components,
-    measure_order_agreement,
-)
+from lipmotion_studio.study.analysis.paired import analyse_pairs, average_share_effects, compare_orders, tabulate_pairs
 from lipmotion_studio.study.answers import ANCHOR, FIRST, MOS, PAIRED, RECORDING, Answer, read_answers
 
 MIN_ATTENTION = 2 / 3
@@ -143,7 +138,7 @@ def _check_sides(mine: Sequence[Answer]) -> str:
 
     if not mine:
         return ""
-    alike, pairs = measure_order_agreement(build_pair_table(mine)).sum(axis=0).tolist()
+    alike, pairs = compare_orders(tabulate_pairs(mine)).sum(axis=0).tolist()
     if pairs and bdtr(alike, pairs, 0.5) < MIN_CHANCE:
         return f"{alike} of {pairs} pairs answered alike in both orders"
     return ""
@@ -201,9 +196,7 @@ def compute_power(components: Components, difference: float, raters: int, senten
     return float((ndtr((difference - limit) / truth) + ndtr((-difference - limit) / truth)).mean())
 
 
-def find_raters_needed(
-    components: Components, difference: float, sentences: int, power: float = USUAL_POWER
-) -> int | None:
+def count_raters(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
     """Return the least number of raters that tells a difference; None: ``MAX_RATERS`` do not, for want of sentences."""
     low, high = 1, 2  # the power grows with the raters; one rater is no panel
     while compute_power(components, difference, high, sentences) < power:
@@ -217,22 +210,22 @@ def find_raters_needed(
     return high if high <= MAX_RATERS else None
 
 
-def list_rating_power(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
+def plan_ratings(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
     """Return the raters needed for differences of means of a kind of judgement."""
     if components is None or sentences < 2:
         return []
     differences: Sequence[float] = DIFFERENCES.get(kind, RANK_DIFFERENCES)
-    return [{"difference": d, "raters": find_raters_needed(components, d, sentences, power)} for d in differences]
+    return [{"difference": d, "raters": count_raters(components, d, sentences, power)} for d in differences]
 
 
-def list_share_power(components: Components | None, sentences: int, power: float) -> list[Figures]:
-    """Return the raters needed for preferences; ``components``: of ``paired.estimate_share_components``."""
+def plan_pairs(components: Components | None, sentences: int, power: float) -> list[Figures]:
+    """Return the raters needed for preferences; ``components``: of ``paired.average_share_effects``."""
     if components is None or sentences < 2:
         return []
     rows = []
     for share in SHARES:
         scaled = Components(*(share * (1 - share) * np.array(components)).tolist())
-        rows.append({"share": share, "raters": find_raters_needed(scaled, share - 0.5, sentences, power)})
+        rows.append({"share": share, "raters": count_raters(scaled, share - 0.5, sentences, power)})
     return rows
 
 
@@ -282,8 +275,8 @@ def analyse_study(
     screening = screen(given)
     kept = screening.select_kept(counted)
     plan = (baseline, power, sentences)
-    everybody = _analyse_parts(counted, *plan)
-    screened = everybody if len(kept) == len(counted) else _analyse_parts(kept, *plan)
+    everybody = _list_parts(counted, *plan)
+    screened = everybody if len(kept) == len(counted) else _list_parts(kept, *plan)
     return {
         "answers": len(counted),
         "left_aside": len(given) - len(counted),
@@ -294,21 +287,19 @@ def analyse_study(
     }
 
 
-def _analyse_parts(
-    answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None
-) -> list[Figures]:
+def _list_parts(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> list[Figures]:
     parts = []
     for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
         mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
         if kind == PAIRED:
             figures = _analyse_comparisons(mine, power, sentences)
         else:
-            table = build_rating_table(mine)
-            components, planned = estimate_difference_components(table), sentences or table.values.shape[2]
+            table = tabulate_ratings(mine)
+            components, planned = average_difference_effects(table), sentences or table.values.shape[2]
             figures = analyse_ratings(table, baseline) | {
                 "variance": components._asdict() if components else None,
                 "planned_sentences": planned,
-                "raters_needed": list_rating_power(components, kind, planned, power),
+                "raters_needed": plan_ratings(components, kind, planned, power),
             }
         part: Figures = {"kind": kind, "question": question, "answers": len(mine)}
         part |= {"raters": len({each.rater for each in mine}), "sentences": len({each.sentence for each in mine})}
@@ -321,13 +312,13 @@ def _analyse_comparisons(answers: Sequence[Answer], power: float, sentences: int
     mine = [each for each in answers if ANCHOR not in (each.condition, each.other)]
     if not mine:
         return {"missing": "all comparisons are with the anchor"}
-    table = build_pair_table(mine)
-    components = estimate_share_components(table)
+    table = tabulate_pairs(mine)
+    components = average_share_effects(table)
     planned = sentences or len(table.sentences)
     return analyse_pairs(table) | {
         "variance": components._asdict() if components else None,
         "planned_sentences": planned,
-        "raters_needed": list_share_power(components, planned, power),
+        "raters_needed": plan_pairs(components, planned, power),
     }
 
 
@@ -369,22 +360,12 @@ def _format_ratings(part: Figures, everybody: Figures | None) -> list[str]:
     rows = [["condition", "mean", "95 %", "deviation", f"% over {part['baseline']}", "95 %", "all raters"]]
     for row in part["conditions"]:
         better = relative.get(row["condition"], {"percent": None, "low": None, "high": None})
-        mean = [
-            row["condition"],
-            _format(row["mean"], ".2f"),
-            _format_limits(row, ".2f"),
-            _format(row["deviation"], ".2f"),
-        ]
-        gain = [_format(better["percent"], "+.1f"), _format_limits(better, "+.1f")]
-        rows.append([*mean, *gain, _format(before.get(row["condition"]), ".2f")])
+        mean = [row["condition"], _show(row["mean"], ".2f"), _show_ci(row, ".2f"), _show(row["deviation"], ".2f")]
+        gain = [_show(better["percent"], "+.1f"), _show_ci(better, "+.1f")]
+        rows.append([*mean, *gain, _show(before.get(row["condition"]), ".2f")])
     pairs = [["pair", "difference", "95 %", "p", "p (Holm)"]]
     pairs += [
-        [
-            f"{row['condition']} - {row['other']}",
-            _format(row["difference"], "+.2f"),
-            _format_limits(row, "+.2f"),
-            *_format_tests(row),
-        ]
+        [f"{row['condition']} - {row['other']}", _show(row["difference"], "+.2f"), _show_ci(row, "+.2f"), *_show_p(row)]
         for row in part["pairs"]
     ]
     return [*_align(_without_last(rows, bool(before))), *_format_scope(part["conditions"]), *_align(pairs)]
@@ -397,32 +378,25 @@ def _format_pairs(part: Figures, everybody: Figures | None) -> list[str]:
     before = {(row["condition"], row["other"]): row["share"] for row in everybody.get("pairs", ())} if everybody else {}
     scores = [["condition", "preferred", "share", "95 %"]]
     scores += [
-        [
-            row["condition"],
-            f"{row['wins']} of {row['answers']}",
-            _format(row["share"], ".1%"),
-            _format_limits(row, ".1%"),
-        ]
+        [row["condition"], f"{row['wins']} of {row['answers']}", _show(row["share"], ".1%"), _show_ci(row, ".1%")]
         for row in part["conditions"]
     ]
     pairs = [["pair", "preferred", "share", "95 %", "p", "p (Holm)", "p (binomial)", "all raters"]]
     for row in part["pairs"]:
         name = f"{row['condition']} over {row['other']}"
-        share = [f"{row['wins']} of {row['answers']}", _format(row["share"], ".1%"), _format_limits(row, ".1%")]
-        all_raters = _format(before.get((row["condition"], row["other"])), ".1%")
-        pairs.append([name, *share, *_format_tests(row), _format_p(row["p_binomial"]), all_raters])
+        share = [f"{row['wins']} of {row['answers']}", _show(row["share"], ".1%"), _show_ci(row, ".1%")]
+        all_raters = _show(before.get((row["condition"], row["other"])), ".1%")
+        pairs.append([name, *share, *_show_p(row), _round_p(row["p_binomial"]), all_raters])
     first, both = part["first_preferred"], part["consistency"]
-    orders = f"  the first was preferred in {_format(first['share'], '.1%')} ({_format_limits(first, '.1%')}); "
-    orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_format(both['share'], '.1%')})"
+    orders = f"  the first was preferred in {_show(first['share'], '.1%')} ({_show_ci(first, '.1%')}); "
+    orders += f"{both['consistent']} of {both['pairs']} pairs in both orders alike ({_show(both['share'], '.1%')})"
     lines = [*_align(scores), *_align(_without_last(pairs, bool(before))), *_format_scope(part["pairs"]), orders]
     model = part["bradley_terry"]
     if "missing" in model:
         return [*lines, f"  no Bradley–Terry strengths: {model['missing']}"]
     rows = [["Bradley–Terry", "log odds", "95 %"]]
-    rows += [
-        [row["condition"], _format(row["strength"], "+.2f"), _format_limits(row, "+.2f")] for row in model["conditions"]
-    ]
-    rows.append(["shown first", _format(model["order"]["strength"], "+.2f"), _format_limits(model["order"], "+.2f")])
+    rows += [[row["condition"], _show(row["strength"], "+.2f"), _show_ci(row, "+.2f")] for row in model["conditions"]]
+    rows.append(["shown first", _show(model["order"]["strength"], "+.2f"), _show_ci(model["order"], "+.2f")])
     lines += _align(rows)
     if model["is_shrunk"]:
         lines.append("  a strength would be infinite: half a win was given to both sides of each comparison")
@@ -455,21 +429,21 @@ def _align(rows: Sequence[Sequence[str]]) -> list[str]:
     ]
 
 
-def _format_tests(row: Figures) -> list[str]:
-    return [_format_p(row["p"]), _format_p(row["p_holm"])]
+def _show_p(row: Figures) -> list[str]:
+    return [_round_p(row["p"]), _round_p(row["p_holm"])]
 
 
-def _format_p(p: float | None) -> str:
-    return "<0.001" if p is not None and p < 0.001 else _format(p, ".3f")
+def _round_p(p: float | None) -> str:
+    return "<0.001" if p is not None and p < 0.001 else _show(p, ".3f")
 
 
-def _format_limits(row: Figures, form: str) -> str:
+def _show_ci(row: Figures, form: str) -> str:
     if _is_missing(row["low"]):
         return NO_FIGURE
     return f"{row['low']:{form}} to {row['high']:{form}}"
 
 
-def _format(value: float | None, form: str) -> str:
+def _show(value: float | None, form: str) -> str:
     return NO_FIGURE if value is None or _is_missing(value) else format(value, form)
 
 

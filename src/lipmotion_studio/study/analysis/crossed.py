@@ -1,5 +1,4 @@
-"""The mean of judgements by several raters of several sentences, with an interval that holds for other raters and
-other sentences.
+"""Means of judgements by several raters of several sentences, with intervals for other raters and sentences.
 
 A judgement is the sum of a mean, an effect of the rater, one of the sentence and a rest (two-way random effects). What
 one rater says of six sentences are not six independent judgements, nor are forty raters' words on one sentence forty.
@@ -102,8 +101,7 @@ def estimate_mean(values: Array, width: float) -> CrossedMean:
     width  : of the scale, by which differences are told from rounding
     The variance of the mean is the sum of those of the effects, each estimated by moments and at least 0; degrees of
     freedom by Satterthwaite's approximation, to which an effect that is estimated as 0 does not add. Coverage:
-    docs/study-analysis.md. With one rater, or one sentence, or none that share one, the error is that over sentences,
-    or raters, alone.
+    docs/study-analysis.md. With one rater or sentence, or none that share one, the error is over the others alone.
     Source: Searle, Casella & McCulloch 1992, §4.3 and 5.2 (moments); Gao & Owen 2017 (tables with gaps).
     Deviation: an effect of 0 leaves the degrees of freedom.
     """
@@ -201,12 +199,12 @@ class RatingTable:
         """Return all pairs of conditions without the anchor, in the order of the table."""
         return list(combinations([name for name in self.conditions if name != ANCHOR], 2))
 
-    def compare_conditions(self, condition: str, other: str) -> CrossedMean:
+    def compare(self, condition: str, other: str) -> CrossedMean:
         """Return the mean difference of two conditions, of the same rater on the same sentence."""
         return estimate_mean(self.select_condition(condition) - self.select_condition(other), self.width)
 
 
-def build_rating_table(answers: Sequence[Answer]) -> RatingTable:
+def tabulate_ratings(answers: Sequence[Answer]) -> RatingTable:
     """Return the table of judgements of one kind on one scale; conditions are in alphabetical order."""
     conditions, raters, sentences = (
         sorted({getattr(answer, name) for answer in answers}) for name in ("condition", "rater", "sentence")
@@ -241,7 +239,7 @@ def analyse_ratings(table: RatingTable, baseline: str | None) -> Figures:
         means.append(row)
     base = baseline if baseline in table.conditions else find_lowest(table)
     pairs = table.list_pairs()
-    differences = [table.compare_conditions(*pair) for pair in pairs]
+    differences = [table.compare(*pair) for pair in pairs]
     p_values = [each.p_value for each in differences]
     return {
         "conditions": sorted(means, key=lambda row: -row["mean"]),
@@ -283,9 +281,7 @@ def measure_improvement(table: RatingTable, condition: str, base: str) -> Figure
     return row | {"percent": percent, "low": percent + interval.low, "high": percent + interval.high}
 
 
-def estimate_difference_components(table: RatingTable) -> Components | None:
+def average_difference_effects(table: RatingTable) -> Components | None:
     """Return the mean variances of the effects on differences over all pairs; None: they cannot be told apart."""
-    found = [
-        mean.components for mean in (table.compare_conditions(*pair) for pair in table.list_pairs()) if mean.components
-    ]
+    found = [mean.components for mean in (table.compare(*pair) for pair in table.list_pairs()) if mean.components]
     return Components(*np.mean(found, axis=0).tolist()) if found else None

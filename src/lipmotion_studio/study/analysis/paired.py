@@ -167,7 +167,7 @@ class PairTable:
         return first, second
 
 
-def build_pair_table(answers: Sequence[Answer]) -> PairTable:
+def tabulate_pairs(answers: Sequence[Answer]) -> PairTable:
     """Return the table of answers to paired comparisons. Raises InputError: a condition meets itself, or nothing."""
     for answer in answers:
         if not answer.other or answer.other == answer.condition:
@@ -252,13 +252,13 @@ def compute_binomial_p(wins: int, count: int) -> float:
 
 def measure_consistency(table: PairTable) -> Figures:
     """Return in what share of the pairs that a rater saw in both orders the same condition was preferred twice."""
-    agreed = measure_order_agreement(table)
+    agreed = compare_orders(table)
     count = int(agreed[:, 1].sum())
     share = float(agreed[:, 0].sum() / count) if count else np.nan
     return {"pairs": count, "consistent": int(agreed[:, 0].sum()), "share": share}
 
 
-def measure_order_agreement(table: PairTable) -> Indices:
+def compare_orders(table: PairTable) -> Indices:
     """Return for each rater how many pairs were preferred alike in both orders, and of how many [shape=(R, 2)]."""
     found = np.zeros((len(table.raters), 2), np.intp)
     preferred: dict[tuple[int, int, int, int], bool] = {}
@@ -305,7 +305,7 @@ def analyse_strengths(table: PairTable) -> Figures:
     }
 
 
-def estimate_share_components(table: PairTable) -> crossed.Components | None:
+def average_share_effects(table: PairTable) -> crossed.Components | None:
     """Return the mean variances of effects on shares, by that of one answer; None: they cannot be told apart."""
     found = []
     for _, _, cells in _pair_cells(table):
