@@ -67,7 +67,7 @@ Curve = NDArray[np.float64]
 
 UNSCALED_GAP = 0.03
 """Lips that have just parted by less than this, in eye distances, move less than in proportion to the intensity."""
-GROWING = ("protrusion", "spread")
+INTENSIFIED = ("protrusion", "spread")
 """The articulatory channels that grow with the intensity; the others state what touches what."""
 POSE_CHANNELS = ("opening", "width", "outer")
 """The channels that decide where held poses begin, where the motion has them."""
@@ -141,14 +141,14 @@ def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Un
 
 
 def intensify(generation: Generation, intensity: float | Curve, opening: Curve | None = None) -> Generation:
-    """Return a generation with movements away from the rest pose so many times as large.
+    """Return a generation whose movements away from the rest pose are ``intensity`` times as large.
 
-    intensity : of all frames, or of each [shape=(T,)]; frames of 1 stay as they are
-    opening : how far the lips are apart in every frame [shape=(T,)]; None: the channel ``opening``
-    In every frame the whole face moves by one factor, so that distances and points agree. It is 1 where the lips touch,
-    or are no further apart than at rest (silence, p b m), and the intensity where they are open; openings beyond the
-    largest of the motion approach twice that. Weights stay between 0 and 1.
-    Without an opening the factor is the intensity everywhere.
+    intensity : one number, or one for each frame [shape=(T,)]; frames of 1 do not change
+    opening   : distance of the lips in every frame [shape=(T,)]; None: the channel ``opening``
+    Each frame has one factor for the whole face, so that distances and points agree. The factor is the intensity where
+    the mouth is open, and 1 where the lips touch or are as close as at rest (silence, p b m); without an opening it is
+    the intensity everywhere. Openings beyond the largest of the motion approach twice that. Weights stay between 0
+    and 1.
     """
     motion = generation.motion
     factor = intensity = np.broadcast_to(np.asarray(intensity, np.float64), len(motion.values))
@@ -169,7 +169,7 @@ def intensify(generation: Generation, intensity: float | Curve, opening: Curve |
     values = motion.values.copy()
     for column, channel in enumerate(motion.channels):  # by columns: hours of all channels would not fit twice
         curve = values[:, column].astype(np.float64)
-        if channel.name in GROWING:
+        if channel.name in INTENSIFIED:
             curve = 1 - np.clip(1 - curve, 0, 1) ** np.sqrt(intensity)
         elif channel.name not in ARTICULATORY and not is_mood(channel.name):
             still = np.median(curve[rest])
@@ -180,7 +180,7 @@ def intensify(generation: Generation, intensity: float | Curve, opening: Curve |
     return replace(generation, motion=replace(motion, values=values), spread=spread)
 
 
-ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", "oval", *GROWING, *EDITED.values())
+ARTICULATORY = ("tongue", "lip_tuck", "lip_press", "teeth", "oval", *INTENSIFIED, *EDITED.values())
 """Channels that are not movements away from a rest pose (docs/articulation.md)."""
 
 

@@ -245,14 +245,14 @@ def add_outputs(parser: argparse.ArgumentParser, files: str, *, required: bool =
 
 def add_detail(parser: argparse.ArgumentParser) -> None:
     """Add ``--detail``: options of a level of detail. What the command line says is ahead of them."""
-    told = "film: all; game, mobile: fewer frames, keys and curves (docs/controls.md#levels-of-detail)"
-    parser.add_argument("--detail", choices=tuple(DETAILS), action=_Detail, help=told)
+    text = "film: all; game, mobile: fewer frames, keys and curves (docs/controls.md#levels-of-detail)"
+    parser.add_argument("--detail", choices=tuple(DETAILS), action=_Detail, help=text)
 
 
 def add_job_file(parser: argparse.ArgumentParser) -> None:
     """Add ``--job``: options from a file. What the command line says is ahead of it."""
-    told = "options from a TOML file; those that are given here are ahead of it (docs/api.md)"
-    add_input(parser, "--job", what="job file", action=_JobFile, metavar="FILE.toml", help=told)
+    text = "options from a TOML file; those that are given here are ahead of it (docs/api.md)"
+    add_input(parser, "--job", what="job file", action=_JobFile, metavar="FILE.toml", help=text)
     parser.set_defaults(start=Job())
 
 
@@ -297,24 +297,24 @@ def _name(each: Field[Any]) -> str:
 
 
 def _add(parser: argparse.ArgumentParser, flags: tuple[str, ...], each: Field[Any], changes: Mapping[str, Any]) -> None:
-    told, kind = each.metadata, kind_of(each)
+    about, kind = each.metadata, kind_of(each)
     how: dict[str, Any] = {"default": each.default, "type": kind}
-    how |= {name: told[name] for name in ("help", "metavar") if name in told}
-    if told["rule"].choices:
-        how["choices"] = told["rule"].choices
-    if "still" in told:
+    how |= {name: about[name] for name in ("help", "metavar") if name in about}
+    if about["rule"].choices:
+        how["choices"] = about["rule"].choices
+    if "still" in about:
         how |= {"default": "", "type": str}
     elif kind is bool:
-        how = {"action": "store_true", "help": told["help"]}
-    elif kind is tuple and "writes" in told:
+        how = {"action": "store_true", "help": about["help"]}
+    elif kind is tuple and "writes" in about:
         how |= {"type": str, "nargs": "+", "action": _Collected}
     elif kind is tuple:
         how["type"] = _listed
     how |= changes
-    if "reads" in told:
-        of_input = {name: told[name] for name in ("replaceable", "default_path") if name in told}
-        add_input(parser, *flags, what=told["reads"], **of_input, **how)
-    elif "writes" in told:
+    if "reads" in about:
+        of_input = {name: about[name] for name in ("replaceable", "default_path") if name in about}
+        add_input(parser, *flags, what=about["reads"], **of_input, **how)
+    elif "writes" in about:
         add_output(parser, *flags, force="-o" in flags, **how)
     else:
         parser.add_argument(*flags, **how)

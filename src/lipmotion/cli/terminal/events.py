@@ -199,8 +199,8 @@ class RhubarbStatus(Events):
 
 def create_events(words: Sequence[str]) -> Events:
     """Return the events that a command line asks for, before it is parsed: parsing errors are events, too."""
-    asked = any(len(word) > 2 and option.startswith(word) for option in OPTIONS for word in words)
+    requested = any(len(word) > 2 and option.startswith(word) for option in OPTIONS for word in words)
     verb = next((word for word in words if not word.startswith("-")), "")
-    if asked and verb in STATUS_VERBS:
+    if requested and verb in STATUS_VERBS:
         return RhubarbStatus()
-    return JsonLines() if asked and verb in LINES_VERBS else Events()
+    return JsonLines() if requested and verb in LINES_VERBS else Events()

@@ -64,8 +64,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     files = "FILE.tsv .xml .json .dat .pgo .spine.json, or several; FOLDER/"
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
     kinds = ("tsv", "xml", "json", "dat", "pgo", "spine.json")
-    told = "(default: that of the suffix; tsv on standard output and in a folder)"
-    add("-f", "--format", "--exportFormat", type=str.lower, choices=kinds, help=told)
+    text = "(default: that of the suffix; tsv on standard output and in a folder)"
+    add("-f", "--format", "--exportFormat", type=str.lower, choices=kinds, help=text)
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
     add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
     add("--shapes", default="GHX", help="optional shapes that the character has (default: GHX; none: '')")
@@ -76,14 +76,14 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add = group.add_argument
     unset: dict[str, Any] = {"default": argparse.SUPPRESS}
     add("-d", "--dialogFile", metavar="FILE", dest="transcript", type=_dialogue, help="--transcript FILE", **unset)
-    told = "--recogniser: pocketSphinx is auto, phonetic is fast"
+    text = "--recogniser: pocketSphinx is auto, phonetic is fast"
     recognisers = "pocketSphinx|phonetic"
-    add("-r", "--recognizer", metavar=recognisers, dest="recogniser", type=_recogniser, help=told, **unset)
+    add("-r", "--recognizer", metavar=recognisers, dest="recogniser", type=_recogniser, help=text, **unset)
     add("--extendedShapes", metavar="GHX", dest="shapes", help="--shapes", **unset)
-    told = "--fps, for every format; in .dat shapes have their letters then"
-    add("--datFrameRate", metavar="FPS", dest="fps", action=_DatFrameRate, type=float, help=told, **unset)
-    told = "Preston Blair's names in .dat, as without --datFrameRate"
-    add("--datUsePrestonBlair", action="store_true", dest="blair", help=told)
+    text = "--fps, for every format; in .dat shapes have their letters then"
+    add("--datFrameRate", metavar="FPS", dest="fps", action=_DatFrameRate, type=float, help=text, **unset)
+    text = "Preston Blair's names in .dat, as without --datFrameRate"
+    add("--datUsePrestonBlair", action="store_true", dest="blair", help=text)
     add_output(parser, "--logFile", metavar="FILE", dest="log_file", help="a file for warnings and errors")
     level: dict[str, Any] = {"type": str.lower, "choices": tuple(LEVELS), "metavar": "LEVEL"}
     add("--logLevel", dest="log_level", default="debug", help=f"of --logFile, from: {', '.join(LEVELS)}", **level)
@@ -108,13 +108,13 @@ def run(options: argparse.Namespace) -> None:
         if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
             options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
         check_paths(options)  # in a folder it may be a file that is read
-        delivery, asked = pick_part(options, Delivery()), pick_part(options, Request(), recording=speech)
+        delivery, requested = pick_part(options, Delivery()), pick_part(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, speech, options.format)
         set_progress(0.0)
-        request, model = read_request(asked), load_model(asked.model)
+        request, model = read_request(requested), load_model(requested.model)
         set_progress(0.1)
-        edits = edit_file(asked.edits)
+        edits = edit_file(requested.edits)
         result = animate(request, model=model, edits=edits)
         delivery = edits.edits.delivery(delivery)
         set_progress(0.9)

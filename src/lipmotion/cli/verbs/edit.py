@@ -37,8 +37,8 @@ def run(options: argparse.Namespace) -> None:
             raise InputError(f"{options.file}: no such file; begin one: lipmotion edit {options.file} --of RECORDING")
         if options.of is not None and options.file.exists():
             raise InputError(f"{options.file}: exists; add edits without --of, or delete it to begin again")
-        asked = pick_part(options, Request(), recording=options.of)
-        file = create_edit_file(asked)[0] if options.of is not None else read_edits(options.file)
+        requested = pick_part(options, Request(), recording=options.of)
+        file = create_edit_file(requested)[0] if options.of is not None else read_edits(options.file)
         after = file.undo(options.undo).then(*options.sentences)
         session, edits = file.session(), after.edits
         units = session.generate(edits).units if edits.steps else session.units()

@@ -36,8 +36,8 @@ def run(options: argparse.Namespace) -> None:
     )
     from lipmotion.pipeline.model import load_model
 
-    asked = pick_part(options, Request())
-    request, model = read_request(asked), load_model(asked.model)
+    requested = pick_part(options, Request())
+    request, model = read_request(requested), load_model(requested.model)
     if options.at is not None:
         explanations = explain(request, at=options.at, model=model)
         documents, text = map(write_document, explanations), "\n\n".join(map(write_explanation, explanations))
