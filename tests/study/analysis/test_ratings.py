@@ -55,10 +55,8 @@ def test_answers_survive_the_table():
     again = tabulate_ratings(rated_answers(table))
     assert again.conditions == table.conditions
     assert np.array_equal(again.values, table.values)
-    assert (
-        tabulate_ratings(rated_answers(ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), RANKS))).scale
-        == RANKS
-    )
+    ranked = ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), RANKS)
+    assert tabulate_ratings(rated_answers(ranked)).scale == RANKS
 
 
 def test_known_means_are_found():
