@@ -110,9 +110,9 @@ class StoredVideo:
 
     def __post_init__(self) -> None:
         with format_errors("the stored video", _REMEDY):
-            found = len(self._layout[0]) - 1
-            if found != self.count or not 1 <= self.count <= MAX_FRAMES:
-                raise ValueError(f"{found} frames, required {self.count}, at least 1 and at most {MAX_FRAMES}")
+            count = len(self._layout[0]) - 1
+            if count != self.count or not 1 <= self.count <= MAX_FRAMES:
+                raise ValueError(f"{count} frames, required {self.count}, at least 1 and at most {MAX_FRAMES}")
 
     def __len__(self) -> int:
         return self.count

@@ -151,7 +151,7 @@ def compare_engines(
         }
         for name, each in trained.items()
     }
-    conditions = {name: {"systems": _make_rows(recordings, found, settings.seed)} for name, found in made.items()}
+    conditions = {name: {"systems": _make_rows(recordings, systems, settings.seed)} for name, systems in made.items()}
     return replace_nan(about | {"conditions": conditions})
 
 

@@ -540,11 +540,11 @@ PART, INSTANTS, SHOWN_S = "league", 6, 6.0
 """Folder of the report; pictures of each system, and the length of what is shown."""
 
 
-def describe_league(found: League) -> Section:
+def describe_league(league: League) -> Section:
     """Return what is said of a league: its table, against the best rival, and what was found."""
     rows: dict[str, dict[str, Any]] = {}
-    best = found.best_rival
-    for each in found.standings:
+    best = league.best_rival
+    for each in league.standings:
         row: dict[str, Any] = {"given": each.rival.given}
         for name, figure in each.figures.items():
             row |= {name: figure.value, f"{name}_95": figure.compute_interval(0)}
@@ -552,59 +552,59 @@ def describe_league(found: League) -> Section:
                 row[f"{name}_gain_95"] = figure.compute_gain(best.figures[name], 0)
         rows[each.rival.title] = replace_nan(row)
     verdict = "nothing could be compared"
-    if found.standings:
-        first = found.standings[0]
+    if league.standings:
+        first = league.standings[0]
         verdict = f"Best: {first.rival.title}, opening {first.figures['acc'].value:.3f}"
         if best is not None and best is not first:
             low, high = first.figures["acc"].compute_gain(best.figures["acc"], 0)
             verdict += f"; {low:+.3f} to {high:+.3f} more than the best rival, {best.rival.title}"
-    lips = int(sum(counts[:2].sum() for counts in found.standings[0].figures["lips"].sums)) if found.standings else 0
-    about = ", ".join(f"{key}: {value}" for key, value in found.about.items())
+    lips = int(sum(counts[:2].sum() for counts in league.standings[0].figures["lips"].sums)) if league.standings else 0
+    about = ", ".join(f"{key}: {value}" for key, value in league.about.items())
     table = Table("standings", f"recorded closings in p, b, m: {lips}", COLUMNS, rows, best.rival.title if best else "")
-    words = warn_of_few(len(found.recordings))
-    for title, reasons in (("Not installed", found.absent), ("Failed", found.failed)):
+    words = warn_of_few(len(league.recordings))
+    for title, reasons in (("Not installed", league.absent), ("Failed", league.failed)):
         words |= {title: [f"{name}: {reason}" for name, reason in reasons.items()]} if reasons else {}
     return Section("The league", about, verdict, words, (), table, shown=list(rows))
 
 
-def write_league(found: League, folder: Path) -> dict[str, Any]:
+def write_league(league: League, folder: Path) -> dict[str, Any]:
     """Write the page of a league, with its pictures and all figures, to a folder; return the figures."""
-    section, motion, part = describe_league(found), _choose_excerpt(found), folder / PART
-    names = [each.utterance.name for each in found.recordings]
-    accs = {each.rival.title: [acc for acc, _ in each.figures["acc"].sums] for each in found.standings}
-    figures: dict[str, Any] = {"about": found.about, "best_rival": section.table.reference or None}
-    figures |= {"rivals": section.table.rows, "absent": found.absent, "failed": found.failed}
-    figures["chosen"] = {each.rival.title: each.chosen for each in found.standings}
+    section, motion, part = describe_league(league), _choose_excerpt(league), folder / PART
+    names = [each.utterance.name for each in league.recordings]
+    accs = {each.rival.title: [acc for acc, _ in each.figures["acc"].sums] for each in league.standings}
+    figures: dict[str, Any] = {"about": league.about, "best_rival": section.table.reference or None}
+    figures |= {"rivals": section.table.rows, "absent": league.absent, "failed": league.failed}
+    figures["chosen"] = {each.rival.title: each.chosen for each in league.standings}
     figures["each"] = {title: dict(zip(names, of, strict=True)) for title, of in accs.items()}
     figures = replace_nan(figures)
     section.write_tables(part / "tables")
     write_text(part / "figures.json", as_json(figures) + "\n")
-    record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": found.about}
+    record = {"pictures": list(_draw_mouths(motion, part)) if motion else [], "videos": [], "stamp": league.about}
     finished = [FinishedPart(PART, record, motion, section)]
     page = write_html(
-        "The league", found.about, finished, found.absent, found.failed, subtitle=SUBTITLE, how_to_read=HOW_TO_READ
+        "The league", league.about, finished, league.absent, league.failed, subtitle=SUBTITLE, how_to_read=HOW_TO_READ
     )
     write_text(folder / "index.html", page)
     return figures
 
 
-def _choose_excerpt(found: League) -> dict[str, Any]:
+def _choose_excerpt(league: League) -> dict[str, Any]:
     """Return what systems do in the seconds that have most p, b and m, as the page of a report shows it."""
-    if not found.standings:
+    if not league.standings:
         return {}
 
     def count_lips(n: int, start_s: float) -> int:
-        spans = found.recordings[n].list_spans(lips=True)
+        spans = league.recordings[n].list_spans(lips=True)
         return sum(start_s <= start and end <= start_s + SHOWN_S for start, end in spans)
 
     begins = [
-        (n, s) for n, r in enumerate(found.recordings) for s in [0.0, *(span[0] for span in r.list_spans(lips=True))]
+        (n, s) for n, r in enumerate(league.recordings) for s in [0.0, *(span[0] for span in r.list_spans(lips=True))]
     ]
     number, begin_s = max(begins, key=lambda each: count_lips(*each))
-    recording = found.recordings[number]
+    recording = league.recordings[number]
     seen = (recording.time_s >= begin_s) & (recording.time_s < begin_s + SHOWN_S)
     spoken = [s for s in recording.phones if s[2] and s[1] > begin_s and s[0] < begin_s + SHOWN_S]
-    systems = {each.rival.title: each.made[number][seen] for each in found.standings}
+    systems = {each.rival.title: each.made[number][seen] for each in league.standings}
     utterance = recording.utterance
     about = {"name": utterance.name, "words": list(utterance.words or ()), "channels": list(CHANNELS)}
     recorded = {"spoken": spoken, "time_s": recording.time_s[seen], RECORDED: recording.original[seen]}

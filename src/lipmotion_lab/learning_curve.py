@@ -58,17 +58,17 @@ def run_learning_curve(
     kept = runner.open_parts(work, corpus, settings, key)
     rows, parts = [], runner.share_out(settings, [f"{count} clips" for count in steps], sizes=steps)
     for count, part in zip(steps, parts, strict=True):
-        found = kept.load(str(count))
-        if found is None:
+        arrays = kept.load(str(count))
+        if arrays is None:
             result = runner.train_and_generate(corpus, listed[:count], held_out, channels, part, work)
             row = {"names": count} | _make_row(corpus, result, settings.seed)
             if rival:
                 row[BLSTM] = _compare_network(corpus, result, validation, part)
             for condition, clips in result.clips.items():
                 settings.receive(f"{count} recordings", condition, result.recordings, clips)
-            found = {_ROW: np.array(json.dumps([result.recordings.closed_under, row]))}
-            kept.save(str(count), found)
-        closed_under, row = json.loads(str(found[_ROW]))
+            arrays = {_ROW: np.array(json.dumps([result.recordings.closed_under, row]))}
+            kept.save(str(count), arrays)
+        closed_under, row = json.loads(str(arrays[_ROW]))
         rows.append(row)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "closed_under": closed_under}

@@ -137,14 +137,14 @@ def list_rows(*, guided: bool = True) -> dict[str, SelectionConfig]:
     guided : with the rows whose models learn from the sound, a guide or phones of the speaker's own
     """
     printed = SelectionConfig.parsed(MINNIS_2000)
-    found = {PRINTED: printed} | {
+    configurations = {PRINTED: printed} | {
         name: replace(printed, **{key: getattr(SelectionConfig(), key) for key in keys})
         for name, keys in ADDITIONS.items()
     }
-    found |= {name: replace(printed, **changes) for name, changes in VARIANTS.items()}
+    configurations |= {name: replace(printed, **changes) for name, changes in VARIANTS.items()}
     everything = SelectionConfig(closures=False)
-    found |= {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
-    return {name: each for name, each in found.items() if guided or not (each.guide or each.joint_recogniser)}
+    configurations |= {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
+    return {name: each for name, each in configurations.items() if guided or not (each.guide or each.joint_recogniser)}
 
 
 @limit_threads()
@@ -183,11 +183,11 @@ def run_minnis2000(
         trained = EngineModel(model, perf_counter() - start_s)
     else:
         trained = train_engines(corpus, kept_in, training, [ENGINE])[ENGINE]
-    found = {}
+    figures = {}
     for (split, names), part in zip(lists.items(), runner.share_out(settings, [*lists], 0.6), strict=True):
         key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(list_rows(guided=guided)))
         kept = runner.open_parts(work and work / split, corpus, settings, key)
-        found[split] = _measure_list(corpus, names, trained.model, list_rows(guided=guided), kept, part)
+        figures[split] = _measure_list(corpus, names, trained.model, list_rows(guided=guided), kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
     printed = vars(SelectionConfig.parsed(MINNIS_2000))
@@ -195,7 +195,7 @@ def run_minnis2000(
         name: {key: value for key, value in vars(config).items() if value != printed[key]}
         for name, config in list_rows(guided=guided).items()
     }
-    return replace_nan(about | {"lists": found})
+    return replace_nan(about | {"lists": figures})
 
 
 def _measure_list(
@@ -230,8 +230,8 @@ def _measure_list(
 
     for name, config in with_progress(list(systems.items()), "comparing", sub_monitor(settings.monitor, 0.4, 1)):
         learned = _simplify_model(model.learned, config)
-        for condition, found in conditions.items():
-            stage = f"{len(found)} {condition}"
+        for condition, rows in conditions.items():
+            stage = f"{len(rows)} {condition}"
             arrays = kept.load(stage)
             if arrays is None:
                 engine = SelectionEngine(config)
@@ -262,7 +262,7 @@ def _measure_list(
                 arrays = {_ROW: np.array(json.dumps(row)), _SUMS: sums[0], _OVERLAP: sums[1]}
                 kept.save(stage, arrays)
             reference.setdefault(condition, (arrays[_SUMS], arrays[_OVERLAP]))
-            found[name] = json.loads(str(arrays[_ROW]))
+            rows[name] = json.loads(str(arrays[_ROW]))
     return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}
 
 

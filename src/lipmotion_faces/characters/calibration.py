@@ -112,8 +112,8 @@ def list_pose_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) ->
     motion = Motion(np.stack([opening, width], axis=1), RATE_HZ, (Channel("opening"), Channel("width")))
     units, frames = Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
     if isinstance(curves, Path):
-        found = make_rig_sources(motion, units, rows)
-        return {name: curve[frames].tolist() for name, curve in found.items()}
+        sources = make_rig_sources(motion, units, rows)
+        return {name: curve[frames].tolist() for name, curve in sources.items()}
     if curves.shapes is None:
         raise InputError("the character is moved by control points, which have no weights to calibrate")
     solved = solve_shape_weights(motion, units, curves.shapes)

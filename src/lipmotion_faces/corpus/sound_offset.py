@@ -59,8 +59,8 @@ class SoundMark:
 
 def find_marks(audio: Audio) -> tuple[SoundMark, ...]:
     """Return the claps and beeps of a recording, by time; there may be none, or sounds that only resemble them."""
-    found = [*_find_claps(audio), *_find_beeps(audio)]
-    return tuple(sorted(found, key=lambda mark: mark.time_s))
+    marks = [*_find_claps(audio), *_find_beeps(audio)]
+    return tuple(sorted(marks, key=lambda mark: mark.time_s))
 
 
 def _find_claps(audio: Audio) -> list[SoundMark]:

@@ -43,8 +43,7 @@ MIN_CONTRAST = 20.0
 """Mouths with less contrast than this have none: of noise nothing can be compared."""
 UNLIKE, REPAIR = 2.5, 4.5
 """A mouth is unlike all others at this multiple of the median of one less the best correlation; it is smeared, if the
-next one is not, and is lower by the second multiple (GRID s1: 7 clips of 524, each repaired at a key picture of the
-original)."""
+next one is not, and is lower by the second multiple (GRID s1: 7 clips of 524, each repaired at a key picture)."""
 MIN_USUAL = 0.01
 """Smallest median that counts: in footage of a still mouth it is 0."""
 MIN_SMEARED = 2
@@ -114,8 +113,8 @@ def find_damaged(
         padded = np.pad(sharp, BLUR_FRAMES // 2, "edge")
         steady = np.median(np.lib.stride_tricks.sliding_window_view(padded, BLUR_FRAMES), axis=-1)
         dark, blurred = lights < DARKNESS * light, steady < SHARPNESS * sharpness
-        found = {"dark": dark, "blurred": blurred, "smeared": _find_smeared(values / usual)}
-        result.append({kind: mask & which for kind, which in found.items()})
+        masks = {"dark": dark, "blurred": blurred, "smeared": _find_smeared(values / usual)}
+        result.append({kind: mask & which for kind, which in masks.items()})
     return result
 
 

@@ -184,8 +184,8 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
     times_s, cuts = np.array(pictures.times_s), tuple(follower.list_cuts())
     rate_hz = find_nominal_rate(times_s, video.stated_rates_hz)
     repeated, frozen = damaged_pictures.find_repeated(pictures.changes, rate_hz)
-    found = np.array(pictures.seen)
-    pictures.mark_unseen(repeated[found])
+    has_face = np.array(pictures.seen)
+    pictures.mark_unseen(repeated[has_face])
     notes = (
         *damage_notes(video, times_s, rate_hz),
         *(f"cut at {times_s[index]:.2f} s" for index in cuts),
@@ -199,7 +199,7 @@ def track_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: 
         if unit_px < SMALL_EYES_PX:
             wanted = f"{SMALL_EYES_PX:.0f} give a good track; film closer"
             notes = (*notes, f"the face is small: {unit_px:.0f} px between the eyes, {wanted}")
-    _check(path, times_s, found & ~frozen, video, rate_hz, notes)
+    _check(path, times_s, has_face & ~frozen, video, rate_hz, notes)
     return TrackedFrames(
         times_s, np.array(pictures.seen), np.stack(pictures.points), frozenset(pictures.sizes), cuts, rate_hz, notes
     )

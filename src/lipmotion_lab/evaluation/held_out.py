@@ -138,12 +138,12 @@ def load_held_out(  # noqa: PLR0913
         tracks = [utterance.track for utterance in training or utterances]
         threshold = find_threshold([np.asarray(each.motion[OPENING], float)[np.asarray(each.seen)] for each in tracks])
     recognised = with_progress(utterances, "phones: recognition", sub_monitor(monitor, 0.4, 0.9))
-    found = [phones.recognition(utterance.audio, utterance.features) for utterance in recognised]
-    conditions = {AUDIO_ONLY: [each.units for each in found]}
+    recognitions = [phones.recognition(utterance.audio, utterance.features) for utterance in recognised]
+    conditions = {AUDIO_ONLY: [each.units for each in recognitions]}
     if all(utterance.words or utterance.phones for utterance in utterances):
         conditions[WITH_TRANSCRIPT] = reference
     return HeldOutRecordings(
-        utterances, compared, still, threshold, reference, conditions, phones, found, eigenlips, prior, speakers
+        utterances, compared, still, threshold, reference, conditions, phones, recognitions, eigenlips, prior, speakers
     )
 
 
@@ -187,9 +187,9 @@ def make_speech(
         used: list[Recognition] = []  # what was recognised, if the engine needs it
         if condition == AUDIO_ONLY:
 
-            def recognise(found: Recognition = recognition, used: list[Recognition] = used) -> Recognition:
-                used.append(found)
-                return found
+            def recognise(result: Recognition = recognition, used: list[Recognition] = used) -> Recognition:
+                used.append(result)
+                return result
 
             plain = recognise_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
         else:

@@ -103,13 +103,13 @@ def write_videos(
 
     utterance = corpus.utterance(content["name"])
     samples = resample_poly(np.asarray(utterance.audio.samples, np.float32), SOUND_HZ, utterance.audio.rate_hz)
-    sound, found = Audio(samples.astype(np.float32), SOUND_HZ), []
+    sound, videos = Audio(samples.astype(np.float32), SOUND_HZ), []
     crops = utterance.track.crops
     if crops is not None and len(crops):
         size = (MOUTH_SCALE * crops.shape[2], MOUTH_SCALE * crops.shape[1])
         enlarged = (np.asarray(Image.fromarray(np.asarray(crop)).resize(size, Resampling.BICUBIC)) for crop in crops)
         write_mp4(folder / "mouth.mp4", enlarged, fps=utterance.track.motion.rate_hz, audio=sound)
-        found.append({"file": "mouth.mp4", "caption": "the recording itself: the mouth as filmed"})
+        videos.append({"file": "mouth.mp4", "caption": "the recording itself: the mouth as filmed"})
     shown = {RECORDED: content[RECORDED]}
     shown |= {name: content["systems"][name] for name in systems if name in content["systems"]}
     # No shape of a phone is drawn, the motion alone is shown: the face is given the silence around the phones.
@@ -124,8 +124,8 @@ def write_videos(
         file = f"{number}.mp4"
         frames = draw_mouths(np.stack(columns, axis=1), content["channels"], silence)
         write_mp4(folder / file, frames, fps=FPS, audio=sound)
-        found.append({"file": file, "caption": "a drawn face, recorded motion" if name == RECORDED else name})
-    return found
+        videos.append({"file": file, "caption": "a drawn face, recorded motion" if name == RECORDED else name})
+    return videos
 
 
 def draw_mouths(

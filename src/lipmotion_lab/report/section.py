@@ -261,13 +261,13 @@ class PaperOrder:
 
     def describe(self) -> list[str]:
         """Return what held and what did not, sentence by sentence."""
-        found = [f"In print: {self._list(self.paper)}.", f"Here: {self._list(self.here)}."]
+        sentences = [f"In print: {self._list(self.paper)}.", f"Here: {self._list(self.here)}."]
         best, here = self._list_best(self.paper)[0], self._list_best(self.here)
         pair = next((each for each in self.pairs if here and {each.better, each.worse} == {best, here[0]}), None)
         if best not in here and pair is not None and pair.difference is not None:
             low, high = pair.interval
             lies = "" if low is None or high is None else f", 95 % interval {low:{self.form}} to {high:{self.form}}"
-            found.append(
+            sentences.append(
                 f"The paper's best is {-pair.difference:{self.form.replace('+', '')}} behind the best here: {best} "
                 f"against {here[0]} {pair.difference:{self.form}}{lies}, where print has it above 0."
             )
@@ -284,13 +284,13 @@ class PaperOrder:
             if pairs:
                 joint = "over" if sign else "and"
                 names = "; ".join(f"{first} {joint} {', '.join(others)}" for first, others in grouped.items())
-                found.append(f"{what} ({len(pairs)} of {len(self.pairs)} pairs): {names}.")
+                sentences.append(f"{what} ({len(pairs)} of {len(self.pairs)} pairs): {names}.")
         agreeing = sum((pair.difference or 0) > 0 for pair in self.pairs)
-        found.append(
+        sentences.append(
             f"Intervals aside, {agreeing} of {len(self.pairs)} differences have the paper's sign. Of {len(self.pairs)} "
             f"intervals about {CHANCE * len(self.pairs):.1f} would leave out 0 by chance if nothing differed."
         )
-        return found
+        return sentences
 
     def _list(self, values: Mapping[str, float | None]) -> str:
         """Return names with their values, from the best to the worst; those without a value are left out."""

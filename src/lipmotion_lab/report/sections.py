@@ -152,8 +152,8 @@ MINNIS_COLUMNS = (
 def build_minnis_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``run_minnis2000`` say, on the last of its lists, which is ``test``."""
     tables: dict[tuple[str, str], Table] = {}
-    for split, found in figures["lists"].items():
-        for condition, rows in found["conditions"].items():
+    for split, part in figures["lists"].items():
+        for condition, rows in part["conditions"].items():
             name, caption = f"minnis2000-{split}-{condition}", f"Unit selection, {split}, {condition}"
             with_joins = {}
             for system, row in rows.items():
@@ -336,9 +336,9 @@ def build_engines_section(figures: Mapping[str, Any]) -> Section:
         condition: {
             name: {**row, "acc_gain_95": row["acc_gain_95"].get(reference)}
             | {f"unpinned_{key}": value for key, value in row["unpinned"].items()}
-            for name, row in found["systems"].items()
+            for name, row in case["systems"].items()
         }
-        for condition, found in figures["conditions"].items()
+        for condition, case in figures["conditions"].items()
     }
     main, *more = _make_tables("engines", "Engines", ENGINES_COLUMNS, conditions, reference)
     signs = {name: find_sign(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}

@@ -277,17 +277,17 @@ def run_all(options: argparse.Namespace) -> None:
     with report_progress(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
         settings = ExperimentSettings(lexicon=lexicon, workers=count_workers(options), monitor=report.receive)
-        found = write_report(
+        result = write_report(
             Corpus.open(options.corpus), options.output, only=options.only, quick=options.quick, settings=settings
         )
-        lines = [f"{name}: {verdict}" for name, verdict in found.verdicts.items()]
-        lines += [f"{name}: {reason}" for name, reason in found.left_out.items()]
-        lines += [f"{name}: failed: {describe_error(error)}" for name, error in found.failed.items()]
-        is_done = not (found.made or found.failed)
-        lines.append(f"{'nothing was left to do; ' if is_done else ''}report: {found.page}")
-        figures: dict[str, Any] = {"report": str(found.page), "verdicts": dict(found.verdicts)}
-        figures |= {"left_out": dict(found.left_out), "made": list(found.made)}
-        if not (found.failed and options.machine_readable):  # the last event is that of the failure
+        lines = [f"{name}: {verdict}" for name, verdict in result.verdicts.items()]
+        lines += [f"{name}: {reason}" for name, reason in result.left_out.items()]
+        lines += [f"{name}: failed: {describe_error(error)}" for name, error in result.failed.items()]
+        is_done = not (result.made or result.failed)
+        lines.append(f"{'nothing was left to do; ' if is_done else ''}report: {result.page}")
+        figures: dict[str, Any] = {"report": str(result.page), "verdicts": dict(result.verdicts)}
+        figures |= {"left_out": dict(result.left_out), "made": list(result.made)}
+        if not (result.failed and options.machine_readable):  # the last event is that of the failure
             report.finish("\n".join(map(printable, lines)), **figures)
-        if found.failed:
-            raise next(iter(found.failed.values()))
+        if result.failed:
+            raise next(iter(result.failed.values()))

@@ -100,7 +100,7 @@ def run_league(options: argparse.Namespace) -> None:
 
     corpus, choosing = Corpus.open(options.recordings), options.choose and Corpus.open(options.choose)
     with report_progress(options) as report, lock_folder(options.output):
-        found = run_rivals(
+        league = run_rivals(
             corpus,
             Path(options.adapters),
             options.output / "work",
@@ -110,5 +110,5 @@ def run_league(options: argparse.Namespace) -> None:
             limit_s=options.limit,
             monitor=report.receive,
         )
-        figures = write_league(found, options.output)
-        report.finish(describe_league(found).as_text(), figures=figures)
+        figures = write_league(league, options.output)
+        report.finish(describe_league(league).as_text(), figures=figures)

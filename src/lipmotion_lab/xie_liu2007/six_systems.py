@@ -240,17 +240,17 @@ class _TrainingSetup:
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
             part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here
-            found = kept.load(f"system-{name}") if chains else None
-            if found is not None:
-                trained[name] = system_from_arrays(found)
+            arrays = kept.load(f"system-{name}") if chains else None
+            if arrays is not None:
+                trained[name] = system_from_arrays(arrays)
                 continue
             known = [*with_inputs_of(name, examples, self.corpus)]
             known += others if COMPARED_SYSTEMS[name].second_stage else []
             trained[name] = train_system(name, known, recordings.get("val"), trained, self.options.mixtures, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
-                found = system_to_arrays(trained[name])
-                kept.save(f"system-{name}", found)
-                trained[name] = system_from_arrays(found)
+                arrays = system_to_arrays(trained[name])
+                kept.save(f"system-{name}", arrays)
+                trained[name] = system_from_arrays(arrays)
         return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
 
     def _prepare(
@@ -313,11 +313,11 @@ def _generate(
     made = {}
     for name, system in systems.items():
         stage = f"{condition}-{name}"
-        found = kept.load(stage)
-        if found is None:
-            found = runner.clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
-            kept.save(stage, found)
-        made[name] = runner.clips_from_arrays(found)
+        arrays = kept.load(stage)
+        if arrays is None:
+            arrays = runner.clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
+            kept.save(stage, arrays)
+        made[name] = runner.clips_from_arrays(arrays)
     return made
 
 

@@ -94,9 +94,10 @@ def measure_clips(made: Sequence[ComparedClip]) -> tuple[float, float]:
 def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, monitor: Monitor) -> TrainedSystem:
     """Return the BLSTM whose learning rate, then cells, then steps are the best on validation recordings."""
     hearing: Animator[Any] = BlstmBaseline()
-    speech, found = held_out.make_speech(validation, AUDIO_ONLY, hearing, None), list[tuple[Trial, TrainedSystem]]()
+    speech = held_out.make_speech(validation, AUDIO_ONLY, hearing, None)
+    candidates: list[tuple[Trial, TrainedSystem]] = []
     for kind in NETWORK_SETTINGS:
-        best = find_best_trial([trial for trial, _ in found]).options if found else {}
+        best = find_best_trial([trial for trial, _ in candidates]).options if candidates else {}
         for change in kind:
             options = {**best, **change}
             start_s, engine = process_time(), BlstmBaseline(**options)
@@ -104,24 +105,24 @@ def tune_network(examples: Sequence[Example], validation: HeldOutRecordings, mon
             size = sum(array.size for array in model.learned.network.parameters)
             made = held_out.generate_compared(validation, speech, engine, model)
             trial = Trial(options, *measure_clips(made), size)
-            found.append((trial, TrainedSystem(engine, model, process_time() - start_s)))
-    return choose_best(found)
+            candidates.append((trial, TrainedSystem(engine, model, process_time() - start_s)))
+    return choose_best(candidates)
 
 
-def split_while_better(found: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
+def split_while_better(candidates: Iterable[tuple[Trial, TrainedSystem]]) -> Iterator[tuple[Trial, TrainedSystem]]:
     """Yield systems of 1, 2, 4, … Gaussians, up to the first that is no better than that before it."""
     best = -np.inf
-    for trial, system in found:
+    for trial, system in candidates:
         yield trial, system
         if trial.acc <= best:
             return
         best = trial.acc
 
 
-def choose_best(found: Sequence[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
+def choose_best(candidates: Sequence[tuple[Trial, TrainedSystem]]) -> TrainedSystem:
     """Return the system of the highest ACC; of equals the first; with all trials."""
-    _, best = max(found, key=lambda pair: pair[0].acc)
-    return replace(best, tried=tuple(trial for trial, _ in found))
+    _, best = max(candidates, key=lambda pair: pair[0].acc)
+    return replace(best, tried=tuple(trial for trial, _ in candidates))
 
 
 def as_row(trial: Trial) -> dict[str, Any]:
@@ -258,11 +259,11 @@ def train_system(
         start_s, engine = process_time(), system.make()
         return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
     if system.splits and validation is not None:
-        found: list[tuple[Trial, TrainedSystem]] = []
+        candidates: list[tuple[Trial, TrainedSystem]] = []
         for more in [{"visual_mixtures": mixtures}, {}][: 1 if system.options["structure"] == HMM else 2]:
             grown = train_stages({**system.options, "mixtures": mixtures, **more}, examples, monitor)
-            found += split_while_better(judge_systems(grown, validation))
-        return choose_best(found)
+            candidates += split_while_better(judge_systems(grown, validation))
+        return choose_best(candidates)
     *_, last = train_stages(system.options, examples, monitor)
     return last
 

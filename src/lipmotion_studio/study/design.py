@@ -58,21 +58,21 @@ Condition = Callable[[StudySentence, Path], MadeVideo]
 
 def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
     """Return the sentences of files and folders by name. Raises InputError: none, or two of one name."""
-    found = [StudySentence(path.stem, path) for path in list_recordings(given)]
-    if not found:
+    sentences = [StudySentence(path.stem, path) for path in list_recordings(given)]
+    if not sentences:
         raise InputError("no sentences; give recordings: --sentence FILE|FOLDER")
-    names = [sentence.name for sentence in found]
-    for sentence in found:
+    names = [sentence.name for sentence in sentences]
+    for sentence in sentences:
         if names.count(sentence.name) > 1:
             raise InputError(f"{sentence.recording}: two sentences are called {sentence.name!r}; rename one file")
         if not sentence.recording.is_file():
             raise InputError(f"{sentence.recording}: no such file; give the recording of a sentence")
-    return found
+    return sentences
 
 
 def parse_conditions(given: Sequence[str]) -> dict[str, str]:
     """Return the sources of conditions by name. Raises InputError: another form, a name that is taken, or under two."""
-    found: dict[str, str] = {}
+    sources: dict[str, str] = {}
     for text in given:
         name, equals, source = text.partition("=")
         name, source = name.strip(), source.strip()
@@ -82,12 +82,12 @@ def parse_conditions(given: Sequence[str]) -> dict[str, str]:
             raise InputError(f"the condition {text!r}, required NAME=SOURCE, or {RECORDING}")
         elif name in (ANCHOR, RECORDING) or source == RECORDING:
             raise InputError(f"the condition {text!r}: the recordings themselves are called {RECORDING!r}, no other")
-        if name in found:
+        if name in sources:
             raise InputError(f"two conditions are called {name!r}; give them different names")
-        found[name] = source
-    if len(found) < 2:
-        raise InputError(f"{len(found)} condition, required at least 2: --condition NAME=SOURCE, or {RECORDING}")
-    return found
+        sources[name] = source
+    if len(sources) < 2:
+        raise InputError(f"{len(sources)} condition, required at least 2: --condition NAME=SOURCE, or {RECORDING}")
+    return sources
 
 
 def make_condition(source: str, sentences: Sequence[StudySentence], drawn: Job) -> Condition:

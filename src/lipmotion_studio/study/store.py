@@ -135,13 +135,13 @@ class StudyStore:
 
     def list_sheets(self) -> list[AnswerSheet]:
         """Return all answers, in the order of raters and trials."""
-        found: dict[tuple[int, int], list[tuple[str, float, int]]] = {}
+        answers: dict[tuple[int, int], list[tuple[str, float, int]]] = {}
         order = "SELECT rater, trial, value, seconds, plays FROM answers ORDER BY rater, trial, item"
         for rater, trial, *rest in self._reader.execute(order):
-            found.setdefault((rater, trial), []).append((rest[0], rest[1], rest[2]))
+            answers.setdefault((rater, trial), []).append((rest[0], rest[1], rest[2]))
         return [
             AnswerSheet(rater, trial, tuple(value for value, _, _ in rows), rows[0][1], rows[0][2])
-            for (rater, trial), rows in found.items()
+            for (rater, trial), rows in answers.items()
         ]
 
     def forget(self, rater: int) -> int:

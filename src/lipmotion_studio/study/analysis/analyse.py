@@ -92,7 +92,7 @@ def screen(answers: Sequence[Answer]) -> Screening:
         (checks if answer.expected else judged)[answer.rater].append(answer)
     fast = _find_fast(select_counting(real))
     usual = float(np.median([len(mine) for mine in judged.values()])) if raters else 0.0
-    found: dict[str, dict[str, str]] = {}
+    reasons: dict[str, dict[str, str]] = {}
     for rater, mine in judged.items():
         right, shown = sum(each.value == each.expected for each in checks[rater]), len(checks[rater])
         texts = {
@@ -104,8 +104,8 @@ def screen(answers: Sequence[Answer]) -> Screening:
             "answers": f"{len(mine)} of usually {usual:g}" if len(mine) < MIN_ANSWERS * usual else "",
         }
         if any(texts.values()):
-            found[rater] = {rule: text for rule, text in texts.items() if text}
-    return Screening(tuple(raters), found)
+            reasons[rater] = {rule: text for rule, text in texts.items() if text}
+    return Screening(tuple(raters), reasons)
 
 
 def _check_values(mine: Sequence[Answer]) -> str:
@@ -150,7 +150,7 @@ def _find_fast(answers: Sequence[Answer]) -> dict[str, str]:
     logs: dict[tuple[str, str], list[float]] = {}
     for each in timed:
         logs.setdefault((each.kind, each.question), []).append(float(np.log(each.seconds)))
-    usual = {question: float(np.median(found)) for question, found in logs.items()}
+    usual = {question: float(np.median(values)) for question, values in logs.items()}
     by_rater: dict[str, list[float]] = {}
     for each in timed:
         by_rater.setdefault(each.rater, []).append(float(np.log(each.seconds)) - usual[each.kind, each.question])
@@ -189,8 +189,8 @@ def compute_power(components: Components, difference: float, raters: int, senten
     free = raters - 1, sentences - 1, (raters - 1) * (sentences - 1)
     of_rater, of_sentence, of_rest = np.random.default_rng(SEED).chisquare(free, (DRAWS, 3)).T / np.array(free)[:, None]
     noise = rest * of_rest
-    found = [np.maximum((part + rest) * draw - noise, 0) for part, draw in ((rater, of_rater), (sentence, of_sentence))]
-    variance, degrees = combine_variances(found[0], found[1], noise, free)
+    parts = [np.maximum((part + rest) * draw - noise, 0) for part, draw in ((rater, of_rater), (sentence, of_sentence))]
+    variance, degrees = combine_variances(parts[0], parts[1], noise, free)
     limit = stdtrit(np.minimum(degrees, MAX_DEGREES), (1 + CONFIDENCE) / 2) * np.sqrt(variance)
     truth = np.sqrt(rater + sentence + rest)
     return float((ndtr((difference - limit) / truth) + ndtr((-difference - limit) / truth)).mean())
@@ -406,8 +406,8 @@ def _format_pairs(part: Figures, everybody: Figures | None) -> list[str]:
 def _format_scope(rows: Sequence[Figures]) -> list[str]:
     """Return what the intervals are over, where it is not raters and sentences."""
     scopes = sorted({row["over"] for row in rows} - {BOTH})
-    found = [row for row in rows if row["over"] in scopes]
-    named = [f"{row['condition']}–{row['other']}" if "other" in row else row["condition"] for row in found]
+    limited = [row for row in rows if row["over"] in scopes]
+    named = [f"{row['condition']}–{row['other']}" if "other" in row else row["condition"] for row in limited]
     return [f"  intervals over {' / '.join(scopes)} only: {', '.join(named)}"] if scopes else []
 
 

@@ -163,11 +163,11 @@ def _compute_error(variance: float, width: float) -> float:
 
 def correct_p_values(p_values: list[float]) -> list[float]:
     """Return p-values corrected for their number (Holm 1979); NaN ones stay so, and do not count."""
-    found = sorted((value, place) for place, value in enumerate(p_values) if not np.isnan(value))
-    corrected, least = list(p_values), 0.0
-    for rank, (value, place) in enumerate(found):
-        least = max(least, min(1.0, (len(found) - rank) * value))
-        corrected[place] = least
+    ranked = sorted((value, place) for place, value in enumerate(p_values) if not np.isnan(value))
+    corrected, floor = list(p_values), 0.0
+    for rank, (value, place) in enumerate(ranked):
+        floor = max(floor, min(1.0, (len(ranked) - rank) * value))
+        corrected[place] = floor
     return corrected
 
 
@@ -283,5 +283,5 @@ def measure_improvement(table: RatingTable, condition: str, base: str) -> Figure
 
 def average_difference_effects(table: RatingTable) -> Components | None:
     """Return the mean variances of the effects on differences over all pairs; None: they cannot be told apart."""
-    found = [mean.components for mean in (table.compare(*pair) for pair in table.list_pairs()) if mean.components]
-    return Components(*np.mean(found, axis=0).tolist()) if found else None
+    components = [mean.components for mean in (table.compare(*pair) for pair in table.list_pairs()) if mean.components]
+    return Components(*np.mean(components, axis=0).tolist()) if components else None

@@ -94,8 +94,8 @@ def _has_maximum(first_wins: crossed.Array, second_wins: crossed.Array, has_orde
     rows += (-_build_contrasts(np.argwhere(second_wins > 0), len(first_wins))).tolist()
     contrasts = np.array(rows)
     contrasts[:, -1] *= has_order
-    found = linprog(-contrasts.sum(axis=0), A_ub=-contrasts, b_ub=np.zeros(len(rows)), bounds=(-1, 1), method="highs")
-    return bool(-found.fun < 1e-7)
+    best = linprog(-contrasts.sum(axis=0), A_ub=-contrasts, b_ub=np.zeros(len(rows)), bounds=(-1, 1), method="highs")
+    return bool(-best.fun < 1e-7)
 
 
 def _build_contrasts(pairs: NDArray[np.intp], count: int) -> crossed.Array:
@@ -260,7 +260,7 @@ def measure_consistency(table: PairTable) -> Figures:
 
 def compare_orders(table: PairTable) -> Indices:
     """Return for each rater how many pairs were preferred alike in both orders, and of how many [shape=(R, 2)]."""
-    found = np.zeros((len(table.raters), 2), np.intp)
+    counts = np.zeros((len(table.raters), 2), np.intp)
     preferred: dict[tuple[int, int, int, int], bool] = {}
     columns = table.rater, table.sentence, *table.shown.T, table.is_first
     for rater, sentence, first, second, is_first in zip(*(column.tolist() for column in columns), strict=True):
@@ -268,8 +268,8 @@ def compare_orders(table: PairTable) -> Indices:
     for (rater, sentence, first, second), is_first in preferred.items():
         turned = preferred.get((rater, sentence, second, first))
         if first < second and turned is not None:
-            found[rater] += (is_first != turned, 1)
-    return found
+            counts[rater] += (is_first != turned, 1)
+    return counts
 
 
 def analyse_strengths(table: PairTable) -> Figures:
@@ -307,19 +307,19 @@ def analyse_strengths(table: PairTable) -> Figures:
 
 def average_share_effects(table: PairTable) -> crossed.Components | None:
     """Return the mean variances of effects on shares, by that of one answer; None: they cannot be told apart."""
-    found = []
+    components = []
     for _, _, cells in _pair_cells(table):
         share = crossed.estimate_mean(cells, 1.0)
         if share.components and share.error > 0:
-            found.append(np.array(share.components) / (share.mean * (1 - share.mean)))
-    return crossed.Components(*np.mean(found, axis=0).tolist()) if found else None
+            components.append(np.array(share.components) / (share.mean * (1 - share.mean)))
+    return crossed.Components(*np.mean(components, axis=0).tolist()) if components else None
 
 
 def _pair_cells(table: PairTable) -> list[tuple[int, int, crossed.Array]]:
     """Return all pairs that were compared, and the share of the first for each rater and sentence."""
-    found = []
+    cells = []
     for i, j in combinations(range(len(table.conditions)), 2):
         chosen = table.mark_between(i, j)
         if chosen.any():
-            found.append((i, j, table.average_cells(table.is_preferred(i).astype(float), chosen)))
-    return found
+            cells.append((i, j, table.average_cells(table.is_preferred(i).astype(float), chosen)))
+    return cells
