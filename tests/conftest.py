@@ -33,6 +33,7 @@ from testing.toy_face import toy_face
 
 if sys.platform == "linux":  # arrays of a megabyte go back to the system when they are freed: a worker runs 2,000 tests
     ctypes.CDLL(None).mallopt(-3, 1 << 20)  # M_MMAP_THRESHOLD
+    ctypes.CDLL(None).mallopt(-8, 1)  # M_ARENA_MAX: threads share what is free
 SENTENCES = 12
 MAX_HEARD = 40
 """Sounds whose posteriors are kept: those of the toy, and some before."""
@@ -52,7 +53,7 @@ settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100
 settings.load_profile(FIXED)
 
 ENOUGH_STEPS = posterior_network.STEPS / 3
-HASTY = {"cli", "docs", "experiments", "training"}
+HASTY = {"cli", "docs", "experiments", "pipeline", "training"}
 """Folders of tests whose networks are trained for a few steps, and whose intervals are of a few draws."""
 MEASURED_S = pytest.StashKey[float]()
 """Processor time of these tests, and of all processes that they waited for, when it was last looked at."""

@@ -1,5 +1,7 @@
 import json
 
+import pytest
+
 from cli.conftest import check_refused
 from lipmotion import compare, evaluate, load_model
 
@@ -37,6 +39,7 @@ def test_a_league_without_adapters_says_where_they_are(run, toy_corpus):
     check_refused(run("league", str(toy_corpus.path), "-o", "report", "--adapters", "nowhere"), 3, "extras/league")
 
 
+@pytest.mark.long
 def test_the_figures_of_a_model_are_those_of_the_function(run, toy_corpus, toy_model_file, here):
     done = run("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json")
     assert (done.code, done.err) == (0, [])

@@ -8,6 +8,7 @@ from children import run_child
 
 resource = pytest.importorskip("resource")
 LIMIT = 3000
+pytestmark = pytest.mark.long
 
 
 def run_limited(*arguments: object, limit: int = LIMIT) -> tuple[int, str]:

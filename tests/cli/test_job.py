@@ -185,6 +185,7 @@ def speech(toy_speech: Path, tmp_path: Path) -> Path:
     return tmp_path / "speech.wav"
 
 
+@pytest.mark.long
 def test_what_is_edited_is_replayed_by_all_verbs(run, speech, toy_model_file, tmp_path):
     """The same bytes, from the recording and from the file alone."""
     file = tmp_path / "a.edits.json"

@@ -21,6 +21,7 @@ from studio.toy_recordings import SENTENCES, write_recordings
 from testing.toy import toy_sentences
 
 
+@pytest.mark.long
 def test_a_model_and_what_it_was_made_of(run, toy_corpus, here):
     done = run("train", toy_corpus.path, "-o", "mine.lipmotion")
     use = "use it: lipmotion animate SPEECH -o FILE --model mine.lipmotion"
@@ -182,6 +183,7 @@ def test_sync(run, toy_corpus, here):
     assert is_one_error(run("corpus", "sync", "missing"), 4)
 
 
+@pytest.mark.long
 def test_prepare_prints_the_counts(run, here):
     """What was prepared is kept, and what cannot be used is skipped."""
     recordings = write_recordings(here / "recordings")

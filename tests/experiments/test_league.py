@@ -70,6 +70,7 @@ def does(*what: str, **more: Any) -> dict[str, Any]:
     return {"settings": {"does": list(what)}, **more}
 
 
+@pytest.mark.long
 def test_the_best_settings_map_and_lag_are_chosen_on_other_recordings(adapters, toy_corpus, tmp_path):
     late = {"settings": {"does": ["noise", "told"], "late": [0.08]}, "given": "phones"}
     rows = {"late": late, "noise": does("noise"), "ours": does("follows", ours=True)}

@@ -141,6 +141,10 @@ def test_a_drawing_has_limits_as_a_whole():
             parse_drawing(svg(inside))
     with pytest.raises(InputError, match="not an SVG"):
         parse_drawing(b"<!DOCTYPE svg " * 300_000)
+
+
+@pytest.mark.long
+def test_a_drawing_has_so_many_points():
     line = '<path d="M0 0' + "h0" * 399_970 + '"/>'
     assert len(parse_drawing(svg(line)).shapes) == 1
     for more in ('<path d="M0 0a1 1 0 011 1"/>', '<path d="M0 0' + "z" * 80 + '"/>', '<circle r="1"/>'):

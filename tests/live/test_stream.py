@@ -258,12 +258,13 @@ def test_what_is_told_wrongly_is_refused_and_forgotten_at_an_interruption(sound:
 
 
 def test_eyes_and_head_move_by_themselves() -> None:
-    minute = np.zeros(16_000 * 60, np.float32)
-    frames, same, mouth_alone = (Stream(seed=seed).push(minute) for seed in (3, 3, None))
-    assert np.array_equal(values_of(frames), values_of(same))
+    silence = np.zeros(16_000 * 30, np.float32)
+    frames = Stream(seed=3).push(silence)
+    same, mouth_alone = (Stream(seed=seed).push(silence[:48_000]) for seed in (3, None))
+    assert np.array_equal(values_of(frames[: len(same)]), values_of(same))
     lids = np.array([frame["eyeBlinkLeft"] for frame in frames])
     blinks = int(((lids[1:] > 0.5) & (lids[:-1] <= 0.5)).sum())
-    assert 8 <= blinks <= 40
+    assert 4 <= blinks <= 20
     yaw = np.array([frame["headYaw"] for frame in frames])
     assert 0.003 < yaw.std() < 0.1
     assert np.abs(np.diff(yaw)).max() < 0.01
@@ -271,7 +272,7 @@ def test_eyes_and_head_move_by_themselves() -> None:
     assert "eyeBlinkLeft" not in mouth_alone[0].weights
     stream = Stream()
     stream.look_at(0.5)
-    turned = stream.push(minute[:48_000])[-1]
+    turned = stream.push(silence[:48_000])[-1]
     assert 0.2 < turned["headYaw"] < 0.5
     assert turned["eyeLookOutLeft"] > 0.05
     with pytest.raises(InputError, match="required at most 1"):

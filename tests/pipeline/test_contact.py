@@ -286,6 +286,7 @@ def show(generation: Generation, character: Any) -> dict[str, Rows]:
     return rows
 
 
+@pytest.mark.long
 def test_what_is_held_or_locked_stays_on_all_faces(session: Session, spoken: Edits, character: Any):
     plain, held = (show(session.generate(each), character) for each in (spoken, spoken.then(HOLD)))
     for name, rows in held.items():
@@ -307,6 +308,7 @@ def test_a_hold_is_left_no_faster_than_lips_move(session: Session, spoken: Edits
     assert np.abs(np.diff(left[after : after + 15])).max() < 1.2 * LIP_SPEED / 100
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sentence", ["pin opening 0.1 at 1.1", "draw opening 0.1 0.1 from 1.05 to 1.15"])
 def test_what_is_pinned_or_drawn_is_shown_in_every_phone(session, spoken, character, sentence):
     for phone in "m w f th".split():
@@ -318,6 +320,7 @@ def test_what_is_pinned_or_drawn_is_shown_in_every_phone(session, spoken, charac
         assert shown["arkit"][110] @ arkit_mouth().gap == pytest.approx(wanted, abs=1e-2), phone
 
 
+@pytest.mark.long
 def test_a_pin_of_any_curve_shows_on_every_face(session: Session, spoken: Edits, character: Any):
     plain = show(session.generate(spoken), character)
     for sentence, sign in (("pin jawOpen 0.8 at 1.1", 1), ("pin viseme_aa 1 at 1.1", 1), ("pin aa 1 at 1.1", 1)):

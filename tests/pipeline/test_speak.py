@@ -1,3 +1,4 @@
+import shutil
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,7 +10,7 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate import speak as module
 from lipmotion.pipeline.generate.speak import REST_S, speak_from_corpus
-from lipmotion.speech.voices.installed import choose_voice, list_installed
+from lipmotion.speech.voices.installed import choose_voice
 from lipmotion.types import Span, SpokenText, Unit
 from lipmotion.units import LIP_CLOSING, Lexicon, is_silent
 from pipeline.made import corpus_of
@@ -97,7 +98,7 @@ def test_neighbouring_silences_are_one_and_short_ones_are_pauses():
     ]  # fmt: skip
 
 
-@pytest.mark.skipif(not list_installed(), reason="no synthesiser is installed")
+@pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
 def test_a_real_voice_closes_the_lips_in_time():
     spoken = speak("Please bring my mother the blue ball.", voice=choose_voice(), model=load_model())
     opening = spoken.generation.motion["opening"]
@@ -134,6 +135,7 @@ def test_a_recorded_sentence_is_said_by_its_recording(toy_corpus, selection_mode
     assert len(generation.motion.values) == pytest.approx(sound.duration_s * 100, abs=2)
 
 
+@pytest.mark.long
 def test_sound_and_motion_are_in_step(toy_corpus, selection_model):
     sound, generation = speak_from_corpus("Mama now, see papa.", toy_corpus, selection_model)
     opening = generation.motion["opening"]
@@ -149,6 +151,7 @@ def test_sound_and_motion_are_in_step(toy_corpus, selection_model):
     assert generation.units[0].end_s <= REST_S + 1e-6
 
 
+@pytest.mark.long
 def test_sources_are_the_recordings_whose_sound_is_joined(toy_corpus, selection_model):
     sound, generation = speak_from_corpus("baby blue", toy_corpus, selection_model)
     found = []
@@ -173,11 +176,13 @@ def test_a_model_without_recordings_is_refused(toy_corpus, toy_model):
         speak_from_corpus("baby blue", toy_corpus, toy_model)
 
 
+@pytest.mark.long
 def test_another_corpus_is_refused(selection_model, tmp_path):
     with pytest.raises(InputError, match="lacks"):
         speak_from_corpus("baby blue", Corpus.create(tmp_path / "empty"), selection_model)
 
 
+@pytest.mark.long
 def test_phones_that_were_never_recorded_are_named(toy_corpus, selection_model, caplog):
     speak_from_corpus("baby blue", toy_corpus, selection_model)
     assert "do not have" not in caplog.text

@@ -33,6 +33,8 @@ from pipeline.made import GAIN, OFFSET, corpus_of, of_ben, people
 from robustness.case import changed_model, npy
 from testing.toy import SMALL, ToySentence, toy_motion, toy_utterances
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def two_people(tmp_path_factory: pytest.TempPathFactory) -> Corpus:

@@ -182,8 +182,8 @@ def run_in_background(work: Coroutine[Any, Any, None]) -> Iterator[asyncio.Abstr
             others = asyncio.all_tasks(loop)  # of clients that hang
             for other in others:
                 other.cancel()
-            if others:
-                loop.run_until_complete(asyncio.wait(others))
+            last = loop.create_task(asyncio.sleep(0))  # in which sockets are closed
+            loop.run_until_complete(asyncio.wait({*others, last}))
 
     thread = Thread(target=run, name="live", daemon=True)
     thread.start()

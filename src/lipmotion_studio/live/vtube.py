@@ -102,12 +102,18 @@ class VTubeStudio:
         is_told = False
         while True:
             try:
-                async with connect(self._address, compression=None, close_timeout=CLOSE_S, proxy=None) as connection:
+                connection = await connect(self._address, compression=None, close_timeout=CLOSE_S, proxy=None)
+                try:
                     is_told = False
                     if not await self._authenticate(connection):
                         LOG.warning("VTube Studio was told not to let lipmotion in; allow it there, and begin again")
                         return
                     await self._send_frames(connection, await self._find_parameters(connection))
+                finally:
+                    try:
+                        await connection.close()
+                    finally:  # where it is cancelled meanwhile
+                        connection.transport.abort()
             except (OSError, WebSocketException, TimeoutError, asyncio.TimeoutError, InputError):
                 if not is_told:
                     LOG.warning("VTube Studio is not at %s; start it, and allow plugins to use its API", self._address)

@@ -59,6 +59,7 @@ def pictures(path: Path) -> tuple[list[np.ndarray], Any, dict[str, str]]:
         return frames, stream.average_rate, dict(container.metadata)
 
 
+@pytest.mark.long
 def test_any_rate(filmed_face, motion):
     for fps in (None, 12.5, 30.0):
         film = make_film(filmed_face, motion, fps=fps)

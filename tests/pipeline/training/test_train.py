@@ -148,6 +148,7 @@ def others() -> Iterator[SpokenSentence]:
         yield SpokenSentence(sentence.name, ("bert", "anna")[number % 2], sentence.audio, sentence.units)
 
 
+@pytest.mark.long
 def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus):
     stages: list[str] = []
     plain = {"states": 1, "asynchrony": 0, "mixtures": 1, "acoustic_regression": False, "variance_scaling": False}
@@ -366,6 +367,7 @@ def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models, toy_corpus):
     assert np.abs(drawn - real).mean() < 0.5 * still
 
 
+@pytest.mark.long
 def test_figures_of_pictures(models, toy_corpus):
     figures = evaluate(load_model(models["eigenlips"]), toy_corpus, recogniser="own")
     assert figures["closed_under"] is None
@@ -382,6 +384,7 @@ def test_figures_of_pictures(models, toy_corpus):
     assert "lips_r_01 " not in format_figures(figures).replace("lag of lips_r_01 ", "")
 
 
+@pytest.mark.long
 def test_figures_of_both(models, toy_model, toy_corpus):
     """The eigenlips stand apart: figures of the lip distances are of these alone."""
     figures, plain = (

@@ -136,7 +136,7 @@ class Synthesiser:
 
 START_S, EACH_S = 30.0, 5.0
 """The time limit of a program: to start, and for each sentence; both are a hundred times what it needs."""
-STILL_S = 10.0
+STILL_S = 30.0
 """A program that prints and writes nothing for so long hangs."""
 POLL_S = 0.05
 LARGEST_OUTPUT_BYTES = 4 << 20

@@ -185,6 +185,7 @@ def test_the_mouth_rests_in_long_silence():
     assert generated[30:].max() > 0.15
 
 
+@pytest.mark.long
 def test_unknown_voices_follow_their_encoding():
     draw, engine = np.random.default_rng(0), engine_named("coupled", PLAIN)
     heard = [

@@ -490,6 +490,7 @@ def test_without_a_lag_chains_that_move_together_are_one_chain():
     assert printed[1] < alone[1] - 0.005
 
 
+@pytest.mark.long
 def test_factorial_chains_as_printed_may_be_apart_from_the_start():
     """Without a limit in Viterbi training, more joint states two states apart have densities of their own."""
     two_apart = []
