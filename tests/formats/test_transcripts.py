@@ -240,7 +240,7 @@ DAMAGED = {
     "an end before its start": (SRT.replace("02,750", "09,750"),
         r"a\.txt: line 6 ends at 4 s, before its start at 9.75 s"),
     "a table with a broken row": ("start\tend\ttext\n0\t1\ta\n2 3 b\n",
-        r"a\.txt: line 3 is '2 3 b'; required: start, end"),
+        r"a\.txt: line 3 is '2 3 b'; required, as in line 1: start"),
     "no word": (SRT.replace("Hello there!", "♪").replace("How are\nyou?", "[music]"), "holds no word"),
     "JSON cut off": ('{"segments": [\n{"start": 0,', r"a\.txt: line 2: damaged JSON"),
     "JSON with more after it": ('{"segments": []}\n]', r"a\.txt: line 2: damaged JSON"),

@@ -227,6 +227,17 @@ def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:
     assert level[110:120].max() < level[:100].max() - 5  # as silent as a room, in what recognisers get
 
 
+@pytest.mark.parametrize("hertz", [(50, 150, 250), (120,), (200.4,)])
+def test_a_voice_is_found_beneath_hum(hertz: tuple[float, ...]) -> None:
+    samples = np.concatenate([spoken(0), noise(1, 25), spoken(1)])
+    loudest = np.sqrt(np.square(spoken(0)).mean())
+    hum = sum(loudest * np.sin(2 * np.pi * each * np.arange(len(samples)) / RATE_HZ) for each in hertz)
+    clean, found = (analysed_audio.AnalysedAudio(x.astype(np.float32), RATE_HZ) for x in (samples, samples + hum))
+    assert len(clean.passages) == len(found.passages)
+    for one, other in zip(clean.passages, found.passages, strict=True):
+        assert other.first == pytest.approx(one.first, abs=30)
+
+
 def test_noise_stands_in_the_gaps_of_a_noise_gate() -> None:
     """Beside digital silence all speech would look alike, and every voice like that of the training."""
     samples = toy_sentences(3)[0].audio.samples.copy()

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.types.values import parse_clock
 
 LOG = logging.getLogger("lipmotion")
 
@@ -304,7 +305,6 @@ open anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pi
 devices."""
 LARGEST_BLOCK_BYTES = 1 << 28
 """Most bytes that FFmpeg may allocate at a time: three pictures of ``MAX_PIXELS`` with four channels of 16 bits."""
-DURATION = re.compile(r"(\d{1,6}):(\d\d):(\d\d(?:\.\d{1,9})?)")
 MAX_PIXELS = 4096 * 2304
 """Most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures."""
 
@@ -385,11 +385,5 @@ def read_duration(container: Any, stream: Any) -> float:
         return float(stream.duration * stream.time_base)
     if not container.streams.subtitles:
         return (container.duration or 0) / 1e6
-    return max(map(_tagged_s, (*container.streams.video, *container.streams.audio)))
-
-
-def _tagged_s(stream: Any) -> float:
-    """Return the duration of a Matroska stream, which is stored as text, in seconds; 0 if there is none."""
-    match = DURATION.fullmatch(stream.metadata.get("DURATION", ""))
-    hours, minutes, seconds = map(float, match.groups()) if match else (0.0, 0.0, 0.0)
-    return 3600 * hours + 60 * minutes + seconds
+    streams = (*container.streams.video, *container.streams.audio)
+    return max(max(0.0, parse_clock(each.metadata.get("DURATION", ""))) for each in streams)  # Matroska's is a text

@@ -1,4 +1,4 @@
-"""Acoustic conditions: noise at a stated ratio; and for training, rooms, telephones, other voices."""
+"""Acoustic conditions: hum taken out, noise at a stated ratio; and for training, rooms, telephones, other voices."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
@@ -19,8 +20,31 @@ FEWEST_TALKERS = 2
 """One other talker is an interruption, not a babble."""
 SILENT_RMS = 1e-6
 """Speech of a lower root mean square, full scale 1, is silence."""
+HUM, LEAST_HUM, MAX_HUM_BLOCKS, HUM_RATIO, HUM_WIDTH = 16_000, 32_000, 200, 8.0, 61
+"""Hum is looked for in blocks of a second, in sound of two and more: bins of a hertz of so much more amplitude than
+those around, also where all else pauses."""
 
 Noise = NDArray[np.float32]
+
+
+def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return sound at 16 kHz [shape=(N,)] without lines of its spectrum that never pause, as hum of the mains."""
+    from scipy.ndimage import binary_dilation, median_filter
+
+    if len(samples) < LEAST_HUM:
+        return samples
+    # before and after go half a second, whole periods of any mains
+    padded = np.concatenate([samples[: HUM // 2], samples, samples[-HUM // 2 :]])
+    blocks, window = sliding_window_view(padded, HUM)[:: HUM // 4], np.hanning(HUM + 1)[:-1]
+    judged = blocks[:: max(len(blocks) // MAX_HUM_BLOCKS, 1)] * window
+    steady = np.quantile(np.abs(np.fft.rfft(judged)), 0.2, axis=0)
+    lines = steady > HUM_RATIO * median_filter(steady, HUM_WIDTH)
+    if not lines.any():
+        return samples
+    kept, clean = ~binary_dilation(lines, iterations=3), np.zeros(len(padded), np.float32)
+    for number, block in enumerate(blocks):
+        clean[number * HUM // 4 :][:HUM] += np.fft.irfft(np.fft.rfft(block * window) * kept).astype(np.float32) / 2
+    return clean[HUM // 2 :][: len(samples)]
 
 
 def mix_noise(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:
