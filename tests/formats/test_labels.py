@@ -18,12 +18,8 @@ SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 
 
 @pytest.fixture
-def read(tmp_path):
-    def read(text: str, name: str = "a.lab"):
-        (tmp_path / name).write_text(text, encoding="utf-8")
-        return label_files.read_labels(tmp_path / name)
-
-    return read
+def read(write):
+    return lambda text, name="a.lab": label_files.read_labels(write(text, name))
 
 
 def rows(found) -> list[tuple[float, float, str]]:

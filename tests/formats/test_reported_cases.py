@@ -37,20 +37,6 @@ def times(path: Path) -> list[tuple[float | None, float | None]]:
     return [(word.start_s, word.end_s) for line in found.lines for word in line.words]
 
 
-@pytest.fixture
-def write(tmp_path: Path) -> Any:
-    """Return the path of a file with some content: bytes, a text, or a value for JSON."""
-
-    def writer(content: Any, name: str = "a.json") -> Path:
-        path = tmp_path / name
-        if not isinstance(content, str | bytes):
-            content = json.dumps(content, ensure_ascii=False)
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-        return path
-
-    return writer
-
-
 def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
     rows = ""
     for name, labels in tiers.items():
@@ -293,7 +279,6 @@ OTHERS: dict[str, Any] = {
     "milliseconds as lines": "".join(f"{a:.1f}\t{b:.1f}\t{w}\n" for w, a, b in MS),
     "a table of clocks": "start,end,text\n" + "".join(f"0:0{a:.3f},00:00:0{b:.3f},{w}\n" for w, a, b in W),
     "a table in seconds": "start\tend\ttext\n" + "".join(f"{a}\t{b}\t{w}\n" for w, a, b in W),
-    "Whisper's table": "start\tend\ttext\n" + "".join(f"{a:.0f}\t{b:.0f}\t{w}\n" for w, a, b in MS),
     "numbers between commas": "".join(f"{a:.0f},{b:.0f},{w}\n" for w, a, b in MS),
     "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
 }  # fmt: skip

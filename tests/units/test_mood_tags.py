@@ -28,11 +28,7 @@ def test_unknown_tags_are_named_and_not_spoken(caplog):
 @pytest.mark.parametrize(
     ("text", "words", "named"),
     [
-        (
-            "“What the {i}heck{/i} is this?{w=0.5} My {b}boat{/b} is gone.”",
-            "what the heck is this my boat is gone",
-            "{w=0.5}",
-        ),
+        ("“What the {i}heck{/i}?{w=0.5} My {b}boat{/b} is gone.”", "what the heck my boat is gone", "{w=0.5}"),
         ("<color=#f00>re</color>d un<b>believ</b>able <sprite index=1>", "red unbelievable", "<sprite index=1>"),
         ("[wave]hey[/wave] you #line:0e12a", "hey you", "#line:0e12a"),
         ("See [[Go north|North]] <<set $y to 2>> (set: $x to 1)", "see go north", "<<set $y to 2>>"),

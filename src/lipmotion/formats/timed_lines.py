@@ -62,8 +62,6 @@ HEADLESS = (
     (re.compile(r"\d*\.\d+,\d*\.\d+,.*"), "start,end,text"),
 )
 """The first line of tables without a header, and theirs: of aeneas, of people."""
-WHISPER = "start\tend\ttext"
-"""The header of Whisper's table, whose times are in milliseconds."""
 TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
 LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
@@ -231,4 +229,4 @@ def _read_table(text: str, columns: dict[str, int], where: str, given: str = "")
         kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))
     tiers = [find_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
     whole = all(label.start_s % 1 == 0 == label.end_s % 1 for tier in tiers for label in tier.labels)
-    return parse_seconds(tiers, where, 1000 if whole and header == WHISPER else 0)
+    return parse_seconds(tiers, where, 1000 if whole and header == "start\tend\ttext" else 0)  # Whisper's

@@ -261,20 +261,15 @@ def check_kind(path: Path, wanted: str, kind: str = "") -> None:
         head = file.read(HEAD)
         file.seek(max(path.stat().st_size - TAIL, 0))
         tail = file.read(TAIL) if head.startswith(b"PK") else b""
-        unpacked = _unpacked(head)
+        unpacked = b"" if head.startswith(b"\x1f\x8b") else head  # of gzip
+        with suppress(zlib.error):
+            unpacked = unpacked or zlib.decompressobj(31).decompress(head, HEAD)
         fine = _NO_MISTAKE.get(wanted, {"archive", "picture", "sound"})
         for group, name, marks in _KINDS:
             for at, mark in marks if group not in fine else ():
                 beginnings = (head[at : at + len(mark)], unpacked[at : at + len(mark)])
                 if mark in (tail if at == -1 else unpacked) if at < 0 else mark in beginnings:
                     raise InputError(f"{path}: is {name}, required a {kind or wanted}; {_NEXT[group]}")
-
-
-def _unpacked(head: bytes) -> bytes:
-    """Return the beginning of a file without the packing of gzip."""
-    with suppress(zlib.error):
-        return zlib.decompressobj(31).decompress(head, HEAD) if head.startswith(b"\x1f\x8b") else head
-    return b""
 
 
 def is_text(path: Path) -> bool:

@@ -138,7 +138,10 @@ class _TrackDecoder:
         if frame.pts is not None:
             time_s = float(frame.pts * frame.time_base)
             if self._clock_s is None:
-                self._start(time_s)
+                has_pictures = bool(list_video(self._container))
+                offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
+                self._count += self._silence(max(offset_s, 0.0))
+                self._cut = max(round(-offset_s * self._rate_hz), 0)
             elif time_s - self._clock_s > HOLE_S:
                 self._flush()
                 self._silence_s += time_s - self._clock_s
@@ -147,12 +150,6 @@ class _TrackDecoder:
                 self._clock_s = time_s
         if self._clock_s is not None:
             self._clock_s += frame.samples / frame.sample_rate
-
-    def _start(self, time_s: float) -> None:
-        has_pictures = bool(list_video(self._container))
-        offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
-        self._count += self._silence(max(offset_s, 0.0))
-        self._cut = max(round(-offset_s * self._rate_hz), 0)
 
     def _silence(self, duration_s: float) -> int:
         """Return the number of samples of a hole's silence. Raises InputError: the hole is too long."""
