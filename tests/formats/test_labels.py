@@ -18,12 +18,8 @@ SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 
 
 @pytest.fixture
-def read(tmp_path):
-    def read(text: str, name: str = "a.lab"):
-        (tmp_path / name).write_text(text, encoding="utf-8")
-        return label_files.read_labels(tmp_path / name)
-
-    return read
+def read(write):
+    return lambda text, name="a.lab": label_files.read_labels(write(text, name))
 
 
 def rows(found) -> list[tuple[float, float, str]]:
@@ -213,22 +209,24 @@ def test_what_would_be_read_as_words_is_refused(tmp_path: Path) -> None:
             with pytest.raises(InputError, match=message):
                 label_files.read_labels(path)
         with pytest.raises(InputError, match=message):
-            label_files.check_plain_text(text, "a.txt")
+            label_files.read_plain_text(path)
 
 
 def test_words_and_labels_in_time_are_no_plain_text_and_words_with_numbers_are(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
     for text, message in TIMED.values():
+        path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=message):
-            label_files.check_plain_text(text, "a.txt")
-        (tmp_path / "a.txt").write_text(text, encoding="utf-8")
-        assert "hello" in (label_files.read_labels(tmp_path / "a.txt").words or ())
+            label_files.read_plain_text(path)
+        assert "hello" in (label_files.read_labels(path).words or ())
     for text in ("0 1000000 p\n1000000 2000000 aa\n", "0.0\t0.5\thello\n", '"ooTextFile" "TextGrid"'):
+        path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=r"a\.txt: holds labels in time, required the words alone"):
-            label_files.check_plain_text(text, "a.txt")
+            label_files.read_plain_text(path)
     for text in LABEL_WORDS:
-        label_files.check_plain_text(text, "a.txt")
-        (tmp_path / "a.txt").write_text(text, encoding="utf-8")
-        assert label_files.read_labels(tmp_path / "a.txt").words
+        path.write_text(text, encoding="utf-8")
+        assert label_files.read_plain_text(path) == text
+        assert label_files.read_labels(path).words
 
 
 LABELLED = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 0.7, "dh", 'a "the"')]

@@ -37,20 +37,6 @@ def times(path: Path) -> list[tuple[float | None, float | None]]:
     return [(word.start_s, word.end_s) for line in found.lines for word in line.words]
 
 
-@pytest.fixture
-def write(tmp_path: Path) -> Any:
-    """Return the path of a file with some content: bytes, a text, or a value for JSON."""
-
-    def writer(content: Any, name: str = "a.json") -> Path:
-        path = tmp_path / name
-        if not isinstance(content, str | bytes):
-            content = json.dumps(content, ensure_ascii=False)
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-        return path
-
-    return writer
-
-
 def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
     rows = ""
     for name, labels in tiers.items():
@@ -291,6 +277,9 @@ OTHERS: dict[str, Any] = {
     }}},
     "milliseconds with decimals": [{"word": w, "start": a + 0.01, "end": b + 0.01} for w, a, b in MS],
     "milliseconds as lines": "".join(f"{a:.1f}\t{b:.1f}\t{w}\n" for w, a, b in MS),
+    "a table of clocks": "start,end,text\n" + "".join(f"0:0{a:.3f},00:00:0{b:.3f},{w}\n" for w, a, b in W),
+    "a table in seconds": "start\tend\ttext\n" + "".join(f"{a}\t{b}\t{w}\n" for w, a, b in W),
+    "numbers between commas": "".join(f"{a:.0f},{b:.0f},{w}\n" for w, a, b in MS),
     "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
 }  # fmt: skip
 
@@ -308,6 +297,9 @@ BODY = '<body><p begin="{}" {}="{}">hello<br/>big <span>moon</span></p></body>'
 RATES = 'p:frameRate="25" p:tickRate="10000000"'
 LINES = {
     "aeneas' table": 'f000001,0.400,1.600,"hello big moon"\n',
+    "whisper.cpp prints": "Detecting language\n[00:00:00.400 --> 00:00:01.600]   hello big moon\n",
+    "faster-whisper prints": "[0.40s -> 1.60s] hello big moon\n",
+    "subtitles of an old Mac": "1\r00:00:00,400 --> 00:00:01,600\rhello big\rmoon\r",
     "SBV": "0:00:00.400,0:00:01.600\nhello big\nmoon\n",
     "TTML": TTML.format("", BODY.format("00:00:00.4", "end", "1600ms")),
     "TTML in ticks": TTML.format(RATES, BODY.format("4000000t", "dur", "12000000t")),
@@ -329,6 +321,27 @@ def test_lines_in_time(write: Any, name: str) -> None:
     (line,) = found.lines
     assert " ".join(word.word for word in line.words) == "hello big moon"
     assert (line.start_s, line.end_s) == pytest.approx((0.4, 1.6))
+
+
+MAMA = (("m", 0, 0.1), ("aa", 0.1, 0.3), ("m", 0.3, 0.4), ("ax", 0.4, 0.6))
+MAMA_OF = [{"phoneme": p, "start": a, "end": b} for p, a, b in MAMA]
+PHONES: dict[str, Any] = {
+    "Kaldi's CTM": "".join(f"take 1 {a:.2f} {b - a:.2f} {p}_I\n" for p, a, b in MAMA),
+    "a table": "Start,End,Text\n" + "".join(f'"{a}","{b}","{p}"\n' for p, a, b in MAMA),
+    "lists": [[a, b, p] for p, a, b in MAMA],
+    "objects": MAMA_OF,
+    "beside words": {"words": [{"word": "mama", "start": 0, "end": 0.6}], "phonemes": MAMA_OF},
+    "within words": {"segments": [{"start": 0, "end": 1, "text": "mama", "words": [
+        {"word": "mama", "start": 0, "end": 0.6, "phones": MAMA_OF}]}]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PHONES)
+def test_phones_are_no_words(write: Any, name: str) -> None:
+    path = write(PHONES[name])
+    assert phones(path) == [p for p, *_ in MAMA]
+    if "words" in name:
+        assert words(path) == "mama"
 
 
 def test_times_that_are_none_are_missing(write: Any) -> None:

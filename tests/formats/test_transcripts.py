@@ -8,21 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from formats.timing_samples import (
-    AZURE_VISEMES,
-    AZURE_WORDS,
-    CARTESIA,
-    ELEVENLABS,
-    GENTLE,
-    GOOGLE,
-    KOKORO,
-    MFA,
-    MFA_CSV,
-    PIPER,
-    POLLY,
-    SERVERS,
-    json_lines,
-)
+from formats import timing_samples as timings
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels, holds_timings, read_labels, read_phones, read_transcript
 from lipmotion.pipeline.analysis.read_request import read_units
@@ -35,13 +21,11 @@ HELLO_WORDS = [("hello", 1.0, 1.75), ("there", 1.75, 2.5), ("how", 2.75, 3.0), (
 
 
 @pytest.fixture
-def read(tmp_path: Path) -> Read:
+def read(write: Any) -> Read:
     """Return the transcript in time of a file with some content."""
 
     def reader(content: str | bytes) -> TimedTranscript:
-        path = tmp_path / "a.txt"
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-        found = read_transcript(path)
+        found = read_transcript(write(content, "a.txt"))
         assert isinstance(found, TimedTranscript)
         return found
 
@@ -240,7 +224,7 @@ DAMAGED = {
     "an end before its start": (SRT.replace("02,750", "09,750"),
         r"a\.txt: line 6 ends at 4 s, before its start at 9.75 s"),
     "a table with a broken row": ("start\tend\ttext\n0\t1\ta\n2 3 b\n",
-        r"a\.txt: line 3 is '2 3 b'; required: start, end"),
+        r"a\.txt: line 3 is '2 3 b'; required, as in line 1: start"),
     "no word": (SRT.replace("Hello there!", "♪").replace("How are\nyou?", "[music]"), "holds no word"),
     "JSON cut off": ('{"segments": [\n{"start": 0,', r"a\.txt: line 2: damaged JSON"),
     "JSON with more after it": ('{"segments": []}\n]', r"a\.txt: line 2: damaged JSON"),
@@ -382,18 +366,6 @@ def test_an_empty_file_is_no_transcript(tmp_path: Path, caplog: pytest.LogCaptur
     assert "take1.txt: is empty: it counts as no transcript" in caplog.messages[0]
 
 
-@pytest.fixture
-def file(tmp_path: Path) -> Any:
-    """Return a file with some content, or the JSON of a value."""
-
-    def write(content: Any, name: str = "a.json") -> Path:
-        path = tmp_path / name
-        path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
-        return path
-
-    return write
-
-
 def words_of(path: Path) -> list[tuple[str, float | None, float | None]]:
     found = read_transcript(path)
     assert isinstance(found, TimedTranscript)
@@ -407,112 +379,107 @@ def phones(path: Path) -> list[tuple[float, float, str, str]]:
 
 
 WORDS = {
-    "Polly": (POLLY, [("mama", 0.06, 0.4), ("bites", 0.7, 1.1)]),
-    "Azure's boundaries": (AZURE_WORDS, [("hello", 0.05, 0.3875), ("you", 0.45, 0.75)]),
+    "Polly": (timings.POLLY, [("mama", 0.06, 0.4), ("bites", 0.7, 1.1)]),
+    "Azure's boundaries": (timings.AZURE_WORDS, [("hello", 0.05, 0.3875), ("you", 0.45, 0.75)]),
     "Azure's batch": ([{"Text": "the", "AudioOffset": 38, "Duration": 153}], [("the", 0.038, 0.191)]),
-    "ElevenLabs": (ELEVENLABS, [("hi", 0.5, 0.7), ("2", 0.8, 1.2)]),
-    "ElevenLabs' pieces": (
-        json_lines(
-            {"alignment": {"characters": ["h"], "character_start_times_seconds": [0.5],
-                           "character_end_times_seconds": [0.6]}},
-            {"alignment": None},
-            {"alignment": {"characters": ["i"], "character_start_times_seconds": [0.6],
-                           "character_end_times_seconds": [0.75]}},
-        ),
-        [("hi", 0.5, 0.75)],
-    ),
-    "ElevenLabs' socket": (
-        {"audio": "", "isFinal": False, "normalizedAlignment":
-            {"chars": [" ", "h", "i"], "charStartTimesMs": [0, 100, 200], "charsDurationsMs": [100, 100, 150]}},
-        [("hi", 0.1, 0.35)],
-    ),
-    "Cartesia": (CARTESIA, [("hi", 0, 0.4), ("you", 0.5, 0.9)]),
-    "Google": (GOOGLE, [("hello", 0.25, 0.75), ("you", 0.75, None)]),
-    "Kokoro": (KOKORO, [("hi", 0.25, 0.55), ("you", 0.6, 0.9)]),
-    "servers of Kokoro": (SERVERS, [("hi", 0.1, 0.4)]),
-    "Gentle": (GENTLE, [("hi", 0.1, 0.4), ("you", 0.5, 0.8)]),
-    "MFA": (MFA, [("my", 0.1, 0.5), ("spot", 0.5, 1.0)]),
-    "MFA's table": (MFA_CSV, [("my", 0.1, 0.5)]),
+    "ElevenLabs": (timings.ELEVENLABS, [("hi", 0.5, 0.7), ("2", 0.8, 1.2)]),
+    "ElevenLabs' pieces": (timings.json_lines(*({"alignment": text and {
+        "characters": [text], "character_start_times_seconds": [start], "character_end_times_seconds": [end]}}
+        for text, start, end in (("h", 0.5, 0.6), (None, 0, 0), ("i", 0.6, 0.75)))), [("hi", 0.5, 0.75)]),
+    "ElevenLabs' socket": ({"audio": "", "isFinal": False, "normalizedAlignment": {
+        "chars": [" ", "h", "i"], "charStartTimesMs": [0, 100, 200], "charsDurationsMs": [100, 100, 150]}},
+        [("hi", 0.1, 0.35)]),
+    "Cartesia": (timings.CARTESIA, [("hi", 0, 0.4), ("you", 0.5, 0.9)]),
+    "Google": (timings.GOOGLE, [("hello", 0.25, 0.75), ("you", 0.75, None)]),
+    "Kokoro": (timings.KOKORO, [("hi", 0.25, 0.55), ("you", 0.6, 0.9)]),
+    "servers of Kokoro": (timings.SERVERS, [("hi", 0.1, 0.4)]),
+    "Gentle": (timings.GENTLE, [("hi", 0.1, 0.4), ("you", 0.5, 0.8)]),
+    "MFA": (timings.MFA, [("my", 0.1, 0.5), ("spot", 0.5, 1.0)]),
+    "MFA's table": (timings.MFA_CSV, [("my", 0.1, 0.5)]),
 }  # fmt: skip
 PHONES = {
-    "Polly": (POLLY, "sil p/mama aa/mama p/mama ax/mama sil p/bites aa/bites t/bites s/bites sil", 0.4),
-    "Azure": (AZURE_VISEMES, "sil hh eh l ow", 0.2),
-    "Cartesia": (CARTESIA, "hh/hi ay/hi sp y/you uw/you", 0.4),
-    "Piper": (PIPER, "sil hh ay sp y uw sil sil", 0.4),
-    "Kokoro": (KOKORO, "sil hh/hi ay/hi sp y/you uw/you sil sil", 0.55),
-    "Gentle": (GENTLE, "hh/hi ay/hi sp spn/you", 0.4),
-    "MFA": (MFA, "m/my ay/my s/spot p/spot ao/spot t/spot", 0.5),
-    "MFA's table": (MFA_CSV, "m/my ay/my", 0.5),
+    "Polly": (timings.POLLY, "sil p/mama aa/mama p/mama ax/mama sil p/bites aa/bites t/bites s/bites sil", 0.4),
+    "Azure": (timings.AZURE_VISEMES, "sil hh eh l ow", 0.2),
+    "Cartesia": (timings.CARTESIA, "hh/hi ay/hi sp y/you uw/you", 0.4),
+    "Piper": (timings.PIPER, "sil hh ay sp y uw sil sil", 0.4),
+    "Kokoro": (timings.KOKORO, "sil hh/hi ay/hi sp y/you uw/you sil sil", 0.55),
+    "Gentle": (timings.GENTLE, "hh/hi ay/hi sp spn/you", 0.4),
+    "MFA": (timings.MFA, "m/my ay/my s/spot p/spot ao/spot t/spot", 0.5),
+    "MFA's table": (timings.MFA_CSV, "m/my ay/my", 0.5),
 }
 """Phones with their words, in order, and the end of one of them."""
 
 
 @pytest.mark.parametrize("name", WORDS)
-def test_words_of_every_service_in_time(file: Any, name: str) -> None:
+def test_words_of_every_service_in_time(write: Any, name: str) -> None:
     content, expected = WORDS[name]
-    assert words_of(file(content)) == expected
-    assert holds_timings(file(content))
+    assert words_of(write(content)) == expected
+    assert holds_timings(write(content))
 
 
 @pytest.mark.parametrize("name", PHONES)
-def test_phones_in_time(file: Any, name: str) -> None:
+def test_phones_in_time(write: Any, name: str) -> None:
     content, expected, end_s = PHONES[name]
-    found = phones(file(content))
+    found = phones(write(content))
     assert [f"{phone}/{word.lower()}" if word else phone for *_, phone, word in found] == expected.split()
     assert end_s in [each[1] for each in found]
     starts, ends = [each[0] for each in found[1:]], [each[1] for each in found[:-1]]
     assert ends == pytest.approx(starts, abs=0.11) or name == "Cartesia"
 
 
-def test_a_textgrid_in_ipa(file: Any) -> None:
+def test_a_textgrid_in_ipa(write: Any) -> None:
     rows = "".join(f'{start}\n{end}\n"{text}"\n' for start, end, text in ((0, 0.1, "m"), (0.1, 0.4, "ɒ"), (0.4, 1, "")))
     grid = f'"ooTextFile"\n"TextGrid"\n0\n1\n<exists>\n1\n"IntervalTier"\n"phones"\n0\n1\n3\n{rows}'
-    assert phones(file(grid, "a.TextGrid")) == [(0, 0.1, "m", ""), (0.1, 0.4, "ao", ""), (0.4, 1, "sil", "")]
+    assert phones(write(grid, "a.TextGrid")) == [(0, 0.1, "m", ""), (0.1, 0.4, "ao", ""), (0.4, 1, "sil", "")]
 
 
-def test_beside_a_recording_and_other_suffixes(file: Any, tmp_path: Path) -> None:
-    file(POLLY, "take.json")
+def test_beside_a_recording_and_other_suffixes(write: Any, tmp_path: Path) -> None:
+    write(timings.POLLY, "take.json")
     assert find_labels(tmp_path / "take.wav").words == ("mama", "bites")
-    assert phones(file(POLLY, "take.marks")) == phones(file(POLLY, "take.jsonl")) == phones(tmp_path / "take.json")
-    assert phones(file(MFA_CSV, "take.csv")) == phones(file(MFA_CSV, "b.txt"))
-    assert read_labels(file(CARTESIA)).phones is not None
-    assert read_phones(file(MFA_CSV, "b.txt"))[0].label.word == "my"
+    assert (
+        phones(write(timings.POLLY, "take.marks"))
+        == phones(write(timings.POLLY, "take.jsonl"))
+        == phones(tmp_path / "take.json")
+    )
+    assert phones(write(timings.MFA_CSV, "take.csv")) == phones(write(timings.MFA_CSV, "b.txt"))
+    assert read_labels(write(timings.CARTESIA)).phones is not None
+    assert read_phones(write(timings.MFA_CSV, "b.txt"))[0].label.word == "my"
 
 
 ERRORS = {
     "a viseme of Polly": (
-        POLLY.replace('"@"', '"Q"'), r"a\.json: line 7: no viseme of Polly is 'Q'; known are: sil p t"),
+        timings.POLLY.replace('"@"', '"Q"'), r"a\.json: line 7: no viseme of Polly is 'Q'; known are: sil p t"),
     "a viseme of Azure": ([{"audio_offset": 0, "viseme_id": 22}], "the viseme is 22, required a whole"),
-    "a symbol": (CARTESIA.replace('"aɪ"', '"§"'), "phonemes 2 is '§', which is no phone"),
-    "lists": (CARTESIA.replace("[0, 0.5]", "[0]"), "line 2, .*: required are the lists words, start"),
+    "a symbol": (timings.CARTESIA.replace('"aɪ"', '"§"'), "phonemes 2 is '§', which is no phone"),
+    "lists": (timings.CARTESIA.replace("[0, 0.5]", "[0]"), "line 2, .*: required are the lists words, start"),
     "a mark": ({"timepoints": [{"markName": "m1"}]}, "timepoints 1 is the mark 'm1', which is no word; name every"),
-    "a rate": ({**PIPER, "sample_rate": 0}, "line 1: the sample rate in hertz is 0, required"),
-    "durations": ({**KOKORO, "pred_dur": [1]}, "1 durations of 7 phonemes, required two more than phonemes"),
+    "a rate": ({**timings.PIPER, "sample_rate": 0}, "line 1: the sample rate in hertz is 0, required"),
+    "durations": ({**timings.KOKORO, "pred_dur": [1]}, "1 durations of 7 phonemes, required two more than phonemes"),
     "an event without a time": ([{"Text": "a", "AudioOffset": None}], "no words in time are found"),
-    "a time": ({**MFA, "tiers": {"words": {"entries": [["x", 1, "a"]]}}}, "entry 1: a time is 'x', required a number"),
-    "a line": (MFA_CSV + "0.5,x\n", "line 5 is '0.5,x'; required, as in line 1: Begin,End"),
+    "a time": ({**timings.MFA, "tiers": {"words": {"entries": [["x", 1, "a"]]}}}, "entry 1: a time is 'x', required"),
+    "a line": (timings.MFA_CSV + "0.5,x\n", "line 5 is '0.5,x'; required, as in line 1: Begin,End"),
     "pieces of the socket": (
-        json_lines(*[{"alignment": {"chars": ["a"], "charStartTimesMs": [0], "charDurationsMs": [1]}}] * 2),
-        "holds 2 pieces whose times each begin at 0",
-    ),
-    "a symbol without end": (CARTESIA.replace('"aɪ"', f'"{"a" * 41}"'), "has 41 letters, required a phone: 40 at most"),
+        timings.json_lines(*[{"alignment": {"chars": ["a"], "charStartTimesMs": [0], "charDurationsMs": [1]}}] * 2),
+        "holds 2 pieces whose times each begin at 0"),
+    "a symbol without end": (timings.CARTESIA.replace('"aɪ"', f'"{"a" * 41}"'),
+        "has 41 letters, required a phone: 40 at most"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ERRORS)
-def test_what_is_not_understood_is_named(file: Any, name: str) -> None:
+def test_what_is_not_understood_is_named(write: Any, name: str) -> None:
     content, message = ERRORS[name]
     with pytest.raises(InputError, match=message):
-        read_labels(file(content))
+        read_labels(write(content))
 
 
-def test_words_alone_are_no_units_and_visemes_alone_no_transcript(file: Any) -> None:
+def test_words_alone_are_no_units_and_visemes_alone_no_transcript(write: Any) -> None:
     with pytest.raises(InputError, match=r"holds words in time, but no phones; give it as a transcript"):
-        read_units(file(ELEVENLABS))
+        read_units(write(timings.ELEVENLABS))
     with pytest.raises(InputError, match="phones in time, but no words; give them as units"):
-        read_transcript(file(AZURE_VISEMES))
+        read_transcript(write(timings.AZURE_VISEMES))
 
 
-def test_words_that_gentle_did_not_find_are_reported(file: Any, caplog: pytest.LogCaptureFixture) -> None:
-    read_labels(file(GENTLE))
+def test_words_that_gentle_did_not_find_are_reported(write: Any, caplog: pytest.LogCaptureFixture) -> None:
+    read_labels(write(timings.GENTLE))
     assert "1 words were not found in the sound and are left out" in caplog.text

@@ -118,13 +118,8 @@ FORMS = {
     "valid bits more than there are": riff(chunk(b"fmt ", long_form(24, 16)), SOUND),
     "valid bits not said": riff(chunk(b"fmt ", long_form(0, 16)), SOUND),
     "the longer header cut off": riff(chunk(b"fmt ", form(16, coding=EXTENSIBLE) + bytes(2)), SOUND),
-    **{
-        f"float of {8 * len(content) // len(TONE)} bits, {valid} valid": riff(
-            chunk(b"fmt ", long_form(valid, 8 * len(content) // len(TONE), FLOAT)), chunk(b"data", content)
-        )
-        for content, valids in ((F32, (0, 16, 24, 32)), (F64, (0, 24, 32, 64)))
-        for valid in valids
-    },
+    **{f"float of {bits}, {valid} valid": riff(chunk(b"fmt ", long_form(valid, bits, FLOAT)), chunk(b"data", content))
+       for content, bits, valids in ((F32, 32, (0, 16, 24, 32)), (F64, 64, (0, 24, 32, 64))) for valid in valids},
     "a length of 0": riff(chunk(b"fmt ", form()), chunk(b"data", S16, 0), length=0),
     "a length to the end": riff(chunk(b"fmt ", form()), chunk(b"data", S16, TO_THE_END), length=TO_THE_END),
     "24 in 32, a length of 0": riff(chunk(b"fmt ", long_form(24, 32)), chunk(b"data", S24_IN_32, 0), length=0),
@@ -133,19 +128,14 @@ FORMS = {
     "a padded chunk of odd length": riff(chunk(b"fmt ", form()), chunk(b"junk", b"12345"), SOUND),
     "an odd chunk without its pad": riff(chunk(b"fmt ", form()), chunk(b"junk", b"12345", pad=False), SOUND),
     "RF64": riff(wide(len(S16)), chunk(b"fmt ", form()), chunk(b"data", S16, TO_THE_END), kind=b"RF64"),
-    "BW64, 24 in 32, more behind it": riff(
-        wide(len(S24_IN_32)),
-        chunk(b"fmt ", long_form(24, 32)),
-        chunk(b"data", S24_IN_32, TO_THE_END),
-        chunk(b"axml", bytes(range(1, 200))),
-        kind=b"BW64",
-    ),
+    "BW64, 24 in 32, more behind it": riff(wide(len(S24_IN_32)), chunk(b"fmt ", long_form(24, 32)), chunk(
+        b"data", S24_IN_32, TO_THE_END), chunk(b"axml", bytes(range(1, 200))), kind=b"BW64"),
     "Wave64": wave64((b"fmt ", form()), (b"data", S16)),
     "Wave64, 24 in 32": wave64((b"fmt ", long_form(24, 32)), (b"data", S24_IN_32)),
     "AIFC sowt": aifc(b"sowt", 16, S16),
     "AIFC fl32": aifc(b"fl32", 32, TONE.astype(">f4").tobytes()),
     "AIFC of 20 bits": aifc(b"NONE", 20, samples(20, 24, high_first=True)),
-}
+}  # fmt: skip
 
 
 def read(content: bytes, folder: Path) -> np.ndarray:

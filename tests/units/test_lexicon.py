@@ -30,6 +30,9 @@ def test_dictionary_words() -> None:
     ):  # fmt: skip
         assert Lexicon().known(word)
         assert said(word) == phones
+    for word, end in (("percent's", "t s"), ("eighth's", "th s"), ("box's", "s ix z"), ("emoji's", "iy z")):
+        assert said(word)[-1].endswith(f" {end}")
+    assert said("nodo's", Lexicon({"nodo": (("n", "ow"),)})) == ["n ow z"]  # and that of the user
     assert len(said("tomato")) == 2
     for word, first in (("of", "ax v"), ("cut", "k ah t"), ("her", "hh axr")):  # weak words alone are reduced
         assert said(word)[0] == first

@@ -28,11 +28,7 @@ def test_unknown_tags_are_named_and_not_spoken(caplog):
 @pytest.mark.parametrize(
     ("text", "words", "named"),
     [
-        (
-            "“What the {i}heck{/i} is this?{w=0.5} My {b}boat{/b} is gone.”",
-            "what the heck is this my boat is gone",
-            "{w=0.5}",
-        ),
+        ("“What the {i}heck{/i}?{w=0.5} My {b}boat{/b} is gone.”", "what the heck my boat is gone", "{w=0.5}"),
         ("<color=#f00>re</color>d un<b>believ</b>able <sprite index=1>", "red unbelievable", "<sprite index=1>"),
         ("[wave]hey[/wave] you #line:0e12a", "hey you", "#line:0e12a"),
         ("See [[Go north|North]] <<set $y to 2>> (set: $x to 1)", "see go north", "<<set $y to 2>>"),
@@ -52,6 +48,9 @@ def test_unknown_tags_are_named_and_not_spoken(caplog):
         ("Note: this is said.", "note this is said", ""),
         ("He said: go\nAt 5:30: run", "he said go at five thirty run", ""),
         ("HELP\nme now", "help me now", ""),
+        ("0:00\nhi\nAnna Lee  1:07\nyou", "hi you", "0:00, Anna Lee  1:07"),
+        ("(00:04) hi\n00:00:09 - you", "hi you", "(00:04), 00:00:09 -"),
+        ("5:30 is early\n7:15 is late", "five thirty is early seven fifteen is late", ""),
         ('e "Hello"', "hello", "e"),
         ('e happy "Hello"\n"A voice."\nm "Hi \\"you\\""', "hello a voice hi you", "e happy, m"),
         ('she said "hello"', "she said hello", ""),

@@ -53,6 +53,7 @@ def test_texts() -> None:
         ("$0 $0.00 $5.5", "zero dollars zero dollars five point five dollars"),
         ("$ 7", "seven dollars"),
         ("7% 8 % ٩٪ %", "seven percent eight percent nine"),
+        ("St. Mary's, Henry VIII's 1995's", "saint mary's henry the eighth's nineteen ninety five's"),
         ("you &amp; me &#39;", "you and me"),
     ):
         assert " ".join(split_words(text)) == words

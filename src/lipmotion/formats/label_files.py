@@ -171,7 +171,7 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
     text, where = _read_text(path, "units"), str(path)
     tiers = _choose_tiers(_read_tiers(text, where) or [], where, tier, speaker)
     phones = _choose_phones(tiers, where)
-    if not phones and any(each.role in (WORDS, LINES) for each in tiers):
+    if not phones and any(each.role in (WORDS, LINES, "") for each in tiers):
         raise InputError(f"{where}: holds words in time, but no phones; give it as a transcript (--transcript)")
     if not phones:
         held = f"{describe_json(text, where)}; " if is_json(text) else "holds no phones in time, "
@@ -344,20 +344,15 @@ def _choose_words(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel
 
 
 def read_plain_text(path: Path) -> str:
-    """Return the text of a file of words alone.
+    """Return the text of a file of words alone: times and marks of labels and subtitles would be read as words.
 
     Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT_BYTES``, not UTF-8 text, or labels in time.
     """
     text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT_BYTES)
-    check_plain_text(text, str(path))
+    if is_textgrid(text) or parse_line_tiers(text, str(path)) is not None:
+        raise InputError(f"{path}: holds labels in time, required the words alone; write them into a text file")
+    _check_no_labels(text, str(path))
     return text
-
-
-def check_plain_text(text: str, where: str) -> None:
-    """Raise InputError unless a text is words alone: times and marks of labels and subtitles would be read as words."""
-    if is_textgrid(text) or parse_line_tiers(text, where) is not None:
-        raise InputError(f"{where}: holds labels in time, required the words alone; write them into a text file")
-    _check_no_labels(text, where)
 
 
 def _check_no_labels(text: str, where: str) -> None:
@@ -399,7 +394,8 @@ def _check_plain(text: str, path: Path) -> None:
 
 
 def _read_text(path: Path, kind: str = "label") -> str:
-    return read_text_file(path, kind, LARGEST_LABELS, western=True)
+    text = read_text_file(path, kind, LARGEST_LABELS, western=True)
+    return text if "\n" in text else text.replace("\r", "\n")
 
 
 def write_labels(path: Path, units: Timeline[Unit]) -> None:

@@ -32,6 +32,7 @@ from lipmotion.formats.label_tiers import (
     check_count,
     find_tier,
     find_time_unit,
+    holds_phones,
     parse_seconds,
     split_ipa,
 )
@@ -100,12 +101,13 @@ TIMES = (
 )
 TEXTS = (
     "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
-    "displaytext segs alternatives nbest"
+    "displaytext segs alternatives nbest label phone phoneme"
 ).split()
 """The names of what is said, in order; of alternatives it is the first one."""
 ALTERNATIVES = ("alternatives", "nbest")
 WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints", "timestampedwords")
 """Members that hold words in time, within a line or alone."""
+PHONE_LISTS = ("phones", "phonemes")
 LINE_LISTS = (
     "segments transcription utterances monologues events chunks fragments channels recognizedphrases sentences phrases "
     "paragraphs result results transcript alternatives nbest data response output prediction predictions documents"
@@ -274,7 +276,7 @@ def _parse_time(value: Any, where: str, per_s: float = 1) -> float:
 def _read_row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
     text = next((text for name in TEXTS if name in item and (text := _find_text(item[name])) is not None), None)
-    role = WORDS if "word" in item or name in WORD_LISTS else ""
+    role = WORDS if "word" in item or name in WORD_LISTS else PHONE_LABELS if {"phone", "phoneme"} & {*item} else ""
     if text is None and any(item.get(name) for name in ("text", "word")):
         stored = shorten(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {stored}, required a text")
@@ -375,24 +377,28 @@ def _read_object(item: dict[str, Any], place: str, where: str, name: str, depth:
     timed = own is not None and not math.isnan(own.start)
     if name == "words" and own is None:
         raise InputError(f"{where}: {place}: no text; required a member 'word'")
-    words = [row for row in first_of(each for each in WORD_LISTS if not (timed and each == "tokens")) if row.text]
+    heard = [row for row in first_of(each for each in WORD_LISTS if not (timed and each == "tokens")) if row.text]
+    words = [row for row in heard if row.role != PHONE_LABELS]
+    phones = [replace(row, role=PHONE_LABELS) for row in first_of(PHONE_LISTS) if not math.isnan(row.start)]
+    phones += [row for row in heard if row.role == PHONE_LABELS]
     lines = first_of(LINE_LISTS)
     if words and not any(line.parts for line in lines):
         lines = [replace(own, parts=tuple(words))] if own is not None and timed else words
-    elif not lines and not timed:  # under a name that is not known
+    elif not (lines or timed or phones):  # under a name that is not known
         lines = first_of(each for each in item if each not in (*WORD_LISTS, *LINE_LISTS))
         lines = [line for line in lines if line.parts or not math.isnan(line.start)]
     if not lines and (own is None or item.get("case") == MISSED):
-        return []
-    if not lines and own is not None:  # a word, perhaps with Gentle's phones
-        phones = _list_durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
-        spans = _sum_durations(phones, own.start, where) if phones else []
+        return phones
+    if not lines and own is not None and not phones:  # a word, perhaps with Gentle's phones
+        lengths = _list_durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
+        spans = _sum_durations(lengths, own.start, where) if lengths else []
         rows = ((span.start_s, span.end_s, span.text.partition("_")[0], span.position) for span in spans)
         return [own, *(Row(*row, own.times, own.speaker, PHONE_LABELS) for row in rows)]
+    lines = lines or [own] if own is not None else lines
     if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
         lines = [replace(lines[0], start=own.start, end=own.end, times=own.times)]
     speaker = own.speaker if own is not None else _find_speaker(item)
-    return [line if line.speaker else replace(line, speaker=speaker) for line in lines]
+    return [line if line.speaker else replace(line, speaker=speaker) for line in (*lines, *phones)]
 
 
 def _find_speaker(item: dict[str, Any]) -> str:
@@ -426,6 +432,8 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     for row, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
         by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
     tiers = [LabelTier(PHONE_LABELS, tuple(_scale_rows(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
+    if not phones and all(row.role != WORDS and not row.parts for row in spoken):
+        role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(rows))) for rows in by_speaker.values()) else role
     return tiers + [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
 
 

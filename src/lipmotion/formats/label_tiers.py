@@ -14,7 +14,7 @@ from statistics import median
 from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, sort_lines
-from lipmotion.types.values import parse_number
+from lipmotion.types.values import parse_clock, parse_number
 from lipmotion.units import (
     PAUSE,
     PHONES,
@@ -82,8 +82,8 @@ PAUSES = frozenset((" ", *' ^ $ . , ; : ! ? — – … ( ) “ ” " « » ¡ �
 """Symbols of voices for silence: padding, blanks and punctuation, which last as long as the pause."""
 LONGEST_SYMBOL = 40
 """Most letters of a phone with all its marks."""
-WITH_GLIDES = {"aj": "aɪ", "ej": "eɪ", "ɔj": "ɔɪ", "ow": "oʊ", "əw": "əʊ", "aw": "aʊ"}
-"""Diphthongs as the Montreal Forced Aligner writes them."""
+WITH_GLIDES = {"aj": "aɪ", "ej": "eɪ", "ɔj": "ɔɪ", "ow": "oʊ", "əw": "əʊ", "aw": "aʊ", "ɐ": "ʌ"}
+"""Diphthongs, and the vowel of "cut", as the Montreal Forced Aligner writes them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,9 @@ def check_count(count: int, where: str) -> None:
 
 
 def require_time(text: str, place: str, where: str) -> float:
-    """Return a time from its text, also with a decimal comma. Raises InputError: it is none, or not finite."""
+    """Return a time from its text, also with a decimal comma or as 0:01.5. Raises InputError: it is none."""
+    if ":" in text and not math.isnan(clock_s := parse_clock(text)):
+        return clock_s
     return parse_number(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
 
 
@@ -173,7 +175,8 @@ def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[
     spoken = [tier for tier in tiers if tier.role != OTHER]
     judged = next((tier for tier in spoken if tier.role == WORDS or holds_phones(tier)), next(iter(spoken), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
-    role = PHONE_LABELS if judged and holds_phones(judged) else judged.role if judged else ""
+    single = WORDS if all(len(text.split()) < 2 for *_, text in spans) else ""
+    role = PHONE_LABELS if judged and holds_phones(judged) else judged.role or single if judged else ""
     per_s = per_s or find_time_unit(spans, role, where)
     scaled = []
     for tier in tiers:

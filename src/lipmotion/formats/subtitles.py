@@ -1,5 +1,5 @@
-"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``,
-Whisper's table of lines (``.tsv``), and lyrics (``.lrc``)."""
+"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``, lyrics
+(``.lrc``), and what Whisper's programs print."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from io import StringIO
 from pathlib import Path
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.label_tiers import LINES, LabelTier, TimedLabel, check_count
+from lipmotion.formats.label_tiers import LINES, LabelTier, TimedLabel, check_count, require_time
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.values import parse_clock
@@ -36,9 +36,6 @@ WORD_TIME = re.compile(rf"<{TIME}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
 NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")
 """The start of a block of WebVTT that is not shown."""
-HEADER = "start\tend\ttext"
-"""The first line of Whisper's table; times are in milliseconds."""
-ROW = re.compile(r"(\d{1,12})\t(\d{1,12})\t(.*)")
 BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 """Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
@@ -53,18 +50,20 @@ BREAK = re.compile(r"\\[Nnh]")
 """Line breaks and hard blanks within the text."""
 LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
 """What lyrics say of themselves: ``[ar:Anna]``, ``[offset:+250]``."""
-LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]")
-"""The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``."""
-LYRICS_LINE = re.compile(rf"((?:\[{TIME}\]\s{{0,4}}){{1,100}}).*")
+SPAN = rf"\[([\d:.,]{{1,20}})s?\s{{0,3}}{ARROW}\s{{0,3}}([\d:.,]{{1,20}})s?\]"
+LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]|^[ \t]{{0,20}}{SPAN}", re.MULTILINE)
+"""The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``, ``[0.00s -> 2.50s] Hello``
+as Whisper's programs print, perhaps after other lines."""
+LYRICS_TIME = re.compile(rf"\[{TIME}\]|{SPAN}")
+LYRICS_LINE = re.compile(rf"((?:(?:\[{TIME}\]|{SPAN})\s{{0,4}}){{1,100}}).*")
 PHONES = ".phones"
 """A file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words."""
 _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 
 def is_subtitles(text: str) -> bool:
-    """Return whether a text is a file of subtitles or lyrics, or Whisper's table of lines."""
-    matches = (form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
-    return text.startswith(("WEBVTT", HEADER)) or any(matches)
+    """Return whether a text is a file of subtitles or lyrics."""
+    return text.startswith("WEBVTT") or any(form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
 
 
 def parse_subtitles(text: str, where: str) -> LabelTier:
@@ -74,7 +73,7 @@ def parse_subtitles(text: str, where: str) -> LabelTier:
     Numbers of cues may be missing, and blank lines too.
     Raises InputError: times that are damaged or end before they start, with their line; too many cues or words.
     """
-    read = _read_table if text.startswith(HEADER) else _read_lyrics if LYRICS.search(text) else _read_cues
+    read = _read_lyrics if LYRICS.search(text) else _read_cues
     cues = list((_read_dialogue if read is _read_cues and SUBSTATION.search(text) else read)(text, where))
     labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(cues))
     return LabelTier("subtitles", tuple(labels), LINES)
@@ -99,13 +98,14 @@ def _read_lyrics(text: str, where: str) -> Iterator[TimedLabel]:
             if cues and not re.fullmatch(LYRICS_TAG, line):
                 cues[-1] = replace(cues[-1], text=f"{cues[-1].text}\n{line}")
             continue
-        for time in re.finditer(TIME, timed[1]):
+        for time in LYRICS_TIME.finditer(timed[1]):
             check_count(len(cues), where)
-            start_s = max(parse_clock(time[1]) - early_s, 0.0)
-            cues.append(TimedLabel(start_s, math.inf, line[timed.end(1) :], f"line {number}"))
+            place = f"line {number}"
+            edges_s = [require_time(edge, place, where) - early_s for edge in (time[1] or time[2], time[3]) if edge]
+            cues.append(TimedLabel(max(edges_s[0], 0.0), (*edges_s, math.inf)[1], line[timed.end(1) :], place))
     cues.sort(key=lambda cue: cue.start_s)
     for cue, end_s in zip(cues, [*(cue.start_s for cue in cues[1:]), math.inf], strict=True):
-        yield replace(cue, end_s=end_s)
+        yield replace(cue, end_s=end_s if math.isinf(cue.end_s) else cue.end_s)
 
 
 def _read_cues(text: str, where: str) -> Iterator[TimedLabel]:
@@ -140,19 +140,6 @@ def _join_shown(lines: list[str]) -> str:
         if line.strip() and not hidden:
             shown.append(line)
     return "\n".join(shown)
-
-
-def _read_table(text: str, where: str) -> Iterator[TimedLabel]:
-    """Yield the rows of Whisper's table as cues."""
-    for number, row in enumerate(StringIO(text), 1):
-        line = row.rstrip("\r\n")
-        if number == 1 or not line.strip():
-            continue
-        check_count(number, where)
-        match = ROW.fullmatch(line)
-        if match is None:
-            raise InputError(f"{where}: line {number} is {shorten(line)!r}; required: start, end and text, with tabs")
-        yield TimedLabel(int(match[1]) / 1000, int(match[2]) / 1000, match[3], f"line {number}")
 
 
 def _drop_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:

@@ -34,7 +34,7 @@ SHORTEST_TICKS = 10_000
 LONG_SPAN = 45
 """Whole numbers in order that are further apart than this are no seconds."""
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
-WHOLE = re.compile(r"(\d+)\s+(\d+)\s+(\S+)(?:\s.*)?")
+WHOLE = re.compile(r"(\d+)[\s,;]\s*(\d+)[\s,;]\s*(\S+)(?:\s.*)?")
 STARTS = re.compile(r"(\d+)\s+([^\d\s]\S*)")
 SECONDS = re.compile(r"([-+]?\d*\.\d+)\s+([-+]?\d*\.\d+)(?:\s+(.*))?|([-+]?\d+,\d+)\t([-+]?\d+,\d+)(?:\t(.*))?")
 CTM = re.compile(rf"(\S+)\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?")
@@ -47,8 +47,8 @@ LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")
 """The first line of a text of LRS: what is said."""
 LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
 COLUMNS = {
-    "start": {"begin", "start", "starttime", "starts", "tmin", "onset"},
-    "end": {"end", "endtime", "ends", "stop", "tmax", "offset"},
+    "start": {"begin", "start", "starttime", "starts", "tmin", "onset", "startframe", "framestart"},
+    "end": {"end", "endtime", "ends", "stop", "tmax", "offset", "endframe", "frameend"},
     "duration": {"duration", "dur"},
     "text": {"label", "text", "word", "phone", "transcript", "transcription", "utterance"},
     "kind": {"type", "tier", "tiername"},
@@ -77,7 +77,9 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     first = next((line for _, line in _lines(text)), "")
     if RTTM.match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
-    for read in (_read_columns, _read_lrs, _read_seconds, _read_wholes, _read_starts, _read_nist):
+    if SECONDS.fullmatch(first):
+        return [_read_spans(text, SECONDS, where)]
+    for read in (_read_columns, _read_lrs, _read_wholes, _read_starts, _read_nist):
         tiers = read(text, first, where)
         if tiers is not None:
             return tiers
@@ -89,10 +91,6 @@ def _read_columns(text: str, first: str, where: str) -> list[LabelTier] | None:
     header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
     columns = _find_columns(header or first)
     return _read_table(text, columns, where, header) if columns else None
-
-
-def _read_seconds(text: str, first: str, where: str) -> list[LabelTier] | None:
-    return [_read_spans(text, SECONDS, where)] if SECONDS.fullmatch(first) else None
 
 
 def _read_wholes(text: str, first: str, where: str) -> list[LabelTier] | None:
@@ -161,7 +159,8 @@ def _read_nist(text: str, _: str, where: str) -> list[LabelTier] | None:
     """Return the words of a CTM or the lines of an STM in order of time, a tier for each channel or speaker."""
     first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")[:1000]
     matches = ((form, form.fullmatch(first)) for form in (STM, CTM))
-    form = next((form for form, match in matches if match and _has_decimals(match)), None)
+    found = ((form, match) for form, match in matches if match and "." in match[3] + match[4])
+    form = next((form for form, match in found if not re.match(rf"(?:{NUMBER})(?:\s|$)", match[5])), None)
     if form is None:
         return None
     wanted = "recording channel start duration word" if form is CTM else "recording channel speaker start end words"
@@ -177,17 +176,12 @@ def _read_nist(text: str, _: str, where: str) -> list[LabelTier] | None:
             raise InputError(f"{where}: line {number}: a duration of {end_s:g} s, required 0 or more")
         end_s += start_s if form is CTM else 0.0
         by_speaker[speaker].append(TimedLabel(start_s, end_s, words, f"line {number}"))
-    role = WORDS if form is CTM else LINES
+    role = "" if form is CTM else LINES  # Kaldi writes phones in CTM, too
     several = len(by_speaker) > 1
     return [
         LabelTier(speaker, tuple(sorted(labels, key=lambda label: label.start_s)), role, speaker if several else "")
         for speaker, labels in by_speaker.items()
     ]
-
-
-def _has_decimals(match: re.Match[str]) -> bool:
-    """Return whether the times of a line of NIST have decimals, and what is said does not begin with a number."""
-    return "." in match[3] + match[4] and not re.match(rf"(?:{NUMBER})(?:\s|$)", match[5])
 
 
 def _read_lrs(text: str, _: str, where: str) -> list[LabelTier] | None:
@@ -216,12 +210,14 @@ def _read_table(text: str, columns: dict[str, int], where: str, given: str = "")
     header = given or next(line for _, line in _lines(text))
     delimiter = max(",;\t", key=header.count)
     kinds: dict[tuple[str, str], list[TimedLabel]] = defaultdict(list)
-    named = re.split(r"[,;\t]", header)[columns["text"]].strip(' "')
+    named = re.split(r"[,;\t]", header)[columns["text"]].strip(' "').lower()
+    named = "" if named in ("text", "label") else named
     for number, line in islice(_lines(text), 0 if given else 1, None):
         check_count(number, where)
         place = f"line {number}"
         try:
             fields = next(csv.reader([line], delimiter=delimiter))
+            fields += [""] if columns["text"] == len(fields) else []  # of a line that is empty
             known = {kind: at for kind, at in columns.items() if at < len(fields) or kind != "speaker"}
             row = {kind: fields[column] for kind, column in known.items()}
             times = (row["start"], row.get("end") or row["duration"])
@@ -232,4 +228,5 @@ def _read_table(text: str, columns: dict[str, int], where: str, given: str = "")
         key = (row.get("kind", named), row.get("speaker", ""))
         kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))
     tiers = [find_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
-    return parse_seconds(tiers, where)
+    whole = all(label.start_s % 1 == 0 == label.end_s % 1 for tier in tiers for label in tier.labels)
+    return parse_seconds(tiers, where, 1000 if whole and header == "start\tend\ttext" else 0)  # Whisper's

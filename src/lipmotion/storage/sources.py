@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.types.values import parse_clock
 
 LOG = logging.getLogger("lipmotion")
 
@@ -260,20 +261,15 @@ def check_kind(path: Path, wanted: str, kind: str = "") -> None:
         head = file.read(HEAD)
         file.seek(max(path.stat().st_size - TAIL, 0))
         tail = file.read(TAIL) if head.startswith(b"PK") else b""
-        unpacked = _unpacked(head)
+        unpacked = b"" if head.startswith(b"\x1f\x8b") else head  # of gzip
+        with suppress(zlib.error):
+            unpacked = unpacked or zlib.decompressobj(31).decompress(head, HEAD)
         fine = _NO_MISTAKE.get(wanted, {"archive", "picture", "sound"})
         for group, name, marks in _KINDS:
             for at, mark in marks if group not in fine else ():
                 beginnings = (head[at : at + len(mark)], unpacked[at : at + len(mark)])
                 if mark in (tail if at == -1 else unpacked) if at < 0 else mark in beginnings:
                     raise InputError(f"{path}: is {name}, required a {kind or wanted}; {_NEXT[group]}")
-
-
-def _unpacked(head: bytes) -> bytes:
-    """Return the beginning of a file without the packing of gzip."""
-    with suppress(zlib.error):
-        return zlib.decompressobj(31).decompress(head, HEAD) if head.startswith(b"\x1f\x8b") else head
-    return b""
 
 
 def is_text(path: Path) -> bool:
@@ -304,7 +300,6 @@ open anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pi
 devices."""
 LARGEST_BLOCK_BYTES = 1 << 28
 """Most bytes that FFmpeg may allocate at a time: three pictures of ``MAX_PIXELS`` with four channels of 16 bits."""
-DURATION = re.compile(r"(\d{1,6}):(\d\d):(\d\d(?:\.\d{1,9})?)")
 MAX_PIXELS = 4096 * 2304
 """Most pixels of a picture: slightly more than 4K. A decoder may keep sixteen pictures."""
 
@@ -385,11 +380,5 @@ def read_duration(container: Any, stream: Any) -> float:
         return float(stream.duration * stream.time_base)
     if not container.streams.subtitles:
         return (container.duration or 0) / 1e6
-    return max(map(_tagged_s, (*container.streams.video, *container.streams.audio)))
-
-
-def _tagged_s(stream: Any) -> float:
-    """Return the duration of a Matroska stream, which is stored as text, in seconds; 0 if there is none."""
-    match = DURATION.fullmatch(stream.metadata.get("DURATION", ""))
-    hours, minutes, seconds = map(float, match.groups()) if match else (0.0, 0.0, 0.0)
-    return 3600 * hours + 60 * minutes + seconds
+    streams = (*container.streams.video, *container.streams.audio)
+    return max(max(0.0, parse_clock(each.metadata.get("DURATION", ""))) for each in streams)  # Matroska's is a text

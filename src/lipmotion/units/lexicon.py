@@ -49,6 +49,8 @@ SpokenForm = tuple[tuple[str, str], ...]
 """Phones, each with the word that it is of; between words a pause that may be made, without a word."""
 
 FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
+OWNED = dict.fromkeys("p t k f th".split(), ("s",)) | dict.fromkeys("s z sh zh ch jh".split(), ("ix", "z"))
+"""The phones of an ``'s`` after some phones; ``z`` after all others."""
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
 """Monosyllables that are unstressed in running speech."""
 LARGEST_LEXICON_BYTES, MAX_LINES = 1 << 25, 1 << 20
@@ -131,7 +133,7 @@ class Lexicon:
 
     def known(self, word: str) -> bool:
         """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
-        said = (each in self.user or is_in_dictionary(each) for each in list_readings(word)[0])
+        said = (each in self.user or is_in_dictionary(each) for each in list_readings(word.removesuffix("'s"))[0])
         return word in self.user or all(said) or bool(expand_lengthened(word) or SOUNDED.fullmatch(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
@@ -170,6 +172,8 @@ class Lexicon:
         variants = [reduce_vowels(word, entry) for entry in entries]
         if variants:
             return tuple(dict.fromkeys(variants))
+        if word[1:].endswith("'s"):
+            return tuple((*each, *OWNED.get(each[-1], ("z",))) for each in self._pronounce(word[:-2]))
         by_rules = guess_pronunciation(word)
         if SOUNDED.fullmatch(word):
             return (by_rules,)

@@ -10,6 +10,7 @@ from enum import Enum
 
 from lipmotion.errors import InputError
 from lipmotion.types import TimedWord
+from lipmotion.types.values import parse_clock
 from lipmotion.units.text_normalisation import tokenise
 from lipmotion.units.written_forms import list_readings
 
@@ -29,6 +30,12 @@ SPEAKER = re.compile(
     re.MULTILINE,
 )
 """What may be the name of a speaker: before a colon at the start of a line, perhaps with ``(V.O.)``."""
+STAMP = re.compile(
+    r"^[ \t]*(?:[^\W\d_][\w.'’ -]{0,30}?[ \t]+(?=[(\[]?[\d:]{4,8}[)\]]?[ \t]*$))?"
+    r"[(\[]?((?:\d{1,2}:)?\d{1,2}:\d\d)(?:[.,]\d{1,3})?[)\]]?(?:[ \t]*$|[ \t]*[-–—|]?[ \t]+(?=\S))",
+    re.MULTILINE,
+)
+"""The time of a line of a transcript of the web, before it or above it: ``0:12 Hello``, ``Anna  0:12``."""
 CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]{1,20}\))?)[ \t]*\n(?=[^\n]*[a-z])")
 """A name in capitals above what that person says, as in screenplays."""
 DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
@@ -97,7 +104,7 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
 
     Names are those in capitals and with a remark (``ANNA:``, ``Anna (V.O.):``, ``[Anna]:``), ``Speaker 1:``, those in
     ``names``, two lines or more in capitals above what is said, as in screenplays, and what stands before the quotes of
-    a game's script, if all lines are such.
+    a game's script, if all lines are such; also times before lines, if they rise from the first minute on.
     """
     left_out: list[str] = []
 
@@ -112,6 +119,9 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
         numbered = re.fullmatch(r"[Ss]peaker[ _]?\w{1,3}", name)
         return leave_out(match) if in_capitals or has_remark or numbered or name in names else match[0]
 
+    times_s = [parse_clock(stamp[1]) for stamp in STAMP.finditer(text)]
+    if times_s[:1] == [0] or (len(times_s) > 1 and times_s[0] < 60 and times_s == sorted({*times_s})):
+        text = STAMP.sub(leave_out, text)
     cues = list(CUE.finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
         text = DIRECTION.sub(leave_out, CUE.sub(leave_out, text))

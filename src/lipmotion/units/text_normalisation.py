@@ -82,7 +82,7 @@ def tokenise(text: str) -> tuple[str, ...]:
 @cache
 def _scanner() -> re.Pattern[str]:
     word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
-    forms = [rf"(?:{form})(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
+    forms = [rf"(?:{form})(?:'s)?(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
     signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|[~≈±](?=\d)"
     dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[mdht\d%])–(?=[$£€]?\d)"

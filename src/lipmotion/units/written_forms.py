@@ -97,6 +97,9 @@ def _iterate_readings(token: str) -> Iterator[str]:
         return
     matches = ((said, re.fullmatch(pattern, token, re.IGNORECASE)) for pattern, said in FORMS)
     said, match = next(((said, match) for said, match in matches if match), ("", None))
+    if match is None and token.endswith("'s"):  # of a written form, as "Henry VIII's"
+        yield from (f"{' '.join(reading)}'s" for reading in list_readings(token[:-2]))
+        return
     if match is None or callable(said):
         yield from said(token) if callable(said) else [token.lower()]
         return

@@ -148,18 +148,12 @@ def build_inventory(examples: Sequence[Example], values: Sequence[Array], guide:
             ]
         ).astype(np.float16)
     names = tuple(example.name for example in examples)
-    kept = _kept(examples, first)
-    motion = np.concatenate(values)[np.concatenate([np.arange(start, stop) for start, stop in kept])].astype(np.float16)
-    return RecordedUnits(names, windows, usable, first, np.array(kept, np.intp), motion, predicted)
-
-
-def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int]]:
-    """Return the ranges of rows that are stored: not the middle of long silences, nor what was not measured."""
-    ranges = list[list[int]]()
+    kept = list[list[int]]()  # ranges of rows: not the middle of long silences, nor what was not measured
     for example, begin in zip(examples, first[:-1].tolist(), strict=True):
         near = example.valid & ~mark_distant(example.speech.units, len(example.valid), KEPT_SILENCE_S)
-        ranges += (find_runs(near) + begin).tolist()
-    return ranges
+        kept += (find_runs(near) + begin).tolist()
+    motion = np.concatenate(values)[np.concatenate([np.arange(start, stop) for start, stop in kept])].astype(np.float16)
+    return RecordedUnits(names, windows, usable, first, np.array(kept, np.intp), motion, predicted)
 
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:

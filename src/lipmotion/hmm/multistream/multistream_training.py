@@ -335,7 +335,7 @@ def _start(
     if not set(streams) & set(config.training.active):
         raise InputError(f"switched on are {', '.join(config.training.active)}; observed were {', '.join(streams)}")
     hmm = _make_equal_models(utterances, inventory, config, streams)
-    prepared = _prepare(hmm, utterances)
+    prepared = prepare_utterances(hmm, [(each.observed, each.units) for each in utterances])
     if not any(item.fits for item in prepared.items):
         raise CorpusError(
             f"none of {len(utterances)} utterances has room for the states of its units; "
@@ -435,7 +435,3 @@ def _split(
     tied = model.tied.split(statistics)
     new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})
     return _run_em(new, prepared, f"{tied.mixtures.size[1]} Gaussians for {name}", hmm.config.iterations, monitor, work)
-
-
-def _prepare(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> PreparedUtterances:
-    return prepare_utterances(hmm, [(utterance.observed, utterance.units) for utterance in utterances])

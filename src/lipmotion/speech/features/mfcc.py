@@ -61,8 +61,10 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
     log_powers = log_mels(check_samples(audio), [mel_filters(warp) for warp in warps])
     features = []
     while log_powers:
-        cepstra, rounding = _cepstra(log_powers.pop(0))  # the log powers of a long recording are freed here
-        static = np.concatenate([cepstra, energy[:, None]], axis=1)
+        powers = log_powers.pop(0)
+        rounding = ROUNDING_SHARE * max(float(powers.max()), -float(powers.min()))  # constant but for that
+        static = np.concatenate([powers @ build_cosine(FILTERS, 1, CEPSTRA + 1), energy[:, None]], axis=1)
+        del powers  # those of a long recording are freed here
         width = static.shape[1]
         values = np.empty((len(static), 3 * width), np.float32)
         values[:, :width] = static
@@ -70,12 +72,6 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
             values[:, first : first + width] = compute_delta(values[:, first - width : first])
         features.append(Features(normalise_rows(values, rounding), audio.duration_s))
     return features
-
-
-def _cepstra(log_powers: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
-    """Return c1–c12 [shape=(T, 12)] and the standard deviation up to which a feature is constant but for rounding."""
-    rounding = ROUNDING_SHARE * max(float(log_powers.max()), -float(log_powers.min()))
-    return log_powers @ build_cosine(FILTERS, 1, CEPSTRA + 1), rounding
 
 
 def check_samples(audio: Audio) -> NDArray[np.float32]:

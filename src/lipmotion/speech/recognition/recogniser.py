@@ -188,7 +188,8 @@ class Recogniser:
             aligned = self.align_phones(audio, features, phones)
         except AlignmentError:
             return labels
-        return [LabelledFrames(_first_frame(span.start_s), span.label.phone) for span in aligned]
+        frames = [round(span.start_s * FRAME_RATE_HZ + 0.5) if span.start_s > 0 else 0 for span in aligned]
+        return [LabelledFrames(frame, span.label.phone) for frame, span in zip(frames, aligned, strict=True)]
 
     def align(
         self,
@@ -341,11 +342,6 @@ def open_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | N
 def weigh_own_model(score: float) -> float:
     """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
     return min(max((score - STRANGER_SCORE) / (FULL_WEIGHT_SCORE - STRANGER_SCORE), 0.0), 1.0)
-
-
-def _first_frame(start_s: float) -> int:
-    """Return the first frame of a phone that ``_timeline`` made."""
-    return round(start_s * FRAME_RATE_HZ + 0.5) if start_s > 0 else 0
 
 
 def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:

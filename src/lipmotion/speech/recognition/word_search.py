@@ -205,13 +205,11 @@ class WordSearch:
         believed = np.full(len(words), self.believing or fit > STRETCH_FIT) | (fits > WORD_FIT)
         decided = list(label_words(aligned, stretch, believed, first_word))
         if not believed.all():
-            decided = [(stretch, splice(self._favouring(stretch, aligned), decided, stretch.end))]
+            # phones as they are recognised if those of words in it are more probable than others
+            values = self.free.stretch(*stretch) + weigh_phones(self.hmm, aligned, WORD_BONUS)
+            path = self.loop.network.best_path(wrap_log_likelihoods(values))
+            decided = [(stretch, splice(recognise_free(self.loop, path, stretch.first), decided, stretch.end))]
         return decided, fits.tolist()
-
-    def _favouring(self, stretch: Stretch, aligned: AlignedWords) -> list[LabelledFrames]:
-        """Return the phones of a stretch that are recognised if those of words in it are more probable than others."""
-        values = self.free.stretch(*stretch) + weigh_phones(self.hmm, aligned, WORD_BONUS)
-        return recognise_free(self.loop, self.loop.network.best_path(wrap_log_likelihoods(values)), stretch.first)
 
 
 def score_words(fit: float, posterior: float) -> float:

@@ -1,4 +1,4 @@
-"""Acoustic conditions: noise at a stated ratio; and for training, rooms, telephones, other voices."""
+"""Acoustic conditions: hum taken out, noise at a stated ratio; and for training, rooms, telephones, other voices."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.loudness import find_loud_frames
 from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, log_energy, spectrum
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.sound.voice_activity import find_passages
 from lipmotion.types import Audio, ConditionSpectrum
 
 NOISE_KINDS = ("white", "babble")
@@ -19,8 +21,35 @@ FEWEST_TALKERS = 2
 """One other talker is an interruption, not a babble."""
 SILENT_RMS = 1e-6
 """Speech of a lower root mean square, full scale 1, is silence."""
+HUM, LEAST_HUM, MAX_HUM_BLOCKS, HUM_RATIO, HUM_WIDTH = 16_000, 32_000, 200, 8.0, 61
+HUM_SHARE, HUM_REST = 0.03, 1e-5
+"""Hum is looked for in blocks of a second, in sound of two and more: bins of a hertz of so much more amplitude than
+those around, also where all else pauses, and this share of the loudest. Without it, this share of the power is left."""
 
 Noise = NDArray[np.float32]
+
+
+def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return sound at 16 kHz [shape=(N,)] without lines of its spectrum that never pause, if a voice is beside them."""
+    from scipy.ndimage import binary_dilation, median_filter
+
+    if len(samples) < LEAST_HUM:
+        return samples
+    # before and after go half a second, whole periods of any mains
+    padded = np.concatenate([samples[: HUM // 2], samples, samples[-HUM // 2 :]])
+    blocks, window = sliding_window_view(padded, HUM)[:: HUM // 4], np.hanning(HUM + 1)[:-1]
+    judged = blocks[:: max(len(blocks) // MAX_HUM_BLOCKS, 1)] * window
+    steady, loud = np.quantile(np.abs(np.fft.rfft(judged)), (0.2, 0.9), axis=0)
+    lines = steady > np.maximum(HUM_RATIO * median_filter(steady, HUM_WIDTH), HUM_SHARE * loud.max())
+    if not lines.any():
+        return samples
+    kept, clean = ~binary_dilation(lines, iterations=3), np.zeros(len(padded), np.float32)
+    for number, block in enumerate(blocks):
+        clean[number * HUM // 4 :][:HUM] += np.fft.irfft(np.fft.rfft(block * window) * kept).astype(np.float32) / 2
+    clean = clean[HUM // 2 :][: len(samples)]
+    within, before = (sound[HUM // 2 : -HUM // 2] for sound in (clean, samples))  # hum may be left at the ends
+    voiced = np.square(within).sum() > HUM_REST * np.square(before).sum() and find_passages(log_energy(within))
+    return clean if voiced else samples
 
 
 def mix_noise(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:

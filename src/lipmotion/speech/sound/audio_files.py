@@ -109,6 +109,7 @@ class _TrackDecoder:
         while self._pieces:  # each is freed when it is copied
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
+        unstated = self._container.streams.video and not self._stream.duration
         return DecodedAudio(
             samples=samples[self._cut :],
             rate_hz=self._rate_hz,
@@ -117,13 +118,8 @@ class _TrackDecoder:
             packets=self._packets,
             damaged=self._damaged,
             silence_s=self._silence_s,
-            stated_s=self._stated_s(),
+            stated_s=0.0 if unstated else read_duration(self._container, self._stream),
         )
-
-    def _stated_s(self) -> float:
-        if self._container.streams.video and not self._stream.duration:
-            return 0.0
-        return read_duration(self._container, self._stream)
 
     def _frames(self) -> Iterator[Any]:
         """Yield the frames that can be decoded; damaged packets are counted."""
@@ -142,7 +138,10 @@ class _TrackDecoder:
         if frame.pts is not None:
             time_s = float(frame.pts * frame.time_base)
             if self._clock_s is None:
-                self._start(time_s)
+                has_pictures = bool(list_video(self._container))
+                offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
+                self._count += self._silence(max(offset_s, 0.0))
+                self._cut = max(round(-offset_s * self._rate_hz), 0)
             elif time_s - self._clock_s > HOLE_S:
                 self._flush()
                 self._silence_s += time_s - self._clock_s
@@ -151,12 +150,6 @@ class _TrackDecoder:
                 self._clock_s = time_s
         if self._clock_s is not None:
             self._clock_s += frame.samples / frame.sample_rate
-
-    def _start(self, time_s: float) -> None:
-        has_pictures = bool(list_video(self._container))
-        offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
-        self._count += self._silence(max(offset_s, 0.0))
-        self._cut = max(round(-offset_s * self._rate_hz), 0)
 
     def _silence(self, duration_s: float) -> int:
         """Return the number of samples of a hole's silence. Raises InputError: the hole is too long."""
@@ -270,7 +263,12 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
         LOG.log(level, "%s: damaged: %s%s", path, found, holes)
     if held_s < CUT_SHORT_SHARE * sound.stated_s:
         LOG.log(level, "%s: cut short: it states %.1f s of sound and holds %.1f s", path, sound.stated_s, held_s)
-    return _checked(path, Audio(sound.samples, rate_hz))
+    audio = Audio(sound.samples, rate_hz)
+    if audio.duration_s < SHORTEST_S:
+        raise InputError(f"{path}: holds {audio.duration_s * 1000:.0f} ms of sound, required at least 100 ms")
+    if not np.isfinite([audio.samples.min(), audio.samples.max()]).all():  # which needs no further array
+        raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); export the recording again")
+    return audio
 
 
 def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
@@ -285,7 +283,7 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
                 raise InputError(f"{path}: its sound is coded in an unknown way; export it as .wav or .flac")
             check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
             if len(container.streams.audio) > 1:
-                LOG.info("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
+                LOG.warning("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
             return _TrackDecoder(container, rate_hz, channel).decoded()
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
@@ -295,14 +293,6 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
             raise InputError(f"{path}: {told}") from error
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: not a readable recording ({reason}); give an audio or video file") from error
-
-
-def _checked(path: Path, audio: Audio) -> Audio:
-    if audio.duration_s < SHORTEST_S:
-        raise InputError(f"{path}: holds {audio.duration_s * 1000:.0f} ms of sound, required at least 100 ms")
-    if not np.isfinite([audio.samples.min(), audio.samples.max()]).all():  # which needs no further array
-        raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); export the recording again")
-    return audio
 
 
 class _Wave(mmap.mmap):

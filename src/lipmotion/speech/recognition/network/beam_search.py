@@ -114,7 +114,8 @@ def load_english() -> EnglishWords:
     chosen = np.argsort(-scores, kind="stable")[:MOST_WORDS]
     chosen = chosen[scores[chosen] > LEAST_LOG_PROBABILITY]
     words = np.array([names[number] for number in chosen.tolist()])
-    numbers = [_numbers(pronounced[word]) for word in words.tolist()]
+    coded = ([bytes(map(NUMBER.__getitem__, said.split())) for said in pronounced[word]] for word in words.tolist())
+    numbers = [[phones for phones in each if len(phones) <= LONGEST_WORD] for each in coded]
     del pronounced, names  # no string of theirs is kept, which would keep the memory of many
     tree = build_word_tree(numbers, scores[chosen] * LANGUAGE_WEIGHT)
     return EnglishWords(tree, LanguageModel(tuple(words.tolist()), model, base))
@@ -134,12 +135,6 @@ def _pronunciations() -> dict[str, list[str]]:
         else:
             found[word] = [phones]
     return found
-
-
-def _numbers(pronunciations: list[str]) -> list[bytes]:
-    """Return the numbers of the phones in ``SOUNDS``, a byte a phone, of all pronunciations that are short enough."""
-    each = (bytes(map(NUMBER.__getitem__, pronunciation.split())) for pronunciation in pronunciations)
-    return [phones for phones in each if len(phones) <= LONGEST_WORD]
 
 
 def build_word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float64]) -> WordTree:
