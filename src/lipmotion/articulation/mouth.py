@@ -28,13 +28,13 @@ TONGUE_GAP = (0.05, 0.1)
 """Range of the gap while the tongue is between the teeth."""
 PURSED_GAP = (0.04, 0.05)
 """Range of the gap of w: a small hole."""
-ROUND_GAP, TEETH_GAP = 0.06, 0.045
-"""Least gap of protruded lips, and where both rows of teeth are seen."""
+ROUND_GAPS, TEETH_GAPS = (0.06, 0.085), (0.045, 0.1)
+"""Range of the gap of wholly protruded lips, and where both rows of teeth are seen."""
 ROUND_WIDTH, PURSED_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.89, 0.82, 1.05, 0.97
 """Protruded lips and those of w are at most so wide, spread ones at least, those of an oval mouth at most."""
-OVAL_GAPS = (0.08, 0.18)
+OVAL_GAPS = (0.06, 0.16)
 """The gap at which an opening begins to be an oval, and at which it is one, where the phone asks for it."""
-SPREAD_GAP, SPREAD_FROM = 0.1, 0.55
+SPREAD_GAP, SPREAD_FROM = 0.1, 0.45
 """Wholly spread lips are apart by this gap and a third of what was measured beyond it: ee is not aa. Lips count as
 spread from the second value on."""
 WIDTH_REACH = 0.3
@@ -293,10 +293,12 @@ def _articulate(gap: Curve, weights: dict[str, Curve], time_s: Curve) -> Curve:
     press, tuck, pursed = weights["lip_press"], weights["lip_tuck"], weights["pursed"]
     free = (1 - press) * np.clip(gap / 0.03, 0, 1)
     shown = np.maximum(2 * weights["teeth"] - 1, 0)
-    for weight, low in ((shown, TEETH_GAP), (weights["protrusion"] ** 2 * (1 - pursed), ROUND_GAP)):
+    for weight, low in ((shown, TEETH_GAPS[0]), (weights["protrusion"] ** 2 * (1 - pursed), ROUND_GAPS[0])):
         gap = gap + free * weight * (np.maximum(gap, low) - gap)
     spread = np.clip((weights["spread"] - SPREAD_FROM) / (1 - SPREAD_FROM), 0, 1) * (1 - weights["protrusion"])
-    gap = gap - spread * np.maximum(gap - SPREAD_GAP, 0) * 2 / 3
+    protruded = np.clip(4 * weights["protrusion"] - 3, 0, 1)  # oo, not oh
+    for weight, high in ((spread * 2 / 3, SPREAD_GAP), (protruded, ROUND_GAPS[1]), (shown**2, TEETH_GAPS[1])):
+        gap = gap - weight * np.maximum(gap - high, 0)
     between = np.clip((weights["tongue"] - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
     apart = np.clip((0.75 - press) / 0.15, 0, 1)  # also where they were tracked as closed
     for weight, (low, high) in ((pursed, PURSED_GAP), (between * apart, TONGUE_GAP), (tuck * apart, TUCKED_GAP)):

@@ -69,8 +69,8 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     "tongue": (
         GestureTarget(0, 0, 0.5, 0.025),
         _steady({"th dh": TIP_OUT}, 5.0, 0.02)
-        | _steady({"l el": TIP_UP, "t d n en": 0.55, "ch jh": 0.45}, 2.5, 0.022)
-        | _steady({"s z": 0.3, "sh zh": 0.25, "iy ih ey y": 0.2, "r er axr": 0.2}, 0.8, 0.03),
+        | _steady({"l el": TIP_UP, "t d n en": 0.5, "ch jh": 0.3}, 2.5, 0.022)
+        | _steady({"s z": 0.3, "sh zh": 0.25, "r er axr": 0.2}, 0.8, 0.03),
     ),
     "lip_tuck": (
         GestureTarget(0, 0, 1.0, 0.022),
@@ -79,15 +79,14 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     "protrusion": (
         GestureTarget(0, 0, 0.25, 0.03),
         _steady({"uw w": 1.0}, 3.0, 0.045)
-        | _steady({"uh": 0.65, "ao": 0.4}, 1.6, 0.05)
+        | _steady({"uh ao": 0.65}, 1.6, 0.05)
         | {
             "ow": GestureTarget(0.55, 1.0, 2.2, 0.05),
             "oy": GestureTarget(0.6, 0.0, 1.6, 0.04),
             "aw": GestureTarget(0.0, 0.6, 1.4, 0.04),
         }
-        | _steady({"sh zh ch jh": 0.5}, 1.4, 0.04)
-        | _steady({"r": 0.55, "er axr": 0.4}, 1.2, 0.04)
-        | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 2.2, 0.035)
+        | _steady({"sh zh ch jh r": 0.6, "er axr": 0.45}, 4.0, 0.035)
+        | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 3.0, 0.035)
         | _steady({"th dh": 0.0}, 1.6, 0.03)
         | _steady({"f v": 0.0, "s z": 0.0, "sil sp": 0.0}, 0.7, 0.03),
     ),
@@ -99,7 +98,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
             "ay": GestureTarget(0.0, 0.6, 1.0, 0.035),
             "oy": GestureTarget(0, 0.6, 1.0, 0.035),
         }
-        | _steady({"ih ix": 0.55, "ae eh": 0.45, "y": 0.7}, 1.0, 0.035)
+        | _steady({"ih y": 0.7, "ix": 0.55, "ae eh": 0.45}, 1.0, 0.035)
         | _steady({"s z": 0.6}, 0.8, 0.03)
         | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 1.5, 0.04)
         | _steady({"sil sp": 0.0}, 0.7, 0.03),
@@ -116,10 +115,10 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     ),
     "teeth": (
         GestureTarget(0.5, 0.5, 0.5, 0.03),
-        _steady({"s z": 1.0, "iy": 0.87, "sh zh ch jh": 0.97}, 2.0, 0.03)
-        | _steady({"ih ix ey y": 0.75, "t d n en": 0.7, "ae eh": 0.6, "k g ng": 0.6}, 0.8, 0.03)
-        | _steady({"f v th dh": 0.5}, 2.0, 0.025)
-        | _steady({"uw w": 0.0, "uh": 0.15, "ao": 0.3, "aa": 0.4}, 2.0, 0.04)
+        _steady({"s z sh zh ch jh": 0.98}, 7.0, 0.025)
+        | _steady({"t d n en": 0.82, "iy k g ng": 0.79, "ih ix ey y": 0.75}, 1.5, 0.03)
+        | _steady({"f v th dh ah": 0.5, "ae eh": 0.58}, 2.0, 0.025)
+        | _steady({"uw w": 0.0, "uh ao": 0.15, "aa": 0.4}, 2.0, 0.04)
         | {"ow": GestureTarget(0.3, 0.0, 1.6, 0.04)}
         | _steady({"sil sp": 0.0}, 2.5, 0.03),
     ),

@@ -116,7 +116,7 @@ def _reduce(mask: NDArray[np.bool_]) -> Pixels:
 
 OWN_SIZE = 640
 MOUTH = "mouth-"
-CHANGE_COST = 0.012
+CHANGE_COST = 0.01
 """A change of mouths costs as much as this squared distance at 2 frames a second, so that none is shown too shortly."""
 EYE_DISTANCE = 0.285
 """Height of the picture that stands for an eye distance, in which heads and eyes are moved."""
@@ -140,17 +140,17 @@ MOUTHS = {
     "rest": _Key(0.0, teeth=0.0),
     "mbp": _Key(0.0),
     "fv": _Key(0.05, tuck=1.0),
-    "th": _Key(0.09, tongue=1.0),
-    "l": _Key(0.09, tongue=0.58),
-    "s": _Key(0.055, 1.04, teeth=0.95),
-    "ee": _Key(0.11, 1.1, teeth=0.8),
-    "eh": _Key(0.13, 1.03),
-    "aa": _Key(0.19, 0.94, oval=0.8),
-    "oh": _Key(0.1, 0.82, protrusion=0.55, teeth=0.2),
-    "oo": _Key(0.06, 0.7, protrusion=1.0, teeth=0.0),
+    "th": _Key(0.1, tongue=1.0),
+    "l": _Key(0.12, tongue=0.6, teeth=0.55),
+    "s": _Key(0.1, 1.02, tongue=0.3, protrusion=0.15, teeth=1.0),
+    "ee": _Key(0.11, 1.08, tongue=0.2, teeth=0.79),
+    "eh": _Key(0.14, 1.03, teeth=0.57),
+    "aa": _Key(0.22, 0.97, teeth=0.4, oval=0.9),
+    "oh": _Key(0.12, 0.91, tongue=0.05, protrusion=0.55, teeth=0.25),
+    "oo": _Key(0.05, 0.83, protrusion=1.0, teeth=0.0),
 }
 """The mouths that a drawing may have, as layers ``mouth-NAME``; ``rest`` is required, what is missing is replaced."""
-_WEIGHTS = np.array([6.0, 1.6, 0.5, 0.9, 0.7, 0.6, 0.5])
+_WEIGHTS = np.array([5.0, 1.5, 1.0, 0.9, 1.0, 1.2, 0.6])
 
 
 @final
