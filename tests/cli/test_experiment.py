@@ -11,6 +11,8 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion_lab import runner
 from lipmotion_lab.report import sections
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -35,14 +37,12 @@ def figures_of(run, here):
     return figures_of
 
 
-@pytest.mark.long
 def test_the_table_is_that_of_the_figures(figures_of, toy_corpus, here):
     figures = figures_of(sections.build_hofer_section, "hofer2008", toy_corpus.path, "--split", "val", "--quick")
     assert (figures["split"], figures["clips"], figures["mixtures"]) == ("val", 2, [1, 2])
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
 
-@pytest.mark.long
 def test_the_learning_curve_of_a_list(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
     chosen = ("--order", "order.txt", "--sizes", "3", "--split", "val")
@@ -51,13 +51,11 @@ def test_the_learning_curve_of_a_list(figures_of, toy_corpus, here):
     assert [row["names"] for row in figures["rows"]] == [3]
 
 
-@pytest.mark.long
 def test_folds_of_the_training_list(figures_of, toy_corpus):
     figures = figures_of(sections.build_folds_section, "folds", toy_corpus.path, "--folds", "2")
     assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
 
 
-@pytest.mark.long
 def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
     few = ("--systems", "ph-MSHMM;mean pose", "--order", "order.txt")
@@ -69,7 +67,6 @@ def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
     assert sorted(path.name for path in here.iterdir()) == ["a.json", "order.txt", "pictures"]
 
 
-@pytest.mark.long
 def test_all_engines(figures_of, run, toy_corpus, here):
     chosen = (sections.build_engines_section, "engines", toy_corpus.path, "--split", "test", "--models", "models")
     figures = figures_of(*chosen)

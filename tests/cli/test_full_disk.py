@@ -32,7 +32,6 @@ def test_animate(toy_speech, toy_model_file, here, name):
     assert list(here.iterdir()) == []
 
 
-@pytest.mark.long
 def test_a_film(toy_speech, toy_model_file, filmed_face_file, here):
     basics = ("animate", toy_speech, "--model", toy_model_file, "--face", filmed_face_file)
     code, line = run_limited(*basics, "-o", "a.mp4", limit=20_000)
@@ -58,7 +57,6 @@ def test_a_face(filmed_face_file, here):
     assert list(here.iterdir()) == []
 
 
-@pytest.mark.long
 def test_train_says_what_is_kept_and_goes_on(run_outside, toy_corpus, here):
     train = ("train", toy_corpus.path, "--engine", "joint", "--set", "mixtures=1")
     code, line = run_limited(*train, "-o", "m.lipmotion", limit=30_000)  # phones, not the model
@@ -71,7 +69,6 @@ def test_train_says_what_is_kept_and_goes_on(run_outside, toy_corpus, here):
     assert (here / "m.lipmotion").read_bytes() == (here / "whole.lipmotion").read_bytes()
 
 
-@pytest.mark.long
 def test_a_report_says_so_before_the_work(toy_corpus, here):
     code, line = run_limited("experiment", "all", toy_corpus.path, "-o", "r", "--quick")
     assert (code, line.startswith("lipmotion: error: r/index.html: cannot be written: ")) == (7, True)

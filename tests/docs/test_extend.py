@@ -10,6 +10,7 @@ import pytest
 
 from children import LIPMOTION, Done, environment, run_child
 
+pytestmark = pytest.mark.long
 PAGES = Path(__file__).parents[2] / "docs" / "extend"
 PROJECT = """[build-system]
 requires = ["hatchling"]
@@ -57,7 +58,6 @@ class Package:
         return done.stdout
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("page", ["engine.md", "face.md", "exporter.md"])
 def test_what_a_page_writes_keeps_its_contract(page, tmp_path):
     package = Package(page, tmp_path)
@@ -65,7 +65,6 @@ def test_what_a_page_writes_keeps_its_contract(page, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("page", "chosen", "missing"),
     [
@@ -87,7 +86,6 @@ def test_what_is_installed_trains_saves_loads_and_animates(page, chosen, missing
     assert missing in without.stderr
 
 
-@pytest.mark.long
 def test_an_installed_face_format_and_output_work_from_the_command_line(toy_speech, tmp_path):
     face, table = Package("face.md", tmp_path / "face"), Package("exporter.md", tmp_path / "table")
     words = Package("output.md", tmp_path / "words")

@@ -119,7 +119,6 @@ def test_one_person_is_not_mapped(two_people):
     assert model.speakers is None
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("engine", ["joint", "coupled"])
 def test_other_engines(two_people, toy_sentence, engine):
     settings = {"chains": "sVis 2vis", "mixtures": 2} if engine == "coupled" else {}
@@ -142,7 +141,6 @@ def captured(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
     return replace(utterance, track=replace(utterance.track, motion=motion), speaker="captured")
 
 
-@pytest.mark.long
 def test_channels_that_all_have_are_trained_on(two_people, tmp_path, caplog):
     footage = [two_people.utterance(name) for name in two_people.names("train")[:6]]
     jaw = (Channel("jaw", "weight"), Channel("width"), Channel("opening"))
@@ -214,7 +212,6 @@ def test_variance_and_pins_and_explanations_are_of_the_person(toy_model, toy_sen
     assert explanation.motion["opening"].value == pytest.approx(mapped.motion["opening"][90], abs=1e-9)
 
 
-@pytest.mark.long
 def test_a_person_of_the_model_onto_another(two_model, toy_sentence, ben):
     """Whoever of the model's people speaks, the motion is in ben's place and range."""
     people = [
