@@ -144,17 +144,17 @@ def _train_system(
                 return
 
     stage = f"{config.units}-{config.states}-{options.mixtures}-{options.motion_mixtures}"
-    if (kept := checkpoint.load(stage)) is None:
+    if (stored := checkpoint.load(stage)) is None:
         try_numbers(sub_monitor(monitor, 0, 0.6), mixtures=max(options.mixtures))
         if not tried:
             raise InputError(f"no state has data for {min(options.mixtures)} Gaussians; compare also fewer, from 1")
         if max(options.motion_mixtures) > 1:
             most = {"mixtures": _find_best_count(tried)[0], "motion_mixtures": max(options.motion_mixtures)}
             try_numbers(sub_monitor(monitor, 0.6, 1), **most)
-        kept = arrays | {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
-        checkpoint.save(stage, kept)
-    acc = dict(zip(map(tuple, kept[_COUNTS].tolist()), kept[_ACC].tolist(), strict=True))
-    model = engine.from_arrays({name: array for name, array in kept.items() if name not in (_ACC, _COUNTS)})
+        stored = arrays | {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
+        checkpoint.save(stage, stored)
+    acc = dict(zip(map(tuple, stored[_COUNTS].tolist()), stored[_ACC].tolist(), strict=True))
+    model = engine.from_arrays({name: array for name, array in stored.items() if name not in (_ACC, _COUNTS)})
     return _System(engine, model, acc)
 
 
