@@ -30,7 +30,7 @@ from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, 
 
 
 class RateLimit:
-    """Allows so many requests a second for each asker, and some more at once.
+    """Limits the requests of each asker: a number a second, and some more at once.
 
     Of askers whose allowance is full again nothing is kept: the memory is bounded by ``burst / rate_hz`` seconds of
     requests, and askers are few.
