@@ -59,8 +59,8 @@ def train_engines(
         if models:
             utterances = [corpus.utterance(name) for name in training]
             required = describe_training(corpus, utterances, "train", len(training))
-            for name, kept in models.items():
-                _check_model(paths[name], name, kept.model, required)
+            for name, trained in models.items():
+                _check_model(paths[name], name, trained.model, required)
     missing = [name for name in names if name not in models]
     for name, here in zip(missing, runner.share_out(settings, missing), strict=True):
         start_s, engine = perf_counter(), engine_named(name, {})

@@ -91,10 +91,10 @@ def cross_validate(
     runner.check_opening(corpus, names)
     mixed = runner.shuffle(groups, settings.seed)
     key = runner.PartKey(engine_named("trajectory"), names, others=f"{count} {by_speaker}")
-    kept, results = runner.open_parts(work, corpus, settings, key), []
+    checkpoint, results = runner.open_parts(work, corpus, settings, key), []
     for fold, part in enumerate(runner.share_out(settings, [f"fold {fold + 1}" for fold in range(count)])):
         stage = f"fold-{fold}"
-        arrays = kept.load(stage)
+        arrays = checkpoint.load(stage)
         if arrays is not None:
             results.append(_fold_from_arrays(arrays))
             continue
@@ -104,7 +104,7 @@ def cross_validate(
         speakers = [utterance.speaker for utterance in made.recordings.utterances]
         results.append(_GeneratedFold(made.clips, speakers, len(made.used), made.recordings.closed_under))
         if work is not None:
-            kept.save(stage, results[-1].as_arrays())
+            checkpoint.save(stage, results[-1].as_arrays())
     about: dict[str, Any] = {"folds": count, "seed": settings.seed, "clips": len(names)}
     about |= {"trained_on": [result.used for result in results], "closed_under": results[0].closed_under}
     shared = [name for name in results[0].clips if all(name in result.clips for result in results)]
@@ -159,17 +159,17 @@ def cross_validate_blocks(
     if OPENING in channels:
         threshold = find_threshold([np.asarray(each.motion[OPENING])[np.asarray(each.seen)] for each in tracks])
     parts = runner.PartKey(engine_named("trajectory"), names, others=f"{count} {key}")
-    kept, results = runner.open_parts(work, corpus, settings, parts), []
+    checkpoint, results = runner.open_parts(work, corpus, settings, parts), []
     shares = runner.share_out(settings, [f"block {number + 1}" for number in range(count)])
     for number, (test, part) in enumerate(zip(blocks, shares, strict=True)):
-        arrays = kept.load(f"block-{number}")
+        arrays = checkpoint.load(f"block-{number}")
         if arrays is None:
             validation = blocks[(number + 1) % count]
             training = [name for name in names if name not in {*test, *validation}]
             lists = {"train": training, "val": validation, "test": test}
             block = _run_block(experiment, corpus, lists, part)
             arrays = replace(block, closed_under=threshold).as_arrays()
-            kept.save(f"block-{number}", arrays)
+            checkpoint.save(f"block-{number}", arrays)
         results.append(_fold_from_arrays(arrays))
     conditions: dict[str, dict[str, list[ComparedClip]]] = {}
     for place in results[0].clips:

@@ -130,8 +130,8 @@ def _train_system(
     """
     config, tried, arrays = engine.config, dict[tuple[int, int], float](), dict[str, Any]()
 
-    def try_numbers(monitor: Monitor, **most: Any) -> None:
-        for model in JointEngine(replace(config, **most)).growing_models(examples, monitor):
+    def try_numbers(monitor: Monitor, **limits: Any) -> None:
+        for model in JointEngine(replace(config, **limits)).growing_models(examples, monitor):
             sizes = (model.hmm.models[stream].tied.mixtures.size[1] for stream in (SPEECH, MOTION))
             speech, motion = (1 << (size - 1).bit_length() for size in sizes)  # where data is short, not all are split
             if (speech, motion) in tried or speech not in options.mixtures or motion not in options.motion_mixtures:
@@ -144,17 +144,17 @@ def _train_system(
                 return
 
     stage = f"{config.units}-{config.states}-{options.mixtures}-{options.motion_mixtures}"
-    if (kept := checkpoint.load(stage)) is None:
+    if (stored := checkpoint.load(stage)) is None:
         try_numbers(sub_monitor(monitor, 0, 0.6), mixtures=max(options.mixtures))
         if not tried:
             raise InputError(f"no state has data for {min(options.mixtures)} Gaussians; compare also fewer, from 1")
         if max(options.motion_mixtures) > 1:
-            most = {"mixtures": _find_best_count(tried)[0], "motion_mixtures": max(options.motion_mixtures)}
-            try_numbers(sub_monitor(monitor, 0.6, 1), **most)
-        kept = arrays | {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
-        checkpoint.save(stage, kept)
-    acc = dict(zip(map(tuple, kept[_COUNTS].tolist()), kept[_ACC].tolist(), strict=True))
-    model = engine.from_arrays({name: array for name, array in kept.items() if name not in (_ACC, _COUNTS)})
+            limits = {"mixtures": _find_best_count(tried)[0], "motion_mixtures": max(options.motion_mixtures)}
+            try_numbers(sub_monitor(monitor, 0.6, 1), **limits)
+        stored = arrays | {_COUNTS: np.array(list(tried)), _ACC: np.array(list(tried.values()))}
+        checkpoint.save(stage, stored)
+    acc = dict(zip(map(tuple, stored[_COUNTS].tolist()), stored[_ACC].tolist(), strict=True))
+    model = engine.from_arrays({name: array for name, array in stored.items() if name not in (_ACC, _COUNTS)})
     return _System(engine, model, acc)
 
 

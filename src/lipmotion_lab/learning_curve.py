@@ -55,10 +55,10 @@ def run_learning_curve(
     check_training_names(corpus, listed, (*held_out, *validation))
     channels = runner.check_opening(corpus, held_out)
     key = runner.PartKey(engine_named("trajectory"), (*listed, *held_out, *validation), others=BLSTM * rival)
-    kept = runner.open_parts(work, corpus, settings, key)
+    checkpoint = runner.open_parts(work, corpus, settings, key)
     rows, parts = [], runner.share_out(settings, [f"{count} clips" for count in steps], sizes=steps)
     for count, part in zip(steps, parts, strict=True):
-        arrays = kept.load(str(count))
+        arrays = checkpoint.load(str(count))
         if arrays is None:
             result = runner.train_and_generate(corpus, listed[:count], held_out, channels, part, work)
             row = {"names": count} | _make_row(corpus, result, settings.seed)
@@ -67,7 +67,7 @@ def run_learning_curve(
             for condition, clips in result.clips.items():
                 settings.receive(f"{count} recordings", condition, result.recordings, clips)
             arrays = {_ROW: np.array(json.dumps([result.recordings.closed_under, row]))}
-            kept.save(str(count), arrays)
+            checkpoint.save(str(count), arrays)
         closed_under, row = json.loads(str(arrays[_ROW]))
         rows.append(row)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}

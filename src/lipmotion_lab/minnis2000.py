@@ -186,8 +186,8 @@ def run_minnis2000(
     figures = {}
     for (split, names), part in zip(lists.items(), runner.share_out(settings, [*lists], 0.6), strict=True):
         key = runner.PartKey(trained.model.engine, names, model=trained.model, others=str(list_rows(guided=guided)))
-        kept = runner.open_parts(work and work / split, corpus, settings, key)
-        figures[split] = _measure_list(corpus, names, trained.model, list_rows(guided=guided), kept, part)
+        checkpoint = runner.open_parts(work and work / split, corpus, settings, key)
+        figures[split] = _measure_list(corpus, names, trained.model, list_rows(guided=guided), checkpoint, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
     printed = vars(SelectionConfig.parsed(MINNIS_2000))
@@ -203,7 +203,7 @@ def _measure_list(
     names: Sequence[str],
     model: Model,
     systems: Mapping[str, SelectionConfig],
-    kept: Checkpoint,
+    checkpoint: Checkpoint,
     settings: runner.ExperimentSettings,
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
@@ -232,7 +232,7 @@ def _measure_list(
         learned = _simplify_model(model.learned, config)
         for condition, rows in conditions.items():
             stage = f"{len(rows)} {condition}"
-            arrays = kept.load(stage)
+            arrays = checkpoint.load(stage)
             if arrays is None:
                 engine = SelectionEngine(config)
                 speech = speak(condition, config.joint_recogniser and condition == AUDIO_ONLY)
@@ -260,7 +260,7 @@ def _measure_list(
                     "error_gain_95": gains[1],
                 }
                 arrays = {_ROW: np.array(json.dumps(row)), _SUMS: sums[0], _OVERLAP: sums[1]}
-                kept.save(stage, arrays)
+                checkpoint.save(stage, arrays)
             reference.setdefault(condition, (arrays[_SUMS], arrays[_OVERLAP]))
             rows[name] = json.loads(str(arrays[_ROW]))
     return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}

@@ -145,8 +145,8 @@ def train_phones(
     """Return phone models of some utterances, and these as examples for an engine."""
     lexicon = settings.lexicon or Lexicon()
     with open_training(settings.workers, len(utterances)) as each:
-        kept = replace(checkpoint, parallel_map=each)
-        phones, examples, _ = fit_phones(utterances, settings.recogniser, lexicon, settings.monitor, kept)
+        parallel = replace(checkpoint, parallel_map=each)
+        phones, examples, _ = fit_phones(utterances, settings.recogniser, lexicon, settings.monitor, parallel)
     return phones, examples
 
 

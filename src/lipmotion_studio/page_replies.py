@@ -59,21 +59,21 @@ class RecordingReplies:
         self._studio, self._access, self._workspace = studio, access, studio.workspace
 
     async def open_recording(self, request: Request) -> Response:
-        """The state of a recording; it is opened, and analysed if it is new."""
+        """Open a recording, analyse it if it is new, and reply its state."""
         number = self._find_number(request)
         if self._workspace.open(number).recording is None:
             return self._reply_waiting(number)
         return await self._reply_after(number, lambda _: {})
 
     async def edit(self, request: Request) -> Response:
-        """Edits to be made."""
+        """Make edits."""
         number, content, revision = await self._read_change(request)
         steps, instead = take_texts(content, "steps", most=MAX_STEPS), take_int(content, "instead", 0)
         commands = self._studio.add_phones(steps)
         return await self._reply_after(number, lambda recording: recording.edit(revision, commands, instead))
 
     def step_with(self, step: Callable[[OpenRecording, int, int], Changed]) -> Callable[[Request], Awaitable[Response]]:
-        """Return what replies once so many edits were taken back, or made again."""
+        """Return a handler that takes back, or makes again, a number of edits."""
 
         async def reply(request: Request) -> Response:
             number, content, revision = await self._read_change(request)
@@ -83,12 +83,12 @@ class RecordingReplies:
         return reply
 
     async def settle(self, request: Request) -> Response:
-        """The full motion to be made, after edits of a long recording."""
+        """Make the full motion, after edits of a long recording."""
         number, _, revision = await self._read_change(request)
         return await self._reply_after(number, lambda recording: recording.settle(revision))
 
     async def change_words(self, request: Request) -> Response:
-        """Words of a recording, or of a stretch of it."""
+        """Change the words of a recording, or of a stretch of it."""
         number, content, revision = await self._read_change(request)
         words = take_text(content, "text", longest=MAX_TRANSCRIPT)
         is_part = "start_s" in content or "end_s" in content
@@ -104,13 +104,13 @@ class RecordingReplies:
         return await self._reply_after(number, change)
 
     async def send_sound(self, request: Request) -> Response:
-        """The sound as it is played."""
+        """Send the sound as it is played."""
         number = self._find_number(request)
         path = await self._workspace.run_apart(lambda: self._studio.prepare_sound(number))
         return FileResponse(path, media_type="audio/wav", headers=FRESH)
 
     async def send_recorded(self, request: Request) -> Response:
-        """The real video, as browsers play it."""
+        """Send the real video, as browsers play it."""
         number, folder = self._find_number(request), self._studio.folder
         if request.headers.get("range", BEGINNING).startswith(BEGINNING):  # and not again for each part of it
             await self._workspace.run_apart(lambda: folder.check_sound(folder.find_recording(number)))
@@ -118,7 +118,7 @@ class RecordingReplies:
         return FileResponse(path, media_type=kind, headers=FRESH)
 
     async def vote(self, request: Request) -> Response:
-        """Which of two motions somebody found better."""
+        """Store which of two motions somebody found better."""
         number, content, revision = await self._read_change(request)
         shown = [take_text(side, "by", "") for side in take_objects(content, "shown")]
         better = None if content.get("better") is None else take_int(content, "better", most=1)
@@ -131,26 +131,26 @@ class RecordingReplies:
         return reply_json(await self._workspace.run_apart(add))
 
     async def keep(self, request: Request) -> Response:
-        """The edits as they are, to be kept as a version."""
+        """Keep the present edits as a version."""
         number, _, revision = await self._read_change(request)
         return await self._change_versions(
             number, revision, lambda now, recording: now.with_version(recording.file.edits.sentences)
         )
 
     async def forget(self, request: Request) -> Response:
-        """A version that is kept no longer."""
+        """Remove a version."""
         number, content, revision = await self._read_change(request)
         name = take_text(content, "version")
         return await self._change_versions(number, revision, lambda now, _: now.without_version(name))
 
     async def go_back(self, request: Request) -> Response:
-        """A version to go back to; the edits as they are become one, too."""
+        """Go back to a version; the present edits become one, too."""
         number, content, revision = await self._read_change(request)
         name = take_text(content, "version")
         return await self._reply_after(number, lambda recording: recording.restore_version(revision, name))
 
     async def restore(self, request: Request) -> Response:
-        """The last good copy of edits that are damaged."""
+        """Restore the last good copy of damaged edits."""
         number, _, revision = await self._read_change(request)
         with self._studio.folder.check_out(number, revision) as recording:
             self._studio.folder.restore_edits(recording)
@@ -159,7 +159,7 @@ class RecordingReplies:
         return self._reply_waiting(number)
 
     async def send_motion(self, request: Request) -> Response:
-        """Numbers of the motion."""
+        """Send numbers of the motion."""
         query = request.query_params
         of = take_text(query, "of", "motion")
         if of not in NUMBERS:
@@ -184,7 +184,7 @@ class RecordingReplies:
         return await self._workspace.run(number, reply)
 
     async def send_weights(self, request: Request) -> Response:
-        """The weights of a face's morph targets."""
+        """Send the weights of a face's morph targets."""
         query = request.query_params
         name, by, number = take_text(query, "face", "head"), take_text(query, "by", ""), self._find_number(request)
 
@@ -200,7 +200,7 @@ class RecordingReplies:
         return await self._workspace.run(number, reply)
 
     async def send_picture(self, request: Request) -> Response:
-        """A picture of a drawn face, as PNG."""
+        """Send a picture of a drawn face, as PNG."""
         query = request.query_params
         time_s, face = take_time(query, "time"), self._studio.find_drawn_face(take_text(query, "face", "woman"))
         by, number = take_text(query, "by", ""), self._find_number(request)
@@ -215,7 +215,7 @@ class RecordingReplies:
         return Response(await self._workspace.run(number, draw), media_type="image/png", headers=FRESH)
 
     async def send_video(self, request: Request) -> Response:
-        """A video of a stretch."""
+        """Send a video of a stretch."""
         content = await read_content(request)
         start_s, end_s = take_time(content, "start_s"), take_time(content, "end_s")
         name, by, number = take_text(content, "face", "woman"), take_text(content, "by", ""), self._find_number(request)
@@ -235,12 +235,12 @@ class RecordingReplies:
         return Response(await self._workspace.run(number, write), media_type="video/mp4", headers=FRESH)
 
     async def explain(self, request: Request) -> Response:
-        """What determined a frame."""
+        """Explain what determined a frame."""
         time_s, number = take_time(request.query_params, "time"), self._find_number(request)
         return reply_json(await self._workspace.run(number, lambda recording: recording.explain(time_s)))
 
     async def list_doubts(self, request: Request) -> Response:
-        """The phones, the least sure first."""
+        """List the phones, the least sure first."""
         return reply_json(await self._workspace.run(self._find_number(request), OpenRecording.list_doubts))
 
     def _find_number(self, request: Request) -> int:
@@ -248,7 +248,7 @@ class RecordingReplies:
         return self._studio.find_number(str(request.path_params["number"]))
 
     async def _read_change(self, request: Request) -> tuple[int, dict[str, Any], int]:
-        """Return the recording of a change, what it brings, and the revision that its author saw."""
+        """Return the recording that a request changes, its content, and the revision that its author saw."""
         content = await read_content(request)
         return self._find_number(request), content, take_int(content, "revision")
 
@@ -264,7 +264,7 @@ class RecordingReplies:
         return await self._reply_after(number, change)
 
     async def _reply_after(self, number: int, do: Callable[[OpenRecording], Changed]) -> Response:
-        """Return the state of a recording after something was done, and what that returns."""
+        """Do something to a recording; reply its state then, and what was returned."""
 
         def reply(recording: OpenRecording) -> Response:
             try:
@@ -318,7 +318,7 @@ class ProjectReplies:
         self._studio, self._trainer, self._run_apart = studio, studio.trainer, studio.workspace.run_apart
 
     async def list_recordings(self, request: Request) -> Response:
-        """The recordings, page by page, and what forms need."""
+        """List the recordings, page by page, and what forms need."""
         query = request.query_params
         first, count = take_int(query, "from", 0), take_int(query, "count", 200, most=2000)
         chosen = {name: take_text(query, name, "") for name in ("order", "status", "mark")}
@@ -326,11 +326,11 @@ class ProjectReplies:
         return reply_json(document | {"largest_upload_bytes": MAX_UPLOAD_BYTES})
 
     async def send_progress(self, _: Request) -> Response:
-        """What is at work."""
+        """Tell what is at work."""
         return reply_json(self._studio.describe_progress())
 
     async def analyse(self, request: Request) -> Response:
-        """Recordings that are to be analysed."""
+        """Queue recordings for analysis."""
         content = await read_content(request)
         known = self._studio.folder.project.lines
         numbers = list(known) if content.get("lines") == ALL else take(content, "lines", None, items(NUMBER))
@@ -339,7 +339,7 @@ class ProjectReplies:
         return reply_json({"waiting": self._studio.workspace.queue(numbers)})
 
     async def receive_recording(self, request: Request) -> Response:
-        """A recording that was dropped on the page, as body."""
+        """Add a recording that was dropped on the page: the body."""
         name = take_text(request.query_params, "name", longest=500)
         transcript = unquote(request.headers.get("x-lipmotion-transcript", ""), errors="replace")
         file = self._studio.folder.path / f"{TEMPORARY}{uuid4().hex}"
@@ -353,13 +353,13 @@ class ProjectReplies:
         return reply_json(self._studio.describe_row(self._studio.folder.find_recording(number)), 201)
 
     async def mark(self, request: Request) -> Response:
-        """A mark of a recording."""
+        """Mark a recording."""
         number, content = self._find_number(request), await read_content(request)
         mark, revision = take_text(content, "mark"), take_int(content, "revision")
         return reply_json(await self._run_apart(lambda: self._studio.mark(number, revision, mark)))
 
     async def remove(self, request: Request) -> Response:
-        """A recording that leaves the project; its files stay."""
+        """Remove a recording from the project; its files stay."""
         number, folder = self._find_number(request), self._studio.folder
         with folder.check_out(number, take_int(await read_content(request), "revision")):
             folder.change(lambda project: project.without_recording(number))
@@ -367,12 +367,12 @@ class ProjectReplies:
         return reply_json({"removed": number})
 
     async def export_one(self, request: Request) -> Response:
-        """Files of one recording."""
+        """Export files of one recording."""
         number = self._find_number(request)
         return await self._export(await read_content(request), [number])
 
     async def export_all(self, request: Request) -> Response:
-        """Files of the recordings that are approved, or of all."""
+        """Export files of the approved recordings, or of all."""
         content = await read_content(request)
         only = take_text(content, "only", APPROVED)
         if only not in (APPROVED, ALL):
@@ -386,7 +386,7 @@ class ProjectReplies:
         return reply_json(await self._run_apart(lambda: self._studio.export_several(numbers, preset, face)))
 
     async def send_mesh(self, request: Request) -> Response:
-        """The ``.glb`` of a face."""
+        """Send the ``.glb`` of a face."""
         name = str(request.path_params["name"])
         try:
             content = await self._run_apart(lambda: self._studio.faces.load_mesh(name))
@@ -395,11 +395,11 @@ class ProjectReplies:
         return Response(content, headers=FRESH, media_type="model/gltf-binary")
 
     async def list_pronunciations(self, request: Request) -> Response:
-        """How a word is pronounced."""
+        """List the pronunciations of a word."""
         return self._reply_word(_take_word(request.query_params))
 
     async def pronounce(self, request: Request) -> Response:
-        """A pronunciation that the project keeps."""
+        """Store a pronunciation in the project."""
         content = await read_content(request)
         word, phones = _take_word(content), take_texts(content, "phones", most=MAX_PHONES)
         revision = take_int(content, "revision")
@@ -416,11 +416,11 @@ class ProjectReplies:
         return reply_json(known | {"pronunciations": pronunciations, "revision": revision})
 
     async def send_training(self, _: Request) -> Response:
-        """What is being made, or was made last; what can be made, and of what."""
+        """Tell what is being made, or was made last; what can be made, and of what."""
         return await self._reply_training()
 
     async def begin_training(self, request: Request) -> Response:
-        """A voice or a face that is to be made."""
+        """Begin to make a voice or a face."""
         content = await read_content(request)
         kind, name = take_text(content, "kind"), take_text(content, "name", "")
         numbers = list(dict.fromkeys(take(content, "lines", [], items(NUMBER, most=MAX_RECORDINGS))))
@@ -429,7 +429,7 @@ class ProjectReplies:
         return await self._reply_training(201)
 
     def train_with(self, act: Callable[[], None], status: int = 200) -> Callable[[Request], Awaitable[Response]]:
-        """Return what replies once something was done: what is made was stopped, gone on with, or restored."""
+        """Return a handler that stops, continues or restores what is being made."""
 
         async def reply(request: Request) -> Response:
             await read_content(request)
@@ -439,7 +439,7 @@ class ProjectReplies:
         return reply
 
     async def choose_voice(self, request: Request) -> Response:
-        """The voice that the project uses from now on."""
+        """Change the voice that the project uses."""
         content = await read_content(request)
         name, revision = take_text(content, "voice"), take_int(content, "revision")
         path, voice = await self._run_apart(lambda: self._studio.load_voice(name))

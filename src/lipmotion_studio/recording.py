@@ -136,7 +136,7 @@ class OpenRecording:
     def edit(self, revision: int, steps: tuple[str | Step, ...], instead: int = 0) -> dict[str, Any]:
         """Make some edits; return what moved, and the words whose pronunciation is a guess.
 
-        instead : so many of the last edits are taken back first, for good
+        instead : number of the last edits that are taken back first, for good
         Nothing has changed where an edit is refused.
         Raises RevisionError: the edits are no longer those of the revision. InputError: an edit is refused.
         """

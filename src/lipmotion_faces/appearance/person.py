@@ -56,7 +56,7 @@ EDGE_PX = 3
 LIP_DISTANCES = ("opening", "width", "outer")
 """Channels in which the mixture of recorded mouths is to be like the motion."""
 DISTANCE_GAINS = np.array([1.0, 1.1, 1.0])
-"""How much further from their middle they are sought: trackers measure so much less width in the mixtures."""
+"""They are sought this much further from their middle, because trackers measure less width in the mixtures."""
 DISTANCE_WEIGHTS = np.array([800.0, 1600.0, 800.0])
 """What one standard deviation of each among the candidates counts, beside the eigenlips, grey levels: the regression
 alone shows two thirds of the width's deviation (docs/results/video.md)."""

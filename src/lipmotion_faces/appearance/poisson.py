@@ -92,7 +92,7 @@ class GridFiller:
     """Interpolates from the nodes to all pixels of some pictures, without new memory for each."""
 
     def __init__(self, grids: NestedGrids, count: int, colours: int) -> None:
-        """Take memory for ``count`` pictures of so many colours at once."""
+        """Take memory for ``count`` pictures at once, each of the given number of colours."""
         self._grids = grids
         shapes = [grids.shape(level) for level in range(len(grids.nodes))]
         self._filled = [np.zeros((count, *shape, colours), np.float32) for shape in shapes]
@@ -161,7 +161,7 @@ Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
 
 COLOURS = 3
 LARGEST_EDGE = 2048
-"""Largest number of pixels on the edge of a region. The matrix grows with its square; with so many it has 100 MB."""
+"""Largest number of pixels on the edge of a region; the matrix grows with its square, to 100 MB."""
 CHUNK = 1 << 17
 """About the number of pixels that are interpolated at once: what fits into the cache of a processor."""
 BATCH = 64

@@ -46,7 +46,7 @@ MIN_OPAQUE_LEVEL = 250
 """A texture with pixels of a lower opacity than this, of 255, has holes."""
 _NO_COLOUR = (np.nan,) * 3
 _SHININESS = 60.0
-"""A specular exponent (``Ns``) of so much is a gloss of 1/2."""
+"""The specular exponent (``Ns``) of a gloss of 1/2."""
 _REST = rb")(?=\s|\Z)[^\r\n\\]*(?:\\(?:\r?\n)?[^\r\n\\]*)*)"
 _STATEMENTS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:v|vt|f|o|g|usemtl|mtllib" + _REST)
 _LOOKS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:newmtl|map_Kd|Kd|Ns|d|Tf" + _REST)

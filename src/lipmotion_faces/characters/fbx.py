@@ -56,7 +56,7 @@ def find_blender() -> list[str]:
 
 
 def convert_to_fbx(source: Path, target: Path, rate_hz: int) -> None:
-    """Write a moving ``.glb`` as ``.fbx``, at so many whole frames a second.
+    """Write a moving ``.glb`` as ``.fbx``, at a whole number of frames a second.
 
     Raises MissingDependencyError: there is no Blender. Raises ExportError: Blender cannot do it.
     """

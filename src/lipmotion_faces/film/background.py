@@ -41,11 +41,11 @@ ALIGNED_EDGE_PX = 25.0
 MAX_PARTS = 24
 """Parts of the footage that are tried as backgrounds."""
 COMPARED_STEP = 3
-"""Every so many frames of them are compared."""
+"""Of their frames, every third is compared."""
 SHOWN_S = 60.0
 """How long they are shown then."""
 SHORT_S, SHORT_COST = 3.0, 2.0
-"""A part that is shorter costs so much more, in proportion to what is missing: it would repeat too soon."""
+"""Shorter parts would repeat too soon: they cost more, in proportion to what is missing."""
 COMPARED_SHARE = 0.9
 """A part of this share of ``SHORT_S`` is still compared."""
 MAX_TRACKED_S = 120.0

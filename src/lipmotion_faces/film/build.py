@@ -35,9 +35,9 @@ from lipmotion_faces.tracking.track import UNSEEN_LIMIT, Footage, decode_footage
 MAX_FOOTAGE_S = 240.0
 """Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""
 LONG_S = 10.0
-"""Recordings are used whole if they are no longer; of longer ones the beginning, at least so much."""
+"""Shorter recordings are used whole; of longer ones the beginning is used, at least this much."""
 MAX_MEASURED_RECORDINGS = 240
-"""The durations of at most so many recordings are read."""
+"""Most recordings whose durations are read."""
 RIGHTS = ("licence", "attribution")
 """What is kept of the rights of a recording."""
 

@@ -37,7 +37,7 @@ _UPPER_LIP, _LOWER_LIP = 0.076, 0.106
 OVAL_SQUEEZE = 0.14
 """How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
 HOLE_WIDTH = (0.014, 0.6)
-"""Half the width of a round hole, round which the lips run as a ring: a length, and so much of the gap."""
+"""Half the width of a round hole, round which the lips run as a ring: a length, and a share of the gap."""
 RING_GAP, LINE_SHARE = 0.01, 0.25
 """Below this gap the hole of round lips widens to a line, by so much: more, and sums of blendshapes fit worse."""
 ROUND_BOW = 0.0012

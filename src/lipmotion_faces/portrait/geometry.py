@@ -26,9 +26,9 @@ TEETH_EDGE = 0.024
 SPREAD_RISE = (0.5, 0.06)
 """The upper lip of spread lips rises by this part of the gap, at most so far: more of the upper teeth shows."""
 LARGEST_RING_SHARE, LIP_RING_SHARE = 0.9, 0.8
-"""Protruded lips are a ring round a hole, this part of both lips thick; they are at most so much of their own width."""
+"""Protruded lips are a ring round a hole: its thickness as a part of both lips, and its largest part of their width."""
 ROUND_HOLE = (0.012, 0.85)
-"""Half the width of the hole of protruded lips: a length, and so much of the gap."""
+"""Half the width of the hole of protruded lips: a length, and a share of the gap."""
 SMILE_RISE, FROWN_FALL, RAISED_LIP, CHIN_RISE = 0.11, 0.1, 0.055, 0.03
 """How far a mood raises the corners, lowers them, raises the upper lip, and the middle of both lips by the chin."""
 TUCKED_LIP = 0.05

@@ -30,7 +30,7 @@ LARGEST_SHARE = 1 / 3
 FROZEN_S = 0.2
 """Pictures that repeat one another for so long are frozen; single ones are doubled, as by changed frame rates."""
 JUMP = 1.5
-"""The picture after frozen ones differs at least so much more than most; after people who stand still it does not."""
+"""The picture after frozen ones differs at least this much more than most; people who stand still differ less."""
 MAX_COMPARED = 4000
 """Mouths of a person that each one is compared with, spread evenly."""
 MIN_COMPARED = 500

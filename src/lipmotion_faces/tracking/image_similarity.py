@@ -14,7 +14,7 @@ CUT_LEVELS = 6.0
 """Mean change of the thumbnail between two frames, in grey levels, that begins a new scene (GRID: up to 1.3)."""
 SCENE_SIZE = (32, 24)
 SCENE_SAMPLES = 640
-"""Every so many columns and rows of a picture are looked at that about this number is left of the more numerous."""
+"""Pictures are thinned to about this number of columns or rows, whichever are more."""
 FACE_SIZE = (36, 24)
 FACE_WIDTH, FACE_TOP, FACE_BOTTOM = 0.75, 0.5, 0.5
 """The region of the upper face, which speech does not change: from the point between the eyes to either side, up and

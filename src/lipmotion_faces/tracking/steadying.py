@@ -38,7 +38,7 @@ REGION = (-42.0, 2.0, 42.0, 44.0)
 """Left, top, right and bottom of nose and cheeks, which speech hardly moves, px of the face that looks straight ahead,
 from the point between the eyes."""
 MAX_SAMPLES = 1.5
-"""Pixels of the region per px of the face that looks straight ahead are those of the picture, at most so many."""
+"""Most pixels of the region per px of a face that looks ahead; with fewer in the picture, as many as there."""
 MARGIN = 3
 """Pixels at the edge of the region that are not compared."""
 BLURS_PX = (3.0, 1.0)

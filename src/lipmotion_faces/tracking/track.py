@@ -41,7 +41,7 @@ SMALL_EYES_PX = 35.0
 """A smaller median distance between the eyes is reported. GRID clips made small and tracked have a correlation of the
 opening with the clip as it was of 0.99 at 65 px, 0.98 at 40, 0.90 at 25."""
 COMPARED_PX = 360
-"""Every so many columns and rows of a picture are compared with the one before that fewer than this are left."""
+"""Pictures are thinned to fewer columns and rows than this before they are compared with the one before."""
 STRETCH_LIMIT = 2.0
 """A clip is refused when its time stamps span more than this many times the frames that it holds."""
 

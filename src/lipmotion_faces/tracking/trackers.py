@@ -106,7 +106,7 @@ class LandmarkTracker(ABC):
 
     @abstractmethod
     def open_point_finder(self, most: int = 1) -> PointFinder:
-        """Return what finds the points of so many faces in a clip. Raises MissingDependencyError: no package."""
+        """Return a finder of the points of up to ``most`` faces. Raises MissingDependencyError: no package."""
 
     @abstractmethod
     def open_box_finder(self) -> BoxFinder:

@@ -46,7 +46,7 @@ class _Scale:
         return self.start + (value - self.low) / (self.high - self.low) * (self.stop - self.start)
 
     def list_ticks(self, count: int = 5) -> list[float]:
-        """Return round values on the axis, at most so many."""
+        """Return up to ``count`` round values on the axis."""
         smallest = (self.high - self.low) / count
         power = 10.0 ** np.floor(np.log10(smallest))
         step = next(power * step for step in (*STEPS, 10.0) if power * step >= smallest)

@@ -74,8 +74,8 @@ def _draw_acc(title: str, table: Table) -> Html:
 def build_hofer_section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``run_hofer2008`` say; the case of the paper: audio alone, as printed, most states."""
     blocks = list(figures["tables"])
-    most = max(block["states"] for block in blocks)
-    case = (most, AUDIO_ONLY, AS_PRINTED)
+    states = max(block["states"] for block in blocks)
+    case = (states, AUDIO_ONLY, AS_PRINTED)
     main = next(each for each in blocks if (each["states"], each["condition"], each["pins"]) == case)
     table, rows = _build_hofer_table(main), main["rows"]
     order = _build_hofer_order(main)
@@ -86,14 +86,14 @@ def build_hofer_section(figures: Mapping[str, Any]) -> Section:
         f"Which set of units predicts closings of the mouth best: the system of the paper, trained on "
         f"{figures['trained_on']} recordings with each of {len(rows)} sets, compared on {figures['clips']} of "
         f"{figures['split']}.{_describe_closings(figures, next(iter(rows.values())))} "
-        f"Channels of motion: {figures['channels'] or 'all'}. Shown first: sound alone, {AS_PRINTED}, {most} states."
+        f"Channels of motion: {figures['channels'] or 'all'}. Shown first: sound alone, {AS_PRINTED}, {states} states."
     )
     words = warn_of_few(figures["clips"]) | {"The paper's order": order.describe()}
     more = [
         replace(other, heading=f"{other.caption.removeprefix(SETS)}: {_build_hofer_order(block).judge()}")
         for block, other in [(block, _build_hofer_table(block)) for block in blocks if block is not main]
     ]
-    shown = [f"{units}, {most} states" for units in table.rows]
+    shown = [f"{units}, {states} states" for units in table.rows]
     title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
     return Section(title, about, order.judge(), words, charts, table, more, shown)
 

@@ -217,8 +217,8 @@ def _run_xieliu2007(options: argparse.Namespace) -> None:
 
 def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = actions.add_parser("minnis2000", help="unit selection as Minnis & Breen 2000 print it, and each addition")
-    kept = "keep the model there, so that a run that was stopped goes on and a second one does not train"
-    add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=kept)
+    text = "keep the model there, so that a run that was stopped goes on and a second one does not train"
+    add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=text)
     unguided = (
         "leave out the rows that learn from the sound: the paper's system and its readings, in a tenth of the time"
     )
@@ -238,8 +238,8 @@ def _run_minnis2000(options: argparse.Namespace) -> None:
 def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = actions.add_parser("engines", help="all engines in one table")
     parser.add_argument("--split", default="val", help="compare on val or test (default: val)")
-    kept = "the engines' models: what is not there yet is trained and kept (default: train all, keep none)"
-    add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=kept)
+    text = "the engines' models: what is not there yet is trained and kept (default: train all, keep none)"
+    add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=text)
     add_experiment_arguments(parser)
     parser.set_defaults(run=_run_engines)
 

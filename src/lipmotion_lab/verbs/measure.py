@@ -1,4 +1,4 @@
-"""``lipmotion compare``, ``evaluate`` and ``run_rivals``: figures of motion, of a model, of rivals."""
+"""``lipmotion compare``, ``evaluate`` and ``league``: figures of motion, of a model, of rivals."""
 
 from __future__ import annotations
 

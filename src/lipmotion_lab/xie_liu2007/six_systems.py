@@ -203,8 +203,8 @@ def run_xieliu2007(  # noqa: PLR0913
     parts = runner.share_out(settings, [f"{count} clips" for count in steps], sizes=steps)
     for count, part in zip(steps, parts, strict=True):
         trained = setup.train(names, listed[:count], part.monitor)
-        kept = setup.open_checkpoint(listed[:count], held_out)
-        rows.append({"names": count} | _measure_size(trained, options.transcripts, settings, kept))
+        checkpoint = setup.open_checkpoint(listed[:count], held_out)
+        rows.append({"names": count} | _measure_size(trained, options.transcripts, settings, checkpoint))
     recordings = trained.recordings
     if plots is not None:
         draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
@@ -235,12 +235,12 @@ class _TrainingSetup:
     def train(self, systems: Sequence[str], names: Sequence[str], monitor: Monitor) -> _TrainedSystems:
         """Return systems, trained on the same phones of the utterances ``names``."""
         examples, recordings = self._prepare(names, self.held_out, sub_monitor(monitor, 0, 0.3))
-        kept, trained = self.open_checkpoint(names), dict[str, TrainedSystem]()
+        checkpoint, trained = self.open_checkpoint(names), dict[str, TrainedSystem]()
         others = [*list_motionless(engine_named("coupled"), self.options.voices)]
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
             part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here
-            arrays = kept.load(f"system-{name}") if chains else None
+            arrays = checkpoint.load(f"system-{name}") if chains else None
             if arrays is not None:
                 trained[name] = system_from_arrays(arrays)
                 continue
@@ -249,7 +249,7 @@ class _TrainingSetup:
             trained[name] = train_system(name, known, recordings.get("val"), trained, self.options.mixtures, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 arrays = system_to_arrays(trained[name])
-                kept.save(f"system-{name}", arrays)
+                checkpoint.save(f"system-{name}", arrays)
                 trained[name] = system_from_arrays(arrays)
         return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
 
@@ -281,12 +281,12 @@ class _TrainingSetup:
 
 
 def _measure_size(
-    trained: _TrainedSystems, transcripts: bool, settings: runner.ExperimentSettings, kept: Checkpoint
+    trained: _TrainedSystems, transcripts: bool, settings: runner.ExperimentSettings, checkpoint: Checkpoint
 ) -> dict[str, Any]:
     """Return the figures of all systems trained on one number of utterances."""
     recordings, systems, seed = trained.recordings, trained.systems, settings.seed
     conditions = list(recordings.conditions) if transcripts else [AUDIO_ONLY]
-    generated = {condition: _generate(recordings, condition, systems, kept) for condition in conditions}
+    generated = {condition: _generate(recordings, condition, systems, checkpoint) for condition in conditions}
     for condition, of_systems in generated.items():
         for name, clips in of_systems.items():
             settings.receive(name, condition, recordings, clips)
@@ -308,15 +308,15 @@ def _measure_size(
 
 
 def _generate(
-    recordings: HeldOutRecordings, condition: str, systems: Mapping[str, TrainedSystem], kept: Checkpoint
+    recordings: HeldOutRecordings, condition: str, systems: Mapping[str, TrainedSystem], checkpoint: Checkpoint
 ) -> dict[str, list[ComparedClip]]:
     made = {}
     for name, system in systems.items():
         stage = f"{condition}-{name}"
-        arrays = kept.load(stage)
+        arrays = checkpoint.load(stage)
         if arrays is None:
             arrays = runner.clips_to_arrays(generate_clips(recordings, condition, system.engine, system.model))
-            kept.save(stage, arrays)
+            checkpoint.save(stage, arrays)
         made[name] = runner.clips_from_arrays(arrays)
     return made
 

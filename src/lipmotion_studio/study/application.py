@@ -30,7 +30,7 @@ from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, 
 
 
 class RateLimit:
-    """Allows so many requests a second for each asker, and some more at once.
+    """Limits the requests of each asker: a number a second, and some more at once.
 
     Of askers whose allowance is full again nothing is kept: the memory is bounded by ``burst / rate_hz`` seconds of
     requests, and askers are few.
@@ -157,13 +157,13 @@ class _Replies:
         self._trials = lru_cache(maxsize=1000)(partial(order_trials, study))
 
     async def describe(self, _: Request) -> Response:
-        """What raters read before they begin; nothing of conditions."""
+        """Send what raters read before they begin; nothing of conditions."""
         study = self._study
         document = {"kind": study.kind, "title": study.title, "consent": study.consent.split("\n")}
         return reply_json(document | {"instructions": study.instructions.split("\n"), "asks": ASKED[study.kind]})
 
     async def join(self, request: Request) -> Response:
-        """A new rater, who has agreed to take part."""
+        """Add a rater, who has agreed to take part."""
         if await read_json(request) != {"agrees": True}:
             raise InputError('required {"agrees": true}')
         if not self._joins.allows():
@@ -172,12 +172,12 @@ class _Replies:
         return reply_json({"token": token, **self._describe_place(number, 0)}, 201)
 
     async def send_state(self, request: Request) -> Response:
-        """The trial that a rater is at."""
+        """Send the trial that a rater is at."""
         rater = self._find_rater(request)
         return reply_json(self._describe_place(rater, self._store.find_next_trial(rater)))
 
     async def answer(self, request: Request) -> Response:
-        """The answers to the next trial, or again those to one that was answered; replied to once they are stored."""
+        """Store the answers to the next trial, or again those to one that was answered; reply once they are stored."""
         rater = self._find_rater(request)
         sheet = check_sheet(self._study, self._trials(rater), rater, await read_json(request))
         following = self._store.find_next_trial(rater)

@@ -30,11 +30,11 @@ MAX_ANCHOR = 0.5
 MIN_CHANCE = 0.01
 """A rater whose answers to both orders disagree more than by so small a chance presses the same side."""
 MIN_ALIKE = 8
-"""From so many judgements on, one who always gives the same value does not judge."""
+"""Who gives the same value in this many judgements or more does not judge."""
 MIN_PANEL = 5
 """With fewer raters nobody is said to be faster than the others."""
 FASTEST, DEVIATIONS = 0.5, 3.0
-"""A rater is too fast who is below this share of the usual time, and so many deviations of its logarithm below it."""
+"""A rater below this share of the usual time, and this many deviations of its logarithm below it, is too fast."""
 MIN_ANSWERS = 0.5
 """Share of the usual number of answers below which a rater gave too few."""
 NORMAL = 1.4826

@@ -220,7 +220,7 @@ def analyse_shares(cells: crossed.Array) -> Figures:
     """Return a share, its interval over raters and sentences, and the test against one half.
 
     cells : share of each rater on each sentence; NaN: none [shape=(R, S)]
-    The interval is symmetric in log odds. Where all answers agree, it is the exact one of so many independent answers
+    The interval is symmetric in log odds. Where all answers agree, it is the exact one of as many independent answers
     as there are raters (Clopper & Pearson 1934), and so is the test.
     """
     share = crossed.estimate_mean(cells, 1.0)
