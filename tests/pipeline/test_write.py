@@ -91,6 +91,8 @@ def test_nothing_is_written_unless_everything_can_be(result, toy_model, toy_spee
     broken = np.full_like(result.motion.values, np.nan)
     cases: list[tuple[Generation, str, dict[str, Any], type[Exception], str]] = [
         (result, "a.xyz", {}, ExportError, r"a.xyz: unknown format '.xyz'; required one of: .json .csv .npz "),
+        (result, "a.TSV", {}, ExportError, r"unknown format '.TSV'; required a.cues.tsv, or one of: .json "),
+        (result, "in/a.png", {}, ExportError, r"in/a.png: unknown format '.png'; required a.%05d.png, or one of: "),
         (result, "missing/a.json", {}, ExportError, r"the folder .*missing does not exist; create it first"),
         (result, "folder.json", {}, ExportError, r"folder.json: is a folder"),
         (result, "a.mp4", {"speech": None}, ExportError, r"a video needs the recording: write\(..., speech=FILE\)"),

@@ -363,6 +363,22 @@ def test_a_hole_keeps_what_follows_in_time(tmp_path: Path, original: Samples, ca
         assert "became silence" in caplog.text
 
 
+@pytest.mark.parametrize(
+    ("size", "share", "missing"),
+    [
+        (64_000, 0.6, "the last 0.8 s are missing"), (64_000, 0.94, "the last 0.1 s are missing"), (64_000, 0.99, ""),
+        (64_000, 1.0, ""), (0, 0.6, ""), (0xFFFFFFFF, 0.6, ""), (0x7FFF0000, 0.6, ""),
+    ],
+)  # fmt: skip
+def test_a_wave_file_says_what_is_missing_of_it(tmp_path, caplog, size: int, share: float, missing: str) -> None:
+    """Programs that write into a stream state no size, or the largest there is."""
+    content = write_wave(tmp_path / "a.wav", np.arange(32_000) % 999).read_bytes()
+    (tmp_path / "b.wav").write_bytes(content[:40] + struct.pack("<I", size) + content[44 : 44 + int(64_000 * share)])
+    assert read_audio(tmp_path / "b.wav").duration_s == pytest.approx(2 * share)
+    assert missing in caplog.text
+    assert ("cut short" in caplog.text) == bool(missing)
+
+
 def test_damaged_packets_are_left_out_and_reported(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     content = bytearray(write_sound(tmp_path / "a.flac", babble(16_000, 10.0), 16_000, "flac").read_bytes())
     middle = len(content) // 2

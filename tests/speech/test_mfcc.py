@@ -205,15 +205,18 @@ def test_the_forward_pass_is_that_of_the_network() -> None:
 
 def test_rows_do_not_depend_on_what_is_asked_for() -> None:
     """Long sound is encoded in windows that fade into each other, each computed when it is needed."""
-    samples = np.random.default_rng(0).normal(0, 0.05, 10 * RATE_HZ).astype(np.float32)
+    samples = np.random.default_rng(0).normal(0, 0.05, 14 * RATE_HZ).astype(np.float32)
     read: list[int] = []
 
     def take(first: int, stop: int) -> NDArray[np.float32]:
         read.append(first)
         return samples[first:stop]
 
-    some = WindowedEncoding(take, len(samples)).rows(700, 760)
+    encoding = WindowedEncoding(take, len(samples))
+    some = encoding.rows(700, 760)
     assert len(read) == 2  # of the windows from 0 and 6 s, between which it lies
+    assert [encoding.rows(first, first + 9).shape for first in (1300, 700, 0)] == [(9, COMPONENTS)] * 3
+    assert read[2:] == [191_800, 0]  # the window from 12 s, and again the first one: two are kept
     whole = WindowedEncoding(take, len(samples)).rows(0, 1001)
     assert whole.shape == (1001, COMPONENTS)
     assert whole[700:760] == pytest.approx(some, abs=1e-2)
