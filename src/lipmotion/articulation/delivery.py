@@ -140,11 +140,14 @@ def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Un
     return Timeline(tuple(spans))
 
 
-def intensify(generation: Generation, intensity: float | Curve, opening: Curve | None = None) -> Generation:
+def intensify(
+    generation: Generation, intensity: float | Curve, opening: Curve | None = None, *, in_place: bool = False
+) -> Generation:
     """Return a generation with movements away from the rest pose so many times as large.
 
     intensity : of all frames, or of each [shape=(T,)]; frames of 1 stay as they are
     opening : how far the lips are apart in every frame [shape=(T,)]; None: the channel ``opening``
+    in_place : whether the motion is nobody else's: hours of it would not fit twice
     In every frame the whole face moves by one factor, so that distances and points agree. It is 1 where the lips touch,
     or are no further apart than at rest (silence, p b m), and the intensity where they are open; openings beyond the
     largest of the motion approach twice that. Weights stay between 0 and 1.
@@ -166,7 +169,7 @@ def intensify(generation: Generation, intensity: float | Curve, opening: Curve |
         limited = np.where(wanted > widest, widest + widest * np.tanh((wanted - widest) / widest), wanted)
         change = np.divide(limited, further, out=np.ones_like(further), where=further > 0) - 1
         factor = 1 + smooth_step((further - touching) / UNSCALED_GAP) * change
-    values = motion.values.copy()
+    values = motion.values if in_place else motion.values.copy()
     for column, channel in enumerate(motion.channels):  # by columns: hours of all channels would not fit twice
         curve = values[:, column].astype(np.float64)
         if channel.name in GROWING:

@@ -56,7 +56,7 @@ class WindowedEncoding:
         """
         place, odd = np.divmod(np.arange(first, stop), ROW_FRAMES)
         here, after = (self._rows(np.minimum(at, self._samples // HOP // ROW_FRAMES)) for at in (place, place + odd))
-        self._windows = dict([*self._windows.items()][-2:])  # those that the next passage may take
+        self._windows = dict(sorted(self._windows.items())[-2:])  # those that the next passage may take
         return ((here + after) / 2).astype(np.float16)
 
     def _rows(self, rows: NDArray[np.intp]) -> Array:
