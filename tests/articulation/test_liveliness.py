@@ -252,8 +252,8 @@ def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Genera
     assert change[115] > 0
     assert change[-20:].max() == 0
     assert with_manners(generation, parse_moods("happy")) is generation
-    before, moods = generation.motion.values.copy(), parse_moods("shout, happy at 1.1")
-    assert not np.array_equal(deliver(generation, Delivery(moods=moods)).motion.values[:, : before.shape[1]], before)
+    before, delivery = generation.motion.values.copy(), Delivery(mood="shout, happy at 1.1")
+    assert not np.array_equal(deliver(generation, delivery).motion.values[:, : before.shape[1]], before)
     assert np.array_equal(generation.motion.values, before)
 
 

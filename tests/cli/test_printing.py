@@ -244,14 +244,8 @@ def objects(done: Done) -> list[dict[str, object]]:
     return [json.loads(line) for line in done.out]
 
 
-def options(machine_readable: bool) -> Namespace:
-    return Namespace(
-        machine_readable=machine_readable, stopper=Stopper(), events=JsonLines() if machine_readable else Events()
-    )
-
-
 def test_every_event_is_one_json_object_on_a_line(capsys):
-    with report_progress(options(machine_readable=True)) as report:
+    with report_progress(Namespace(machine_readable=True, stopper=Stopper(), events=JsonLines())) as report:
         for event in EVENTS:
             report.receive(event)
         logging.getLogger("lipmotion").warning("strange %s", "word")
