@@ -11,10 +11,10 @@ from lipmotion.articulation.liveliness import (
     lid_closure,
 )
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, find_mouth
-from lipmotion.pipeline.outputs.deliver import FACTORS, with_detected, with_manners
+from lipmotion.pipeline.outputs.deliver import FACTORS, deliver, with_detected, with_manners
 from lipmotion.types import Channel, Generation, Motion, Prosody, Span, Timeline, Unit, VoiceEvent
 from lipmotion.types.audio import BREATH, LAUGHTER, SHOUT, WHISPER
-from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, format_moods, parse_moods
+from lipmotion.types.delivery import MANNERS, MOODS, NEUTRAL, PLAIN, Delivery, MoodKey, format_moods, parse_moods
 from meshes.speech import motion, units
 
 MINUTE = Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),))
@@ -252,6 +252,9 @@ def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Genera
     assert change[115] > 0
     assert change[-20:].max() == 0
     assert with_manners(generation, parse_moods("happy")) is generation
+    before, delivery = generation.motion.values.copy(), Delivery(mood="shout, happy at 1.1")
+    assert not np.array_equal(deliver(generation, delivery).motion.values[:, : before.shape[1]], before)
+    assert np.array_equal(generation.motion.values, before)
 
 
 @pytest.mark.parametrize(

@@ -175,6 +175,7 @@ def test_progress(capsys, terminal, watched):
     out, err = capsys.readouterr()
     assert out == "two\nlines" + SHOWN[:12] + "\n"
     assert err.count(SHOWN) >= (5 if watched else 3)
+    assert ("50%" in err) == ("(1/2)" in err) == watched  # a bar
     assert not any(part in err for part in ("\x1b]", "\x07", "\x9b", "\u202e", "\nlipmotion: error: forged"))
 
 
@@ -243,14 +244,8 @@ def objects(done: Done) -> list[dict[str, object]]:
     return [json.loads(line) for line in done.out]
 
 
-def options(machine_readable: bool) -> Namespace:
-    return Namespace(
-        machine_readable=machine_readable, stopper=Stopper(), events=JsonLines() if machine_readable else Events()
-    )
-
-
 def test_every_event_is_one_json_object_on_a_line(capsys):
-    with report_progress(options(machine_readable=True)) as report:
+    with report_progress(Namespace(machine_readable=True, stopper=Stopper(), events=JsonLines())) as report:
         for event in EVENTS:
             report.receive(event)
         logging.getLogger("lipmotion").warning("strange %s", "word")
@@ -268,18 +263,11 @@ def test_every_event_is_one_json_object_on_a_line(capsys):
     ]
 
 
-@pytest.mark.parametrize("watched", [False, True])
-def test_a_terminal_gets_a_bar_and_nobody_else(capsys, terminal, watched):
-    terminal(watched)
-    with report_progress(options(machine_readable=False)) as report:
-        for event in EVENTS:
-            report.receive(event)
-        report.finish("done", used=3, kind="video")
-    out, err = capsys.readouterr()
-    warning = "lipmotion: warning: skipped b: no face\\nanywhere\n"
-    assert out == "done\n"
-    assert (err == warning) != watched
-    assert all(part in err for part in ("first (1/2)", "25%", "second (2/2)", "100%", warning)) == watched
+def test_a_person_is_told_what_to_expect_of_the_motion_and_a_program_is_not(run, basics, here, terminal):
+    for watched, words in ((False, ()), (True, ()), (True, ("--machine-readable",))):
+        terminal(watched)
+        done = run(*basics, "-o", here / "a.json", "--force", *words)
+        assert any(line.endswith("dB apart") or "dB apart; " in line for line in done.err) == (watched and not words)
 
 
 @pytest.mark.long

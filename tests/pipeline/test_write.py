@@ -21,17 +21,11 @@ from lipmotion.pipeline.outputs import output
 from lipmotion.pipeline.outputs.curve_sets import make_curves, with_curves
 from lipmotion.pipeline.outputs.deliver import deliver, deliver_to_face, hold_mouth
 from lipmotion.pipeline.outputs.motion_files import with_articulation
-from lipmotion.pipeline.outputs.output import (
-    Output,
-    OutputSettings,
-    Performance,
-    create_outputs,
-    plan,
-    shift_prosody,
-)
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, create_outputs, plan, shift_prosody
 from lipmotion.types import Audio, Generation, Prosody, Timeline
 from lipmotion.types.delivery import MoodKey
 from lipmotion_faces import Staging
+from lipmotion_faces.outputs import drawn_video
 from lipmotion_faces.outputs.scenes import build_scene
 from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
@@ -177,14 +171,21 @@ def test_a_name_asks_for_a_kind(name, kind, settings):
 
 
 def test_what_no_kind_writes_is_refused(settings, tmp_path):
-    for name in ("a.xyz", "a.png", "a"):
-        with pytest.raises(ExportError, match="required one of") as error:
+    for name, meant in (("a.xyz", ""), ("in/a.png", "a.%05d.png, or "), ("a.TSV", "a.cues.tsv, or "), ("a", "")):
+        with pytest.raises(ExportError, match=f"required {meant}one of: .json ") as error:
             plan(name, settings)
         assert {".json", ".mp4", ".glb", ".wav", "%05d.png", ".cues.tsv"} <= {*str(error.value).split()}
     with pytest.raises(ExportError, match=r"unknown format '\.wav'"):
         plan("a.wav", replace(settings, sounded=False))
     with pytest.raises(InputError, match="the frame rate is 101"):
         create_outputs([tmp_path / "a.cues.tsv"], replace(settings, outputs=Outputs(fps=101.0)))
+
+
+def test_what_python_alone_draws_says_how_long_it_takes(monkeypatch, caplog):
+    monkeypatch.setattr(drawn_video, "numba_works", lambda: False)
+    assert [*drawn_video.report_cost(Path("a.mp4"), iter("abc"), 3)] == ["a", "b", "c"]
+    (said,) = caplog.messages
+    assert all(part in said for part in ("a.mp4: without numba its 3 pictures take about ", "pip install numba"))
 
 
 def test_cues_beside_other_outputs_are_those_of_the_function(result, tmp_path):

@@ -14,7 +14,7 @@ NO_RECORDING = ("not a readable recording", "give an audio or video file")
 NO_SPEECH = ("no speech found in the recording: the mouth rests; give a recording in which something is said",)
 CUT = ("cut short: it states 3", "s of sound and holds")
 CONTAINERS: dict[str, tuple[str, dict[float, Any]]] = {
-    "wav": ("pcm_s16le", {0.6: (0, *NO_SPEECH), 0.004: (3, "holds", "required at least 100 ms")}),
+    "wav": ("pcm_s16le", {0.6: (0, *CUT), 0.004: (3, "holds", "required at least 100 ms")}),
     "flac": ("flac", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
     "mp3": ("libmp3lame", {0.6: (0, *CUT)}),
     "ogg": ("libopus", {0.6: (0, *NO_SPEECH)}),

@@ -205,16 +205,19 @@ def test_the_forward_pass_is_that_of_the_network() -> None:
 
 def test_rows_do_not_depend_on_what_is_asked_for() -> None:
     """Long sound is encoded in windows that fade into each other, each computed when it is needed."""
-    samples = np.random.default_rng(0).normal(0, 0.05, 10 * RATE_HZ).astype(np.float32)
+    samples = np.random.default_rng(0).normal(0, 0.05, 14 * RATE_HZ).astype(np.float32)
     read: list[int] = []
 
     def take(first: int, stop: int) -> NDArray[np.float32]:
         read.append(first)
         return samples[first:stop]
 
-    some = WindowedEncoding(take, len(samples)).rows(700, 760)
+    encoding = WindowedEncoding(take, len(samples))
+    some = encoding.rows(700, 760)
     assert len(read) == 2  # of the windows from 0 and 6 s, between which it lies
-    whole = WindowedEncoding(take, len(samples)).rows(0, 1001)
+    assert [len(encoding.rows(first, first + 9)) for first in (1300, 700, 0)] == [9, 9, 9]
+    assert read[2:] == [191_800, 0, 0]  # the windows from 6 and 12 s are kept
+    whole = encoding.rows(0, 1001)
     assert whole.shape == (1001, COMPONENTS)
     assert whole[700:760] == pytest.approx(some, abs=1e-2)
     steps = np.abs(np.diff(whole.astype(float), axis=0)).mean(axis=1)

@@ -140,11 +140,14 @@ def shift_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Un
     return Timeline(tuple(spans))
 
 
-def intensify(generation: Generation, intensity: float | Curve, opening: Curve | None = None) -> Generation:
+def intensify(
+    generation: Generation, intensity: float | Curve, opening: Curve | None = None, *, in_place: bool = False
+) -> Generation:
     """Return a generation whose movements away from the rest pose are ``intensity`` times as large.
 
     intensity : one number, or one for each frame [shape=(T,)]; frames of 1 do not change
     opening   : distance of the lips in every frame [shape=(T,)]; None: the channel ``opening``
+    in_place  : whether the motion is nobody else's: hours of it would not fit twice
     Each frame has one factor for the whole face, so that distances and points agree. The factor is the intensity where
     the mouth is open, and 1 where the lips touch or are as close as at rest (silence, p b m); without an opening it is
     the intensity everywhere. Openings beyond the largest of the motion approach twice that. Weights stay between 0
@@ -166,7 +169,7 @@ def intensify(generation: Generation, intensity: float | Curve, opening: Curve |
         limited = np.where(wanted > widest, widest + widest * np.tanh((wanted - widest) / widest), wanted)
         change = np.divide(limited, further, out=np.ones_like(further), where=further > 0) - 1
         factor = 1 + smooth_step((further - touching) / UNSCALED_GAP) * change
-    values = motion.values.copy()
+    values = motion.values if in_place else motion.values.copy()
     for column, channel in enumerate(motion.channels):  # by columns: hours of all channels would not fit twice
         curve = values[:, column].astype(np.float64)
         if channel.name in INTENSIFIED:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import re
-from collections.abc import Callable, Iterable
+import time
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -13,15 +15,12 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError
 from lipmotion.kernels.compiler import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, measure_prosody
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
-from lipmotion.types.progress import with_reports
-from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, Face, Staging
-from lipmotion_faces.film.filmed_video import RENDERING
-from lipmotion_faces.portrait import DrawnFace
-from lipmotion_faces.registry import stage_face
+from lipmotion.types import Audio, Generation, Motion
+from lipmotion_faces.base import TRANSPARENT, Staging
 
+LOG = logging.getLogger("lipmotion")
 OPAQUE_SUFFIX = ".mp4"
 VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
 """Videos with sound; all but the first can be transparent."""
@@ -106,24 +105,14 @@ def check_drawable(path: Path, motion: Motion) -> None:
         raise ExportError(f"{path}: the motion has {missing}; write motion files")
 
 
-def write_drawn_face(  # noqa: PLR0913
-    path: Path,
-    generation: Generation,
-    sound: Audio,
-    fps: float,
-    face: Face,
-    staging: Staging,
-    monitor: Monitor,
-    prosody: Prosody | None = None,
-) -> None:
-    """Write generated motion as a drawn face, in the format of the suffix; brows and head move with the sound.
-
-    prosody : loudness and pitch in the time of the motion; None: those of the sound, which begins with the motion
-    Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
-    """
-    staged = stage_face(face, staging, prosody or measure_prosody(sound))
-    drawn = staged.render(generation.motion, generation.units, fps=fps)
-    write_frames(path, with_reports(drawn, count_frames(generation, fps), RENDERING, monitor), fps, sound)
+def report_cost(path: Path, pictures: Iterable[NDArray[np.uint8]], count: int) -> Iterator[NDArray[np.uint8]]:
+    """Yield pictures; once the first one is drawn by Python alone, say how long all ``count`` of them will take."""
+    start_s = time.monotonic()
+    for number, picture in enumerate(pictures):
+        if not number and not numba_works():
+            about = f"without numba its {count} pictures take about {(time.monotonic() - start_s) * count / 60:.1f} min"
+            LOG.warning("%s: %s; pip install numba, or choose a simpler face or a smaller --size", path, about)
+        yield picture
 
 
 def count_frames(generation: Generation, fps: float) -> int:
@@ -141,10 +130,3 @@ def write_frames(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float, so
         write_mp4(path, frames, fps=fps, audio=sound)
     else:
         write_with_alpha(path, frames, fps=fps, audio=sound)
-
-
-def load_drawing(face: Face) -> None:
-    """Load what draws a face for videos (compiled kernels), so that drawing it begins sooner."""
-    if isinstance(face, DrawnFace) and numba_works():
-        closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
-        list(face.with_staging(Staging(size=SMALLEST_PX)).render(closed, Timeline(())))

@@ -5,8 +5,11 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
+import numpy as np
+
 from lipmotion.articulation.cue_sheets import list_frame_shapes
 from lipmotion.errors import ExportError, InputError
+from lipmotion.kernels.compiler import numba_works
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
@@ -14,11 +17,11 @@ from lipmotion.pipeline.outputs.curve_sets import WEIGHTS
 from lipmotion.pipeline.outputs.deliver import deliver_to_face
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace, measure_prosody, shift_prosody
 from lipmotion.storage.sources import check_kind, is_file
-from lipmotion.types import Generation, Prosody
+from lipmotion.types import Channel, Generation, Motion, Prosody, Timeline
 from lipmotion.types.delivery import MOODS
 from lipmotion.types.progress import with_reports
 from lipmotion.units.phones import OPTIONAL
-from lipmotion_faces.base import Face, Staging
+from lipmotion_faces.base import SMALLEST_PX, Face, Staging
 from lipmotion_faces.characters.scene import Scene
 from lipmotion_faces.cut_out import CutOut, read_cut_out
 from lipmotion_faces.film import filmed_video
@@ -26,6 +29,7 @@ from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion_faces.mesh import MeshFace
 from lipmotion_faces.outputs import drawn_video
 from lipmotion_faces.outputs.scenes import build_character_scene, build_head_scene
+from lipmotion_faces.portrait import DrawnFace
 from lipmotion_faces.registry import FACES, is_drawings, make_face, stage_face
 
 LOG = logging.getLogger("lipmotion")
@@ -66,11 +70,17 @@ class ShownDrawing(_WithHead):
             named = ", ".join(sorted(others))
             LOG.warning("%s: %s is of a rig that this face has not, and does not show; pin jawOpen", path, named)
         seen, prosody = performance.cached(_deliver), performance.cached(_measure_played_prosody)
-        monitor, hertz = performance.monitor, _find_rate(settings)
-        drawn_video.write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
+        staged = stage_face(self.face, settings.staging, prosody or measure_prosody(played))
+        fps = _find_rate(settings)
+        count = drawn_video.count_frames(seen, fps)
+        drawn = drawn_video.report_cost(path, staged.render(seen.motion, seen.units, fps=fps), count)
+        shown = with_reports(drawn, count, filmed_video.RENDERING, performance.monitor)
+        drawn_video.write_frames(path, shown, fps, played)
 
     def load(self) -> None:  # noqa: D102
-        drawn_video.load_drawing(self.face)
+        if isinstance(self.face, DrawnFace) and numba_works():  # compiled kernels
+            closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
+            list(self.face.with_staging(Staging(size=SMALLEST_PX)).render(closed, Timeline(())))
 
 
 class ShownCharacter(ShownDrawing):

@@ -53,5 +53,5 @@ def run(options: argparse.Namespace) -> None:
             note = done.outlook.text if done.outlook is not None else ""
         written = [str(path) for path in (*files, job.outputs.posteriors) if path and not pipe]
         report.finish("\n".join(map(printable, written)), files=written)
-    if note and sys.stderr is not None and sys.stderr.isatty():
+    if note and not options.machine_readable and sys.stderr is not None and sys.stderr.isatty():
         print_error(note)

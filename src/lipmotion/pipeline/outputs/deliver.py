@@ -54,10 +54,11 @@ def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tup
     return sort_moods(keys)
 
 
-def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
+def with_manners(generation: Generation, keys: Sequence[MoodKey], *, in_place: bool = False) -> Generation:
     """Return generated motion whose mouth moves more, or less, in some manners of speaking; what is closed stays so.
 
     keys : in the order of their times; moods do not count. Each holds until the next manner
+    in_place : as of ``intensify``
     """
     manners, time_s = [key for key in keys if key.is_manner], generation.motion.time_s
     last, intensity = MoodKey(len(time_s) / generation.motion.rate_hz, PLAIN), np.ones(len(time_s))
@@ -66,7 +67,7 @@ def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
             near = slice(*np.searchsorted(time_s, (key.time_s - GAIN_EDGE_S, later.time_s + GAIN_EDGE_S)))
             share = weigh_span(time_s[near], key.time_s, later.time_s, GAIN_EDGE_S)
             intensity[near] *= 1 + share * key.strength * (FACTORS[key.mood] - 1)
-    return intensify(generation, intensity)
+    return intensify(generation, intensity, in_place=in_place)
 
 
 def deliver(generation: Generation, delivery: Delivery) -> Generation:
@@ -78,14 +79,14 @@ def deliver(generation: Generation, delivery: Delivery) -> Generation:
     Raises InputError: the offset leaves nothing.
     """
     keys = with_detected(sort_moods((*delivery.moods, *generation.moods)), generation.events)
-    generation = with_manners(generation, keys)
+    if has_moods := not all(key.is_manner for key in keys):
+        generation = generation.selected([name for name in generation.motion.names if not is_mood(name)])
+        generation = generation.with_motion(with_moods(generation.motion, keys))
+    generation = with_manners(generation, keys, in_place=has_moods)
     if delivery.intensity != 1:
         motion = generation.motion
         opening = with_mouth(motion)["opening"].astype(np.float64) if is_of_blendshapes(motion) else None
-        generation = intensify(generation, delivery.intensity, opening)
-    if not all(key.is_manner for key in keys):
-        generation = generation.selected([name for name in generation.motion.names if not is_mood(name)])
-        generation = generation.with_motion(with_moods(generation.motion, keys))
+        generation = intensify(generation, delivery.intensity, opening, in_place=has_moods)
     return shift_in_time(generation, delivery)
 
 
@@ -119,9 +120,7 @@ def deliver_to_face(
 
 def with_drawn_channels(generation: Generation) -> Generation:
     """Return a generation with the channels that faces draw: those of a mouth, where it has blendshapes."""
-    if not is_of_blendshapes(generation.motion):
-        return generation
-    return generation.with_motion(with_mouth(generation.motion))
+    return generation.with_motion(with_mouth(generation.motion)) if is_of_blendshapes(generation.motion) else generation
 
 
 def hold_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:

@@ -183,16 +183,16 @@ OUTPUTS: Registry[type[Output]] = Registry(
 
 def plan(path: str | Path, settings: OutputSettings) -> Output:
     """Return the output of a path; the longest suffix counts. Raises ExportError: no kind of output has such a name."""
-    name = Path(path).name.lower()
+    file, name, ends = Path(path), Path(path).name.lower(), list_outputs(settings)
 
     def length(kind: type[Output]) -> int:
         return max((len(suffix) for suffix in kind.suffixes(settings) if name.endswith(suffix.lower())), default=0)
 
-    taking = [kind for kind in map(OUTPUTS.load, OUTPUTS.names) if kind.takes(Path(path), settings)]
+    taking = [kind for kind in map(OUTPUTS.load, OUTPUTS.names) if kind.takes(file, settings)]
     if taking:
-        return max(taking, key=length)(Path(path), settings)
-    suffixes = " ".join(list_outputs(settings))
-    raise ExportError(f"{path}: unknown format {Path(path).suffix!r}; required one of: {suffixes}")
+        return max(taking, key=length)(file, settings)
+    meant = [f"{file.stem}.{end.removeprefix('.')}, or " for end in ends if end.endswith(file.suffix.lower() or "\0")]
+    raise ExportError(f"{path}: unknown format {file.suffix!r}; required {''.join(meant)}one of: {' '.join(ends)}")
 
 
 def list_outputs(settings: OutputSettings) -> tuple[str, ...]:

@@ -75,24 +75,21 @@ class AnalysedAudio(Audio):
         bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(stretches)), self.frames]
         passages = []
         sounds = {id(piece): _LevelledPiece(piece.samples) for piece, _ in found}
-        encodings = {id(piece): WindowedEncoding(sounds[id(piece)].read, len(piece.samples)) for piece, _ in found}
+        windows = {id(piece): WindowedEncoding(sounds[id(piece)].read, len(piece.samples)) for piece, _ in found}
+        room = np.zeros(sum(end - first + 2 * SILENT_FRAMES for _, (first, end) in found) * HOP, np.float32)
         for number, (piece, (first, end)) in enumerate(found):
             level, samples = piece.energy[first:end], piece.samples[first * HOP : end * HOP]
             gain = find_passage_gain(level)
             samples = apply_gain(fill_gaps(samples, level), np.arange(len(gain)), gain)
             sound = find_spoken_frames(level)
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
-            padded = _PassageAudio(
-                np.pad(samples, (lead * HOP, tail * HOP)),
-                self.rate_hz,
-                encodings=encodings[id(piece)],
-                first=first,
-                lead=lead,
-                tail=tail,
-            )
-            sounds[id(piece)].add(first, padded.sound.samples, gain)
+            # all in one array: the system gets an hour's memory back as one, not what lies between smaller ones
+            place, room = np.split(room, [len(samples) + (lead + tail) * HOP])
+            place[lead * HOP : lead * HOP + len(samples)] = samples
+            part = _PassageAudio(place, self.rate_hz, encodings=windows[id(piece)], first=first, lead=lead, tail=tail)
+            sounds[id(piece)].add(first, part.sound.samples, gain)
             own = slice(bounds[number], bounds[number + 1])
-            passages.append(Passage(stretches[number].first - lead, own, padded))
+            passages.append(Passage(stretches[number].first - lead, own, part))
         return tuple(passages)
 
     @property
@@ -197,10 +194,11 @@ class AnalysedAudio(Audio):
             self._mfcc.update(zip(missing, self._new_mfcc(missing), strict=True))
         return [self._mfcc[warp] for warp in warps]
 
-    def keep_warps(self, *warps: float) -> None:
-        """Forget the features at all other warps."""
-        for warp in self._mfcc.keys() - {*warps}:
-            del self._mfcc[warp]
+    def forget_warps(self) -> None:
+        """Forget the features at all warps but 1, which recognition alone takes."""
+        for audio in (self, *(passage.audio for passage in self.passages)):
+            for warp in audio._mfcc.keys() - {1.0}:
+                del audio._mfcc[warp]
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
         return [Features(self.joined(partial(_compute_mfcc, warp=warp)), self.duration_s) for warp in warps]
@@ -348,7 +346,7 @@ class _PassageAudio(AnalysedAudio):
     def log_energy(self) -> NDArray[np.float32]:
         return self._with_silence(self._energy)
 
-    @cached_property
+    @property  # not kept: recognition alone takes them, mostly once
     def general_features(self) -> NDArray[np.float32]:
         rows = self._with_silence(general_features(self.sound))
         rows[:, :CEPSTRA] -= rows[:, :CEPSTRA].mean(axis=0, dtype=np.float64).astype(np.float32)

@@ -55,8 +55,8 @@ class WindowedEncoding:
         Source: Radford et al. 2022, §2.2 (log mel spectrum, encoder).
         """
         place, odd = np.divmod(np.arange(first, stop), ROW_FRAMES)
-        last = self._samples // HOP // ROW_FRAMES
-        here, after = (self._rows(np.minimum(rows, last)) for rows in (place, place + odd))
+        here, after = (self._rows(np.minimum(at, self._samples // HOP // ROW_FRAMES)) for at in (place, place + odd))
+        self._windows = dict(sorted(self._windows.items())[-2:])  # those that the next passage may take
         return ((here + after) / 2).astype(np.float16)
 
     def _rows(self, rows: NDArray[np.intp]) -> Array:

@@ -57,7 +57,7 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
         form, warped = _densities(hmm), zip(WARPS, part.mfcc_of_warps(WARPS), strict=True)
         fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in warped}
         warp = find_warp(fits)
-        stretch.keep_warps(1.0, warp)
+        stretch.forget_warps()
         return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
 
     return stretch.cached(("similarity to", hmm), judge)

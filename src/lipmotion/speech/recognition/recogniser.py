@@ -282,6 +282,7 @@ class Recogniser:
             own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
             general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
             log_likelihoods = combine_likelihoods(self.combined, own, weight, general)
+        audio.forget_warps()
         return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
 
     def _own_transform(self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import logging
 import mmap
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,7 @@ class DecodedAudio:
     damaged     : how many of them could not be decoded
     silence_s   : duration of the silence that fills holes
     stated_s    : duration that the container states, 0 if none
+    missing_s   : what a WAVE file's header states beyond its end
     """
 
     samples: NDArray[np.float32]
@@ -56,6 +57,7 @@ class DecodedAudio:
     damaged: int
     silence_s: float
     stated_s: float
+    missing_s: float = 0.0
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
@@ -109,7 +111,7 @@ class _TrackDecoder:
         while self._pieces:  # each is freed when it is copied
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
-        unstated = self._container.streams.video and not self._stream.duration
+        is_stated = self._stream.duration or not self._container.streams.video
         return DecodedAudio(
             samples=samples[self._cut :],
             rate_hz=self._rate_hz,
@@ -118,7 +120,7 @@ class _TrackDecoder:
             packets=self._packets,
             damaged=self._damaged,
             silence_s=self._silence_s,
-            stated_s=0.0 if unstated else read_duration(self._container, self._stream),
+            stated_s=read_duration(self._container, self._stream) if is_stated else 0.0,
         )
 
     def _frames(self) -> Iterator[Any]:
@@ -138,8 +140,7 @@ class _TrackDecoder:
         if frame.pts is not None:
             time_s = float(frame.pts * frame.time_base)
             if self._clock_s is None:
-                has_pictures = bool(list_video(self._container))
-                offset_s = time_s - (self._container.start_time or 0) / 1e6 if has_pictures else 0.0
+                offset_s = time_s - (self._container.start_time or 0) / 1e6 if list_video(self._container) else 0.0
                 self._count += self._silence(max(offset_s, 0.0))
                 self._cut = max(round(-offset_s * self._rate_hz), 0)
             elif time_s - self._clock_s > HOLE_S:
@@ -226,6 +227,8 @@ CUT_SHORT_SHARE = 0.9
 """A recording is called cut short when it holds less than this share of the duration that it states."""
 PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
 """Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
+UNKNOWN_SIZES = range(0x7FFF0000, 0x1_0000_0000)
+"""Sizes in bytes with which programs begin a WAVE file whose end they do not know, besides 0."""
 
 
 def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) -> Audio:
@@ -261,8 +264,10 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     if sound.damaged or sound.silence_s >= SHORTEST_S:
         holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= LEAST_HOLES_S else ""
         LOG.log(level, "%s: damaged: %s%s", path, found, holes)
-    if held_s < CUT_SHORT_SHARE * sound.stated_s:
-        LOG.log(level, "%s: cut short: it states %.1f s of sound and holds %.1f s", path, sound.stated_s, held_s)
+    stated_s = sound.stated_s if held_s < CUT_SHORT_SHARE * sound.stated_s else held_s + sound.missing_s
+    if (missing_s := stated_s - held_s) >= SHORTEST_S:
+        found = f"it states {stated_s:.1f} s of sound and holds {held_s:.1f} s; the last {missing_s:.1f} s are missing"
+        LOG.log(level, "%s: cut short: %s", path, found)
     audio = Audio(sound.samples, rate_hz)
     if audio.duration_s < SHORTEST_S:
         raise InputError(f"{path}: holds {audio.duration_s * 1000:.0f} ms of sound, required at least 100 ms")
@@ -275,7 +280,8 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
     import av
 
     try:
-        with open_media(path, content=_correct_wave(path)) as container:
+        content, missing_s = _correct_wave(path)
+        with open_media(path, content=content) as container:
             if not container.streams.audio:
                 raise InputError(f"{path}: has no sound track; give a recording with sound")
             stream = container.streams.audio[0]
@@ -284,7 +290,7 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
             check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
             if len(container.streams.audio) > 1:
                 LOG.warning("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
-            return _TrackDecoder(container, rate_hz, channel).decoded()
+            return replace(_TrackDecoder(container, rate_hz, channel).decoded(), missing_s=missing_s)
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -309,9 +315,10 @@ class _Wave(mmap.mmap):
         return super().tell() - self.start
 
 
-def _correct_wave(path: Path) -> _Wave | None:
-    """Return a WAVE file under a header that FFmpeg understands; None: its own is one, or it is no WAVE file.
+def _correct_wave(path: Path) -> tuple[_Wave | None, float]:
+    """Return a WAVE file under a header that FFmpeg understands, and how many seconds its own states beyond its end.
 
+    None: its own is one, or it is no WAVE file. 0 seconds: also of streams, which do not know their size.
     FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container: 24 bits in 32 as 24,
     20 as another format, 17 as 24. It also loses its way at a chunk of odd length that no byte follows.
     Raises ValueError: numbers with the high byte first, which FFmpeg would read as the other ones.
@@ -321,23 +328,24 @@ def _correct_wave(path: Path) -> _Wave | None:
         if kind == b"RIFX":
             raise ValueError("a WAVE file with the high byte first (RIFX); export it as .wav or .flac")
         if kind not in {b"RIFF", b"RF64", b"BW64", b"riff"}:
-            return None
+            return None, 0.0
         whole = _Wave(file.fileno(), 0, access=mmap.ACCESS_COPY)
     form, body, size, moved = _sound_of_wave(whole)
     if len(form) < 16:
-        return None
+        return None, 0.0
     coding, channels, rate_hz, per_second, block, bits = struct.unpack_from("<HHIIHH", form)
-    valid = bits
+    valid, missing = bits, 0 if size in UNKNOWN_SIZES else max(body + size - len(whole), 0)
+    missing_s = missing / max(per_second, 1)
     if coding == EXTENSIBLE:
         whole_form = len(form) >= 40
         valid, coding = struct.unpack_from("<H4xH", form, 18) if whole_form else (-1, PCM)
     least = -(-bits // 8) * channels
     frame = block if block * rate_hz == per_second and block >= least else least
     if coding not in {PCM, FLOAT} or not channels or frame % channels:
-        return None
+        return None, missing_s
     container = 8 * frame // channels
     if not moved and bits == container and valid in {0, container}:
-        return None
+        return None, missing_s
     size = min(size or len(whole), len(whole) - body)
     header = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
     lengths = [min(length, 0xFFFFFFFF) for length in (36 + size, size)]
@@ -345,7 +353,7 @@ def _correct_wave(path: Path) -> _Wave | None:
     whole.start, whole.name = body - len(header), str(path)
     whole[whole.start : body] = header
     whole.seek(0)
-    return whole
+    return whole, missing_s
 
 
 def _sound_of_wave(whole: _Wave) -> tuple[bytes, int, int, bool]:
