@@ -68,11 +68,12 @@ def test_xieliu2007_of_some_systems(figures_of, toy_corpus, here):
 
 
 def test_all_engines(figures_of, run, toy_corpus, here):
-    chosen = (sections.build_engines_section, "engines", toy_corpus.path, "--split", "test", "--models", "models")
-    figures = figures_of(*chosen)
+    chosen = ("engines", toy_corpus.path, "--split", "test", "--models", "models")
+    section = sections.build_engines_section
+    figures = figures_of(section, *chosen)
     assert (figures["split"], figures["clips"]) == ("test", 2)
     kept = sorted(path.name for path in (here / "models").iterdir())
     assert kept == ["coupled.lipmotion", "selection.lipmotion", "trajectory.lipmotion"]
-    assert chosen[0](figures_of(*chosen)) == chosen[0](figures)
+    assert section(figures_of(section, *chosen)) == section(figures)
     (here / "models" / "coupled.lipmotion").write_bytes(b"no model")
     assert is_one_error(run("experiment", *chosen, "-o", "a.json", "--workers", "1"), 6)

@@ -41,7 +41,7 @@ ALIGNED_EDGE_PX = 25.0
 MAX_PARTS = 24
 """Parts of the footage that are tried as backgrounds."""
 COMPARED_STEP = 3
-"""Every third of their frames is compared."""
+"""Only every third frame of the parts is compared."""
 SHOWN_S = 60.0
 """How long they are shown then."""
 SHORT_S, SHORT_COST = 3.0, 2.0

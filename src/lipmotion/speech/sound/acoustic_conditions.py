@@ -37,10 +37,13 @@ def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
         return samples
     # before and after go half a second, whole periods of any mains
     padded = np.concatenate([samples[: HUM // 2], samples, samples[-HUM // 2 :]])
-    blocks, window = sliding_window_view(padded, HUM)[:: HUM // 4], np.hanning(HUM + 1)[:-1]
-    judged = blocks[:: max(len(blocks) // MAX_HUM_BLOCKS, 1)] * window
-    steady, loud = np.quantile(np.abs(np.fft.rfft(judged)), (0.2, 0.9), axis=0)
+    blocks, window, part = sliding_window_view(padded, HUM)[:: HUM // 4], np.hanning(HUM + 1)[:-1], HUM // 10
+    judged = blocks[:: max(len(blocks) // MAX_HUM_BLOCKS, 1)]
+    steady, loud = np.quantile(np.abs(np.fft.rfft(judged * window)), (0.2, 0.9), axis=0)
     lines = steady > np.maximum(HUM_RATIO * median_filter(steady, HUM_WIDTH), HUM_SHARE * loud.max())
+    # hum sounds in every tenth of a second; a voice on one note pauses for consonants
+    least = np.quantile(np.abs(np.fft.rfft(judged.reshape(-1, part) * np.hanning(part + 1)[:-1])), 0.05, axis=0)
+    lines &= 10 * least[np.rint(np.arange(len(lines)) / 10).astype(int)] > steady / 2
     if not lines.any():
         return samples
     kept, clean = ~binary_dilation(lines, iterations=3), np.zeros(len(padded), np.float32)
