@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import DECIBEL, MIN_FRAMES, average_power, find_spoken_frames
 from lipmotion.speech.features import analysed_audio, mfcc
-from lipmotion.speech.sound import pauses, voice_activity
+from lipmotion.speech.sound import acoustic_conditions, pauses, voice_activity
 from lipmotion.types import Audio
 from testing.toy import toy_sentences
 
@@ -234,6 +234,13 @@ def test_a_voice_is_found_beneath_hum(hertz: tuple[float, ...]) -> None:
         for sound in (samples, samples + hum)
     )
     assert found == pytest.approx(clean, abs=30)
+
+
+def test_a_voice_on_one_note_is_no_hum() -> None:
+    time_s = np.arange(6 * RATE_HZ) / RATE_HZ
+    sung = sum(np.sin(2 * np.pi * 150 * n * time_s) / n for n in range(1, 20)) * np.where(time_s % 1 < 0.85, 0.1, 1e-3)
+    samples = sung.astype(np.float32)
+    assert acoustic_conditions.remove_hum(samples) is samples
 
 
 def test_noise_stands_in_the_gaps_of_a_noise_gate() -> None:
