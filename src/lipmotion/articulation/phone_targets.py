@@ -98,8 +98,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
             "ay": GestureTarget(0.0, 0.6, 1.0, 0.035),
             "oy": GestureTarget(0, 0.6, 1.0, 0.035),
         }
-        | _steady({"ih y": 0.7, "ix": 0.55, "ae eh": 0.45}, 1.0, 0.035)
-        | _steady({"s z": 0.6}, 0.8, 0.03)
+        | _steady({"ih y": 0.7, "s z": 0.6, "ix": 0.55, "ae eh": 0.45}, 1.0, 0.035)
         | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 1.5, 0.04)
         | _steady({"sil sp": 0.0}, 0.7, 0.03),
     ),

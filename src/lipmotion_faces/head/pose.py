@@ -114,7 +114,7 @@ def pose_head(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         "tuck": mouth.tuck * (1 - closing),
         "tongue_out": out,
         "tongue_up": np.minimum(mouth.tongue / TIP_UP, 1) * (1 - out) * (1 - teeth),
-        "smile": 0.004 * wide + corners * (1 - roundness),
+        "smile": 0.004 * wide + 0.03 * mouth.tuck * (1 - closing) + corners * (1 - roundness),
         "shut": moved.lids,
         "brows": moved.brows,
     }
