@@ -31,9 +31,8 @@ SPEAKER = re.compile(
 )
 """What may be the name of a speaker: before a colon at the start of a line, perhaps with ``(V.O.)``."""
 STAMP = re.compile(
-    r"^[ \t]*(?:[^\W\d_][\w.'’ -]{0,30}?[ \t]+(?=[(\[]?[\d:]{4,8}[)\]]?[ \t]*$))?"
-    r"[(\[]?((?:\d{1,2}:)?\d{1,2}:\d\d)(?:[.,]\d{1,3})?[)\]]?(?:[ \t]*$|[ \t]*[-–—|]?[ \t]+(?=\S))",
-    re.MULTILINE,
+    r"(?m)^[ \t]*(?:[^\W\d_][\w.'’ -]{0,30}?[ \t]+(?=[(\[]?[\d:]{4,8}[)\]]?[ \t]*$))?"
+    r"[(\[]?((?:\d{1,2}:)?\d{1,2}:\d\d)(?:[.,]\d{1,3})?[)\]]?(?:[ \t]*$|[ \t]*[-–—|]?[ \t]+(?=\S))"
 )
 """The time of a line of a transcript of the web, before it or above it: ``0:12 Hello``, ``Anna  0:12``."""
 CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]{1,20}\))?)[ \t]*\n(?=[^\n]*[a-z])")

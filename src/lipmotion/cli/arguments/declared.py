@@ -61,12 +61,9 @@ def add_input(
     **more: Any,
 ) -> None:
     """Add an argument that names an input, with the further arguments of ``add_argument``."""
-    action = parser.add_argument(*names, **({"type": _parse_path_or_url if what == "corpus" else Path} | more))
+    kind = Path if what != "corpus" else lambda text: text if "://" in text else Path(text)
+    action = parser.add_argument(*names, **({"type": kind} | more))
     _declare(parser, "reads", InputArgument(action.dest, what, replaceable, action.type is str, default_path))
-
-
-def _parse_path_or_url(text: str) -> Path | str:
-    return text if "://" in text else Path(text)
 
 
 def add_output(
@@ -309,7 +306,7 @@ def _add(parser: argparse.ArgumentParser, flags: tuple[str, ...], each: Field[An
     elif kind is tuple and "writes" in about:
         how |= {"type": str, "nargs": "+", "action": _Collected}
     elif kind is tuple:
-        how["type"] = _listed
+        how["type"] = lambda text: tuple(text.split(","))
     how |= changes
     if "reads" in about:
         of_input = {name: about[name] for name in ("replaceable", "default_path") if name in about}
@@ -318,10 +315,6 @@ def _add(parser: argparse.ArgumentParser, flags: tuple[str, ...], each: Field[An
         add_output(parser, *flags, force="-o" in flags, **how)
     else:
         parser.add_argument(*flags, **how)
-
-
-def _listed(text: str) -> tuple[str, ...]:
-    return tuple(text.split(","))
 
 
 class _Collected(argparse.Action):

@@ -35,8 +35,7 @@ def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
 
     if len(samples) < LEAST_HUM:
         return samples
-    # before and after go half a second, whole periods of any mains
-    padded = np.concatenate([samples[: HUM // 2], samples, samples[-HUM // 2 :]])
+    padded = np.concatenate([samples[: HUM // 2], samples, samples[-HUM // 2 :]])  # by whole periods of any mains
     blocks, window, part = sliding_window_view(padded, HUM)[:: HUM // 4], np.hanning(HUM + 1)[:-1], HUM // 10
     judged = blocks[:: max(len(blocks) // MAX_HUM_BLOCKS, 1)]
     steady, loud = np.quantile(np.abs(np.fft.rfft(judged * window)), (0.2, 0.9), axis=0)
