@@ -206,9 +206,7 @@ def test_the_preset_needs_nothing_but_phones() -> None:
     assert changed.config == replace(engine.config, candidates=300)  # type: ignore[attr-defined]
 
 
-def test_a_model_of_the_preset_knows_no_stand_ins_of_suppressed_phones_and_names_what_it_plays(
-    model,
-) -> None:
+def test_a_model_of_the_preset_knows_no_stand_ins_of_suppressed_phones_and_names_what_it_plays(model) -> None:
     engine = PRESET
     assert "t" not in engine.stand_ins(model)
     sentence = spoken(("b", "aa", "t", "iy", "m", "uw", "t"))

@@ -23,10 +23,7 @@ from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.product import JointState, Transitions, create_transitions, reachable
 from lipmotion.engines.coupled.chains.structures import list_unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert, sum_precisions
-from lipmotion.engines.coupled.training.chain_training import (
-    MIN_FRAMES,
-    with_joint_state_densities,
-)
+from lipmotion.engines.coupled.training.chain_training import MIN_FRAMES, with_joint_state_densities
 from lipmotion.errors import InputError
 from oracles import coupled as oracle
 
@@ -163,8 +160,7 @@ def random_counts(transitions, seed=0):
 
 
 @pytest.mark.parametrize(
-    ("kind", "sets", "limit"),
-    [(COUPLED, (THREE, TWO), 1), (FACTORIAL, (THREE, TWO), 1), (HMM, (THREE,), 1)],
+    ("kind", "sets", "limit"), [(COUPLED, (THREE, TWO), 1), (FACTORIAL, (THREE, TWO), 1), (HMM, (THREE,), 1)]
 )
 def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
     transitions = chains(structure(kind, sets, limit=limit)).transitions

@@ -24,11 +24,7 @@ from engines.coupled.tiny import (
 from lipmotion import engines, errors
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.chains import densities, model
-from lipmotion.engines.coupled.chains.densities import (
-    LEAST_COMPONENT_FRAMES,
-    AudioVisualObservations,
-    reestimate_group,
-)
+from lipmotion.engines.coupled.chains.densities import LEAST_COMPONENT_FRAMES, AudioVisualObservations, reestimate_group
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.structures import list_unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import EXACT, VITERBI, ConversionSettings, convert
