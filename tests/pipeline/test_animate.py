@@ -51,10 +51,6 @@ def transcript(toy_sentence: ToySentence) -> str:
     return " ".join(toy_sentence.words).capitalize() + "."
 
 
-def frames_of(span: Span[Unit]) -> slice:
-    return slice(round(span.start_s * 100), round(span.end_s * 100) + 1)
-
-
 def agreement(found: Motion, sentence: ToySentence) -> float:
     """Return the correlation of the opening with the known one."""
     known = toy_motion(sentence.units, 100.0)
@@ -103,7 +99,7 @@ def test_the_mouth_closes_on_p_b_m_and_rests_in_silence(move, toy_sentence):
     opening = result.motion["opening"]
     for span in toy_sentence.units:
         if span.label.phone in ("p", "b", "m"):
-            assert opening[frames_of(span)].min() < 0.01
+            assert opening[round(span.start_s * 100) : round(span.end_s * 100) + 1].min() < 0.01
     first, last = toy_sentence.units.spans[0], toy_sentence.units.spans[-1]
     for silence in (opening[: round(first.end_s * 100) - 50], opening[round(last.start_s * 100) + 50 :]):
         assert silence.max() < 0.01
