@@ -115,7 +115,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     "teeth": (
         GestureTarget(0.5, 0.5, 0.5, 0.03),
         _steady({"s z sh zh ch jh": 0.98}, 7.0, 0.025)
-        | _steady({"t d n en": 0.82, "iy k g ng": 0.79, "ih ix ey y": 0.75}, 1.5, 0.03)
+        | _steady({"t d n en": 0.8, "iy k g ng": 0.79, "ih ix ey y": 0.75}, 1.5, 0.03)
         | _steady({"f v th dh ah": 0.5, "ae eh": 0.58}, 2.0, 0.025)
         | _steady({"uw w": 0.0, "uh ao": 0.15, "aa": 0.4}, 2.0, 0.04)
         | {"ow": GestureTarget(0.3, 0.0, 1.6, 0.04)}

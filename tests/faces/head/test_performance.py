@@ -182,7 +182,7 @@ def test_f_shows_upper_teeth_that_end_in_the_lower_lip(mouths):
 def test_teeth_part_when_a_spread_mouth_is_wide_open():
     flat, wide = pose_of("iy", 0.08, 0.03), pose_of("iy", 0.5, 0.03)
     assert flat.bite > 0.4
-    assert wide.bite < 0.1
+    assert wide.bite < 0.2
 
 
 def test_the_tongue_of_th_is_seen_and_is_narrower_than_the_mouth():
