@@ -2,11 +2,16 @@
 
     python scripts/live_network.py CORPUS TEXT VOICES...
 
-CORPUS is a prepared corpus (GRID speaker s1), whose motion is measured; VOICES are folders of recordings
-(``speech-open``; LibriSpeech, one sentence of each of 251 readers and ten of each of ten others, as Resemblyzer has
-them in ``audio_data``) and TEXT a folder of English pages, which flite, festival and espeak-ng speak: for these,
-``animate`` with the shipped model is the teacher. Every recording is heard as it is, by other vocal tracts, and in the
-conditions of training.
+CORPUS is a prepared corpus (GRID speaker s1), whose motion is measured; TEXT a folder of English pages, which flite,
+festival and espeak-ng speak; VOICES folders of recordings, for which, as for these, ``animate`` with the shipped model
+is the teacher. Every recording is heard as it is, by other vocal tracts, and in the conditions of training.
+
+For ``live.npz``: ``speech-open``; LibriSpeech, one sentence of each of 251 readers and ten of each of ten others, as
+Resemblyzer has them in ``audio_data``; speechocean762, the four longest sentences of each adult and the three longest
+of each child older than eight, with their words; the commands of Picovoice's ``speech-to-intent-benchmark``; VCTK, as
+AutoVC has it in ``wavs``; every third sentence of LJ Speech that PhilippMatthes/dc_tts has. It began with the weights
+that an earlier version of this script made of s1's half, ``speech-open``, LibriSpeech, and synthetic speech
+(``--start``), from which ``general-motion.npz`` comes, too.
 """
 
 from __future__ import annotations
@@ -51,7 +56,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.sound.acoustic_conditions import apply_condition
+from lipmotion.speech.sound.acoustic_conditions import apply_condition, mark_spoken
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
@@ -69,13 +74,14 @@ VOICES = [
         for name in ("kal_diphone", "cmu_us_slt_arctic_hts")
     ),
 ]
-SOUNDS = (".flac", ".wav", ".opus", ".mp3")
+SOUNDS = (".flac", ".wav", ".opus", ".mp3", ".ogg")
 HINTS, HINT_LAG, HINT_SHARE = COMPONENTS, 6, 0.25
 """In training it also says what the speech encoder makes of the sound, so many steps ago, with this share of the error:
 who learns what the encoder knows learns the motion of unseen voices from fewer of them."""
-SILENCE_S, LEAST_S, LONGEST_S = 0.8, 1.2, 20.0
-"""Silence after every recording, in which the mouth comes to rest; and how much of a long one is used."""
-GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 4
+SILENCE_S, MARGIN_S, LEAST_S, LONGEST_S = 0.8, 0.3, 1.2, 20.0
+"""Silence after every recording, in which the mouth comes to rest; how much is left of its own; and the shortest and
+the longest piece of a recording."""
+GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 8
 """What is heard: as loud as is drawn, as it is, by other vocal tracts, and half of the time in a condition."""
 VISEME_SCALE = 3.0
 """What is said is learned with deviations about as large as those of the motion."""
@@ -85,6 +91,8 @@ PIECE_STEPS, HELD_OUT = 250, 20
 """Steps of a piece for training; and one in so many recordings measures the errors instead."""
 WEIGHTS_OF = dict.fromkeys(ARTICULATORS, 1.0) | {"opening": 4.0, "width": 3.0, "outer": 2.0}
 Array = NDArray[np.float32]
+Job = tuple[Audio, Track | None, str | None]
+"""A recording, its track, its words."""
 GENERAL_STEPS, GENERAL_EVERY = 3500, 2
 """Of the optimiser for the general network, and steps of lessons from one of its own steps to the next."""
 
@@ -109,12 +117,13 @@ def main() -> None:
     parser.add_argument("text", type=Path)
     parser.add_argument("voices", type=Path, nargs="+")
     parser.add_argument("--split", default="train")
-    parser.add_argument("--minutes", type=float, default=12.0, help="of synthetic speech")
+    parser.add_argument("--minutes", type=float, default=8.0, help="of synthetic speech")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--steps", type=int, default=4000, help="of the optimiser")
+    parser.add_argument("--steps", type=int, default=5000, help="of the optimiser")
+    parser.add_argument("--start", type=Path, help="weights of a live network to begin with; default: random ones")
     parser.add_argument("--keep", type=Path, help="a file that keeps what was prepared")
     parser.add_argument("--output", type=Path, default=OUTPUT)
-    parser.add_argument("--general", type=Path, default=OUTPUT.with_name(general_motion.WEIGHTS))
+    parser.add_argument("--general", type=Path, help="where the general network goes; default: it is not learned")
     options = parser.parse_args()
     if options.keep is not None and options.keep.exists():
         lessons = pickle.loads(options.keep.read_bytes())  # noqa: S301 - what a run before wrote
@@ -124,8 +133,9 @@ def main() -> None:
             options.keep.write_bytes(pickle.dumps(lessons))
     print(f"{len(lessons)} recordings, {sum(len(targets) for targets, *_ in lessons) * STEP_S / 60:.1f} minutes")
     typical = measure_bands(lessons)
-    np.savez_compressed(options.general, **learn_general(lessons))
-    network = learn(lessons, typical, options.steps)
+    if options.general is not None:
+        np.savez_compressed(options.general, **learn_general(lessons))
+    network = learn(lessons, typical, options.steps, options.start)
     arrays = {name: array.astype(np.float16) for name, array in SHAPE.arrays(network).items()}
     rounded = SHAPE.from_arrays(arrays, len(LAGS) * OUTPUTS)
     count, predicted, wanted = len(ARTICULATORS), [], []
@@ -151,26 +161,44 @@ def main() -> None:
     print(f"{options.output.name}: {options.output.stat().st_size} bytes")
 
 
-def learn(lessons: list[Lesson], typical: Array, steps: int) -> ConvolutionalNetwork:
-    """Return a network that is trained with all lessons but those that measure its errors, without its hints."""
-    sequences = [
-        [shift(hear(levels, typical, (number, version)), targets, typical) for version, levels in enumerate(versions)]
-        for number, (targets, versions, _) in enumerate(lessons)
-        if number % HELD_OUT
-    ]
+def learn(lessons: list[Lesson], typical: Array, steps: int, start: Path | None) -> ConvolutionalNetwork:
+    """Return a network that is trained with all lessons but those that measure its errors, without its hints.
+
+    A recording is drawn as often as it has pieces, so that who speaks longer is heard more.
+    """
+    sequences, pieces = [], []
+    for number, (targets, versions, _) in enumerate(lessons):
+        if number % HELD_OUT:
+            pieces += [len(sequences)] * -(-len(targets) // PIECE_STEPS)
+            heard = (hear(levels, typical, (number, version)) for version, levels in enumerate(versions))
+            sequences.append([shift(each, targets, typical) for each in heard])
     weights = np.tile([*(WEIGHTS_OF[name] for name in ARTICULATORS), *np.ones(len(VISEMES_15))], len(LAGS))
     weights = np.append(weights, np.full(HINTS, HINT_SHARE * weights.sum() / HINTS))
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        whole = sequences[number][int(rng.integers(len(sequences[number])))]
+        versions = sequences[pieces[number]]
+        whole = versions[int(rng.integers(len(versions)))]
         return cut(whole, int(rng.integers(max(len(whole.inputs) - PIECE_STEPS, 0) + 1)))
 
     plan = TrainingPlan(steps, batch_size=16, rate=2e-3, dropout=0.15, seed=0)
     network = SHAPE.initial(len(LAGS) * OUTPUTS + HINTS, 0)
-    network = fit_network(network, draw, len(sequences), weights, plan, report)
+    if start is not None:
+        network = take_weights(network, start)
+    network = fit_network(network, draw, len(pieces), weights, plan, report)
     return network.with_parameters(
         [*network.parameters[:-2], *(array[..., :-HINTS] / output_scale() for array in network.parameters[-2:])]
     )
+
+
+def take_weights(network: ConvolutionalNetwork, path: Path) -> ConvolutionalNetwork:
+    """Return a network with the weights of a live network, but its own for the hints."""
+    with np.load(path) as stored:
+        known = SHAPE.from_arrays({name: stored[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)
+    last = [
+        np.concatenate([array * output_scale(), own[..., -HINTS:]], axis=-1)
+        for array, own in zip(known.parameters[-2:], network.parameters[-2:], strict=True)
+    ]
+    return network.with_parameters([*known.parameters[:-2], *last])
 
 
 def learn_general(lessons: list[Lesson]) -> dict[str, NDArray[np.float16]]:
@@ -265,20 +293,34 @@ def cut(whole: TrainingSequence, start: int) -> TrainingSequence:
 def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
     """Yield the lessons of all recordings."""
     corpus = Corpus.open(options.corpus)
-    folders = [sorted(folder.rglob("*")) for folder in options.voices]
-    sounds = [read_audio(path) for folder in folders for path in folder if path.suffix in SOUNDS]
-    jobs: list[tuple[Audio, Track | None, str | None]] = []
-    for name in corpus.names(options.split)[::2]:
+    jobs: list[Job] = [job for folder in options.voices for job in read_voices(folder)]
+    babble = [audio for audio, *_ in jobs[:BABBLE]]
+    for name in corpus.names(options.split):
         utterance = corpus.utterance(name)
         jobs.append((utterance.audio, utterance.track, " ".join(utterance.words or ())))
-    spoken = [audio for audio in sounds if audio.duration_s > LEAST_S]
-    spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in spoken]
-    jobs += [(audio, None, None) for audio in (*spoken, *synthesise(options.text, options.minutes))]
+    jobs += synthesise(options.text, options.minutes)
     with ProcessPoolExecutor(options.workers) as pool:
-        yield from pool.map(partial(teach, babble=sounds[:BABBLE]), jobs, range(len(jobs)), chunksize=8)
+        lesson = partial(teach, babble=babble, encoded=options.general is not None)
+        yield from pool.map(lesson, jobs, range(len(jobs)), chunksize=8)
 
 
-def teach(job: tuple[Audio, Track | None, str | None], number: int, babble: list[Audio]) -> Lesson:
+def read_voices(folder: Path) -> Iterator[Job]:
+    """Yield the recordings of a folder without the silence around them, with the words of a ``.txt`` beside them.
+
+    Longer ones are cut into pieces, without words.
+    """
+    for path in sorted(folder.rglob("*")):
+        if path.suffix not in SOUNDS or (audio := read_audio(path)).duration_s < LEAST_S:
+            continue
+        rate_hz, spoken, text = audio.rate_hz, np.flatnonzero(mark_spoken(audio)), path.with_suffix(".txt")
+        margin, longest = int(MARGIN_S * rate_hz), int(LONGEST_S * rate_hz)
+        samples = audio.samples[max(spoken[0] - margin, 0) : spoken[-1] + margin]
+        words = text.read_text("utf-8") if text.exists() and len(samples) <= longest else None
+        for start in range(0, len(samples) - int(LEAST_S * rate_hz), longest):
+            yield Audio(samples[start : start + longest], rate_hz), None, words
+
+
+def teach(job: Job, number: int, babble: list[Audio], *, encoded: bool) -> Lesson:
     """Return the lesson of a recording: of its measured motion, where there is a track, else of what ``animate`` makes.
 
     job : the recording, its track, its words
@@ -291,10 +333,10 @@ def teach(job: tuple[Audio, Track | None, str | None], number: int, babble: list
         measured, _ = resample_track(tracked, len(motion.values))
         values = measured.values - measured.values.mean(axis=0) + motion.values.mean(axis=0)  # the pose is not heard
         motion = replace(measured, values=values)
-    return make_lesson(model, audio, motion, result.units, babble, number)
+    return make_lesson(model, audio, motion, result.units, babble, number, encoded=encoded)
 
 
-def synthesise(folder: Path, minutes: float) -> Iterator[Audio]:
+def synthesise(folder: Path, minutes: float) -> Iterator[Job]:
     """Yield sentences of pages, spoken by one voice after the other."""
     words = " ".join(path.read_text("utf-8") for path in sorted(folder.rglob("*.md")))
     sentences = list(re.findall(r"[A-Z][a-z]+ [a-z ,']{30,110}[a-z]\.", words.replace("\n", " ")))
@@ -308,14 +350,21 @@ def synthesise(folder: Path, minutes: float) -> Iterator[Audio]:
             subprocess.run(command, check=True, capture_output=True)
             audio = read_audio(file)
             spoken_s += audio.duration_s
-            yield audio
+            yield audio, None, sentences[place]
             if spoken_s > 60 * minutes:
                 return
     raise SystemExit(f"{folder}: {len(sentences)} sentences are {spoken_s / 60:.1f} minutes, required {minutes:g}")
 
 
 def make_lesson(
-    model: Model, audio: Audio, motion: Motion, units: Timeline[Unit], babble: list[Audio], seed: int
+    model: Model,
+    audio: Audio,
+    motion: Motion,
+    units: Timeline[Unit],
+    babble: list[Audio],
+    seed: int,
+    *,
+    encoded: bool,
 ) -> Lesson:
     """Return the targets of a recording, silence after it, and what is heard in several versions."""
     silence = np.zeros(int(SILENCE_S * audio.rate_hz), np.float32)
@@ -333,7 +382,7 @@ def make_lesson(
         heard = longer
         if number >= VERSIONS // 2:
             heard, _ = apply_condition(longer, babble, rng)
-            encodings.append(encode(heard, steps))
+            encodings += [encode(heard, steps)] if encoded else []
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if number else 1.0
         gain = np.float32(10 ** (rng.uniform(*GAIN_DB) / 20))
         samples = np.pad(heard.samples * gain, (0, WINDOW))
