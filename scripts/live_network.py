@@ -2,11 +2,21 @@
 
     python scripts/live_network.py CORPUS TEXT VOICES...
 
-CORPUS is a prepared corpus (GRID speaker s1), whose motion is measured; VOICES are folders of recordings
-(``speech-open``; LibriSpeech, one sentence of each of 251 readers and ten of each of ten others, as Resemblyzer has
-them in ``audio_data``) and TEXT a folder of English pages, which flite, festival and espeak-ng speak: for these,
-``animate`` with the shipped model is the teacher. Every recording is heard as it is, by other vocal tracts, and in the
-conditions of training.
+CORPUS is a prepared corpus (GRID speaker s1), whose motion is measured; TEXT a folder of English pages, which flite,
+festival and espeak-ng speak; VOICES folders of recordings, for which, as for these, ``animate`` with the shipped model
+is the teacher. Every recording is heard as it is, by other vocal tracts, and in the conditions of training.
+
+For ``live.npz``: ``speech-open``; LibriSpeech, one sentence of each of 251 readers and ten of each of ten others, as
+Resemblyzer has them in ``audio_data``; speechocean762, the four longest sentences of each adult and the three longest
+of each child older than eight, with their words; the commands of Picovoice's ``speech-to-intent-benchmark``; VCTK, as
+AutoVC has it in ``wavs``; every third sentence of LJ Speech in PhilippMatthes/dc_tts. OLD, which half of s1,
+``speech-open``, LibriSpeech and synthetic speech had taught in 4,000 steps, knew s1 and few voices; what it learned in
+
+    --start OLD --mean OLD
+    --start FIRST --steps 1500 --rate 1e-3 --measured 3 --mean OLD --share 0.25
+
+with more of them keeps s1 (``val``: 0.802 at 80 ms, before 0.799). Errors are measured on recordings of which OLD had
+heard some. ``general-motion.npz`` is of the same recordings as OLD.
 """
 
 from __future__ import annotations
@@ -51,7 +61,7 @@ from lipmotion.pipeline.outputs.curve_sets import make_curves
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.sound.acoustic_conditions import apply_condition
+from lipmotion.speech.sound.acoustic_conditions import apply_condition, mark_spoken
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
@@ -69,13 +79,14 @@ VOICES = [
         for name in ("kal_diphone", "cmu_us_slt_arctic_hts")
     ),
 ]
-SOUNDS = (".flac", ".wav", ".opus", ".mp3")
+SOUNDS = (".flac", ".wav", ".opus", ".mp3", ".ogg")
 HINTS, HINT_LAG, HINT_SHARE = COMPONENTS, 6, 0.25
 """In training it also says what the speech encoder makes of the sound, so many steps ago, with this share of the error:
 who learns what the encoder knows learns the motion of unseen voices from fewer of them."""
-SILENCE_S, MIN_S, LONGEST_S = 0.8, 1.2, 20.0
-"""Silence after every recording, in which the mouth comes to rest; and how much of a long one is used."""
-GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 4
+SILENCE_S, MARGIN_S, MIN_S, LONGEST_S = 0.8, 0.3, 1.2, 20.0
+"""Silence after every recording, in which the mouth comes to rest; how much is left of its own; and the shortest and
+the longest piece of a recording."""
+GAIN_DB, LARGEST_WARP, VERSIONS = (-14.0, 6.0), 0.16, 8
 """What is heard: as loud as is drawn, as it is, by other vocal tracts, and half of the time in a condition."""
 VISEME_SCALE = 3.0
 """What is said is learned with deviations about as large as those of the motion."""
@@ -85,6 +96,8 @@ PIECE_STEPS, HELD_OUT = 250, 20
 """Steps of a piece for training; and one in so many recordings measures the errors instead."""
 WEIGHTS_OF = dict.fromkeys(ARTICULATORS, 1.0) | {"opening": 4.0, "width": 3.0, "outer": 2.0}
 Array = NDArray[np.float32]
+Job = tuple[Audio, Track | None, str | None]
+"""A recording, its track, its words."""
 GENERAL_STEPS, GENERAL_EVERY = 3500, 2
 """Of the optimiser for the general network, and steps of lessons from one of its own steps to the next."""
 
@@ -95,11 +108,13 @@ class Lesson(NamedTuple):
     targets   : articulators, visemes and the encoding in quiet [shape=(N, 23 + 64)]
     versions  : what is heard in several versions [each shape=(N, 82)]
     encodings : of those versions that are in a condition [each shape=(N, 64)]
+    measured  : the motion is measured
     """
 
     targets: Array
     versions: list[Array]
     encodings: list[Array]
+    measured: bool
 
 
 def main() -> None:
@@ -109,12 +124,17 @@ def main() -> None:
     parser.add_argument("text", type=Path)
     parser.add_argument("voices", type=Path, nargs="+")
     parser.add_argument("--split", default="train")
-    parser.add_argument("--minutes", type=float, default=12.0, help="of synthetic speech")
+    parser.add_argument("--minutes", type=float, default=8.0, help="of synthetic speech")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--steps", type=int, default=4000, help="of the optimiser")
+    parser.add_argument("--steps", type=int, default=5000, help="of the optimiser")
+    parser.add_argument("--rate", type=float, default=2e-3, help="of learning")
+    parser.add_argument("--measured", type=int, default=1, help="times that measured motion is drawn more often")
+    parser.add_argument("--start", type=Path, help="weights of a live network to begin with; default: random ones")
+    parser.add_argument("--mean", type=Path, help="weights of a live network with which those learned are averaged")
+    parser.add_argument("--share", type=float, default=0.5, help="of these in the mean")
     parser.add_argument("--keep", type=Path, help="a file that keeps what was prepared")
     parser.add_argument("--output", type=Path, default=OUTPUT)
-    parser.add_argument("--general", type=Path, default=OUTPUT.with_name(general_motion.WEIGHTS))
+    parser.add_argument("--general", type=Path, help="where the general network goes; default: it is not learned")
     options = parser.parse_args()
     if options.keep is not None and options.keep.exists():
         lessons = pickle.loads(options.keep.read_bytes())  # noqa: S301 - what a run before wrote
@@ -124,12 +144,16 @@ def main() -> None:
             options.keep.write_bytes(pickle.dumps(lessons))
     print(f"{len(lessons)} recordings, {sum(len(targets) for targets, *_ in lessons) * STEP_S / 60:.1f} minutes")
     typical = measure_bands(lessons)
-    np.savez_compressed(options.general, **learn_general(lessons))
-    network = learn(lessons, typical, options.steps)
+    if options.general is not None:
+        np.savez_compressed(options.general, **learn_general(lessons))
+    network = learn(lessons, typical, options)
+    if options.mean is not None:
+        pairs = zip(network.parameters, read_network(options.mean).parameters, strict=True)
+        network = network.with_parameters([own + options.share * (other - own) for own, other in pairs])
     arrays = {name: array.astype(np.float16) for name, array in SHAPE.arrays(network).items()}
     rounded = SHAPE.from_arrays(arrays, len(LAGS) * OUTPUTS)
     count, predicted, wanted = len(ARTICULATORS), [], []
-    for number, (targets, versions, _) in enumerate(lessons[::HELD_OUT]):
+    for number, (targets, versions, *_) in enumerate(lessons[::HELD_OUT]):
         sequence = shift(hear(versions[number % VERSIONS], typical, ()), targets, typical)
         known = sequence.targets[:, :-HINTS] / output_scale()
         for rows, kept in ((rounded(sequence.inputs), predicted), (known, wanted)):
@@ -151,26 +175,48 @@ def main() -> None:
     print(f"{options.output.name}: {options.output.stat().st_size} bytes")
 
 
-def learn(lessons: list[Lesson], typical: Array, steps: int) -> ConvolutionalNetwork:
-    """Return a network that is trained with all lessons but those that measure its errors, without its hints."""
-    sequences = [
-        [shift(hear(levels, typical, (number, version)), targets, typical) for version, levels in enumerate(versions)]
-        for number, (targets, versions, _) in enumerate(lessons)
-        if number % HELD_OUT
-    ]
+def learn(lessons: list[Lesson], typical: Array, options: argparse.Namespace) -> ConvolutionalNetwork:
+    """Return a network that is trained with all lessons but those that measure its errors, without its hints.
+
+    A recording is drawn as often as it has pieces, so that who speaks longer is heard more.
+    """
+    sequences, pieces = [], []
+    for number, (targets, versions, _, measured) in enumerate(lessons):
+        if number % HELD_OUT:
+            pieces += [len(sequences)] * -(-len(targets) // PIECE_STEPS) * (options.measured if measured else 1)
+            heard = (hear(levels, typical, (number, version)) for version, levels in enumerate(versions))
+            sequences.append([shift(each, targets, typical) for each in heard])
     weights = np.tile([*(WEIGHTS_OF[name] for name in ARTICULATORS), *np.ones(len(VISEMES_15))], len(LAGS))
     weights = np.append(weights, np.full(HINTS, HINT_SHARE * weights.sum() / HINTS))
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        whole = sequences[number][int(rng.integers(len(sequences[number])))]
+        versions = sequences[pieces[number]]
+        whole = versions[int(rng.integers(len(versions)))]
         return cut(whole, int(rng.integers(max(len(whole.inputs) - PIECE_STEPS, 0) + 1)))
 
-    plan = TrainingPlan(steps, batch_size=16, rate=2e-3, dropout=0.15, seed=0)
+    plan = TrainingPlan(options.steps, batch_size=16, rate=options.rate, dropout=0.15, seed=0)
     network = SHAPE.initial(len(LAGS) * OUTPUTS + HINTS, 0)
-    network = fit_network(network, draw, len(sequences), weights, plan, report)
+    if options.start is not None:
+        network = take_weights(network, read_network(options.start))
+    network = fit_network(network, draw, len(pieces), weights, plan, report)
     return network.with_parameters(
         [*network.parameters[:-2], *(array[..., :-HINTS] / output_scale() for array in network.parameters[-2:])]
     )
+
+
+def read_network(path: Path) -> ConvolutionalNetwork:
+    """Return the network of a file that this script made."""
+    with np.load(path) as stored:
+        return SHAPE.from_arrays({name: stored[name] for name in SHAPE.specs}, len(LAGS) * OUTPUTS)
+
+
+def take_weights(network: ConvolutionalNetwork, known: ConvolutionalNetwork) -> ConvolutionalNetwork:
+    """Return a network with the weights of a known one, but its own for the hints."""
+    last = [
+        np.concatenate([array * output_scale(), own[..., -HINTS:]], axis=-1)
+        for array, own in zip(known.parameters[-2:], network.parameters[-2:], strict=True)
+    ]
+    return network.with_parameters([*known.parameters[:-2], *last])
 
 
 def learn_general(lessons: list[Lesson]) -> dict[str, NDArray[np.float16]]:
@@ -185,7 +231,7 @@ def learn_general(lessons: list[Lesson]) -> dict[str, NDArray[np.float16]]:
             )
             for encoding in (*[targets[:, OUTPUTS:]] * len(encodings or "1"), *encodings)
         ]
-        for targets, _, encodings in lessons
+        for targets, _, encodings, _ in lessons
     ]
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
@@ -226,7 +272,7 @@ def output_scale() -> Array:
 def measure_bands(lessons: list[Lesson]) -> Array:
     """Return the mean of every band in speech, relative to the level [shape=(40,)]."""
     rows = (
-        np.concatenate([versions[0] for _, versions, _ in lessons]).astype(np.float32).reshape(-1, SPECTRUM_BANDS + 1)
+        np.concatenate([versions[0] for _, versions, *_ in lessons]).astype(np.float32).reshape(-1, SPECTRUM_BANDS + 1)
     )
     mean: Array = rows[rows[:, -1] > -SPEECH_RANGE, :-1].mean(axis=0)
     return mean
@@ -265,20 +311,34 @@ def cut(whole: TrainingSequence, start: int) -> TrainingSequence:
 def prepare(options: argparse.Namespace) -> Iterator[Lesson]:
     """Yield the lessons of all recordings."""
     corpus = Corpus.open(options.corpus)
-    folders = [sorted(folder.rglob("*")) for folder in options.voices]
-    sounds = [read_audio(path) for folder in folders for path in folder if path.suffix in SOUNDS]
-    jobs: list[tuple[Audio, Track | None, str | None]] = []
-    for name in corpus.names(options.split)[::2]:
+    jobs: list[Job] = [job for folder in options.voices for job in read_voices(folder)]
+    babble = [audio for audio, *_ in jobs[:BABBLE]]
+    for name in corpus.names(options.split):
         utterance = corpus.utterance(name)
         jobs.append((utterance.audio, utterance.track, " ".join(utterance.words or ())))
-    spoken = [audio for audio in sounds if audio.duration_s > MIN_S]
-    spoken = [Audio(audio.samples[: int(LONGEST_S * audio.rate_hz)], audio.rate_hz) for audio in spoken]
-    jobs += [(audio, None, None) for audio in (*spoken, *synthesise(options.text, options.minutes))]
+    jobs += synthesise(options.text, options.minutes)
     with ProcessPoolExecutor(options.workers) as pool:
-        yield from pool.map(partial(teach, babble=sounds[:BABBLE]), jobs, range(len(jobs)), chunksize=8)
+        lesson = partial(teach, babble=babble, encoded=options.general is not None)
+        yield from pool.map(lesson, jobs, range(len(jobs)), chunksize=8)
 
 
-def teach(job: tuple[Audio, Track | None, str | None], number: int, babble: list[Audio]) -> Lesson:
+def read_voices(folder: Path) -> Iterator[Job]:
+    """Yield the recordings of a folder without the silence around them, with the words of a ``.txt`` beside them.
+
+    Longer ones are cut into pieces, without words.
+    """
+    for path in sorted(folder.rglob("*")):
+        if path.suffix not in SOUNDS or (audio := read_audio(path)).duration_s < MIN_S:
+            continue
+        rate_hz, spoken, text = audio.rate_hz, np.flatnonzero(mark_spoken(audio)), path.with_suffix(".txt")
+        margin, longest = int(MARGIN_S * rate_hz), int(LONGEST_S * rate_hz)
+        samples = audio.samples[max(spoken[0] - margin, 0) : spoken[-1] + margin]
+        words = text.read_text("utf-8") if text.exists() and len(samples) <= longest else None
+        for start in range(0, len(samples) - int(MIN_S * rate_hz), longest):
+            yield Audio(samples[start : start + longest], rate_hz), None, words
+
+
+def teach(job: Job, number: int, babble: list[Audio], *, encoded: bool) -> Lesson:
     """Return the lesson of a recording: of its measured motion, where there is a track, else of what ``animate`` makes.
 
     job : the recording, its track, its words
@@ -291,10 +351,11 @@ def teach(job: tuple[Audio, Track | None, str | None], number: int, babble: list
         measured, _ = resample_track(tracked, len(motion.values))
         values = measured.values - measured.values.mean(axis=0) + motion.values.mean(axis=0)  # the pose is not heard
         motion = replace(measured, values=values)
-    return make_lesson(model, audio, motion, result.units, babble, number)
+    lesson = make_lesson(model, audio, motion, result.units, babble, number, encoded=encoded)
+    return lesson._replace(measured=tracked is not None)
 
 
-def synthesise(folder: Path, minutes: float) -> Iterator[Audio]:
+def synthesise(folder: Path, minutes: float) -> Iterator[Job]:
     """Yield sentences of pages, spoken by one voice after the other."""
     words = " ".join(path.read_text("utf-8") for path in sorted(folder.rglob("*.md")))
     sentences = list(re.findall(r"[A-Z][a-z]+ [a-z ,']{30,110}[a-z]\.", words.replace("\n", " ")))
@@ -308,14 +369,21 @@ def synthesise(folder: Path, minutes: float) -> Iterator[Audio]:
             subprocess.run(command, check=True, capture_output=True)
             audio = read_audio(file)
             spoken_s += audio.duration_s
-            yield audio
+            yield audio, None, sentences[place]
             if spoken_s > 60 * minutes:
                 return
     raise SystemExit(f"{folder}: {len(sentences)} sentences are {spoken_s / 60:.1f} minutes, required {minutes:g}")
 
 
 def make_lesson(
-    model: Model, audio: Audio, motion: Motion, units: Timeline[Unit], babble: list[Audio], seed: int
+    model: Model,
+    audio: Audio,
+    motion: Motion,
+    units: Timeline[Unit],
+    babble: list[Audio],
+    seed: int,
+    *,
+    encoded: bool,
 ) -> Lesson:
     """Return the targets of a recording, silence after it, and what is heard in several versions."""
     silence = np.zeros(int(SILENCE_S * audio.rate_hz), np.float32)
@@ -333,7 +401,7 @@ def make_lesson(
         heard = longer
         if number >= VERSIONS // 2:
             heard, _ = apply_condition(longer, babble, rng)
-            encodings.append(encode(heard, steps))
+            encodings += [encode(heard, steps)] if encoded else []
         warp = float(np.exp(rng.uniform(-LARGEST_WARP, LARGEST_WARP))) if number else 1.0
         gain = np.float32(10 ** (rng.uniform(*GAIN_DB) / 20))
         samples = np.pad(heard.samples * gain, (0, WINDOW))
@@ -341,7 +409,7 @@ def make_lesson(
             : steps * STEP_FRAMES
         ]
         versions.append(rows.reshape(steps, -1).astype(np.float16))
-    return Lesson(targets, versions, encodings)
+    return Lesson(targets, versions, encodings, measured=False)
 
 
 def encode(audio: Audio, steps: int) -> Array:

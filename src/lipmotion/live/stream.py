@@ -42,7 +42,7 @@ from lipmotion.units.lexicon import Lexicon
 
 Array = NDArray[np.float64]
 LONGEST_LOOK_AHEAD_MS = 640.0
-SPOKEN, SILENT = 0.8, 0.9
+SPOKEN, SILENT = 0.8, 0.82
 """Probability of silence under which the mouth speaks, and from which on it goes to rest."""
 AHEAD_STEPS = 8
 """Lips part before they are heard: as far as so many steps are known, 160 ms, it rests only if all are silent."""
