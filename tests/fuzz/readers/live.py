@@ -6,9 +6,11 @@ import json
 import math
 import socket
 import tempfile
+from collections.abc import Generator
 from contextlib import ExitStack, suppress
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
@@ -111,14 +113,15 @@ class _Studio:
     def __init__(self, replies: Any) -> None:
         self._replies, self._asked, self._connections = replies, list[dict[str, Any]](), 0
 
-    async def __aenter__(self) -> "_Studio":
+    def __await__(self) -> Generator[None, None, "_Studio"]:
         self._connections += 1
         if self._connections > 1:
             raise asyncio.CancelledError
         return self
+        yield
 
-    async def __aexit__(self, *_: object) -> None:
-        pass
+    async def close(self) -> None:
+        self.transport = SimpleNamespace(abort=self._asked.clear)
 
     async def send(self, text: str) -> None:
         self._asked.append(json.loads(text))
