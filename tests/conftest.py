@@ -33,7 +33,6 @@ from testing.toy_face import toy_face
 
 if sys.platform == "linux":  # arrays of a megabyte go back to the system when they are freed: a worker runs 2,000 tests
     ctypes.CDLL(None).mallopt(-3, 1 << 20)  # M_MMAP_THRESHOLD
-    ctypes.CDLL(None).mallopt(-8, 1)  # M_ARENA_MAX: threads share what is free
 SENTENCES = 12
 MAX_HEARD = 40
 """Sounds whose posteriors are kept: those of the toy, and some before."""

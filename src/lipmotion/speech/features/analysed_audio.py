@@ -120,10 +120,10 @@ class AnalysedAudio(Audio):
             if not passages:
                 from lipmotion.speech.sound.acoustic_conditions import remove_hum
 
-                samples = remove_hum(samples)
-                energy = log_energy(samples)
-                tones = find_tones(samples, energy)
-                passages = [] if tones else find_passages(energy)
+                if (clean := remove_hum(samples)) is not samples:
+                    samples, energy = clean, log_energy(clean)
+                    tones = find_tones(samples, energy)
+                    passages = [] if tones else find_passages(energy)
             cuts = _find_silences(passages, samples)
             if tones:
                 waiting.append((start, samples.copy()))
