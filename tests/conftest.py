@@ -7,11 +7,14 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import ctypes
+import gc
 import signal
 import sys
+import time
 import wave
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, suppress
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -22,11 +25,14 @@ import pytest
 from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
-from lipmotion import Corpus, Model, save_model, train
+from lipmotion import Corpus, Model, load_model, save_model, train
 from lipmotion.engines import engine_named
+from lipmotion.errors import ExportError
 from lipmotion.measures import curves
 from lipmotion.motion import posterior_network
+from lipmotion.speech.features import encoding
 from lipmotion.speech.recognition.network.posteriors import Hama
+from lipmotion.storage.locks import lock_folder
 from lipmotion_faces.filmed.face import FilmedFace, save_face  # also where no entry point is installed
 from testing.toy import SMALL, ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
@@ -78,6 +84,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             own = getattr(test, "_hypothesis_internal_use_settings", None)
             if own is not None and own.max_examples < settings().max_examples:
                 test._hypothesis_internal_use_settings = settings(own, max_examples=MORE_SENTENCES * own.max_examples)
+
+
+def pytest_collection_finish() -> None:
+    """Five thousand tests live until the end: what lasts is looked through for garbage once, not at each collection."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -144,20 +156,25 @@ def released(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def heard_once() -> Iterator[None]:
-    """The phone network hears the same toy sentences in a hundred trainings: what it said is known by the sound."""
-    said: dict[bytes, NDArray[np.float32]] = {}
-    hear = Hama.log_posteriors
+    """The networks hear the same toy sentences in a hundred trainings: what they said is known by the sound."""
 
-    def log_posteriors(self: Hama, samples: NDArray[np.float32]) -> NDArray[np.float32]:
-        sound = sha256(samples.tobytes()).digest()
-        if sound not in said:
-            said[sound] = hear(self, samples)
-            if len(said) > MAX_HEARD:
-                del said[next(iter(said))]
-        return said[sound].copy()
+    def remember(hear: Callable[[Any, Any], NDArray[np.float32]]) -> Callable[[Any, Any], NDArray[np.float32]]:
+        said: dict[bytes, NDArray[np.float32]] = {}
+
+        def answer(one: Any, other: Any) -> NDArray[np.float32]:
+            sound = one if isinstance(one, np.ndarray) else other
+            key = sha256(sound.tobytes()).digest()
+            if key not in said:
+                said[key] = hear(one, other)
+                if len(said) > MAX_HEARD:
+                    del said[next(iter(said))]
+            return said[key].copy()
+
+        return answer
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Hama, "log_posteriors", log_posteriors)
+        patched.setattr(Hama, "log_posteriors", remember(Hama.log_posteriors))
+        patched.setattr(encoding, "encode_window", remember(encoding.encode_window))
         yield
 
 
@@ -183,42 +200,36 @@ def quickly(corpus: Corpus, engine: str = "trajectory", visual: str = "geometry"
         return train(corpus, recogniser=SMALL, engine=engine_named(engine, options), visual=visual)[0]
 
 
-@pytest.fixture(scope="session")
-def toy_model(toy_corpus: Corpus) -> Model:
-    return quickly(toy_corpus, articulation=False)
+def made_once(name: str, engine: str = "trajectory", visual: str = "geometry", **options: Any) -> Any:
+    """Return fixtures: the file of a model that one worker trains for all, and the model in it."""
 
-
-@pytest.fixture(scope="session")
-def coupled_model(toy_corpus: Corpus) -> Model:
-    return quickly(toy_corpus, "coupled", chains="sVis 2vis", mixtures=2, articulation=False)
-
-
-@pytest.fixture(scope="session")
-def joint_model(toy_corpus: Corpus) -> Model:
-    return quickly(toy_corpus, "joint")
-
-
-@pytest.fixture(scope="session")
-def pictured_model(toy_corpus: Corpus) -> Model:
-    """A model of lip distances and eigenlips."""
-    return quickly(toy_corpus, visual="both")
-
-
-def as_file(name: str, suffix: str, save: Callable[[Any, Path], object]) -> Any:
-    """Return a fixture: what another one has, as it is saved."""
-
-    def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-        path = tmp_path_factory.mktemp(name) / f"toy{suffix}"
-        save(request.getfixturevalue(name), path)
+    def file(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Path:
+        folder = tmp_path_factory.getbasetemp()
+        folder = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / name
+        path = folder / "toy.lipmotion"
+        with ExitStack() as held:
+            while not path.exists():
+                with suppress(ExportError):  # another worker makes it
+                    held.enter_context(lock_folder(folder))
+                    break
+                time.sleep(0.1)
+            if not path.exists():
+                save_model(quickly(toy_corpus, engine, visual, **options), path)
         return path
 
-    return pytest.fixture(scope="session", name=f"{name}_file")(file)
+    def content(request: pytest.FixtureRequest) -> Model:
+        return load_model(request.getfixturevalue(f"{name}_file"))
+
+    fixture = partial(pytest.fixture, scope="session")
+    return fixture(name=f"{name}_file")(file), fixture(name=name)(content)
 
 
-toy_model_file = as_file("toy_model", ".lipmotion", save_model)
-coupled_model_file = as_file("coupled_model", ".lipmotion", save_model)
-pictured_model_file = as_file("pictured_model", ".lipmotion", save_model)
-filmed_face_file = as_file("filmed_face", ".face", save_face)
+toy_model_file, toy_model = made_once("toy_model", articulation=False)
+coupled_model_file, coupled_model = made_once(
+    "coupled_model", "coupled", chains="sVis 2vis", mixtures=2, articulation=False
+)
+joint_model_file, joint_model = made_once("joint_model", "joint")
+pictured_model_file, pictured_model = made_once("pictured_model", visual="both")  # of lip distances and eigenlips
 
 
 @pytest.fixture(scope="session")
@@ -246,3 +257,10 @@ def recordings() -> Path:
 def filmed_face() -> FilmedFace:
     """The face of the drawn person, learned in two seconds; the toy model is of the same person."""
     return toy_face()
+
+
+@pytest.fixture(scope="session")
+def filmed_face_file(filmed_face: FilmedFace, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("filmed_face") / "toy.face"
+    save_face(filmed_face, path)
+    return path

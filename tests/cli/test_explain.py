@@ -42,6 +42,7 @@ WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SAID = "please speak and my lips will move five big blue boats float by"
 
 
+@pytest.mark.long
 def test_words_are_written_and_given_back(run, here):
     assert run("words", WELCOME, "-o", "said.txt", "said.json") == (0, ["said.txt", "said.json"], [])
     assert (here / "said.txt").read_text() == SAID + "\n"

@@ -42,6 +42,7 @@ def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
         assert (process.communicate()[0], process.returncode) == ("", 3)
 
 
+@pytest.mark.long
 def test_a_character_and_a_rig_get_their_own_curves(run: RunCommand, tmp_path: Path) -> None:
     """Lips that touch in the frames touch on a character of visemes."""
     spoken = {own: name.replace("viseme", "V") for own, name in VISEMES.items()}

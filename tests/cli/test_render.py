@@ -146,6 +146,7 @@ def test_a_picture_of_the_posteriors(run, coupled_model_file, toy_speech, here):
     assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.png", "b.json"]
 
 
+@pytest.mark.long
 def test_onto_another_person(run, here, toy_model_file, toy_speech, toy_corpus):
     given = ["animate", toy_speech, "--model", toy_model_file, "-o", "one.npz"]
     assert run(*given, "--onto", toy_corpus.path).code == 0
@@ -230,6 +231,7 @@ def test_a_mesh_without_blendshapes_is_bound_once(run, here, basics):
     assert done == (0, ["said.mp4"], [])
 
 
+@pytest.mark.long
 def test_a_character_speaks(run, glb, basics, here):
     done = run(*basics, "--character", glb, "-o", "said.mp4", "said.json", "said.glb", "--fps", "3")
     assert done == (0, ["said.mp4", "said.json", "said.glb"], [])

@@ -61,6 +61,7 @@ def test_speakers_are_chosen(run, toy_corpus, here):
     )
 
 
+@pytest.mark.long
 def test_what_is_given_wins_over_what_the_joint_engine_recognises(run, toy_corpus, toy_speech, here):
     own = ["--units", "eVis", "--set", "recognise_units=true", "--set", "mixtures=1"]
     assert run("train", toy_corpus.path, "-o", "m", "--engine", "joint", *own).code == 0
@@ -78,6 +79,7 @@ def test_what_is_given_wins_over_what_the_joint_engine_recognises(run, toy_corpu
     assert {span.label.unit for span in units[0] if not span.label.phone} >= {"bilabial", "low"}
 
 
+@pytest.mark.long
 def test_a_system_of_the_coupled_engine(run, toy_corpus, here):
     wanted = ["--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "acoustic_regression=no"]
     assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0

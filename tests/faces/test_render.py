@@ -94,6 +94,7 @@ def test_f_shows_teeth_where_closed_lips_show_none():
     assert brightest(drawn[5]) > brightest(drawn[15]) + 60
 
 
+@pytest.mark.long
 def test_teeth_that_are_hardly_seen_are_covered_but_not_grey() -> None:
     """Down the middle there are pixels of dark and of teeth, and hardly any between the two but in the lip's shadow."""
     size = 1200

@@ -45,6 +45,7 @@ def test_a_flood_that_was_found_once(name, flood, worker):
     _check(worker, name, FLOODS[name, flood]())
 
 
+@pytest.mark.long
 def test_all_that_was_found_is_of_a_reader():
     assert FOLDERS
     assert {folder.parent.name for folder in FOLDERS} <= READERS.keys()

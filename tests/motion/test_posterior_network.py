@@ -74,6 +74,7 @@ def likeness(network: PosteriorNetwork, spoken: Speech) -> tuple[float, float]:
     return tuple(float(np.corrcoef(made[:, each], wanted[:, each])[0, 1]) for each in range(2))  # type: ignore[return-value]
 
 
+@pytest.mark.long
 def test_motion_follows_the_posteriors_and_the_spectrum_only_of_a_known_voice(network: PosteriorNetwork) -> None:
     assert min(likeness(network, speech(99))) > 0.8
     unknown, unheard = speech(99, voice=0.0), speech(99, heard=False)

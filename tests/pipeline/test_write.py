@@ -246,6 +246,7 @@ def test_each_line_of_a_stem_has_the_motion_and_the_cues_of_the_line_alone(toy_m
     assert opening == pytest.approx(outside)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("offset_ms", [500.0, -250.0])
 def test_files_say_when_the_sound_begins(generation, offset_ms, toy_speech, tmp_path):
     delivery = Delivery(offset_ms=offset_ms)

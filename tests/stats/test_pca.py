@@ -49,10 +49,8 @@ def test_components_are_those_of_the_svd(count, dimensions, seed):
     assert pca.basis == pytest.approx(basis, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("count", "dimensions", "kind"),
-    [pytest.param(1600, 1550, np.float32, marks=pytest.mark.long), (1550, 1600, np.uint8)],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("count", "dimensions", "kind"), [(1600, 1550, np.float32), (1550, 1600, np.uint8)])
 def test_a_large_table_is_searched_for_its_first_components(count, dimensions, kind):
     values = spectrum(3, count, dimensions)
     assert min(values.shape) > module.EXACT_ROWS

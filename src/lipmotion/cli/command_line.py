@@ -92,8 +92,9 @@ def parse_words(words: Sequence[str], options: argparse.Namespace) -> argparse.N
 
     If the first word is no verb, the error names the verb that is meant, by other tools' words, too.
     """
-    program = parser()
-    verbs, verb = _verbs(program), next((word for word in words if not word.startswith("-")), None)
+    verb = next((word for word in words if not word.startswith("-")), None)
+    program = parser([name for name in VERBS.names if name == verb])
+    verbs = _verbs(program)
     if verb is not None and verb not in verbs:
         near = get_close_matches(verb, verbs, n=1)
         usual = "animate SPEECH -o OUT" if Path(verb).suffix else ""
@@ -110,8 +111,8 @@ def parse_words(words: Sequence[str], options: argparse.Namespace) -> argparse.N
     return options
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser with all verbs."""
+def parser(names: Sequence[str] = ()) -> argparse.ArgumentParser:
+    """Return the parser with the verbs that are named, or with all."""
     program = _Parser(
         prog="lipmotion",
         description="Speech in, lip motion out, with models trained from your own recordings.",
@@ -119,7 +120,7 @@ def parser() -> argparse.ArgumentParser:
     )
     program.add_argument("--version", action=Version, nargs=0, help="print the version")
     verbs = program.add_subparsers(title="verbs", dest="verb", required=True, metavar="VERB")
-    for name in VERBS.names:
+    for name in names or VERBS.names:
         VERBS.load(name)(verbs)
     return program
 

@@ -54,6 +54,7 @@ def contents(out: Path) -> dict[str, bytes]:
     return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
 
 
+@pytest.mark.long
 def test_the_outputs_are_those_of_animate(sounds, settings, tmp_path):
     (sounds / "broken.wav").write_text("no sound")
     events: list[Item] = []

@@ -161,6 +161,7 @@ def test_cuts_divide_and_the_person_is_followed(talk, tmp_path, scanned):
     assert scanned["followed"] == (3.0,)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("scanned")
 def test_lists_and_other_recordings_decide_the_splits(talk, talk_file, tmp_path):
     (talk.parent / "test.txt").write_text("talk\n")

@@ -194,6 +194,7 @@ def test_frames_without_a_face_are_left_out(toy_model, toy_corpus, known, tmp_pa
     assert figures["conditions"]["audio only"]["amse"] == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.long
 def test_closed_is_closed_by_the_training_list(toy_model, toy_corpus, figures):
     openings = [toy_corpus.utterance(name).track.motion["opening"] for name in toy_corpus.names("train")]
     expected = pytest.approx(0.1 * np.percentile(np.concatenate(openings), 95), rel=1e-5)

@@ -296,6 +296,7 @@ def test_edits_that_are_not_possible(session, sentence, message):
         session.generate(edited(sentence))
 
 
+@pytest.mark.long
 def test_single_pictures_are_those_of_the_video(session, request_):
     """Any frame, before and after an edit; what is not at that time is refused."""
     pictures = SessionPictures(session)

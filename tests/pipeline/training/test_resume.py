@@ -141,6 +141,7 @@ def test_stopped_in_two_processes(corpus, whole, work, tmp_path):
     assert content(train(corpus, recogniser=CONFIG, run=Run(work=work, workers=2))[0], tmp_path) == whole
 
 
+@pytest.mark.long
 def test_what_is_done_is_not_done_again(corpus, work):
     """What could not be used is reported again."""
     first, again = create_events(corpus, work), create_events(corpus, work)

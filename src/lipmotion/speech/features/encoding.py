@@ -117,8 +117,15 @@ def encode_window(log_mel: Array, encoder: Encoder) -> Array:
 
 def _gelu(x: Array) -> Array:
     """Return the Gaussian error linear unit of values (Hendrycks & Gimpel 2016, the form with tanh)."""
-    result: Array = 0.5 * x * (1 + np.tanh(np.float32(0.7978845608) * (x + np.float32(0.044715) * x * x * x)))
-    return result
+    inner: Array = np.float32(0.044715) * x  # in place: a third of the time of the network was that of new arrays
+    inner *= x
+    inner *= x
+    inner += x
+    inner *= np.float32(0.7978845608)
+    np.tanh(inner, out=inner)
+    inner += 1
+    inner *= 0.5 * x
+    return inner
 
 
 def _standardise(x: Array) -> Array:
