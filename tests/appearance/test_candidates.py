@@ -244,6 +244,7 @@ def test_a_change_is_worth_its_cost() -> None:
     assert find_best_sequence(costs, numbers, 2 * change).tolist() == [[0, 0, 0]]
 
 
+@pytest.mark.long
 def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:
     crops = {split: crops_of(toy_corpus, split) for split in ("train", "val")}
     space = fit_eigenlips(crops["train"][::4], 2)

@@ -119,6 +119,7 @@ def test_warnings_are_status_lines_too(run, basics):
     assert logging.getLogger().handlers == handlers
 
 
+@pytest.mark.long
 def test_sound_from_a_pipe_is_not_named(here, toy_speech, toy_model_file):
     """Its file is temporary, and gone when the cues are opened."""
     command = [*LIPMOTION, "cues", "-", "--model", toy_model_file, "-o", "a.json", "a.xml"]

@@ -104,6 +104,7 @@ def test_an_aid_to_lip_reading(run, basics, tracker, here, overlay):
         assert changed.mean() < 0.15
 
 
+@pytest.mark.long
 def test_speak(run, here, toy_model_file, filmed_face_file, monkeypatch):
     stand_in_voice.install(monkeypatch)
     done = run("speak", "mama", "--model", toy_model_file, "--face", filmed_face_file, "-o", "a.mp4")

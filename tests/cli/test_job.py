@@ -296,6 +296,7 @@ def test_places_that_cannot_be(run, takes, toy_model_file):
         assert not (takes.parent / "out").exists()
 
 
+@pytest.mark.long
 def test_a_character_of_several(run, takes, toy_model_file, here):
     write_glb(here / "head.glb", head())
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--character", "head.glb")
@@ -315,6 +316,7 @@ def test_standard_input_and_output(toy_model_file, toy_speech, here):
     assert json.loads((here / "a.json").read_text())["source"] == {}
 
 
+@pytest.mark.long
 def test_events_go_to_standard_error_beside_motion(run_outside, toy_model_file, toy_speech):
     done = run_outside("animate", toy_speech, "--model", toy_model_file, "-o", "-", "--machine-readable")
     assert [json.loads(line)["type"] for line in done.err][0 :: len(done.err) - 1] == ["start", "success"]

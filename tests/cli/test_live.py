@@ -30,6 +30,7 @@ def test_a_file_becomes_frames_on_the_command_line(run: RunCommand, tmp_path: Pa
     assert max(float(row["jawOpen"]) for row in rows) > 0.05
 
 
+@pytest.mark.long
 def test_raw_sound_comes_on_a_pipe(tmp_path: Path) -> None:
     (tmp_path / "a.raw").write_bytes((read_welcome().samples[:32_000] * 32767).astype("<i2").tobytes())
     command = [*LIPMOTION, "live", "-i", "-", "--to", tmp_path / "a.csv"]

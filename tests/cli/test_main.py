@@ -124,6 +124,7 @@ def test_a_reader_that_has_gone_is_no_error(arguments):
         assert process.wait() == 0
 
 
+@pytest.mark.long
 def test_a_terminal_that_does_not_know_the_letters(run_outside, toy_speech, toy_model_file, here):
     line = ("animate", toy_speech, "--model", toy_model_file, "-o", "ä.json", "--transcript", "see bimab papa mama")
     done = run_outside(*line, encoding="ascii")

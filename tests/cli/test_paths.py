@@ -101,6 +101,7 @@ def test_units_are_replaced_where_that_is_meant(run, here, toy_speech, toy_model
     assert (here / "u.json").read_bytes() != before
 
 
+@pytest.mark.long
 def test_a_model_is_adapted_in_its_place(run, here, toy_speech, toy_model_file):
     shutil.copy(toy_model_file, here / "m.lipmotion")
     assert run("adapt", toy_speech, "--model", "m.lipmotion", "-o", "m.lipmotion", "--force").code == 0

@@ -120,6 +120,7 @@ def test_a_rival_that_hangs_is_ended(adapters, toy_corpus):
     assert write_league(found, adapters.parent / "report")["best_rival"] is None
 
 
+@pytest.mark.long
 def test_what_cannot_be_compared(adapters, toy_corpus, tmp_path):
     with pytest.raises(InputError, match="extras/league"):
         read_rivals(tmp_path / "nowhere")

@@ -118,6 +118,7 @@ PLAIN = st.recursive(
 )
 
 
+@pytest.mark.long
 @given(document=st.dictionaries(st.text(max_size=4), PLAIN, max_size=5), indent=st.sampled_from([None, 1, "\t"]))
 def test_what_is_no_row_is_read_as_json_reads_it(document: dict[str, Any], indent: Any) -> None:
     text = json.dumps(document, indent=indent, ensure_ascii=False)

@@ -42,7 +42,10 @@ def values_of(frames: list[LiveFrame]) -> np.ndarray:
     return np.array([[frame.time_s, frame.known_s, *frame.motion, *frame.weights.values()] for frame in frames])
 
 
-@pytest.mark.parametrize(("rate_hz", "look_ahead_ms"), [(16_000, 160), (24_000, 0), (44_100, 320), (8_000, 80)])
+RATES = [pytest.param(*each, marks=pytest.mark.long) for each in ((16_000, 160), (24_000, 0), (8_000, 80))]
+
+
+@pytest.mark.parametrize(("rate_hz", "look_ahead_ms"), [(44_100, 320), *RATES])
 def test_pieces_do_not_matter(sound: np.ndarray, rate_hz: int, look_ahead_ms: float) -> None:
     positions = np.arange(0, len(sound) - 1, 16_000 / rate_hz)
     there = np.interp(positions, np.arange(len(sound)), sound).astype(np.float32)[: 3 * rate_hz]
@@ -257,6 +260,7 @@ def test_what_is_told_wrongly_is_refused_and_forgotten_at_an_interruption(sound:
     assert max(frame["viseme_PP"] for frame in frames) < 0.2
 
 
+@pytest.mark.long
 def test_eyes_and_head_move_by_themselves() -> None:
     silence = np.zeros(16_000 * 30, np.float32)
     frames = Stream(seed=3).push(silence)

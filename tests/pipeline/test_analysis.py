@@ -220,6 +220,7 @@ def test_files_that_cannot_be_written(found, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_speech_is_as_reliable_as_its_words(found):
     request, model = Request(WELCOME), load_model()
     understood = analyse_speech(model, request)

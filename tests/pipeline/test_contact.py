@@ -310,6 +310,7 @@ def test_what_is_held_or_locked_stays_on_all_faces(session: Session, spoken: Edi
         assert np.abs(after[name] - before[name])[LASTS].max() < 0.03, name
 
 
+@pytest.mark.long
 def test_a_hold_is_left_no_faster_than_lips_move(session: Session, spoken: Edits, character: Any):
     open_at = float(session.generate(spoken).motion["opening"].argmax()) / 100
     edits = spoken.then(f"pin opening 0.3 at {open_at}", f"hold from {open_at} to {open_at + 0.3}")

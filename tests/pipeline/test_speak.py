@@ -190,6 +190,7 @@ def test_phones_that_were_never_recorded_are_named(toy_corpus, selection_model, 
     assert "jh (" in caplog.text
 
 
+@pytest.mark.long
 def test_recordings_of_several_people_are_refused(toy_corpus, selection_model, tmp_path):
     utterances = map(toy_corpus.utterance, toy_corpus.names())
     two = corpus_of(tmp_path / "two", [replace(each, speaker="ab"[n % 2]) for n, each in enumerate(utterances)])

@@ -166,6 +166,7 @@ def test_a_long_word_is_not_repeated_in_full(caplog):
     assert len(record.getMessage()) < 300
 
 
+@pytest.mark.long
 def test_of_many_guesses_some_are_reported_one_by_one(caplog):
     warn_of_guesses([f"bimab{'ab' * i}" for i in range(MAX_WARNINGS + 7)], Lexicon())
     *each, last = [record.getMessage() for record in caplog.records]

@@ -132,6 +132,7 @@ def test_articulatory_channels_are_written_where_they_are_asked_for(result, toy_
     assert not more.variance[:, -1].any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("temporary", [False, True])
 def test_scenes_name_no_sound_that_will_be_gone(result, toy_speech, tmp_path, temporary):
     write(result, [tmp_path / "a.usda"], speech=toy_speech, temporary=temporary)

@@ -257,6 +257,7 @@ def test_noise_stands_in_the_gaps_of_a_noise_gate() -> None:
     assert drop.max() < 36
 
 
+@pytest.mark.long
 def test_hours_of_silence_are_searched_for_tones_block_by_block() -> None:
     samples = np.zeros(4 * 60 * 16_000, np.float32)
     energy = mfcc.log_energy(samples)

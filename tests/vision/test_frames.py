@@ -194,6 +194,7 @@ def test_pictures_larger_than_stated_are_not_decoded(tmp_path):
         assert len(video.damage) == 5
 
 
+@pytest.mark.long
 def test_more_pixels_than_a_cinema_shows(write_video):
     with pytest.raises(InputError, match="pictures of 4112 × 2304 pixels, required at most 9437184 in all; scale"):
         all_frames(write_video(ticks=[0], size=(4112, 2304)))

@@ -148,6 +148,7 @@ def test_in_silence_away_from_speech_the_mean_is_the_rest_pose():
     assert found.channels["opening"].value == pytest.approx(model.rest_pose[0])
 
 
+@pytest.mark.long
 def test_recordings_of_several_blocks_are_explained_as_one():
     border = generation.BLOCK_FRAMES
     engine, (model, _) = engines.engine_named("coupled", coupled_options("ph-vi-CHMM")), fitted("ph-vi-CHMM")

@@ -180,6 +180,7 @@ def test_a_recogniser_is_deserialised(recogniser):
             module.recogniser_from_arrays({key: array for key, array in arrays.items() if key != name})
 
 
+@pytest.mark.long
 def test_a_trained_recogniser_is_kept_in_the_checkpoint(corpus, recogniser, tmp_path):
     checkpoint = Checkpoint(tmp_path, "one")
     first = module.recogniser_to_arrays(fitted(corpus, checkpoint, min_minutes=0.1))

@@ -146,6 +146,7 @@ def test_words_come_from_the_lines_in_time(talk, tmp_path):
     assert words == [("sentence", number) for number in ("zero", "one", "two", "three", "four")]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("scanned")
 def test_words_without_times_are_told_to_be_of_no_use(talk, tmp_path, caplog):
     talk.with_suffix(".txt").write_text("all that is said")
@@ -154,6 +155,7 @@ def test_words_without_times_are_told_to_be_of_no_use(talk, tmp_path, caplog):
     assert "its transcript has no times" in caplog.text
 
 
+@pytest.mark.long
 def test_cuts_divide_and_the_person_is_followed(talk, tmp_path, scanned):
     scanned |= {"cuts_s": (2.4,), "person": (3.0,)}
     report = prepare(talk, tmp_path / "corpus", workers=1)

@@ -131,6 +131,7 @@ def test_sound_and_pictures_are_as_long(filmed_face, motion, toy_sentence, tmp_p
     assert {event.steps for event in events} == {film.count} == {len(frames)}
 
 
+@pytest.mark.long
 def test_the_mark(filmed_face, brief, tmp_path):
     path, sound = tmp_path / "a.mp4", Audio(np.zeros(16_000 * 8 // 10, np.float32), 16_000)
     plain = np.stack(list(make_film(filmed_face, brief).frames))[::10].astype("i4")
@@ -253,6 +254,7 @@ def _spoiled(data: np.ndarray) -> np.ndarray:
     return changed
 
 
+@pytest.mark.long
 def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(filmed_face, brief, video, monkeypatch):
     install(monkeypatch, {video.path: video}, {})
     film = make_film(filmed_face, brief, speech=video.path, fps=50.0, options=Outputs(overlay="mouth"))

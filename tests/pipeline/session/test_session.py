@@ -312,6 +312,7 @@ def test_single_pictures_are_those_of_the_video(session, request_):
         pictures.draw(9)
 
 
+@pytest.mark.long
 def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model, toy_sentence):
     """Each alone and both at once give the same bits; the matrix products of one do not change those of the other."""
     requests = [Request(toy_sentence.audio, " ".join(toy_sentence.words)), Request(toy_sentence.audio)]

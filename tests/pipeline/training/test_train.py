@@ -173,6 +173,7 @@ def test_other_engines_have_no_use_for_voices(toy_corpus):
         train(toy_corpus, engine=engine_named("joint", {}), voices=others())
 
 
+@pytest.mark.long
 def test_the_training_list_is_used_and_gives_the_same_model(toy_corpus, joint_model, tmp_path):
     model, report = train(toy_corpus, recogniser=SMALL, engine=JOINT)
     for name, each in (("first", joint_model), ("again", model)):
@@ -401,6 +402,7 @@ def test_figures_of_both(models, toy_model, toy_corpus):
     assert "AMSE of the eigenlips" in format_figures(figures)
 
 
+@pytest.mark.long
 def test_originals_are_the_projected_pictures(models, toy_corpus):
     model = load_model(models["both"])
     found = load_held_out(toy_corpus, recogniser_of(model), visual=model.visual, eigenlips=model.eigenlips)
