@@ -77,10 +77,7 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
     for kind in RECOGNISER_KINDS:
         found: dict[str, list[float]] = {"audio only": [], "with transcript": []}
         for clip in clips:
-            for condition, words in (
-                ("audio only", None),
-                ("with transcript", " ".join(spell_name(clip.stem) or ())),
-            ):
+            for condition, words in (("audio only", None), ("with transcript", " ".join(spell_name(clip.stem) or ()))):
                 motion = animate(Request(clip, transcript=words, recogniser=kind), model=model).motion
                 seen, recorded = tracks[clip].seen, tracks[clip].motion
                 generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])

@@ -156,9 +156,7 @@ def compare_engines(
 
 
 def _make_rows(
-    recordings: HeldOutRecordings,
-    made: Mapping[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]],
-    seed: int,
+    recordings: HeldOutRecordings, made: Mapping[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]], seed: int
 ) -> dict[str, dict[str, Any]]:
     """Return the figures of systems, with ACC gains over each system; ``unpinned``: without forced closures."""
     acc = {name: sum_correlations(*pair_curves(recordings, clips)) for name, (clips, _) in made.items()}

@@ -432,11 +432,7 @@ class Standing:
 
 
 def play(
-    rival: Rival,
-    tried: Sequence[Sequence[RivalAnswer]],
-    recordings: Sequence[Recording],
-    reported: int,
-    sync_s: float,
+    rival: Rival, tried: Sequence[Sequence[RivalAnswer]], recordings: Sequence[Recording], reported: int, sync_s: float
 ) -> Standing:
     """Return what a rival does on the first ``reported`` recordings, of its answers by settings and recording."""
     settings = rival.list_settings()
