@@ -33,7 +33,6 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion import animate, load_model
-from lipmotion.corpora.folder import spell_name
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import analysed
@@ -43,6 +42,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, split_words
 from lipmotion.units.phones import count_phone_edits
+from lipmotion_faces.corpus.folder import spell_name
 from lipmotion_faces.tracking.track import track
 
 RATE_HZ = 16_000

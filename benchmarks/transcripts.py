@@ -41,7 +41,6 @@ from numpy.typing import NDArray
 from robust import SPOKEN
 
 import lipmotion
-from lipmotion.corpora.folder import spell_name
 from lipmotion.errors import AlignmentError
 from lipmotion.formats.label_files import read_transcript
 from lipmotion.pipeline.analysis.speech_analysis import analyse_speech
@@ -64,6 +63,7 @@ from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import FRAME_RATE_HZ, Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import VISEME_OF, Lexicon, is_silent, split_words
 from lipmotion.units.phones import count_phone_edits
+from lipmotion_faces.corpus.folder import spell_name
 
 RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
 Row = tuple[str, float, float]

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from lipmotion.cli.terminal.progress import outcome
-from lipmotion.corpora.folder import READERS
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry, install_command
@@ -20,6 +19,7 @@ from lipmotion.formats import MotionFormat
 from lipmotion.formats.base import MOTION_FORMATS, check_motion
 from lipmotion.testing import example
 from lipmotion_faces import FACES, Face, make_face
+from lipmotion_faces.corpus.folder import READERS
 
 
 @pytest.fixture

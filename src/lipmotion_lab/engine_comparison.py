@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import limit_threads

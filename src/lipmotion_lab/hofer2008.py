@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import MOTION, SPEECH

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError, shorten
 from lipmotion.formats.sound import write_sound
 from lipmotion.measures import curves

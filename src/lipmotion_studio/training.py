@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora import Corpus, Selection
 from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.registry import DEFAULT
 from lipmotion.errors import InputError, LipMotionError

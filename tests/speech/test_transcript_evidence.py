@@ -6,7 +6,6 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion import load_model
-from lipmotion.corpora.folder import spell_name
 from lipmotion.speech.recognition import agreement, general
 from lipmotion.speech.recognition import transcript_evidence as module
 from lipmotion.speech.recognition.transcript_evidence import (
@@ -19,6 +18,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
 )
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
+from lipmotion_faces.corpus.folder import spell_name
 from pipeline.made import features_of, read_sound, recogniser_of
 from testing.toy import ToySentence, toy_sentences
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus, read_entry
+from lipmotion.corpora import Corpus, read_entry
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures.curves import Offset, find_offset, find_pooled_offset, shift_scores
 from lipmotion.motion.space import resample_to_model

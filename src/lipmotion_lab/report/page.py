@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from PIL.Image import Resampling
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.formats.web_page import Html, build_page, element, joined
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion.storage.json_text import as_json, from_json

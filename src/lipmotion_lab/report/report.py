@@ -11,8 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.source_recordings import SPLITS
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import SPLITS, Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
 from lipmotion.formats.web_page import GENERATOR

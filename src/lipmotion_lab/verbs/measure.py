@@ -49,7 +49,7 @@ def add_evaluate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 def run_evaluate(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
-    from lipmotion.corpora.store import Corpus, Selection
+    from lipmotion.corpora import Corpus, Selection
     from lipmotion.measures.evaluation_table import format_figures
     from lipmotion.pipeline.model import load_model
     from lipmotion.types import Monitor
@@ -94,7 +94,7 @@ def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 def run_league(options: argparse.Namespace) -> None:
     """Call ``run_rivals``, write its page, and print its table."""
     from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.storage.locks import lock_folder
     from lipmotion_lab.league import describe_league, run_rivals, write_league
 

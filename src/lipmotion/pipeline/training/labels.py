@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.extensions import find_version

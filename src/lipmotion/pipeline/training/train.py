@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.extensions import find_version
