@@ -18,10 +18,10 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.meshes.model.mesh import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
-from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces import base
+from lipmotion_faces.characters.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, fill, prepare_surface
 
 Array = NDArray[np.float64]

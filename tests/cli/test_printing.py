@@ -25,9 +25,9 @@ from lipmotion.cli import main
 from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
 from lipmotion.cli.terminal.progress import outcome, print_json, print_line, print_lines, report_progress
 from lipmotion.errors import InputError
-from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.pipeline.generate.explain import write_explanation
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
+from lipmotion_lab.evaluation.table import format_figures
 from robustness.case import changed_model
 
 EVIL = "q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
 from lipmotion.formats.steady_rate import choose_columns, exact_rate
-from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, find_bone_kind, find_head_angles
+from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, find_head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, find_spoken_name, to_arkit
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.delivery import MOODS
@@ -28,6 +28,7 @@ from lipmotion_faces.characters.gltf_document import (
     GltfArrays,
     GltfDocument,
     clean_name,
+    find_bone_kind,
     place_nodes,
     read_gltf_document,
 )

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.normals import sum_normals
 from lipmotion.meshes.model.mesh import Mesh
+from lipmotion_faces.kernels.normals import sum_normals
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
