@@ -89,9 +89,7 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
 
 
 def list_action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
-    """Return the action units that moods ask for, 0 to 1 [each shape=(N,)], at times (None: all frames); none if
-    neutral.
-    """
+    """Return the action units of moods, 0 to 1 [each shape=(N,)], at some times (None: all frames); none if neutral."""
     units: dict[int, Curve] = {}
     for name in motion.names:
         if is_mood(name) and motion[name].any():

@@ -336,9 +336,7 @@ def _create_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods)
 
 @compile_to_rounding
 def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
-    """Return the last columns of joint probabilities, moved one frame on along axis 0 by those of entering [shape=(U,
-    M)].
-    """
+    """Return joint probabilities, last columns, one frame on along axis 0 by those of entering [shape=(U, M)]."""
     last, into_last = before[:, before.shape[1] - count :], entering[:, before.shape[1] - count :]
     after = np.empty((len(before), count), before.dtype)
     for i in range(len(before)):
@@ -348,9 +346,7 @@ def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, co
 
 @compile_to_rounding
 def _move_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
-    """Return joint backward probabilities, moved a frame back along axis 1; ``left``: of leaving last states [shape=(N,
-    U)].
-    """
+    """Return joint backward probabilities a frame back along axis 1; ``left``: of leaving last states [(N, U)]."""
     before, units = np.empty_like(after), left.shape[1]
     inner = after.shape[1] - units
     for i in range(len(after)):

@@ -266,9 +266,7 @@ def _probabilities(log: Array) -> tuple[Array, float]:
 
 
 def _weigh(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
-    """Return the logarithm of the greatest probability of an arc, and the probabilities relative to that, in all forms
-    that the kernels take.
-    """
+    """Return the log of an arc's greatest probability, and all probabilities relative to it, in the kernels' forms."""
     relative, best = _probabilities(arc_log)
     weights = arrange_weights(layout, relative, 0.0)
     return best, weights, _transpose(layout, weights), Chunks.of(layout, weights)
@@ -476,9 +474,7 @@ def _emit(alpha: Array, emission: Array, t: int, scale: float, least: float) -> 
 
 @compile_to_rounding
 def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float, least: float) -> float:
-    """Replace the densities of a frame by its posteriors, and fill in backward probabilities times densities; return
-    the sum of the posteriors.
-    """
+    """Replace a frame's densities by posteriors, fill in backward probabilities times densities; return their sum."""
     total = 0.0
     for i in range(emission.shape[1]):
         back = np.float64(beta[i])

@@ -117,9 +117,7 @@ def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, i
 
 
 def separate_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
-    """Return how a mesh hangs together, its named lips apart even where they touch. Raises InputError: as
-    ``place_lips_by_points``.
-    """
+    """Return a mesh's surface, its named lips apart even where they touch. Raises as ``place_lips_by_points``."""
     _check_named(named, len(mesh.vertices))
     surface = build_surface(mesh)
     if surface.places[named[UPPER_MIDDLE]] != surface.places[named[LOWER_MIDDLE]]:

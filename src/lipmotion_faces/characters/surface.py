@@ -41,9 +41,7 @@ class MeshSurface:
     normals: NDArray[np.float64]
 
     def distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:
-        """Return distances along edges from sources to every vertex [shape=(len(sources), V)]; infinite beyond
-        ``limit``.
-        """
+        """Return distances along edges from N sources to every vertex [shape=(N, V)]; infinite beyond ``limit``."""
         return self.place_distances(sources, limit)[:, self.places]
 
     def place_distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:

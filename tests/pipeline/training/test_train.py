@@ -128,7 +128,7 @@ def test_guessed_words_are_reported(toy_corpus, tmp_path, caplog):
 def test_licence_and_attribution_go_with_the_model(toy_corpus):
     rights = [{"licence": "CC0"}, {"licence": "CC BY 4.0", "attribution": "Anna"}, {"attribution": "Anna"}, {}]
     given = [replace(u, source=source) for u, source in zip(some(toy_corpus, 4), rights, strict=True)]
-    about = describe_training(toy_corpus, given, "train", 4)
+    about = describe_training(toy_corpus, given, Selection("train"), 4)
     assert about["licence"] == ["CC BY 4.0", "CC0"]
     assert about["attribution"] == ["Anna"]
     assert about["corpus"] == ["toy"]

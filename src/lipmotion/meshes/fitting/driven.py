@@ -89,9 +89,7 @@ def _find_solved_name(shape: Blendshape, shapes: FaceShapes) -> str | None:
 
 
 class DrivenPose(NamedTuple):
-    """What moves a character in one frame: weights of its mouth's shapes, or displacements of points [shape=(52, 3)],
-    and of others.
-    """
+    """What moves a character in one frame: weights of its mouth's shapes, or places' shifts [shape=(52, 3)]; others."""
 
     mouth: Array
     others: Array
@@ -207,9 +205,7 @@ class DrivenCharacter:
         return known in others or (self.shapes is not None and known in self.shapes.known)
 
     def weigh_others(self, others: Mapping[str, Array], count: int) -> dict[str, Array]:
-        """Return the weights of the blendshapes of eyes and brows over ``count`` frames, by the mesh's names; missing
-        ones are 0.
-        """
+        """Return weights of eyes' and brows' blendshapes over ``count`` frames, by the mesh's names; missing: 0."""
         nothing = np.zeros(count)
         return {row.control: row.alone(others.get(row.source, nothing)) for row in self._other_rows}
 

@@ -70,9 +70,7 @@ class ControlBinding:
         return csr_array((self.weights.reshape(-1), self.controls.reshape(-1), starts), shape=shape)
 
     def moved(self, mesh: Mesh, displacements: Array) -> Array:
-        """Return the vertices [shape=(V, 3)] when control points are displaced, in eye distances, head frame [shape=(C,
-        3)].
-        """
+        """Return the vertices [shape=(V, 3)] under displacements of control points, eye distances [shape=(C, 3)]."""
         matrices = np.tile(np.eye(3, 4), (len(displacements), 1, 1))
         matrices[:, :, 3] = self.placement.to_mesh(displacements)
         return self.transformed(mesh, matrices)

@@ -104,9 +104,7 @@ def measure_lip_parting(mesh: Mesh, placement: LipPlacement) -> Array:
 
 
 def group_by_name(mesh: Mesh, named: Callable[[str], str | None]) -> dict[str, list[int]]:
-    """Return the numbers of blendshapes by the names they are understood as: a table's, or the first that moves
-    something.
-    """
+    """Return blendshapes' numbers by the names they are understood as: a table's, or the first that moves something."""
     numbers: dict[str, list[int]] = {}
     for number, shape in enumerate(mesh.shapes):
         known = named(shape.called)

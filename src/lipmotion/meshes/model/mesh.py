@@ -37,9 +37,7 @@ ORDER = "YXZ"
 
 
 def turn_head(angles: Array) -> Array:
-    """Return rotations of a head as quaternions x, y, z, w [shape=(T, 4)], near their neighbours, from ``ANGLES``
-    [shape=(T, 3)].
-    """
+    """Return a head's quaternions x, y, z, w [shape=(T, 4)], near their neighbours, from ``ANGLES`` [shape=(T, 3)]."""
     from scipy.spatial.transform import Rotation
 
     turned = Rotation.from_euler(ORDER, angles * SIGNS).as_quat()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -429,9 +429,29 @@ def _follow_units(
     Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
     else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
     """
-    from lipmotion.pipeline.analysis.transcribe import compute_phone_posteriors, format_places, warn_of_label_misfit
+    from lipmotion.pipeline.analysis.transcribe import compute_phone_posteriors, warn_of_label_misfit
     from lipmotion.speech.recognition.agreement import label_fit
-    from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
+
+    spans, guessed = _complete_units(model, request, audio, recognised)
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
+    if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
+        return units, None
+    name = find_network(kind) if request.language == ENGLISH else None
+    posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
+    is_sure = sure >= WORD_POSTERIORS[0]
+    fit = label_fit(audio, units, posteriors if is_sure else None)
+    filling = _fill_open(spans, fit.missing if is_sure else (), audio.duration_s, recognised)
+    warn_of_label_misfit(fit, filled=bool(filling))
+    spans = sorted([*spans, *filling], key=lambda span: span.start_s)
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
+    return units, replace(fit, missing=(*fit.missing, *guessed))
+
+
+def _complete_units(
+    model: Model, request: Request, audio: AnalysedAudio, recognised: Callable[[], Timeline[Unit]]
+) -> tuple[list[Span[Unit]], list[tuple[float, float]]]:
+    """Return the given phones, unknown ones aligned with their word or recognised, and where they are recognised."""
+    from lipmotion.pipeline.analysis.transcribe import format_places
 
     given = cast("Timeline[Unit]", request.units)  # of ``read_request``
     _check_units(given, audio.duration_s)
@@ -455,25 +475,26 @@ def _follow_units(
         LOG.warning("the units do not say the phones of %s: they are those of the dictionary", ", ".join(aligned))
     if guessed:
         LOG.warning("the units do not say which phones are said at %s: they are recognised", format_places(guessed))
-    units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
-    if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
-        return units, None
-    name = find_network(kind) if request.language == ENGLISH else None
-    posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
-    is_sure = sure >= WORD_POSTERIORS[0]
-    fit = label_fit(audio, units, posteriors if is_sure else None)
-    edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), audio.duration_s]
-    filling = [
+    return spans, guessed
+
+
+def _fill_open(
+    spans: list[Span[Unit]],
+    missing: Sequence[tuple[float, float]],
+    duration_s: float,
+    recognised: Callable[[], Timeline[Unit]],
+) -> list[Span[Unit]]:
+    """Return the recognised phones of stretches that the spans leave open and in which speech was heard."""
+    from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
+
+    edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), duration_s]
+    return [
         phone
         for open_s, close_s in zip(edges_s[::2], edges_s[1::2], strict=True)
-        for start_s, end_s in (fit.missing if is_sure else ())
+        for start_s, end_s in missing
         if min(close_s, end_s) - max(open_s, start_s) >= LEAST_GAP_S
         for phone in _cut_phones(recognised(), max(open_s, start_s - REACH_S), min(close_s, end_s + REACH_S))
     ]
-    warn_of_label_misfit(fit, filled=bool(filling))
-    spans = sorted([*spans, *filling], key=lambda span: span.start_s)
-    units = close_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
-    return units, replace(fit, missing=(*fit.missing, *guessed))
 
 
 def _cut_phones(units: Timeline[Unit], start_s: float, end_s: float) -> list[Span[Unit]]:

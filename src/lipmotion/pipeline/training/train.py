@@ -198,33 +198,25 @@ def train(  # noqa: PLR0913
         monitor = sub_monitor(run.monitor, 0, 0.5)
         phones, examples, skipped = fit_phones(utterances, recogniser, lexicon, monitor, checkpoint)
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
-        people, speakers = [speaker_of[example.name] for example in examples], None
-        if len(set(filter(None, people))) > 1:
-            examples, speakers = map_to_mean_person(examples, people)
+        people = [speaker_of[example.name] for example in examples]
+        several = len(set(filter(None, people))) > 1
+        examples, speakers = map_to_mean_person(examples, people) if several else (examples, None)
         sound = {utterance.name: utterance.audio for utterance in utterances}
         examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), each)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
         learning = sub_monitor(run.monitor, 0.6, 1, "learning motion: ")
         fit = engine.fit([*examples, *speech_examples], learning, checkpoint)
-    if not fit.uses_prior:
-        prior = None
     used = tuple(example.name for example in examples)
-    about = describe_training(
-        corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
-    )
-    if selection.speakers and selection.names is None:
-        about["speakers"] = sorted(set(selection.speakers))
-    if speech_examples:
-        about["voices"] = sorted({example.name for example in speech_examples})
-    if eigenlips is not None:
-        about |= {"visual": visual, "eigenlips": eigenlips.summary}
+    about = describe_training(corpus, utterances, selection, len(used))
+    about |= {"voices": sorted({example.name for example in speech_examples})} if speech_examples else {}
+    about |= {"visual": visual, "eigenlips": eigenlips.summary} if eigenlips is not None else {}
     if speakers is not None:
         generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
         speakers = add_habits(speakers, examples, people, generated)
         about["speakers"] = list(speakers.names)
-    return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers), TrainReport(
-        used, skipped, fit.figures
-    )
+    prior = prior if fit.uses_prior else None
+    model = Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers)
+    return model, TrainReport(used, skipped, fit.figures)
 
 
 def fit_phones(
@@ -321,23 +313,26 @@ def _train_phone_models(
     return train_phone_models([*transcribed, *labelled], lexicon, config, monitor, checkpoint)
 
 
-def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
+def describe_training(
+    corpus: Corpus, utterances: Sequence[Utterance], selection: Selection, used: int
+) -> dict[str, Any]:
     """Return the part of the header of a model that is for users: corpus, licence, attribution, versions.
 
-    split      : name of their list, ``all``, or ``given names``
-    used       : how many of them could be used
+    used : how many of the selected utterances could be used
     """
+    speakers = sorted(set(selection.speakers)) if selection.speakers and selection.names is None else []
     sources = [utterance.source for utterance in utterances]
     minutes = sum(utterance.audio.duration_s for utterance in utterances) / 60
     return {
         "corpus": sorted({source["collection"] for source in sources if "collection" in source}) or [corpus.path.name],
-        "split": split,
+        "split": "given names" if selection.names is not None else selection.split or "all",
         "seed": "fixed: the same corpus gives the same model",
         "utterances": used,
         "minutes": round(minutes, 1),
         "licence": sorted({source["licence"] for source in sources if "licence" in source}),
         "attribution": sorted({source["attribution"] for source in sources if "attribution" in source}),
         "versions": {"lipmotion": find_version()} | {name: metadata.version(name) for name in ("numpy", "scipy")},
+        **({"speakers": speakers} if speakers else {}),
     }
 
 
