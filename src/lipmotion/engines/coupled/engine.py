@@ -93,7 +93,7 @@ def _regressions(model: CoupledModel) -> Iterator[str]:
 
 
 Array = NDArray[np.float64]
-MOST_STATES = 3
+MAX_STATES = 3
 """Greatest number of states of a chain that an explanation names."""
 REST = "rest"
 MIN_PROBABILITY = 0.005
@@ -188,7 +188,7 @@ def concatenated(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
 
 
 def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
-    best = np.argsort(-probability, kind="stable")[:MOST_STATES]
+    best = np.argsort(-probability, kind="stable")[:MAX_STATES]
     named = [NamedProbability(names[i], float(probability[i])) for i in best]
     return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
 

@@ -29,7 +29,7 @@ from lipmotion.units import SILENCE, is_silent
 
 SEGMENT_S = 0.1
 """Duration of the segments of speech whose phones cannot be relied on."""
-LEAST_RELIABILITY = 0.5
+MIN_RELIABILITY = 0.5
 """Mean reliability of the phones from which on they choose."""
 
 
@@ -46,7 +46,7 @@ def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
         return costs.target(costs.shown(list_windows([units])), None, None)
     motion, distortion = guide.predict(speech)
-    by_sound = bool(rate_phones(speech, distortion, frames).mean() < LEAST_RELIABILITY)
+    by_sound = bool(rate_phones(speech, distortion, frames).mean() < MIN_RELIABILITY)
     windows = list_windows([_segments(duration_s)]) if by_sound else costs.shown(list_windows([units]))
     predicted = interpolate_at(motion, windows.times_s)
     return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
@@ -64,7 +64,7 @@ LEFT_OUT_RECORDINGS = 24
 """Recordings that are generated without their own units, which come back as they were; spread evenly over all."""
 REST_AWAY_S = 0.3
 """The rest pose is that of silence further than this from speech,"""
-LEAST_REST_FRAMES = 20
+MIN_REST_FRAMES = 20
 """or, where there are fewer frames of it, that of the frames with the smallest openings."""
 KEPT_SILENCE_S = 0.5
 """Silence further than this from speech is not stored (§6: "to edit out this data but maintain synchronisation")."""
@@ -164,7 +164,7 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
             for example, x in zip(examples, values, strict=True)
         ]
     )
-    if len(poses) < LEAST_REST_FRAMES:
+    if len(poses) < MIN_REST_FRAMES:
         poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
         if OPENING in space.direct_names:
             opening = poses[:, space.direct_names.index(OPENING)]

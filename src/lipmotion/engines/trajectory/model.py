@@ -50,7 +50,7 @@ from lipmotion.units import UnitSet
 
 Array = NDArray[np.float64]
 
-MOST_CONTEXTS = 50_000
+MAX_CONTEXTS = 50_000
 """Contexts whose leaves are kept, so that motion is generated again sooner."""
 
 
@@ -102,7 +102,7 @@ class Emission:
         """Return the leaf of a context in a tree; it is looked for once."""
         found = self._leaves.get((name, context))
         if found is None:
-            if len(self._leaves) > MOST_CONTEXTS:
+            if len(self._leaves) > MAX_CONTEXTS:
                 self._leaves.clear()
             found = self._leaves[name, context] = self.forest[name].path(context)[-1]
         return found

@@ -77,7 +77,7 @@ LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
 TIME_UNITS = {"milliseconds": 1e3, "samples": 16e3, "samples of 48 kHz": 48e3, "ticks of 100 ns": 1e7}
 """How many of them a second has: given times that end near so many times the recording are in this unit."""
-SHORTEST_PHONE_S, FEWEST_TIMED = 0.02, 5
+SHORTEST_PHONE_S, MIN_TIMED = 0.02, 5
 """Given phones, of which half are shorter, are faster than speech; so many are needed to tell."""
 REACH_S = 0.1
 """Phones are recognised so far around the first and the last one that is heard."""
@@ -485,14 +485,14 @@ def _fill_open(
     recognised: Callable[[], Timeline[Unit]],
 ) -> list[Span[Unit]]:
     """Return the recognised phones of stretches that the spans leave open and in which speech was heard."""
-    from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
+    from lipmotion.speech.recognition.transcript_evidence import MIN_GAP_S
 
     edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), duration_s]
     return [
         phone
         for open_s, close_s in zip(edges_s[::2], edges_s[1::2], strict=True)
         for start_s, end_s in missing
-        if min(close_s, end_s) - max(open_s, start_s) >= LEAST_GAP_S
+        if min(close_s, end_s) - max(open_s, start_s) >= MIN_GAP_S
         for phone in _cut_phones(recognised(), max(open_s, start_s - REACH_S), min(close_s, end_s + REACH_S))
     ]
 
@@ -526,7 +526,7 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
         LOG.warning(
             "the units go on to %.2f s, the recording ends at %.2f s: are %s?", units[-1].end_s, duration_s, guess
         )
-    elif len(spoken_s) >= FEWEST_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
+    elif len(spoken_s) >= MIN_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
         LOG.warning(
             "the units last %.1f ms each and end at %.2f s of %.2f s, faster than anybody speaks: are their times in "
             "seconds?",

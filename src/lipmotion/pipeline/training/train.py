@@ -68,7 +68,7 @@ from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 
 WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
 """Warps of the frequencies, of one recording after the other."""
-FEWEST_WARPED_RECORDINGS = 60
+MIN_WARPED_RECORDINGS = 60
 """Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
 
 
@@ -87,7 +87,7 @@ def train_phone_models(
     Raises CorpusError: no transcript fits into its recording.
     Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """
-    turns = WARP_CYCLE if len(spoken) >= FEWEST_WARPED_RECORDINGS else (1.0,)
+    turns = WARP_CYCLE if len(spoken) >= MIN_WARPED_RECORDINGS else (1.0,)
     utterances = [
         TranscribedUtterance(analysed(audio).mfcc(warp).values, tuple(lexicon.pronunciations(word) for word in words))
         for (audio, words), warp in zip(spoken, cycle(turns), strict=False)

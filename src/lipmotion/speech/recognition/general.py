@@ -38,7 +38,7 @@ BLOCK = 128
 """Frames computed at a time: the values of their 5,376 Gaussians fit into the cache."""
 THREADS = 2
 """Threads that compute blocks: NumPy lets them run at the same time."""
-LEAST_VARIANCE = 1e-4
+MIN_VARIANCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ def load_general() -> GeneralModel:
         ) from error
     forms, constants = [], []
     for stream in STREAMS:
-        mean, precision = means[:, stream], 1 / np.maximum(variances[:, stream], LEAST_VARIANCE)
+        mean, precision = means[:, stream], 1 / np.maximum(variances[:, stream], MIN_VARIANCE)
         forms.append(np.concatenate([mean * precision, precision / -2], axis=1).transpose(1, 0, 2))
         size = stream.stop - stream.start
         log_norm = size * np.log(2 * np.pi) - np.log(precision).sum(axis=1) + (mean * mean * precision).sum(axis=1)

@@ -33,7 +33,7 @@ from lipmotion.units.ipa_phones import read_tokens
 POSTERIOR_STEP = 2
 """Frames of 10 ms from one row of posteriors to the next."""
 BLANK, WORD_BOUNDARY = "<blank>", "<wb>"
-LEAST_LOG_POSTERIOR = -16.0
+MIN_LOG_POSTERIOR = -16.0
 """The logarithm of what is taken to be impossible."""
 SHORT_FRAMES = 1500
 """So little sound is recognised in this process: to start another one would take as long."""
@@ -222,7 +222,7 @@ def read_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) ->
 
 def _join_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:
     tokens = phone_recogniser(name).tokens
-    silence = np.full(len(tokens), LEAST_LOG_POSTERIOR, np.float16)  # as stretches are computed
+    silence = np.full(len(tokens), MIN_LOG_POSTERIOR, np.float16)  # as stretches are computed
     silence[tokens.index(BLANK)] = 0
     rows, end, parts = -(-audio.frames // POSTERIOR_STEP), 0, list[NDArray[np.float16]]()
     for stretch, posteriors in find_stretches(name, audio, each):
@@ -273,7 +273,7 @@ def _sum_phones(tokens: tuple[str, ...]) -> NDArray[np.float32]:
 LIBRARIES = {("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "x86_64"), ("darwin", "arm64")}
 """Systems and processors that the package has a library for."""
 WEIGHTS = "asr_waveform.hama"
-LEAST_SAMPLES = 1600
+MIN_SAMPLES = 1600
 """Shorter sound is filled up with silence: the network has no row for it."""
 
 
@@ -295,7 +295,7 @@ class Hama(PhoneRecogniser):
 
     def log_posteriors(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return natural logarithms of the posteriors, as ``PhoneRecogniser.log_posteriors``."""
-        filled = np.pad(samples, (0, max(0, LEAST_SAMPLES - len(samples)))).astype(np.float32)
+        filled = np.pad(samples, (0, max(0, MIN_SAMPLES - len(samples)))).astype(np.float32)
         values, rows = _model().session.run(
             ["log_probs", "out_lengths"],
             {"waveform": filled[None], "waveform_lengths": np.array([len(filled)], np.int64)},
