@@ -52,8 +52,8 @@ from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, measure_fit
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     PhonePosteriors,
-    find_installed,
-    phone_recogniser,
+    find_installed_recogniser,
+    load_phone_recogniser,
 )
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import find_evidence
@@ -364,10 +364,10 @@ def _transcripts(recordings: Sequence[Said]) -> Iterator[tuple[str, NDArray[np.f
 
 def _network() -> Hearing | None:
     """Return what hears phones; None where no phone recogniser is installed."""
-    name = find_installed()
+    name = find_installed_recogniser()
     if name is None:
         return None
-    network, step = phone_recogniser(name), PIECE_S * RATE_HZ
+    network, step = load_phone_recogniser(name), PIECE_S * RATE_HZ
 
     def hear(samples: NDArray[np.float32]) -> NDArray[np.float64]:
         pieces = [network.log_posteriors(samples[at : at + step]) for at in range(0, len(samples), step)]

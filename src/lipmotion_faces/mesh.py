@@ -31,7 +31,7 @@ Turn = tuple[float, float, float]
 SHARE_BELOW_MOUTH = 0.55
 """The picture shows as much below the mouth as this share of what is above it, up to the top of the head."""
 KEPT_SHARE = 0.92
-"""The picture has this share of the height that follows from it: hair may leave it at the top."""
+"""The picture is cut to this share of that height: hair may leave it at the top."""
 DISTANCE = 2.8
 """The camera is this many heights of the picture away."""
 DRAWN_HEIGHTS = 1.7

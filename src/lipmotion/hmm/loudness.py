@@ -1,7 +1,7 @@
-"""Frames of a recording that are too loud for silence, or too quiet for speech; how long it is silent does not matter.
+"""Frames of a recording that are too loud for silence, or too quiet for speech.
 
-All levels are measured in sound: against the loudest quarter of a second, and the noise that stands beneath speech. So
-zeros, or another noise, before and after what is said change nothing.
+Levels are measured within the sound: against its loudest quarter of a second, and against the noise beneath speech. So
+silence, zeros or another noise before and after what is said change nothing.
 """
 
 from __future__ import annotations

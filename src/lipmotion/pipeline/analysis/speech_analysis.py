@@ -27,7 +27,7 @@ from lipmotion.speech.features.speaker_similarity import rate_knowledge
 from lipmotion.speech.features.voice_events import find_voice_events, silence_units
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.beam_search import load_english
-from lipmotion.speech.recognition.network.posteriors import infer_tokens
+from lipmotion.speech.recognition.network.posteriors import infer_posteriors
 from lipmotion.speech.recognition.recognised_speech import (
     WORD_POSTERIORS,
     Recognition,
@@ -311,7 +311,7 @@ def build_speech(
     spectrum = rows(lambda sound: sound.spectrum) if inputs.conditions else None
     encoding = rows(lambda sound: sound.encoding) if inputs.encoding else None
     network = find_network(kind) if inputs.posteriors else None
-    posteriors = infer_tokens(network, audio, each, dense=audio.is_passage) if network is not None else None
+    posteriors = infer_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
     parts = None
     if not audio.is_passage:
         parts = tuple(

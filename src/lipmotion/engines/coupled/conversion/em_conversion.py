@@ -68,7 +68,7 @@ def convert(
             lambda streams: chains.infer(_with_visual_streams(speech, streams), lattice),
             lambda _, inference: _update_streams(chains, inference, settings.update),
             settings.most_steps,
-            least_gain=CONVERGENCE_GAIN,
+            min_gain=CONVERGENCE_GAIN,
             maximise_converged=False,
         )
         streams, log_likelihoods = result.model, result.log_likelihoods

@@ -405,7 +405,7 @@ def train_to_convergence(
         lambda chains, statistics: m_step(chains, statistics, floors, streams=streams, transitions=not speech_only),
         most_steps,
         lambda _, chains, statistics: report(TrainingStep(count_components(chains), statistics.mean_log_likelihood)),
-        least_gain=CONVERGENCE_GAIN,
+        min_gain=CONVERGENCE_GAIN,
     )
 
 
