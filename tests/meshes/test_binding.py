@@ -9,8 +9,8 @@ from lipmotion import errors, types
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, build_mouth
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.meshes.fitting import blendshape_motion, shape_weights
+from lipmotion.meshes.fitting.driven import skin_vertices
 from lipmotion.meshes.fitting.shape_weights import OPPOSED, CurveCosts, cancel_opposed, fit_bounded_curves, round_lips
-from lipmotion.meshes.model.binding import skin_vertices
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion_faces.characters import binding as binding_files
 from lipmotion_faces.characters import character_files, lip_placement

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import InputError, ModelFormatError, shorten
-from lipmotion.meshes.model.binding import ControlBinding
+from lipmotion.meshes.fitting.driven import ControlBinding
 from lipmotion.meshes.model.face_shapes import LipPlacement
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_header_of, write_archive

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.config import TrajectoryConfig
 from lipmotion.engines.trajectory.model import (
     NETWORK_SHARE,
     AcousticRegression,
     Emission,
     Experts,
+    TrajectoryConfig,
     TrajectoryModel,
     add_acoustic_regression,
 )
