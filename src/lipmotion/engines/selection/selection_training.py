@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.concatenation import Chosen, concatenated, join_motion, to_pieces
+from lipmotion.engines.selection.concatenation import Chosen, concatenate_pieces, join_motion, to_pieces
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import Guide, SelectionModel, fit_guide, interpolate_at
-from lipmotion.engines.selection.windows import covering, list_windows
+from lipmotion.engines.selection.windows import cover_recording, list_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
@@ -42,7 +42,7 @@ def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     """
     frames = len(speech.features.values)
     duration_s = (frames - 1) / FRAME_RATE_HZ
-    units, guide = covering(speech.units, duration_s), model.guide
+    units, guide = cover_recording(speech.units, duration_s), model.guide
     if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
         return costs.target(costs.shown(list_windows([units])), None, None)
     motion, distortion = guide.predict(speech)
@@ -106,7 +106,7 @@ def fit_selection(
     errors = []
     for one in left_out:
         original, chosen = values[one.number], one.chosen
-        joined = concatenated(costs.inventory, chosen.target, chosen.pieces, len(original))
+        joined = concatenate_pieces(costs.inventory, chosen.target, chosen.pieces, len(original))
         errors.append(with_dynamics(original - joined)[one.frames])
     spread = with_dynamics(recorded).var(axis=0)
     variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
@@ -124,7 +124,7 @@ def fit_selection(
 
 def build_inventory(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
     """Return the inventory of some examples, from reduced motion. Raises CorpusError: no phone was measured whole."""
-    timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
+    timelines = [cover_recording(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
     windows = list_windows(timelines)
     first = np.concatenate([[0], np.cumsum([len(x) for x in values])]).astype(np.intp)
     known = np.concatenate([example.valid for example in examples])

@@ -60,14 +60,14 @@ class Bout(NamedTuple):
     probability: float
 
 
-def laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_]) -> Iterator[Bout]:
+def find_laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_]) -> Iterator[Bout]:
     """Yield the bouts of a recording at 16 kHz that are probably laughter, in order.
 
     level_db : smoothed level of every frame of 10 ms [shape=(T,)]
     voiced   : whether it is voiced [shape=(T,)]
     """
     for calls in find_calls(level_db):
-        figures = figures_of(samples, level_db, voiced, calls)
+        figures = measure_bout(samples, level_db, voiced, calls)
         if figures is None:
             continue
         probability = float(1 / (1 + np.exp(-np.dot(WEIGHTS, [*figures, 1.0]))))
@@ -114,7 +114,7 @@ def _find_fall(heights: Curve, lowest: Curve) -> Curve:
     return np.array(found)
 
 
-def figures_of(
+def measure_bout(
     samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_], calls: tuple[int, ...]
 ) -> tuple[float, ...] | None:
     """Return the figures of a run that ``WEIGHTS`` weigh; None: its voiced share is not that of laughter.
@@ -237,7 +237,7 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
     """Yield laughter where hardly any words are known or confirmed."""
     sure = (span for span in units if span.label.confidence is None or span.label.confidence >= WORD_CONFIDENCE)
     words = [span for span in sure if not is_silent(span.label.phone)]
-    for bout in laughter(audio.samples, level_db, voiced):
+    for bout in find_laughter(audio.samples, level_db, voiced):
         start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
         said_s = sum(_find_overlap((span.start_s, span.end_s), (start_s, end_s)) for span in words)
         if said_s <= MAX_WORD_SHARE * (end_s - start_s):

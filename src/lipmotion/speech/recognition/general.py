@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import StateTable, UnitHmm
 from lipmotion.hmm.network import DensitySelection, LogLikelihoods
-from lipmotion.speech.features.mfcc import FFT_SIZE, build_cosine, check_samples, log_mel, triangles
+from lipmotion.speech.features.mfcc import FFT_SIZE, build_cosine, check_samples, log_mel, make_triangles
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.mixture import Mixtures
@@ -192,7 +192,7 @@ def _filters() -> NDArray[np.float32]:
     mel = np.linspace(2595 * np.log10(1 + LOWEST_HZ / 700), 2595 * np.log10(1 + HIGHEST_HZ / 700), FILTERS + 2)
     edges = (np.round(700 * (10 ** (mel / 2595) - 1) / bin_hz) * bin_hz).astype(np.float64)
     hertz = np.arange(FFT_SIZE // 2 + 1) * bin_hz
-    return (triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])).astype(np.float32)
+    return (make_triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])).astype(np.float32)
 
 
 PROBABILITY_SHARE = {
