@@ -8,7 +8,7 @@ import pytest
 
 from engines.selection.drawn_units import costs_of, inventory, recorded, timeline
 from lipmotion import engines, types
-from lipmotion.engines.selection.concatenation import concatenate_pieces, to_pieces
+from lipmotion.engines.selection.concatenation import join_pieces, to_pieces
 from lipmotion.engines.selection.costs import select
 from lipmotion.engines.selection.inventory import RecordedUnits, find_substitutes, index_units
 from lipmotion.engines.selection.selection_training import build_target
@@ -152,7 +152,7 @@ def joined(units: RecordedUnits, text: str, config=PRINTED):
     costs = costs_of(units.without(config.suppressed_phones), config)
     target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
     pieces = to_pieces(costs, target, select(costs, target).units)
-    return target, concatenate_pieces(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
+    return target, join_pieces(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
 
 
 def with_spikes(units: RecordedUnits) -> RecordedUnits:

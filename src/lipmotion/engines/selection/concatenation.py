@@ -75,7 +75,7 @@ def to_pieces(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
     return pieces
 
 
-def concatenate_pieces(inventory: RecordedUnits, target: Target, pieces: list[Piece], frames: int) -> Array:
+def join_pieces(inventory: RecordedUnits, target: Target, pieces: list[Piece], frames: int) -> Array:
     """Return the motion of some pieces in the motion space, 100 frames a second [shape=(frames, Q)].
 
     Where pieces overlap, the weight of the next one rises from 0 to 1 along a raised cosine. Abutting pieces are bent
@@ -215,7 +215,7 @@ def join_motion(
 ) -> tuple[Motion, ReducedVariance]:
     """Return the motion of chosen units, lips closed if wanted, and its variance, as ``LearnedMotion.generate``."""
     frames = len(speech.features.values)
-    track = concatenate_pieces(costs.inventory, chosen.target, chosen.pieces, frames)
+    track = join_pieces(costs.inventory, chosen.target, chosen.pieces, frames)
     always = not is_silent(costs.stand_ins.get(SILENCE, SILENCE))
     resting = _resting(np.asarray(speech.features.values), speech.units, always=always)[:, None]
     means = with_dynamics(track + resting * (model.rest - track))

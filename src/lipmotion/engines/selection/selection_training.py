@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.concatenation import Chosen, concatenate_pieces, join_motion, to_pieces
+from lipmotion.engines.selection.concatenation import Chosen, join_motion, join_pieces, to_pieces
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import Guide, SelectionModel, fit_guide, interpolate_at
@@ -106,7 +106,7 @@ def fit_selection(
     errors = []
     for one in left_out:
         original, chosen = values[one.number], one.chosen
-        joined = concatenate_pieces(costs.inventory, chosen.target, chosen.pieces, len(original))
+        joined = join_pieces(costs.inventory, chosen.target, chosen.pieces, len(original))
         errors.append(with_dynamics(original - joined)[one.frames])
     spread = with_dynamics(recorded).var(axis=0)
     variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread

@@ -85,7 +85,7 @@ class Product:
         return self.structure.name(self.chain_states[:, state].tolist())
 
 
-def find_reachable_states(structure: Structure, grammar: Grammar) -> Product:
+def find_reachable(structure: Structure, grammar: Grammar) -> Product:
     """Return the product of chains: the joint states that can be reached from the beginning of an utterance.
 
     All chains go through corresponding units; those without a limit of asynchrony are not listed, but ``lattice``'s.

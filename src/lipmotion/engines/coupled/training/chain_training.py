@@ -20,7 +20,7 @@ from lipmotion.engines.coupled.chains.densities import (
 )
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions, Lattice
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Transitions, create_transitions, find_reachable_states
+from lipmotion.engines.coupled.chains.product import Transitions, create_transitions, find_reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
 from lipmotion.engines.coupled.training.alignment import (
     AlignedUtterance,
@@ -227,7 +227,7 @@ def create_chains(
         if structure.limit is None
         else structure
     )
-    transitions = create_transitions(find_reachable_states(limited, estimate_grammar(limited, data)))
+    transitions = create_transitions(find_reachable(limited, estimate_grammar(limited, data)))
     chains = _create_untrained_chains(streams, transitions, data, weights)
     utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
     paths = [split_evenly(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
