@@ -26,7 +26,6 @@ from scipy.signal import butter, fftconvolve, sosfilt
 from scipy.stats import spearmanr
 
 from lipmotion import Corpus, Stream, animate, load_model
-from lipmotion.corpora.folder import spell_name
 from lipmotion.live.network import STEP_S
 from lipmotion.motion.articulation import read_articulation_table
 from lipmotion.pipeline.model import Model
@@ -34,6 +33,7 @@ from lipmotion.pipeline.request import Request
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Track
+from lipmotion_faces.corpus.folder import spell_name
 from lipmotion_faces.tracking.track import track
 
 RATE_HZ = 16_000

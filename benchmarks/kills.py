@@ -71,7 +71,7 @@ class Job:
 
 def make_inputs(folder: Path, command: Sequence[str], names: Sequence[str]) -> Path:
     """Write what jobs of these names use: recordings, sounds with motion, corpora and a model; return the folder."""
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from testing.toy import toy_utterances, write_toy_recordings
 
     folder.mkdir()

@@ -33,7 +33,6 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion import animate, load_model
-from lipmotion.corpora.folder import spell_name
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import Request
 from lipmotion.speech.features.analysed_audio import analysed
@@ -43,6 +42,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, split_words
 from lipmotion.units.phones import count_phone_edits
+from lipmotion_faces.corpus.folder import spell_name
 from lipmotion_faces.tracking.track import track
 
 RATE_HZ = 16_000
@@ -77,10 +77,7 @@ def others(corpora: Path, model: Model, _: Path | None) -> None:
     for kind in RECOGNISER_KINDS:
         found: dict[str, list[float]] = {"audio only": [], "with transcript": []}
         for clip in clips:
-            for condition, words in (
-                ("audio only", None),
-                ("with transcript", " ".join(spell_name(clip.stem) or ())),
-            ):
+            for condition, words in (("audio only", None), ("with transcript", " ".join(spell_name(clip.stem) or ()))):
                 motion = animate(Request(clip, transcript=words, recogniser=kind), model=model).motion
                 seen, recorded = tracks[clip].seen, tracks[clip].motion
                 generated = np.interp(recorded.time_s, motion.time_s, motion["opening"])

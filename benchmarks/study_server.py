@@ -142,11 +142,7 @@ def page(folder: Path) -> dict[str, float]:
             frames = [noise.integers(0, 255, (36, 36, 3), np.uint8).repeat(16, 0).repeat(16, 1) for _ in range(75)]
             write_mp4(folder / source / f"s{n}.mp4", frames, fps=25, audio=sound)
     study = design_study(
-        folder / "page",
-        MOS,
-        [f"a={folder / 'a'}", f"b={folder / 'b'}"],
-        [folder / "a"],
-        StudySettings(anchors=0),
+        folder / "page", MOS, [f"a={folder / 'a'}", f"b={folder / 'b'}"], [folder / "a"], StudySettings(anchors=0)
     )
     size = sum(path.stat().st_size for path in (folder / "page" / "videos").iterdir())
     (folder / "home").mkdir()

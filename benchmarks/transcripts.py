@@ -41,7 +41,6 @@ from numpy.typing import NDArray
 from robust import SPOKEN
 
 import lipmotion
-from lipmotion.corpora.folder import spell_name
 from lipmotion.errors import AlignmentError
 from lipmotion.formats.label_files import read_transcript
 from lipmotion.pipeline.analysis.speech_analysis import analyse_speech
@@ -53,8 +52,8 @@ from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, measure_fit
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     PhonePosteriors,
-    find_installed,
-    phone_recogniser,
+    find_installed_recogniser,
+    load_phone_recogniser,
 )
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import find_evidence
@@ -64,6 +63,7 @@ from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import FRAME_RATE_HZ, Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import VISEME_OF, Lexicon, is_silent, split_words
 from lipmotion.units.phones import count_phone_edits
+from lipmotion_faces.corpus.folder import spell_name
 
 RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
 Row = tuple[str, float, float]
@@ -364,10 +364,10 @@ def _transcripts(recordings: Sequence[Said]) -> Iterator[tuple[str, NDArray[np.f
 
 def _network() -> Hearing | None:
     """Return what hears phones; None where no phone recogniser is installed."""
-    name = find_installed()
+    name = find_installed_recogniser()
     if name is None:
         return None
-    network, step = phone_recogniser(name), PIECE_S * RATE_HZ
+    network, step = load_phone_recogniser(name), PIECE_S * RATE_HZ
 
     def hear(samples: NDArray[np.float32]) -> NDArray[np.float64]:
         pieces = [network.log_posteriors(samples[at : at + step]) for at in range(0, len(samples), step)]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.errors import InputError
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH

@@ -376,14 +376,7 @@ def synthesise(folder: Path, minutes: float) -> Iterator[Job]:
 
 
 def make_lesson(
-    model: Model,
-    audio: Audio,
-    motion: Motion,
-    units: Timeline[Unit],
-    babble: list[Audio],
-    seed: int,
-    *,
-    encoded: bool,
+    model: Model, audio: Audio, motion: Motion, units: Timeline[Unit], babble: list[Audio], seed: int, *, encoded: bool
 ) -> Lesson:
     """Return the targets of a recording, silence after it, and what is heard in several versions."""
     silence = np.zeros(int(SILENCE_S * audio.rate_hz), np.float32)

@@ -20,7 +20,7 @@ from lipmotion.units import Lexicon
 from lipmotion.units.ipa_phones import read_tokens
 from lipmotion.units.phones import FULL_FORMS
 
-MOST_WORDS = 4000
+MAX_WORDS = 4000
 TARGET = Path(__file__).parents[1] / "src" / "lipmotion" / "speech" / "recognition" / "network" / "written_words.txt"
 
 
@@ -29,7 +29,7 @@ def main() -> None:
     network = G2PModel()
     tokens = sorted((token for token in Hama().tokens if not token.startswith("<")), key=len, reverse=True)
     lines = []
-    for word in load_english().language.words[:MOST_WORDS]:
+    for word in load_english().language.words[:MAX_WORDS]:
         known = {tuple(FULL_FORMS.get(phone, phone) for phone in each) for each in Lexicon().pronunciations(word)}
         phones = spelt(unicodedata.normalize("NFC", network.predict(word).ipa), tokens)
         if word.replace("'", "").isalpha() and phones and phones not in known:

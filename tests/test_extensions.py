@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.cli.terminal.progress import outcome
-from lipmotion.corpora.folder import READERS
+from lipmotion.cli.terminal.progress import describe_outcome
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry, install_command
@@ -20,6 +19,7 @@ from lipmotion.formats import MotionFormat
 from lipmotion.formats.base import MOTION_FORMATS, check_motion
 from lipmotion.testing import example
 from lipmotion_faces import FACES, Face, make_face
+from lipmotion_faces.corpus.folder import READERS
 
 
 @pytest.fixture
@@ -128,12 +128,12 @@ def test_what_fails_in_a_package_is_told_from_a_bug(plugin) -> None:
     for how, said in ((1, "ZeroDivisionError: division by zero"), (0, "SystemExit")):
         with pytest.raises((ZeroDivisionError, SystemExit)) as caught:
             called(how)  # type: ignore[operator]
-        code, message = outcome(caught.value) or (0, "")
+        code, message = describe_outcome(caught.value) or (0, "")
         assert code == 3
         assert re.search(rf"'odd-name' .* failed: {said} \(.*odd_plugin.py, line 3\); tell its authors", message)
     with pytest.raises(ZeroDivisionError) as own:
         1 / 0  # noqa: B018
-    assert outcome(own.value) is None
+    assert describe_outcome(own.value) is None
 
 
 def test_an_extra_is_installed_from_where_lipmotion_came_from(

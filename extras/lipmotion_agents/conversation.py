@@ -28,7 +28,7 @@ PIECE_S = 0.04
 REST_S = REST_STEPS * STEP_S
 FRAMES_IN_MESSAGE = 3
 """Keeps messages under 4 kB, which the data channels of all transports carry."""
-LEAST_WEIGHT = 0.002
+MIN_WEIGHT = 0.002
 WORD_S, LETTER_S = 0.2, 0.1
 """A word whose end is not known lasts at most so long, and so much longer with each letter."""
 
@@ -220,7 +220,7 @@ def list_messages(frames: list[LiveFrame], now: bool, **more: Any) -> Iterator[d
         shown = [
             {
                 "time_s": round(frame.time_s, 4),
-                "weights": {n: round(value, 3) for n, value in frame.weights.items() if abs(value) >= LEAST_WEIGHT},
+                "weights": {n: round(value, 3) for n, value in frame.weights.items() if abs(value) >= MIN_WEIGHT},
             }
             for frame in frames[first : first + FRAMES_IN_MESSAGE]
         ]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from lipmotion.articulation.cue_sheets import CueSheet
-    from lipmotion.corpora.store import Corpus, Selection
+    from lipmotion.corpora import Corpus, Selection
     from lipmotion.engines import engine_named
     from lipmotion.formats.base import read_motion
     from lipmotion.live.face import LiveFrame
@@ -59,7 +59,7 @@ _HOMES = {
     name: f"lipmotion.{home}"
     for home, names in {
         "articulation.cue_sheets": "CueSheet",
-        "corpora.store": "Corpus Selection",
+        "corpora": "Corpus Selection",
         "engines": "engine_named",
         "formats.base": "read_motion",
         "live.face": "LiveFrame",

@@ -18,10 +18,10 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.meshes.model.mesh import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
-from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion.storage.files import atomic_file
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces import base
+from lipmotion_faces.characters.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion_faces.rendering.drawn_surface import Camera, TexturedCanvas, fill, prepare_surface
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ Turn = tuple[float, float, float]
 SHARE_BELOW_MOUTH = 0.55
 """The picture shows as much below the mouth as this share of what is above it, up to the top of the head."""
 KEPT_SHARE = 0.92
-"""The picture has this share of the height that follows from it: hair may leave it at the top."""
+"""The picture is cut to this share of that height: hair may leave it at the top."""
 DISTANCE = 2.8
 """The camera is this many heights of the picture away."""
 DRAWN_HEIGHTS = 1.7

@@ -10,7 +10,7 @@ from zipfile import is_zipfile
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.motion.space import resample_track

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError
 from lipmotion.formats.markers import MILLIMETRES
 from lipmotion.measures import curves
@@ -19,6 +18,7 @@ from lipmotion.measures.curves import measure_modulation_distance
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, to_arkit
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.storage.json_text import replace_nan
+from lipmotion.storage.sources import VIDEO_SUFFIXES
 from lipmotion.types import WEIGHT, Generation, Monitor, Motion, Track, silent_monitor, with_progress
 from lipmotion_faces.tracking.track import track
 from lipmotion_faces.tracking.trackers import LIP_POINTS

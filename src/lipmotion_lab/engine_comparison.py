@@ -8,12 +8,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.training.train import Run, describe_training, train
+from lipmotion.pipeline.training.train import TRAINING_LIST, Run, describe_training, train
 from lipmotion.storage.files import make_folder
 from lipmotion.storage.json_text import replace_nan
 from lipmotion.storage.locks import keep_unfinished
@@ -58,7 +58,7 @@ def train_engines(
         models = {name: EngineModel(load_model(path), None) for name, path in paths.items() if path.is_file()}
         if models:
             utterances = [corpus.utterance(name) for name in training]
-            required = describe_training(corpus, utterances, "train", len(training))
+            required = describe_training(corpus, utterances, TRAINING_LIST, len(training))
             for name, trained in models.items():
                 _check_model(paths[name], name, trained.model, required)
     missing = [name for name in names if name not in models]
@@ -156,9 +156,7 @@ def compare_engines(
 
 
 def _make_rows(
-    recordings: HeldOutRecordings,
-    made: Mapping[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]],
-    seed: int,
+    recordings: HeldOutRecordings, made: Mapping[str, tuple[Sequence[ComparedClip], Sequence[ComparedClip]]], seed: int
 ) -> dict[str, dict[str, Any]]:
     """Return the figures of systems, with ACC gains over each system; ``unpinned``: without forced closures."""
     acc = {name: sum_correlations(*pair_curves(recordings, clips)) for name, (clips, _) in made.items()}

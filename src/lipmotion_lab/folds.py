@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import limit_threads

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import MOTION, SPEECH
@@ -31,6 +31,7 @@ PRESET = "hofer2008"
 PINS = {"as printed": False, "lips made to meet on p b m": True}
 """Whether motion is generated with pins in p, b and m, by the name of the block of the table."""
 TWICE_DOUBLED = 4
+"""Training stops once it has this many times the Gaussians of the best model: doubling them twice did not help."""
 _ACC, _COUNTS = "table1/acc", "table1/gaussians"
 
 

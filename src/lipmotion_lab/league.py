@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError, shorten
 from lipmotion.formats.sound import write_sound
 from lipmotion.measures import curves
@@ -432,11 +432,7 @@ class Standing:
 
 
 def play(
-    rival: Rival,
-    tried: Sequence[Sequence[RivalAnswer]],
-    recordings: Sequence[Recording],
-    reported: int,
-    sync_s: float,
+    rival: Rival, tried: Sequence[Sequence[RivalAnswer]], recordings: Sequence[Recording], reported: int, sync_s: float
 ) -> Standing:
     """Return what a rival does on the first ``reported`` recordings, of its answers by settings and recording."""
     settings = rival.list_settings()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import limit_threads

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.engines.selection.concatenation import Piece, to_pieces
 from lipmotion.engines.selection.costs import (

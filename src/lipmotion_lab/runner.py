@@ -21,8 +21,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.source_recordings import SPLITS
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora import SPLITS, Corpus, Selection
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig, UnitHmm

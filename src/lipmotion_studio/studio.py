@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from starlette.exceptions import HTTPException
 
-from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import InputError, LipMotionError, shorten
 from lipmotion.extensions import find_version
 from lipmotion.formats.sound import write_sound
@@ -28,7 +27,7 @@ from lipmotion.pipeline.request import Outputs
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.storage.files import create_folders
 from lipmotion.storage.locks import open_temporary
-from lipmotion.storage.sources import has_video, hash_file, list_video, open_media
+from lipmotion.storage.sources import VIDEO_SUFFIXES, has_video, hash_file, list_video, open_media
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import MANNERS, MOODS, Delivery, Staging
 from lipmotion.units import PHONES, is_silent, split_words

@@ -14,13 +14,12 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.pipeline.workers import start_process
 from lipmotion.storage.files import atomic_file, make_folder, remove
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.locks import UNFINISHED, name_work_folder
-from lipmotion.storage.sources import read_text_file
+from lipmotion.storage.sources import VIDEO_SUFFIXES, read_text_file
 from lipmotion.types import values
 from lipmotion_faces.filmed.face import SUFFIX as FACE_SUFFIX
 from lipmotion_studio.folder import ProjectFolder, clean_name, copy_file, restore_copy, write_with_copy

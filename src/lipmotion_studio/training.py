@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora import Corpus, Selection
 from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.registry import DEFAULT
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.extensions import load_provided
 from lipmotion.formats.label_files import find_label_files
-from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.pipeline.edit_files import check_sound
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, train
@@ -204,7 +203,7 @@ def _measure(model: Model, corpus: Corpus, names: Sequence[str], monitor: Monito
         {"condition": name, "acc": row["acc"], "opening": row["channels"].get("opening", {}).get("acc")}
         for name, row in figures["conditions"].items()
     ]
-    return {"figures": rows, "table": format_figures(figures)}
+    return {"figures": rows, "table": load_provided("format_figures")(figures)}
 
 
 def check_options(values: Mapping[str, Any]) -> VoiceOptions:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.cli import doctor as doctor_module
-from lipmotion.cli.doctor import EXTRAS, InstalledPart, Requirement, doctor, requirement
+from lipmotion.cli.doctor import EXTRAS, InstalledPart, Requirement, doctor, parse_requirement
 from lipmotion.errors import LipMotionError
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
@@ -164,7 +164,7 @@ PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
     ],
 )
 def test_requirements_are_read(text, expected):
-    assert requirement(text) == expected
+    assert parse_requirement(text) == expected
 
 
 def test_markers():

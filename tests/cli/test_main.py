@@ -11,9 +11,8 @@ import pytest
 from children import PIPE, child, run_child
 from cli.conftest import check_refused, is_one_error
 from lipmotion import load_model, save_model
-from lipmotion.citations import ENGINE_KEYS, bibliography, list_engine_citations, list_model_citations
 from lipmotion.cli import main
-from lipmotion.cli.verbs.about import SHELLS
+from lipmotion.cli.verbs.about import ENGINE_KEYS, SHELLS, bibliography, list_engine_citations, list_model_citations
 from lipmotion.engines import ENGINES
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
 from lipmotion.pipeline.model import find_shipped, read_header

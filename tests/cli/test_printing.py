@@ -23,11 +23,11 @@ from cli.conftest import Done, is_one_error
 from lipmotion import Corpus
 from lipmotion.cli import main
 from lipmotion.cli.terminal.events import Events, JsonLines, Stopper
-from lipmotion.cli.terminal.progress import outcome, print_json, print_line, print_lines, report_progress
+from lipmotion.cli.terminal.progress import describe_outcome, print_json, print_line, print_lines, report_progress
 from lipmotion.errors import InputError
-from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.pipeline.generate.explain import write_explanation
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
+from lipmotion_lab.evaluation.table import format_figures
 from robustness.case import changed_model
 
 EVIL = "q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
@@ -207,23 +207,23 @@ def test_what_is_laid_out_stays_so(capsys):
 
 def test_a_message_that_repeats_a_file_is_cut_in_its_middle():
     for error in (InputError, OSError):
-        told = outcome(error(f"a.csv: found {'x' * 100_000}; give numbers"))
+        told = describe_outcome(error(f"a.csv: found {'x' * 100_000}; give numbers"))
         assert told is not None
         assert told[0] == InputError.exit_code
         assert len(told[1]) < 1100
         assert told[1].startswith("a.csv: found xxx")
         assert told[1].endswith("x; give numbers")
         assert " ... " in told[1]
-    whole = outcome(InputError("word " * 199))
+    whole = describe_outcome(InputError("word " * 199))
     assert whole is not None
     assert " ... " not in whole[1]
 
 
 def test_a_current_folder_that_is_gone_is_said():
-    told = outcome(FileNotFoundError(2, os.strerror(2)))
+    told = describe_outcome(FileNotFoundError(2, os.strerror(2)))
     assert told is not None
     assert "the current folder has been deleted" in told[1]
-    other = outcome(FileNotFoundError(2, os.strerror(2), "a.wav"))
+    other = describe_outcome(FileNotFoundError(2, os.strerror(2), "a.wav"))
     assert other is not None
     assert "a.wav" in other[1]
 

@@ -3,11 +3,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.corpora.captured_faces import read_bare_motion, read_channels
-from lipmotion.corpora.folder import discover, read_aligned_words, spell_name
-from lipmotion.corpora.source_recordings import MotionFile, RecordingFolder, add_separate_sounds, read_offsets
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Channel
+from lipmotion_faces.corpus.captured_faces import read_bare_motion, read_channels
+from lipmotion_faces.corpus.folder import discover, read_aligned_words, spell_name
+from lipmotion_faces.corpus.source_recordings import MotionFile, RecordingFolder, add_separate_sounds, read_offsets
 
 
 def touch(folder: Path, *names: str) -> None:

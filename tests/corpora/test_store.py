@@ -8,7 +8,10 @@ import pytest
 
 from children import run_child
 from lipmotion import Corpus
-from lipmotion.corpora.source_recordings import (
+from lipmotion.corpora import quantise, read_entry
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
+from lipmotion_faces.corpus.source_recordings import (
     LARGEST_LIST_BYTES,
     MAX_MISSING_NAMES,
     RecordingFolder,
@@ -16,9 +19,6 @@ from lipmotion.corpora.source_recordings import (
     assign_splits,
     read_names,
 )
-from lipmotion.corpora.store import quantise, read_entry
-from lipmotion.errors import CorpusError, InputError
-from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
 
 
 def utterance(name: str = "one", split: str = "train", crops: bool = True) -> Utterance:
@@ -156,7 +156,7 @@ def test_not_a_corpus(tmp_path):
 def test_reading_needs_no_video_packages(corpus):
     code = (
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = sys.modules['av'] = None; "
-        "from pathlib import Path; from lipmotion.corpora.store import Corpus; "
+        "from pathlib import Path; from lipmotion.corpora import Corpus; "
         f"Corpus.open(Path({str(corpus.path)!r})).utterance('one').track.crops.sum()"
     )
     run_child([sys.executable, "-c", code], check=True)

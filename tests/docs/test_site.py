@@ -66,5 +66,5 @@ def test_the_site_is_built_without_a_warning(tmp_path):
         assert re.findall(r"<(?:link|script|img|iframe)[^>]*(?:href|src)=\"(?:https?:)?//[^\"]*", text) == [], page
     api = (site / "docs" / "api.html").read_text(encoding="utf-8")
     assert all(f'id="lipmotion.{name}"' in api for name in ("animate", "Request", "train"))
-    assert 'id="lipmotion.engines.trajectory.config.TrajectoryConfig"' in api
+    assert 'id="lipmotion.engines.trajectory.model.TrajectoryConfig"' in api
     assert "docs/index.html" in (site / "index.html").read_text(encoding="utf-8")

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from lipmotion import errors, types
-from lipmotion.formats.web_page import SHARED_COLOURS, Html, build_page, element, find_colour, joined
+from lipmotion.pipeline.batch.report import SHARED_COLOURS, insert_colours
 from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, add_inset, place_inset
 from lipmotion_faces.video import mp4, synthetic_mark
+from lipmotion_lab.report.html import Html, build_page, element, joined
 
 RATES = [24, 29.97, 60]
 
@@ -527,5 +528,5 @@ def test_a_page_loads_nothing_from_elsewhere():
 
 
 def test_all_pages_have_the_same_colours():
-    light, dark = find_colour(SHARED_COLOURS).split("prefers-color-scheme: dark")
+    light, dark = insert_colours(SHARED_COLOURS).split("prefers-color-scheme: dark")
     assert set(re.findall(r"--[\w-]+(?=:)", light)) == set(re.findall(r"--[\w-]+(?=:)", dark))

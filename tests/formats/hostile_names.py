@@ -15,7 +15,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from formats.examples import of_motion
-from lipmotion import CueSheet, citations, errors, formats, read_motion, types
+from lipmotion import CueSheet, errors, formats, read_motion, types
+from lipmotion.cli.verbs import about
 from lipmotion.formats import label_files, textgrid
 from lipmotion.formats.cues import write_cue_file
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
@@ -200,7 +201,7 @@ def _xmp(_: Path, name: str) -> None:
 
 
 def _bibtex(_: Path, name: str) -> None:
-    entries = citations.list_model_citations({"engine": "own" + name, "attribution": [f"x{name}x"]})
+    entries = about.list_model_citations({"engine": "own" + name, "attribution": [f"x{name}x"]})
     assert sum(line.startswith("@") for line in re.split(r"[\n\r]", entries)) == 1
 
 

@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.analysis.read_request import read_units
 from lipmotion.pipeline.analysis.speech_analysis import SpeechAnalysis, analyse_speech
 from lipmotion.pipeline.generation import predict_outlook
-from lipmotion.speech.recognition.network.posteriors import find_installed
+from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import UNKNOWN_PHONES, close_gaps, is_silent
 from meshes.speech import said
@@ -111,7 +111,7 @@ def test_right_phones_are_followed_without_a_word(
     assert not caplog.records
 
 
-needs_network = pytest.mark.skipif(find_installed() is None, reason="no phone recogniser is installed")
+needs_network = pytest.mark.skipif(find_installed_recogniser() is None, reason="no phone recogniser is installed")
 
 
 @needs_network

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fuzz.inputs import Files, Good, ImplausibleError, Reader, lay_out, picked_up
-from lipmotion.cli.terminal.progress import outcome
+from lipmotion.cli.terminal.progress import describe_outcome
 
 READ, REFUSED = "read", "refused"
 ERROR, IMPLAUSIBLE, LEFT, MEMORY, HANG, CRASH = "error", "implausible", "left behind", "memory", "hang", "crash"
@@ -67,7 +67,7 @@ def _read(reader: Reader, folder: Path, good: Good) -> Result:
 
 def _error_result(error: Exception) -> Result:
     """Return the result for an error: refused, if the command line reports it in one good line."""
-    known = outcome(error)
+    known = describe_outcome(error)
     if known is None:
         return Result(ERROR, f"{type(error).__name__} {place_of(error)}", _trace(error))
     code, line = known

@@ -67,7 +67,7 @@ class Memory:
     most_mb : growth that counts as a defect; the address space is limited to three times as much
     """
 
-    MOST_MB = 500
+    MAX_MB = 500
 
     def __init__(self, most_mb: int) -> None:
         self._most_mb = most_mb

@@ -41,7 +41,7 @@ class Worker:
         good: Good,
         *,
         hang_s: float = HANG_S,
-        memory_mb: int = Memory.MOST_MB,
+        memory_mb: int = Memory.MAX_MB,
         readers: Any = None,
         lines: bool = True,
     ) -> None:

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.normals import sum_normals
 from lipmotion_faces.kernels import shading
+from lipmotion_faces.kernels.normals import sum_normals
 from oracles import shading as oracle
 
 

@@ -6,14 +6,10 @@ from numpy.typing import NDArray
 
 from lipmotion.measures import closures
 from lipmotion.measures.curves import (
-    MIN_CLIPS,
-    MIN_SCORE,
     compute_interval,
     correlate_clips,
     correlate_pooled,
     correlation,
-    find_offset,
-    find_pooled_offset,
     measure_jerk_ratio,
     measure_lag,
     measure_landmarks,
@@ -25,8 +21,8 @@ from lipmotion.measures.curves import (
     measure_variance_ratio,
     rmse,
     select_moving,
-    shift_scores,
 )
+from lipmotion_faces.corpus.sync import MIN_CLIPS, MIN_SCORE, find_offset, find_pooled_offset, shift_scores
 from oracles import matching
 
 SEEDS = st.integers(0, 2**32 - 1)

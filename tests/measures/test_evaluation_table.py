@@ -1,6 +1,6 @@
 from itertools import count
 
-from lipmotion.measures.evaluation_table import format_figures
+from lipmotion_lab.evaluation.table import format_figures
 
 
 def figures():

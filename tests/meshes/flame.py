@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lipmotion.corpora.captured_faces import FLAME_MARKERS, FLAME_VERTICES
+from lipmotion_faces.corpus.captured_faces import FLAME_MARKERS, FLAME_VERTICES
 
 FACE_MM = {
     **{"EYE_L": (45, 0, 0), "EYE_R": (-45, 0, 0), "NASION": (0, 10, 20), "LIP_0": (0, -54, 30), "LIP_13": (0, -60, 30)},

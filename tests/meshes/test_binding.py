@@ -8,20 +8,14 @@ from scipy.optimize import lsq_linear
 from lipmotion import errors, types
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, build_mouth
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.meshes.fitting import blendshape_motion, lip_placement
-from lipmotion.meshes.fitting.shape_weights import (
-    OPPOSED,
-    CurveCosts,
-    cancel_opposed,
-    fit_bounded_curves,
-    round_lips,
-    solve_shape_weights,
-)
-from lipmotion.meshes.model import face_shapes, surface
-from lipmotion.meshes.model.binding import MAX_WEIGHTS, bind, paint_weights, skin_vertices
+from lipmotion.meshes.fitting import blendshape_motion, shape_weights
+from lipmotion.meshes.fitting.driven import skin_vertices
+from lipmotion.meshes.fitting.shape_weights import OPPOSED, CurveCosts, cancel_opposed, fit_bounded_curves, round_lips
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
-from lipmotion.meshes.model.surface import build_surface
-from lipmotion_faces.characters import binding_files
+from lipmotion_faces.characters import binding as binding_files
+from lipmotion_faces.characters import character_files, lip_placement
+from lipmotion_faces.characters.binding import MAX_WEIGHTS, bind, paint_weights
+from lipmotion_faces.characters.surface import build_surface
 from meshes.heads import COLUMNS, HALF, SEAM, SIZE, VISEMES, head, lip_points, renamed, shaped
 from meshes.speech import PHONES, motion, units
 from oracles.skinning import skinned_vertex_by_vertex
@@ -236,7 +230,7 @@ def test_of_a_dense_mesh_some_vertices_are_compared(monkeypatch):
 
 
 def _shapes_of(mesh):
-    return face_shapes.find_face_shapes(mesh, lip_placement.place_lips_by_shape(mesh, surface.build_surface(mesh)))
+    return character_files.find_face_shapes(mesh, lip_placement.place_lips_by_shape(mesh, build_surface(mesh)))
 
 
 @pytest.fixture(scope="module", params=["mesh", "reference"])
@@ -247,7 +241,9 @@ def shapes(request):
 @pytest.fixture(scope="module")
 def weights(shapes):
     """Of motion with points for the mesh, of distances alone for the reference."""
-    return solve_shape_weights(motion(points=shapes is not blendshape_motion.arkit_mouth()), units(), shapes)
+    return shape_weights.solve_shape_weights(
+        motion(points=shapes is not blendshape_motion.arkit_mouth()), units(), shapes
+    )
 
 
 def test_weights_are_between_0_and_1_and_smooth_and_pucker_in_oo(weights):
@@ -256,7 +252,7 @@ def test_weights_are_between_0_and_1_and_smooth_and_pucker_in_oo(weights):
     assert np.abs(np.diff(weights.values, axis=0)).max() < 0.25
     assert (weights["mouthClose"] - weights["jawOpen"]).max() < 1e-9
     assert weights["mouthPucker"][115] > weights["mouthPucker"][75] + 0.04  # aa
-    of_reference = solve_shape_weights(motion(), units(), blendshape_motion.arkit_mouth())["mouthPucker"]
+    of_reference = shape_weights.solve_shape_weights(motion(), units(), blendshape_motion.arkit_mouth())["mouthPucker"]
     assert of_reference[115] > 0.38
     assert of_reference[75] < 0.3
 
@@ -290,13 +286,13 @@ def test_lips_close_in_p_and_m_and_in_silence(weights, shapes):
 
 
 def test_the_jaw_stays_open_behind_closed_lips(shapes):
-    weights = solve_shape_weights(motion(), units(), shapes)
+    weights = shape_weights.solve_shape_weights(motion(), units(), shapes)
     assert weights["jawOpen"][95] > 0.05
     assert weights["mouthClose"][95] > 0.05
 
 
 def test_lips_are_pressed_in_p_as_captures_press_them(shapes):
-    assert 0.35 < solve_shape_weights(motion(), units(), shapes)["mouthPressLeft"][95] < 0.66
+    assert 0.35 < shape_weights.solve_shape_weights(motion(), units(), shapes)["mouthPressLeft"][95] < 0.66
 
 
 def test_known_weights_come_back():
@@ -306,7 +302,7 @@ def test_known_weights_come_back():
     known[:, shapes.row("jawOpen")] = 0.4 * wave
     known[:, shapes.row("mouthPucker")] = 0.5 * wave[::-1]
     placed = np.einsum("ts,spc->tpc", known, shapes.moved)
-    found = solve_shape_weights(_of(placed, known @ shapes.gap), types.Timeline(()), shapes, _EXACT)
+    found = shape_weights.solve_shape_weights(_of(placed, known @ shapes.gap), types.Timeline(()), shapes, _EXACT)
     found = types.Motion(found.values[30:], 100.0, found.channels)  # before: the rest pose
     assert np.abs(found["jawOpen"] - known[:, shapes.row("jawOpen")]).max() < 0.08
     assert np.abs(found["mouthPucker"] - known[:, shapes.row("mouthPucker")]).max() < 0.12
@@ -315,7 +311,7 @@ def test_known_weights_come_back():
 def test_visemes_are_used_where_there_is_no_jaw_shape():
     shapes = _shapes_of(renamed(VISEMES))
     assert shapes.style == "visemes"
-    found = solve_shape_weights(motion(), units(), shapes)
+    found = shape_weights.solve_shape_weights(motion(), units(), shapes)
     assert found["viseme_aa"][75] > 0.2
     assert found["viseme_aa"][:40].max() < 0.02
     assert found["viseme_U"][115] > found["viseme_U"][75]

@@ -11,7 +11,7 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting import driven, eyes_and_brows, lip_placement, shape_weights
+from lipmotion.meshes.fitting import driven, eyes_and_brows, shape_weights
 from lipmotion.meshes.fitting.blendshape_motion import (
     arkit_mouth,
     arkit_weights,
@@ -19,15 +19,17 @@ from lipmotion.meshes.fitting.blendshape_motion import (
     is_of_blendshapes,
     with_mouth,
 )
-from lipmotion.meshes.model import face_shapes, rig_tables, shape_names, surface
-from lipmotion.meshes.model.mesh import ANGLES, HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, find_bone_kind, merge_bones
+from lipmotion.meshes.model import face_shapes, rig_tables, shape_names
+from lipmotion.meshes.model.mesh import ANGLES, HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit, delivery
 from lipmotion.types.delivery import parse_moods
 from lipmotion.types.motion import RADIAN
 from lipmotion.units import PHONES
 from lipmotion_faces.base import stage_liveliness
-from lipmotion_faces.characters import binding_files, gltf_scene
+from lipmotion_faces.characters import binding, character_files, gltf_scene, lip_placement, surface
 from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
+from lipmotion_faces.characters.gltf_document import find_bone_kind
+from lipmotion_faces.characters.gltf_scene import merge_bones
 from lipmotion_faces.head.pose import list_head_poses
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, VISEMES, head, lip_points, renamed, shaped, write_glb, write_obj
@@ -80,8 +82,8 @@ def test_only_the_moving_vertices_move(files):
 
 def test_bindings_are_stored_and_painted(files):
     computed = load_character(files / "head.obj", points=files / "points.csv")
-    binding_files.save_binding(files / "head.binding", computed.binding, computed.mesh)
-    binding_files.write_weights(files / "weights.csv", computed.binding)
+    binding.save_binding(files / "head.binding", computed.binding, computed.mesh)
+    binding.write_weights(files / "weights.csv", computed.binding)
     stored = load_character(files / "head.obj", binding=files / "head.binding")
     painted = load_character(files / "head.obj", points=files / "points.csv", binding=files / "weights.csv")
     expected = np.stack([*computed.vertices(motion(), units(), TIME_S)])
@@ -252,8 +254,6 @@ def test_a_jaw_bone_opens_the_mouth():
 
 def test_a_character_with_a_jaw_bone_alone_follows_the_motion(tmp_path):
     """The square of two triangles is no head; the made head has no skin. So the bone is put on the read mesh."""
-    from lipmotion_faces.characters import character_files
-
     path = tmp_path / "head.glb"
     write_glb(path, head(shapes=False))
     with pytest.MonkeyPatch.context() as patch:
@@ -343,7 +343,7 @@ def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> N
 def test_a_mesh_shows_the_weights_that_are_given() -> None:
     mesh = head()
     placement = lip_placement.place_lips_by_shape(mesh, surface.build_surface(mesh))
-    character = driven.DrivenCharacter(mesh, placement, face_shapes.find_face_shapes(mesh, placement), None)
+    character = driven.DrivenCharacter(mesh, placement, character_files.find_face_shapes(mesh, placement), None)
     assert character.shapes is not None
     moved = with_mouth(weights(jawOpen=[0.0, 0.25, 0.5], mouthClose=[0.0] * 3))
     rest, half, whole = character.vertices(moved, Timeline(()), np.arange(3) / 100)

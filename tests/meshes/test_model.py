@@ -4,9 +4,10 @@ import pytest
 from lipmotion import errors, types
 from lipmotion.errors import InputError
 from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
-from lipmotion.meshes.model import shape_names, surface
+from lipmotion.meshes.model import shape_names
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.meshes.model.rig_tables import apply_rig, read_rig_table
+from lipmotion_faces.characters import surface
 from lipmotion_faces.characters.scene import HeadTurn, Scene, compute_shading_normals
 from meshes.heads import head, shaped
 

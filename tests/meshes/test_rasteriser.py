@@ -6,8 +6,8 @@ from PIL import Image
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart, Texture
-from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.characters import character_files, gltf_scene, textures
+from lipmotion_faces.characters.surface import compute_normals
 from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.rendering.drawn_surface import Camera, Canvas, TexturedCanvas, fill, fill_gradient, prepare_surface
 from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach

@@ -13,7 +13,7 @@ from lipmotion.pipeline.analysis.transcribe import (
     warn_of_misfit,
 )
 from lipmotion.speech.recognition.agreement import TranscriptFit
-from lipmotion.speech.recognition.network.posteriors import find_installed
+from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser
 from lipmotion.speech.recognition.recognised_speech import select_reliable
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon, is_silent, split_words
@@ -55,7 +55,7 @@ WRONG = ("squash", "six", "fish", "chefs")
 
 @pytest.mark.parametrize("network", [True, False])
 def test_a_transcript_of_something_else_is_doubted(toy_model, audio, features, caplog, network):
-    if network and find_installed() is None:
+    if network and find_installed_recogniser() is None:
         pytest.skip("no phone recogniser is installed")
     phones = recogniser_of(toy_model, "auto" if network else "general")
     recognised = lambda: phones.recognise(audio, features)  # noqa: E731

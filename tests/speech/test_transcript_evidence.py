@@ -6,7 +6,6 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion import load_model
-from lipmotion.corpora.folder import spell_name
 from lipmotion.speech.recognition import agreement, general
 from lipmotion.speech.recognition import transcript_evidence as module
 from lipmotion.speech.recognition.transcript_evidence import (
@@ -19,6 +18,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
 )
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
+from lipmotion_faces.corpus.folder import spell_name
 from pipeline.made import features_of, read_sound, recogniser_of
 from testing.toy import ToySentence, toy_sentences
 
@@ -115,7 +115,7 @@ def test_a_long_recording_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
         spans += list(transcript([*SAID] if number != 1 else [*OTHER], piece_s).shifted(number * piece_s))
     whole = find_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
     monkeypatch.setattr(module, "LARGEST_SEARCH", 0)
-    monkeypatch.setattr(module, "LEAST_STRETCH_S", 0.3)
+    monkeypatch.setattr(module, "MIN_STRETCH_S", 0.3)
     parts = find_evidence(log_posteriors, FRAME_S, Timeline(tuple(spans)))
     assert [word.is_said for word in parts.words] == [True] * 4 + [False] * 3 + [True] * 4
     assert [word[:2] for word in parts.words] == [word[:2] for word in whole.words]

@@ -13,7 +13,7 @@ from lipmotion import errors, load_model, types, units
 from lipmotion.hmm.network import wrap_log_likelihoods
 from lipmotion.speech.recognition import recognised_speech, word_search
 from lipmotion.speech.recognition.network import beam_search, posteriors
-from lipmotion.speech.recognition.network.posteriors import find_installed
+from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser
 from lipmotion.speech.recognition.word_search import list_spoken, list_wordless
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.voice_activity import Stretch, read_stretch
@@ -29,9 +29,9 @@ SAID = "please speak and my lips will move five big blue boats float by".split()
 def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Words are searched by pocketsphinx where no phone recogniser is installed."""
     monkeypatch.setitem(sys.modules, "hama", None)
-    find_installed.cache_clear()
+    find_installed_recogniser.cache_clear()
     yield
-    find_installed.cache_clear()
+    find_installed_recogniser.cache_clear()
 
 
 @pytest.fixture
@@ -298,7 +298,7 @@ def loud(monkeypatch: pytest.MonkeyPatch) -> str:
     registry, places = posteriors.PHONE_RECOGNISERS, {"loud": ":Loud", "absent": ":Absent", "odd": ":Unigram"}
     points = {name: metadata.EntryPoint(name, __name__ + place, registry.group) for name, place in places.items()}
     monkeypatch.setitem(registry.__dict__, "_installed", points)
-    posteriors.phone_recogniser.cache_clear()
+    posteriors.load_phone_recogniser.cache_clear()
     return "loud"
 
 
@@ -319,7 +319,7 @@ def test_a_recording_has_posteriors_throughout(loud: str) -> None:
     assert {found.token for found in posteriors.read_posteriors(loud, audio).best_tokens} == {"b"}
     assert whole.best_tokens[0].first == stretches[0].stretch.first // 2 + 10
     assert posteriors.find_stretches(loud, audio) is stretches
-    found = posteriors.infer_tokens(loud, audio)
+    found = posteriors.infer_posteriors(loud, audio)
     assert found.source == "loud 1 0"
     assert found.mean == pytest.approx(np.exp(-0.1), abs=1e-3)
 
@@ -333,9 +333,9 @@ def test_a_long_recording_is_cut(loud: str) -> None:
 @pytest.mark.usefixtures("loud")
 def test_a_recogniser_that_is_not_installed_or_is_none_is_refused() -> None:
     with pytest.raises(errors.MissingDependencyError, match="pip install absent"):
-        posteriors.phone_recogniser("absent")
+        posteriors.load_phone_recogniser("absent")
     with pytest.raises(errors.InputError, match="required a class of PhoneRecogniser"):
-        posteriors.phone_recogniser("odd")
+        posteriors.load_phone_recogniser("odd")
 
 
 @pytest.mark.skipif(not posteriors.Hama.is_installed(), reason="hama has no library here")
@@ -343,11 +343,11 @@ def test_unsure_posteriors_leave_phones_to_the_models(monkeypatch: pytest.Monkey
     noisy = read_sound(mix_noise(read_welcome(), "white", -5))
     found = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
     monkeypatch.setitem(sys.modules, "hama", None)
-    posteriors.find_installed.cache_clear()
+    posteriors.find_installed_recogniser.cache_clear()
     try:
         alone = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
     finally:
-        posteriors.find_installed.cache_clear()
+        posteriors.find_installed_recogniser.cache_clear()
     assert found.units == alone.units
     assert found.posterior is None
 

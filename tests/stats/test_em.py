@@ -41,9 +41,7 @@ def test_all_steps_are_taken_and_reported():
 @pytest.mark.parametrize(("converged", "model", "reported"), [(True, 0.875, 3), (False, 0.75, 2)])
 def test_it_stops_at_the_first_step_that_gains_too_little(converged, model, reported):
     log = []
-    result = run_em(
-        0.0, Half, maximise, 20, lambda *step: log.append(step), least_gain=0.3, maximise_converged=converged
-    )
+    result = run_em(0.0, Half, maximise, 20, lambda *step: log.append(step), min_gain=0.3, maximise_converged=converged)
     assert result.model == model
     assert result.log_likelihoods == (-1, -0.5, -0.25)
     assert len(log) == reported
@@ -51,7 +49,7 @@ def test_it_stops_at_the_first_step_that_gains_too_little(converged, model, repo
 
 
 def test_the_first_step_never_counts_as_converged():
-    assert run_em(1.0, Half, maximise, 5, least_gain=np.inf).log_likelihoods == (0, 0)
+    assert run_em(1.0, Half, maximise, 5, min_gain=np.inf).log_likelihoods == (0, 0)
 
 
 SHARDS = list(np.random.default_rng(0).normal(0, 1e3, (9, 50)))

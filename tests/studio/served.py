@@ -20,7 +20,7 @@ PHONES = "p b m f aa iy uw ow s t".split()
 GIVEN = ("motion", "motion?of=delivered", "motion?of=deviation", "motion?of=confidence", "weights?face=head")
 EXPORTED = (".json", ".csv", ".livelink.csv", ".glb", ".TextGrid", ".cues.json")
 """What a line gives, and is exported as, where its bytes are compared."""
-MOST_AT_ONCE = 20
+MAX_AT_ONCE = 20
 WORDS = ("bob", "we may", "so", "put a map")
 
 
@@ -187,7 +187,7 @@ def undone_edits(
 ) -> dict[str, Any]:
     """Make random edits through a server, end it, take all back through another one, and make all again.
 
-    They are taken back, and made again, some at a time: 1 to ``MOST_AT_ONCE``.
+    They are taken back, and made again, some at a time: 1 to ``MAX_AT_ONCE``.
     Raises AssertionError: what the server then gives and exports is not to the byte what it was.
     """
     chance, edits, refused = Random(seed), 0, 0
@@ -215,7 +215,7 @@ def undone_edits(
         for what, left, wanted in (("undo", "redo", first), ("redo", "undo", last)):
             state = server.ready()
             while state[what]:
-                some = chance.randint(1, min(MOST_AT_ONCE, state[what]))
+                some = chance.randint(1, min(MAX_AT_ONCE, state[what]))
                 state = stepped(server, state, what, count=some) or {}
             assert (state[what], state[left]) == (0, count)
             now = _bytes_of(server)

@@ -44,7 +44,7 @@ HEAD_MIDDLE_PX = 17.0
 """Height at which the head is widest, px below the eyes."""
 CREASE_PX, CREASE = (4.0, 18.0), 0.2
 """Height and width of the crease above the chin, px of the face, and how much darker it is."""
-LEAST_OPENING_PX, TEETH_PX = 0.6, 5.0
+MIN_OPENING_PX, TEETH_PX = 0.6, 5.0
 """A mouth that is open less looks closed; height of the upper teeth, px of the face."""
 NECK_PX = 40.0
 """Half width of the neck, px of the face."""
@@ -155,7 +155,7 @@ def _picture(x: Values, y: Values, shape: Array, pixel_px: float, noise: float, 
     for side in (-30.0, 30.0):
         picture = _over(picture, EYES, _inside(x - side, y, 15.0, 6.0, pixel_px))
     picture = _over(picture, LIPS, _inside(x, y - middle, width / 2, outer / 2, pixel_px))
-    if opening > LEAST_OPENING_PX:
+    if opening > MIN_OPENING_PX:
         inside = _inside(x, y - middle, INNER_WIDTH * width / 2, opening / 2, pixel_px)
         picture = _over(picture, INSIDE, inside)
         teeth = np.clip(0.5 + (middle - opening / 2 + TEETH_PX - y) / pixel_px, 0, 1) * (1 - 0.5 * (np.abs(x % 6) < 1))

@@ -91,6 +91,6 @@ def test_native_messages_are_dropped_only_inside(capfd):
 def test_importing_needs_no_video_packages():
     code = (
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = None; "
-        "import lipmotion_faces.tracking.track, lipmotion.corpora.store, lipmotion_faces.corpus.prepare"
+        "import lipmotion_faces.tracking.track, lipmotion.corpora, lipmotion_faces.corpus.prepare"
     )
     run_child([sys.executable, "-c", code], check=True)

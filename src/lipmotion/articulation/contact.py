@@ -47,9 +47,7 @@ def smooth_step(share: Curve) -> Curve:
 
 
 def opening_to_gap(opening: Curve) -> Curve:
-    """Return the distance of the inner lips for an opening, eye distances [shape=(T,)]; 0 where they touch; it never
-    falls.
-    """
+    """Return the inner lips' distance for an opening, eye distances [shape=(T,)]; 0 where they touch; never falling."""
     share = np.clip((opening - CLOSED_OPENING) / (FULL_DEFICIT_GAP - CLOSED_OPENING), 0, 1)
     gap = (opening + TRACKER_DEFICIT) * share
     over = (LARGEST_GAP - MEASURED_GAP) * np.tanh(np.maximum(gap - MEASURED_GAP, 0) / (LARGEST_GAP - MEASURED_GAP))

@@ -1,8 +1,8 @@
-"""Expression: what a mood does to a face, beside what is said; the one owner of brows, lids, cheeks and corners of it.
+"""Expression: moods of a motion over time, and the facial action units that show them.
 
 A mood is a set of facial action units with intensities, 0 to 1 (``moods.csv``); motion carries moods as channels, so
-that files hold them. What the action units do to the mouth is limited by what the phones ask of it
-(``articulation.mouth``); what they do elsewhere is beside blinks and accents (``articulation.liveliness``).
+that files hold them. Phones limit what the action units do to the mouth (``articulation.mouth``); elsewhere they add to
+blinks and accents (``articulation.liveliness``).
 
 Sources (the column ``source``): EMFACS, P. Ekman and W. V. Friesen, "EMFACS-7: Emotional Facial Action Coding System",
 1983, and P. Ekman, W. V. Friesen and J. C. Hager, "Facial Action Coding System: Investigator's Guide", 2002, of the
@@ -89,16 +89,12 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
 
 
 def list_action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
-    """Return the action units that moods ask for, 0 to 1 [each shape=(N,)], at times (None: all frames); none if
-    neutral.
-    """
+    """Return the action units of moods, 0 to 1 [each shape=(N,)], at some times (None: all frames); none if neutral."""
     units: dict[int, Curve] = {}
-    for name in motion.names:
-        if is_mood(name) and motion[name].any():
-            strength = np.clip(motion[name].astype(np.float64), 0, 1)
-            if time_s is not None:
-                strength = np.interp(time_s, motion.time_s, strength)
-            for unit, intensity in read_mood_table()[name[len(PREFIX) :]].items():
+    for mood, curve in read_moods(motion).items():
+        if curve.any():
+            strength = curve if time_s is None else np.interp(time_s, motion.time_s, curve)
+            for unit, intensity in read_mood_table()[mood].items():
                 units[unit] = units.get(unit, 0.0) + intensity * strength
     return {unit: np.clip(curve, 0, 1) for unit, curve in units.items()}
 

@@ -49,7 +49,7 @@ LARGEST_UPPER_RISE, UPPER_RATE = 0.058, 5.2
 """The upper lip rises by at most the first length (5 mm), for small gaps by the product of both times the gap."""
 JAW_SHARE = 0.85
 """Share of the lower lip's way that the chin goes: the lip also turns outwards."""
-LEAST_CHIN_DROP_SHARE = 0.75
+MIN_CHIN_DROP_SHARE = 0.75
 """Least drop of the chin, as a share of the usual one: trackers of small jaws, and models of them, show less."""
 ROUND_SHARE = 0.15
 """Share of a smile, of corners pulled down or apart, and of a raised lip that is left on wholly protruded lips."""
@@ -233,7 +233,7 @@ def find_mouth(
     jaw = usual = measure_jaw_drop(gap)
     if rest.chin is not None:  # as tracked (point 152, y upwards), within limits that suit the gap
         drop = rest.chin - motion["y_152"].astype(np.float64)
-        jaw = np.clip(drop, LEAST_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)
+        jaw = np.clip(drop, MIN_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)
     mouth = SpokenMouth(
         motion.rate_hz,
         gap,

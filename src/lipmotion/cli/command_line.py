@@ -101,7 +101,7 @@ def parse_words(words: Sequence[str], options: argparse.Namespace) -> argparse.N
         meant = OF_OTHER_TOOLS.get(verb.lower(), near[0] if near else usual)
         hint = f"did you mean: {program.prog} {meant}" if meant else f"the verbs are: {', '.join(verbs)}"
         program.error(f"no verb {verb!r}; {hint}")
-    words = _sort_verbs(program, words)
+    words = _put_recording_first(program, words)
     empty = argparse.Namespace(**vars(options))
     options, unknown = program.parse_known_args(words, options)
     if getattr(options, "job", None) or getattr(options, "detail", None):  # what they say are the defaults by now
@@ -131,7 +131,7 @@ def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser
     return dict(next((action.choices for action in actions), {}))
 
 
-def _sort_verbs(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
+def _put_recording_first(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
     """Return the words of a command with its recording ahead of the outputs.
 
     An option that takes several words, as ``-o``, takes those that argparse finds behind it: of ``-o OUT RECORDING``
@@ -141,7 +141,7 @@ def _sort_verbs(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[s
     """
     verb, verbs = next((at for at, word in enumerate(words) if not word.startswith("-")), len(words)), _verbs(parser)
     if verb < len(words) and words[verb] in verbs:
-        return [*words[: verb + 1], *_sort_verbs(verbs[words[verb]], words[verb + 1 :])]
+        return [*words[: verb + 1], *_put_recording_first(verbs[words[verb]], words[verb + 1 :])]
     known, free, taken, at = parser._option_string_actions, 0, list[int](), 0
     words = [  # "-o OUT" may be one word, as for Rhubarb
         part for word in words for part in (word.split(maxsplit=1) if word.partition(" ")[0] in known else (word,))

@@ -62,7 +62,7 @@ class Requirement:
         return bool(self.installed) and SpecifierSet(self.versions).contains(self.installed, prereleases=True)
 
 
-def requirement(text: str) -> Requirement:
+def parse_requirement(text: str) -> Requirement:
     """Return a requirement from its text in the metadata of a package: ``NAME>=1 ; MARKER``."""
     found = requirements.Requirement(text)
     marker = str(found.marker or "")
@@ -73,7 +73,7 @@ def requirement(text: str) -> Requirement:
 def list_requirements() -> tuple[Requirement, ...]:
     """Return all requirements of the installed lipmotion; none where it runs from its sources, without metadata."""
     try:
-        return tuple(map(requirement, metadata.requires("lipmotion") or ()))
+        return tuple(map(parse_requirement, metadata.requires("lipmotion") or ()))
     except metadata.PackageNotFoundError:
         return ()
 
@@ -101,7 +101,9 @@ CLOSED, OPEN = ((260, 70),), ((730, 70), (1090, 100), (2440, 160))
 MIN_OPENING = 0.03
 """Opening of the lips that *mama* has at least, in distances between the outer eye corners."""
 OPENCV = "opencv-python-headless"
-LEAN = "another OpenCV lies over it, as pip installs with MediaPipe; without it: requirements/video.txt (docs/start.md)"
+OPENCV_HINT = (
+    "another OpenCV lies over it, as pip installs with MediaPipe; without it: requirements/video.txt (docs/start.md)"
+)
 
 
 @dataclass(frozen=True)
@@ -197,12 +199,12 @@ def _voices() -> str:
 
 
 def _phone_recogniser() -> str:
-    from lipmotion.speech.recognition.network.posteriors import find_installed, phone_recogniser
+    from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, load_phone_recogniser
 
-    name = find_installed()
+    name = find_installed_recogniser()
     if name is None:
         raise _AbsentError("none for this machine: voices that the model does not know are recognised less well")
-    return phone_recogniser(name).source
+    return load_phone_recogniser(name).source
 
 
 def _microphone() -> str:
@@ -220,7 +222,9 @@ def _face_tracking() -> str:
         raise _AbsentError(str(error)) from error
     found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"
     declared = Requirement(OPENCV, "").installed
-    return found if declared.startswith(opencv) else f"{found}; {OPENCV} is {declared or 'not installed'}: {LEAN}"
+    return (
+        found if declared.startswith(opencv) else f"{found}; {OPENCV} is {declared or 'not installed'}: {OPENCV_HINT}"
+    )
 
 
 def _model() -> str:

@@ -55,9 +55,9 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
         is_exit = isinstance(error, SystemExit)
         if not is_exit:
             stopper.check()  # interrupted work may fail in any way
-        from lipmotion.cli.terminal.progress import outcome
+        from lipmotion.cli.terminal.progress import describe_outcome
 
-        known = outcome(error)
+        known = describe_outcome(error)
         stopper.settle()
         if known is not None:
             return _report_failure(events, known[0], f"error: {known[1]}")

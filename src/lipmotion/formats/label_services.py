@@ -389,16 +389,21 @@ def _read_object(item: dict[str, Any], place: str, where: str, name: str, depth:
         lines = [line for line in lines if line.parts or not math.isnan(line.start)]
     if not lines and (own is None or item.get("case") == MISSED):
         return phones
-    if not lines and own is not None and not phones:  # a word, perhaps with Gentle's phones
-        lengths = _list_durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
-        spans = _sum_durations(lengths, own.start, where) if lengths else []
-        rows = ((span.start_s, span.end_s, span.text.partition("_")[0], span.position) for span in spans)
-        return [own, *(Row(*row, own.times, own.speaker, PHONE_LABELS) for row in rows)]
+    if not lines and own is not None and not phones:
+        return [own, *_read_gentle_phones(item, own, place, where)]
     lines = lines or [own] if own is not None else lines
     if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
         lines = [replace(lines[0], start=own.start, end=own.end, times=own.times)]
     speaker = own.speaker if own is not None else _find_speaker(item)
     return [line if line.speaker else replace(line, speaker=speaker) for line in (*lines, *phones)]
+
+
+def _read_gentle_phones(item: dict[str, Any], word: Row, place: str, where: str) -> list[Row]:
+    """Return the phones of a word of Gentle, whose lengths are given; none of other services."""
+    lengths = _list_durations(item.get("phones"), "phone", "duration", f"{place}, phone", 1)
+    spans = _sum_durations(lengths, word.start, where) if lengths else []
+    rows = ((span.start_s, span.end_s, span.text.partition("_")[0], span.position) for span in spans)
+    return [Row(*row, word.times, word.speaker, PHONE_LABELS) for row in rows]
 
 
 def _find_speaker(item: dict[str, Any]) -> str:
@@ -411,10 +416,7 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return lists of items in time: phones, and a tier of each speaker, of words if nearly all are, else of lines."""
     rows = [row for place, item in objects for row in _find_rows(item, place if len(objects) > 1 else "", where)]
     check_count(len(rows), where)
-    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
-    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
-    if missed and where:
-        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
+    _warn_of_missed_words(objects, where)
     timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
     if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
@@ -424,17 +426,29 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     spoken = _drop_first_pass(_extend_to_next([row for row in rows if row.role != PHONE_LABELS], silences))
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
-    counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in spoken]
-    check_word_count(sum(counts) + sum(len(row.parts) for row in spoken), where)
-    single = sum(row.role == WORDS or count < 2 for row, count in zip(spoken, counts, strict=True))
-    role = WORDS if single >= SINGLE_SHARE * len(spoken) and not any(row.parts for row in spoken) else LINES
-    by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
-    for row, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
-        by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
     tiers = [LabelTier(PHONE_LABELS, tuple(_scale_rows(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
-    if not phones and all(row.role != WORDS and not row.parts for row in spoken):
-        role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(rows))) for rows in by_speaker.values()) else role
-    return tiers + [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
+    return tiers + _group_by_speaker(spoken, where, may_be_phones=not phones)
+
+
+def _warn_of_missed_words(objects: Objects, where: str) -> None:
+    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
+    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
+    if missed and where:
+        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
+
+
+def _group_by_speaker(rows: list[Row], where: str, *, may_be_phones: bool) -> list[LabelTier]:
+    """Return a tier of each speaker: of words if nearly all rows are single ones, else of lines, or of phones."""
+    counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
+    check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
+    single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
+    role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
+    by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
+    for row, label in zip(rows, _scale_rows(rows, role, where), strict=True):
+        by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
+    if may_be_phones and all(row.role != WORDS and not row.parts for row in rows):
+        role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
+    return [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
 
 
 def _drop_first_pass(rows: list[Row]) -> list[Row]:

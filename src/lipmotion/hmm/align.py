@@ -54,9 +54,7 @@ def expand_states(hmm: UnitHmm, units: Sequence[str]) -> StateSequence:
 def align_states(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
 ) -> tuple[StateSequence, NDArray[np.intp]]:
-    """Return the states of a unit sequence, and that of every frame [shape=(T,)]. Raises AlignmentError: too few
-    frames.
-    """
+    """Return a unit sequence's states, and that of every frame [shape=(T,)]. Raises AlignmentError: too few frames."""
     chain = expand_states(hmm, units)
     used, local = np.unique(chain.densities, return_inverse=True)
     if windows is not None:
@@ -69,9 +67,7 @@ def align_states(
 def align_units(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, units: Sequence[str], windows: Windows | None = None
 ) -> NDArray[np.intp]:
-    """Return the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)]. Raises as
-    ``align_states``.
-    """
+    """Return each unit's first frame, and the frame count [shape=(len(units) + 1,)]. Raises as ``align_states``."""
     chain, path = align_states(hmm, log_likelihoods, units, windows)
     return np.append(np.searchsorted(chain.positions[path], np.arange(len(units))), log_likelihoods.frames)
 
@@ -217,9 +213,7 @@ def _check_room(hmm: UnitHmm, frames: int, words: Sequence[Sequence[Sequence[str
 def _append_units(
     builder: NetworkBuilder, hmm: UnitHmm, units: Sequence[str], open_ends: list[tuple[int, float]], pause: str
 ) -> list[tuple[int, float]]:
-    """Add the states of some units to all open ends (states, log P(leave)); return the new ends. ``pause`` may be left
-    out.
-    """
+    """Add states of some units to all open ends (states, log P(leave)); return the new ends. ``pause`` is optional."""
     ends = open_ends
     for unit in units:
         before = ends if unit == pause else []

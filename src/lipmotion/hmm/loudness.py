@@ -1,7 +1,7 @@
-"""Frames of a recording that are too loud for silence, or too quiet for speech; how long it is silent does not matter.
+"""Frames of a recording that are too loud for silence, or too quiet for speech.
 
-All levels are measured in sound: against the loudest quarter of a second, and the noise that stands beneath speech. So
-zeros, or another noise, before and after what is said change nothing.
+Levels are measured within the sound: against its loudest quarter of a second, and against the noise beneath speech. So
+silence, zeros or another noise before and after what is said change nothing.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SOUND_DROP, QUIET_DROP = 20 * DECIBEL, 35 * DECIBEL
 """Sound lies less than the first below the loud level: too loud for silence; below the second one is no speech."""
 ABOVE_NOISE, NOISE_SHARE = 6 * DECIBEL, 0.3
 """Sound is louder than the noise by so much, or by this share of the way to the loud level where that is less."""
-LEAST_RANGE = 6 * DECIBEL
+MIN_RANGE = 6 * DECIBEL
 """Where the loud level is no further above the noise, as in tones and in noise alone, nothing is said."""
 NEAR_LOUD = 20 * DECIBEL
 """The noise is measured around frames no further beneath the loud level."""
@@ -67,7 +67,7 @@ def find_loud_frames(
 ) -> NDArray[np.bool_]:
     """Return which frames are louder than the noise, and than a level ``drop`` beneath the loud one [shape=(T,)]."""
     loud, noise = measure_levels(log_energy)
-    if loud - noise < LEAST_RANGE:
+    if loud - noise < MIN_RANGE:
         return np.zeros(len(log_energy), bool)
     threshold = max(loud - drop, noise + min(ABOVE_NOISE, NOISE_SHARE * (loud - noise)))
     return smooth_level(log_energy, smoothing) > threshold

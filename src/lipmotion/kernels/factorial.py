@@ -36,12 +36,12 @@ OFF: dict[np.dtype[Any], float] = {SINGLE: 1e-4, DOUBLE: 1e-10}
 """By precision: the largest share of the likelihood that may come of probabilities that were raised."""
 WHOLE: dict[np.dtype[Any], float] = {SINGLE: 1e16, DOUBLE: 1e70}
 """By precision: the sum of the probabilities of a frame. They are raised to 1 divided by this where they are less."""
-LEAST_PRODUCT = {SINGLE: 1e-37, DOUBLE: 1e-300}
+MIN_PRODUCT = {SINGLE: 1e-37, DOUBLE: 1e-300}
 """By precision: smaller products of probabilities and densities are set to 0."""
-LEAST_TOTAL = {SINGLE: 1e-20, DOUBLE: 1e-150}
+MIN_TOTAL = {SINGLE: 1e-20, DOUBLE: 1e-150}
 """By precision: least sum of these products, as a share of the whole. With such a sum, what was set to 0 or underflowed
 is less than what probabilities are raised to."""
-LEAST_POSTERIOR = 1e-20
+MIN_POSTERIOR = 1e-20
 """Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
 MIN_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
@@ -158,7 +158,7 @@ def _forward_backward(
             entered = [part + more for part, more in zip(entered, step[2:], strict=True)]
     counts = [_counted(*parts) for parts in zip(loops, posteriors[:2], entered, strict=True)]
     for part in (*posteriors, *counts[0], *counts[1]):
-        part[part < LEAST_POSTERIOR] = 0
+        part[part < MIN_POSTERIOR] = 0
     of_audio, of_visual, of_pairs = posteriors
     return FactorialPosteriors(of_audio, of_visual, of_pairs, counts[0], counts[1], log_likelihood)
 
@@ -197,9 +197,9 @@ class _Scaled:
             total = _forward(
                 before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2],
                 density.audio, density.visual, density.pair, density.pair_audio, density.pair_visual,
-                LEAST_PRODUCT[self.kind], self.whole, after,
+                MIN_PRODUCT[self.kind], self.whole, after,
             )  # fmt: skip
-            if not total > LEAST_TOTAL[self.kind]:
+            if not total > MIN_TOTAL[self.kind]:
                 return -math.inf
             log_total += math.log(total) + density.best
             found.append((after, moved))
@@ -224,10 +224,10 @@ class _Scaled:
         total = _backward(
             before, moved, *self.audio[:2], self.audio[2] @ moved[:units], density.audio, density.visual, density.pair,
             density.pair_audio, density.pair_visual,
-            LEAST_PRODUCT[self.kind], self.whole, after, *sums,
+            MIN_PRODUCT[self.kind], self.whole, after, *sums,
         )  # fmt: skip
         met = float(sums[0].sum())
-        enough = met > 0 and total > LEAST_TOTAL[self.kind]
+        enough = met > 0 and total > MIN_TOTAL[self.kind]
         scale = np.float64(1 / met if enough else 0.0)
         log_overlap = math.log(met) - 2 * math.log(self.whole) if enough else -math.inf
         frame = _Frame(sums[0] * scale, sums[1] * scale, sums[2] * scale, log_overlap)
@@ -336,9 +336,7 @@ def _create_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods)
 
 @compile_to_rounding
 def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:
-    """Return the last columns of joint probabilities, moved one frame on along axis 0 by those of entering [shape=(U,
-    M)].
-    """
+    """Return joint probabilities, last columns, one frame on along axis 0 by those of entering [shape=(U, M)]."""
     last, into_last = before[:, before.shape[1] - count :], entering[:, before.shape[1] - count :]
     after = np.empty((len(before), count), before.dtype)
     for i in range(len(before)):
@@ -348,9 +346,7 @@ def _move_to_last(before: Array, stay: Array, onward: Array, entering: Array, co
 
 @compile_to_rounding
 def _move_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
-    """Return joint backward probabilities, moved a frame back along axis 1; ``left``: of leaving last states [shape=(N,
-    U)].
-    """
+    """Return joint backward probabilities a frame back along axis 1; ``left``: of leaving last states [(N, U)]."""
     before, units = np.empty_like(after), left.shape[1]
     inner = after.shape[1] - units
     for i in range(len(after)):

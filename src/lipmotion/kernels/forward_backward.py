@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 LOG_ZERO = -1e30
 """Stands for the log probability -inf: sums and differences of it are no NaN."""
-LEAST_LOG = -700.0
+MIN_LOG = -700.0
 """Probabilities with smaller logarithms are set to 0."""
 LOG_2 = math.log(2)
 
@@ -83,8 +83,8 @@ def chain_posteriors(
 
 
 def _probabilities(log: Array) -> Array:
-    """Return exp of logarithms, which are at most 0 but for rounding; 0 under ``LEAST_LOG``, as denormals are slow."""
-    return np.exp(np.minimum(log, 0, out=log), out=np.zeros_like(log), where=log > LEAST_LOG)
+    """Return exp of logarithms, which are at most 0 but for rounding; 0 under ``MIN_LOG``, as denormals are slow."""
+    return np.exp(np.minimum(log, 0, out=log), out=np.zeros_like(log), where=log > MIN_LOG)
 
 
 @compiled

@@ -8,7 +8,7 @@ Let N be the sum over the states of a frame of forward times backward probabilit
 computed: in the last frame it is 1. From each frame to the one before, and from the first frame to the beginning (whose
 forward probabilities are the initial ones), N changes by
 
-    + what was raised backward, times the forward probabilities: negligible, as these sum to ``MOST_SCALE`` at most
+    + what was raised backward, times the forward probabilities: negligible, as these sum to ``MAX_SCALE`` at most
     − what was raised forward, times the backward probabilities
     − what was lost backward (where blocks are multiplied, or an arc underflows), times the forward probabilities
 
@@ -40,18 +40,18 @@ FRAMES_AT_ONCE = 256
 """Frames whose roots are taken at once: they stay in the cache."""
 LOWEST_ROOT = -80.0
 """Least logarithm of a density's eighth root: exp of less is denormal in single precision, which is slow."""
-LEAST_ROOT = 1.9e-35
+MIN_ROOT = 1.9e-35
 """exp(-80): densities up to its eighth power are set to 0."""
-LEAST_JOINT = 1e-4
+MIN_JOINT = 1e-4
 """Least root of a frame's best joint density, relative to the product of the chains' best ones: where it is less, joint
 densities are computed from sums of logarithms, as factors under e^LOWEST_ROOT may count."""
 LIMITS = {np.dtype(np.float32): (1e-24, 1e-12, 1e-4), np.dtype(np.float64): (1e-140, 1e-100, 1e-10)}
 """By precision: ``least``, ``least_scale`` and ``off`` of ``_forward_backward``."""
-LEAST_POSTERIOR = 1e-12
+MIN_POSTERIOR = 1e-12
 """Smaller posteriors are set to 0."""
 SHARE = 1e-6
 """Shares of a block's sources are set to 0 under this times the least probability: less than what is raised."""
-MOST_SCALE = 1e6
+MAX_SCALE = 1e6
 """Greatest scale of a frame. With a smaller one no share of forward probabilities is set to 0."""
 FRAMES_SUMMED = 256
 """Frames that are summed in the kernel's precision, before they are added in double precision."""
@@ -244,7 +244,7 @@ def _products(
             continue
         roots, bests = zip(*(_roots(log[of_recording]) for log in log_densities), strict=True)
         _fill_joint_roots(np.hstack(roots), shifted, joint[of_recording], best[of_recording])
-        far = start + np.flatnonzero(best[of_recording] < LEAST_JOINT)
+        far = start + np.flatnonzero(best[of_recording] < MIN_JOINT)
         with np.errstate(divide="ignore"):
             best[of_recording] = 8 * np.log(best[of_recording]) + np.sum(bests, axis=0, dtype=np.float64)
         if len(far):
@@ -266,9 +266,7 @@ def _probabilities(log: Array) -> tuple[Array, float]:
 
 
 def _weigh(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
-    """Return the logarithm of the greatest probability of an arc, and the probabilities relative to that, in all forms
-    that the kernels take.
-    """
+    """Return the log of an arc's greatest probability, and all probabilities relative to it, in the kernels' forms."""
     relative, best = _probabilities(arc_log)
     weights = arrange_weights(layout, relative, 0.0)
     return best, weights, _transpose(layout, weights), Chunks.of(layout, weights)
@@ -307,7 +305,7 @@ def _fill_joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, b
     factor, product, tops = np.empty(roots.shape[1], roots.dtype), np.empty(states), np.empty(8)
     for t in range(len(roots)):
         for g in range(len(factor)):
-            factor[g] = roots[t, g] if roots[t, g] > LEAST_ROOT else 0.0
+            factor[g] = roots[t, g] if roots[t, g] > MIN_ROOT else 0.0
         for s in range(states):
             product[s] = factor[columns[0, s]]
         for c in range(1, len(columns)):
@@ -325,7 +323,7 @@ def _fill_joint_roots(roots: Array, columns: NDArray[np.uint32], joint: Array, b
         row = joint[t]
         for s in range(states):
             root = product[s] * scale
-            row[s] = root if root > LEAST_ROOT else 0.0
+            row[s] = root if root > MIN_ROOT else 0.0
 
 
 @compile_to_rounding
@@ -402,7 +400,7 @@ def _forward(
             _forward_runs(alpha, t, runs, run_weight)
             _forward_blocks(alpha, t, blocks, sources, block_weight, leave, room, share, SHARE * least)
         scale[t] = _emit(alpha, density, t, 1 / scale[t - 1] if t > 0 else 1.0, least)
-        if not least_scale < scale[t] < MOST_SCALE:
+        if not least_scale < scale[t] < MAX_SCALE:
             return False
     return True
 
@@ -476,9 +474,7 @@ def _emit(alpha: Array, emission: Array, t: int, scale: float, least: float) -> 
 
 @compile_to_rounding
 def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, scale: float, least: float) -> float:
-    """Replace the densities of a frame by its posteriors, and fill in backward probabilities times densities; return
-    the sum of the posteriors.
-    """
+    """Replace a frame's densities by posteriors, fill in backward probabilities times densities; return their sum."""
     total = 0.0
     for i in range(emission.shape[1]):
         back = np.float64(beta[i])
@@ -486,7 +482,7 @@ def _close(emission: Array, alpha: Array, t: int, beta: Array, onward: Array, sc
         onward[i] = product if product > least else least
         posterior = alpha[t, i] * back
         total += posterior
-        emission[t, i] = posterior if posterior > LEAST_POSTERIOR else 0.0
+        emission[t, i] = posterior if posterior > MIN_POSTERIOR else 0.0
     return total
 
 

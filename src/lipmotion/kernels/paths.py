@@ -319,9 +319,7 @@ def _entries(start: Array, products: Array) -> Array:
 
 
 def _cheapest(ways: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Return the least cost over states before, and which [shapes=(length, C, pieces)], of ways [shape=(length, C, C,
-    pieces)].
-    """
+    """Return the least cost over earlier states, and which [(length, C, pieces)], of ways [(length, C, C, pieces)]."""
     least, which = ways[:, 0].copy(), np.zeros((len(ways), *ways.shape[2:]), np.uint8)
     for state in range(1, ways.shape[1]):
         which[ways[:, state] < least] = state

@@ -239,7 +239,7 @@ def list_recordings(given: Sequence[Path]) -> list[Path]:
 
     Raises InputError: a folder without recordings, or one that cannot be read.
     """
-    from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
+    from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 
     found: list[Path] = []
     for path in given:

@@ -60,7 +60,7 @@ def run_em(
     max_steps: int,
     after_step: Callable[[int, ModelT, StatisticsT], None] = no_report,
     *,
-    least_gain: float = -np.inf,
+    min_gain: float = -np.inf,
     maximise_converged: bool = True,
 ) -> EmResult[ModelT, StatisticsT]:
     """Improve a model by expectation–maximisation (EM).
@@ -69,7 +69,7 @@ def run_em(
     maximise   : the M-step: returns the model that the statistics make most likely
     max_steps : stop after so many steps, 1 or more
     after_step : is called after every step with its number (from 1), the new model, and the statistics of the step
-    least_gain : stop at the first step whose E-step finds a mean log likelihood per frame that is higher by less than
+    min_gain : stop at the first step whose E-step finds a mean log likelihood per frame that is higher by less than
                  this than that of the step before; -inf: always take ``max_steps`` steps
     maximise_converged : whether the step at which EM stops for want of gain still has its M-step; without it, that step
                  is not reported to ``after_step``
@@ -79,7 +79,7 @@ def run_em(
     for step in range(1, max_steps + 1):
         statistics = expect(model)
         log_likelihoods.append(statistics.mean_log_likelihood)
-        converged = step > 1 and log_likelihoods[-1] - log_likelihoods[-2] < least_gain
+        converged = step > 1 and log_likelihoods[-1] - log_likelihoods[-2] < min_gain
         if not converged or maximise_converged:
             model = maximise(model, statistics)
             after_step(step, model, statistics)

@@ -29,9 +29,7 @@ MIN_WEIGHT, MAX_WEIGHT = 0.5, 1.5
 
 @dataclass(frozen=True, eq=False)
 class Mixtures:
-    """G mixtures of M diagonal Gaussians: log weights [shape=(G, M)], -inf if unused, means and variances [shape=(G, M,
-    D)].
-    """
+    """G mixtures of M diagonal Gaussians: log weights [(G, M)], -inf: unused; means and variances [(G, M, D)]."""
 
     log_weights: NDArray[np.float32]
     means: NDArray[np.float32]
@@ -97,10 +95,7 @@ class Mixtures:
         return self.responsibilities(density, x, weights).T @ with_squares(x)
 
     def set_from_statistics(
-        self,
-        densities: NDArray[np.intp],
-        sums: NDArray[np.floating[Any]],
-        floor: NDArray[np.floating[Any]],
+        self, densities: NDArray[np.intp], sums: NDArray[np.floating[Any]], floor: NDArray[np.floating[Any]]
     ) -> None:
         """Set weights, means and variances of densities, in place, to the maximum-likelihood estimates of statistics.
 
@@ -143,9 +138,7 @@ class Mixtures:
     def responsibilities(
         self, density: int, x: NDArray[np.float32], weights: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Return the posteriors of the components of a density, times its own [shape=(N, M)]; arguments as of
-        ``component_sums``.
-        """
+        """Return posteriors of a density's components, times its own [shape=(N, M)]; arguments: ``component_sums``."""
         components = self.log_components(x, np.array([density]))[:, 0]
         components -= components.max(axis=1, keepdims=True)
         posterior = np.exp(components)

@@ -75,9 +75,7 @@ class SequenceNetwork(ABC):
 
     @abstractmethod
     def forward(self, inputs: Array, inside: NDArray[np.bool_], dropout: Dropout | None) -> tuple[Array, Any]:
-        """Return the last hidden layer of a batch [shape=(B, T, H)], and what ``backward`` needs; ``inside``: before
-        each end.
-        """
+        """Return a batch's last hidden layer [(B, T, H)], and what ``backward`` needs; ``inside``: before each end."""
 
     @abstractmethod
     def backward(self, slope: Array, passed: Any) -> list[Array]:

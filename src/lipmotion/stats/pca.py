@@ -27,9 +27,7 @@ CONSTANT = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Pca:
-    """The affine space of principal components: mean [shape=(D,)], orthonormal rows [shape=(K, D)], most variance
-    first.
-    """
+    """Space of principal components: mean [shape=(D,)], orthonormal rows [shape=(K, D)], by falling variance."""
 
     mean: NDArray[np.float64]
     basis: NDArray[np.float64]

@@ -32,7 +32,7 @@ else:
 
 LOCK = f"{TEMPORARY}lock"
 """The file that a process locks while it works on a folder."""
-BRIEF = "lipmotion-"
+FOLDER_PREFIX = "lipmotion-"
 """Prefix of folders in the system's place for temporary files."""
 UNFINISHED = ".unfinished"
 """Suffix of a folder of unfinished work, after the name of the file that the work is for."""
@@ -132,7 +132,7 @@ def open_temporary() -> Iterator[Path]:
     Those that killed runs have left there are removed first: nobody holds their locks.
     """
     place = Path(tempfile.gettempdir())
-    for left in place.glob(f"{BRIEF}*/{LOCK}"):
+    for left in place.glob(f"{FOLDER_PREFIX}*/{LOCK}"):
         with suppress(ExportError, OSError), confine(place):  # it is in use, or another user's
             with lock_folder(left.parent):
                 for path in left.parent.iterdir():
@@ -141,7 +141,7 @@ def open_temporary() -> Iterator[Path]:
             left.parent.rmdir()
     with ExitStack() as kept:
         for is_last in (False, False, True):
-            folder = Path(tempfile.mkdtemp(prefix=BRIEF))
+            folder = Path(tempfile.mkdtemp(prefix=FOLDER_PREFIX))
             kept.callback(shutil.rmtree, folder, ignore_errors=True)
             try:
                 kept.enter_context(lock_folder(folder))

@@ -21,6 +21,10 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.types.values import parse_clock
 
 LOG = logging.getLogger("lipmotion")
+AUDIO_SUFFIXES = frozenset(f".{name}" for name in "aac aif aiff flac m4a mp3 oga ogg opus wav wma".split())
+VIDEO_SUFFIXES = frozenset(
+    f".{name}" for name in "3gp avi flv m2ts m4v mkv mov mp4 mpeg mpg mts mxf ogv ts vob webm wmv".split()
+)
 
 
 @dataclass(frozen=True)

@@ -109,10 +109,10 @@ def sort_moods(keys: Sequence[MoodKey]) -> tuple[MoodKey, ...]:
     return tuple(latest[place] for place in sorted(latest))
 
 
-MOST_INTENSITY = 3.0
-MOST_ANTICIPATION_MS = 1000.0
-MOST_HOLD_MS = 10_000.0
-MOST_OFFSET_MS = 600_000.0
+MAX_INTENSITY = 3.0
+MAX_ANTICIPATION_MS = 1000.0
+MAX_HOLD_MS = 10_000.0
+MAX_OFFSET_MS = 600_000.0
 USUAL_HOLD_MS = 2000 / 24
 """Held poses last as long as two frames of an animation at 24 frames a second, if nothing else is asked for."""
 
@@ -140,25 +140,25 @@ class Delivery(Configuration):
     """
 
     intensity: float = option(
-        1.0, Rule(0, most=MOST_INTENSITY), metavar="X", help="movements of the mouth X times as large, 0 to 3"
+        1.0, Rule(0, most=MAX_INTENSITY), metavar="X", help="movements of the mouth X times as large, 0 to 3"
     )
     anticipation_ms: float = option(
         0.0,
-        Rule(-MOST_ANTICIPATION_MS, most=MOST_ANTICIPATION_MS, unit=" ms"),
+        Rule(-MAX_ANTICIPATION_MS, most=MAX_ANTICIPATION_MS, unit=" ms"),
         what="anticipation",
         metavar="N",
         help="the mouth moves N ms before the sound",
     )
     offset_ms: float = option(
         0.0,
-        Rule(-MOST_OFFSET_MS, most=MOST_OFFSET_MS, unit=" ms"),
+        Rule(-MAX_OFFSET_MS, most=MAX_OFFSET_MS, unit=" ms"),
         what="offset",
         metavar="N",
         help="everything in motion, label and cue files comes N ms later; negative: earlier",
     )
     min_hold_ms: float = option(
         0.0,
-        Rule(0, most=MOST_HOLD_MS, unit=" ms"),
+        Rule(0, most=MAX_HOLD_MS, unit=" ms"),
         what="least hold",
         metavar="N",
         help="hold every pose for at least N ms",

@@ -70,9 +70,7 @@ def list_recognised_phones(units: Timeline[Unit]) -> list[RecognisedPhone]:
 
 
 def restore_confidences(units: Timeline[Unit], recognised: Iterable[RecognisedPhone]) -> Timeline[Unit]:
-    """Return phones in time in which those that are still as recognised (``list_recognised_phones``) have their
-    confidence.
-    """
+    """Return phones in time; those still as recognised (``list_recognised_phones``) have their confidence."""
     confidence_of = {phone[:3]: phone.confidence for phone in recognised}
     return Timeline(
         tuple(

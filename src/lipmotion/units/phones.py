@@ -147,11 +147,7 @@ def is_silent(phone: str) -> bool:
 
 
 def mark_closing_phones(units: Timeline[Unit]) -> list[bool]:
-    """Return for each phone in time whether the lips meet in it. The rule of every part that closes lips:
-
-    contact (``articulation.contact``), lips and tongue by phones (``articulation.phone_targets``), breaths in pauses,
-    the closures of engines (``motion.closure``), cues (``export.cues``).
-    """
+    """Return for each phone whether the lips meet in it: the one rule for contact, gestures, breaths and cues."""
     return [span.label.phone in LIP_CLOSING for span in units]
 
 

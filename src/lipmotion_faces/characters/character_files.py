@@ -14,22 +14,28 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.lip_placement import (
+from lipmotion.meshes.model.face_shapes import FaceShapes, LipPlacement, group_by_name, measure_lip_parting
+from lipmotion.meshes.model.mesh import JAW, MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart, Texture
+from lipmotion.meshes.model.rig_tables import read_character_table, with_sources
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, find_spoken_name, is_known, to_arkit
+from lipmotion.storage.sources import check_kind, is_file
+from lipmotion_faces.characters.binding import (
+    BINDING_SUFFIX,
+    bind,
+    load_binding,
+    paint_weights,
+    read_points,
+    read_weights,
+)
+from lipmotion_faces.characters.file_limits import Budget
+from lipmotion_faces.characters.gltf_scene import read_gltf
+from lipmotion_faces.characters.lip_placement import (
     find_opening_shape,
     place_lips_by_points,
     place_lips_by_shape,
     separate_named_lips,
 )
-from lipmotion.meshes.model.binding import bind, paint_weights
-from lipmotion.meshes.model.face_shapes import find_face_shapes
-from lipmotion.meshes.model.mesh import JAW, MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart, Texture
-from lipmotion.meshes.model.rig_tables import read_character_table, with_sources
-from lipmotion.meshes.model.shape_names import is_known
-from lipmotion.meshes.model.surface import build_surface
-from lipmotion.storage.sources import check_kind, is_file
-from lipmotion_faces.characters.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
-from lipmotion_faces.characters.file_limits import Budget
-from lipmotion_faces.characters.gltf_scene import read_gltf
+from lipmotion_faces.characters.surface import build_surface
 from lipmotion_faces.characters.textures import read_texture
 
 NEUTRAL = "neutral"
@@ -371,3 +377,72 @@ def load_character(
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from error
+
+
+MIN_DISPLACEMENT = 0.02
+"""A blendshape that moves no lip point by this many eye distances is none of the mouth."""
+MAX_SHAPES = 200
+
+
+def find_face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
+    """Return the blendshapes of a mesh that move the mouth.
+
+    Visemes and vowels, where a table says what follows them; ARKit's, where the mesh has ``jawOpen`` and five more of
+    them; otherwise eight visemes or three vowels; otherwise all that move lip points. Blendshapes that a table lets
+    follow one curve are one of these shapes, by the name of the first.
+    One motion parts the lips by the same length on all heads that are as high as people's, however wide their mouths.
+    Raises InputError: none moves the mouth, or a table lets some follow visemes and others ``jawOpen``.
+    """
+    moved = placement.to_motion(mesh.displacements(placement.vertices))
+    strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > MIN_DISPLACEMENT
+    shapes, style = _choose_mouth(mesh, strong)
+    if not shapes:
+        there = shorten(", ".join(mesh.shape_names)) or "none"
+        raise InputError(f"no blendshape moves the mouth; the mesh has {there}. Drive it by control points")
+    if len(shapes) > MAX_SHAPES:
+        raise InputError(
+            f"{len(shapes)} blendshapes move the mouth, required at most {MAX_SHAPES}; leave some empty in its table "
+            "(docs/meshes.md)"
+        )
+    names = tuple(mesh.shape_names[numbers[0]] for _, numbers in shapes)
+    gap = measure_lip_parting(mesh, placement)
+    return FaceShapes(
+        names,
+        tuple(known for known, _ in shapes),
+        np.stack([moved[numbers].sum(axis=0) for _, numbers in shapes]),
+        np.array([gap[numbers].sum() for _, numbers in shapes]),
+        style,
+    )
+
+
+def _choose_mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str, list[int]]], str]:
+    """Return the known names of the shapes of the mouth with their blendshapes, and their style."""
+    spoken = group_by_name(mesh, find_spoken_name)
+    arkit = {
+        known: numbers
+        for known, numbers in group_by_name(mesh, to_arkit).items()
+        if known in ARKIT_MOUTH and len(mesh.shapes[numbers[0]].rows)
+    }
+    jaw = arkit.get("jawOpen", [])
+    stated = [known for known, numbers in spoken.items() if mesh.shapes[numbers[0]].source]
+    if stated and any(mesh.shapes[number].source for number in jaw):
+        raise InputError(
+            f"its table has jawOpen and {stated[0].removeprefix('vowel_')}; leave the sources of one kind empty"
+        )
+    if stated:
+        return [(known, spoken[known]) for known in stated], "visemes"
+    if strong[jaw].any() and len(arkit) > 5:
+        return list(arkit.items()), "arkit"
+    for kind, enough in (("viseme_", 8), ("vowel_", 3)):
+        those = {
+            known: numbers
+            for known, numbers in spoken.items()
+            if known.startswith(kind) and (strong[numbers].any() or known == "viseme_PP")
+        }
+        if len(those) >= enough:
+            return list(those.items()), "visemes"
+    moving = [(known, numbers) for known, numbers in arkit.items() if strong[numbers].any()]
+    named = {number for _, numbers in moving for number in numbers}
+    others = [number for number in np.flatnonzero(strong).tolist() if mesh.shapes[number].called]
+    moving += [("", [number]) for number in others if number not in named]
+    return sorted(moving, key=lambda each: each[1]), "own"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.model.mesh import find_bone_kind
+from lipmotion.meshes.model.mesh import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE
 from lipmotion.storage.files import atomic_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types.values import (
@@ -454,3 +455,23 @@ def place_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
         placed[number] = PlacedNode(matrix, kinds)
         waiting += [(child, placed[number], depth + 1) for child in node.get("children", [])]
     return placed
+
+
+_SIDES = {"l": LEFT_EYE, "left": LEFT_EYE, "r": RIGHT_EYE, "right": RIGHT_EYE}
+_ENDS = {"top", "end", "nub", "tip", "target", "ctrl"}
+
+
+def find_bone_kind(name: str) -> str | None:
+    """Return which bone of the head a name stands for, or None: ``mixamorig:Head``, ``J_Bip_C_Neck``, ``JawBone``.
+
+    >>> find_bone_kind("J_Adj_L_FaceEye"), find_bone_kind("CC_Base_JawRoot"), find_bone_kind("HeadTop_End")
+    ('leftEye', 'jaw', None)
+    """
+    words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)]
+    words = [re.sub(r"^mixamorig", "", word) or word for word in words]
+    plain = {re.sub(r"(bone|root|joint)$", "", word) or word for word in words}
+    if plain & _ENDS:
+        return None
+    if plain & {"eye", "eyeball"}:
+        return next((_SIDES[word] for word in words if word in _SIDES), None)
+    return next((kind for kind in (JAW, HEAD, NECK) if kind in plain), None)

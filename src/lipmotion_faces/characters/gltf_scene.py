@@ -6,7 +6,7 @@ Source: the specifications of VRM 0.x (glTF extension ``VRM``) and VRM 1.0 (``VR
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,17 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.meshes.model.mesh import (
-    OPAQUE,
-    Blendshape,
-    Bone,
-    Material,
-    Mesh,
-    MeshPart,
-    PartNames,
-    Texture,
-    merge_bones,
-)
+from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Bone, Material, Mesh, MeshPart, Texture
 from lipmotion_faces.characters.gltf_document import (
     COMPONENTS,
     LARGEST_NUMBER,
@@ -436,3 +426,35 @@ def _build_expression_shapes(
 
 def _read_bind(mesh: int, bind: Mapping[str, float], full: float) -> Bind:
     return mesh, int(bind["index"]), min(max(bind["weight"] / full, 0.0), 1.0)
+
+
+def merge_bones(bones: Iterable[Bone]) -> tuple[Bone, ...]:
+    """Return one bone of each kind: its vertices are those of all bones of this kind, its place that of the first."""
+    by_kind: dict[str, list[Bone]] = {}
+    for bone in bones:
+        if len(bone.rows):
+            by_kind.setdefault(bone.kind, []).append(bone)
+    merged = []
+    for kind, same in by_kind.items():
+        rows, inverse = np.unique(np.concatenate([bone.rows for bone in same]), return_inverse=True)
+        shares = np.zeros(len(rows))
+        np.maximum.at(shares, inverse.reshape(-1), np.concatenate([bone.shares for bone in same]))
+        merged.append(Bone(kind, same[0].place, rows, shares))
+    return tuple(merged)
+
+
+class PartNames:
+    """Gives parts names that no other part has."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {}
+
+    def unused(self, owner: str, material: str) -> str:
+        """Return the name of the owner, with that of the material where it is taken, and a number where both are."""
+        both = f"{owner} {material}".strip()
+        name = owner if owner not in self._numbers else both
+        while name in self._numbers:
+            self._numbers[both] += 1
+            name = f"{both} {self._numbers[both]}"
+        self._numbers[name] = 1
+        return name

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
 from lipmotion.formats.steady_rate import choose_columns, exact_rate
-from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, find_bone_kind, find_head_angles
+from lipmotion.meshes.model.mesh import ANGLES, HEAD, NECK, find_head_angles
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, find_spoken_name, to_arkit
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.delivery import MOODS
@@ -28,6 +28,7 @@ from lipmotion_faces.characters.gltf_document import (
     GltfArrays,
     GltfDocument,
     clean_name,
+    find_bone_kind,
     place_nodes,
     read_gltf_document,
 )
@@ -102,6 +103,25 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """
     document = read_gltf_document(path)
     arrays = GltfArrays(document)
+    animation, tracks = _choose_animation(document, arrays, path)
+    turns = _read_turns(document, arrays, animation)
+    longest = max(tracks, key=lambda track: len(track.time_s))
+    end_s = max(float(track.time_s[-1]) for track in tracks)
+    hertz = _find_rate(longest.time_s)
+    count = int(np.floor(end_s * hertz + ROUNDING_FRAMES)) + 1
+    document.budget.spend("numbers", count * sum(len(track.names) for track in tracks))
+    time_s = np.arange(count) / hertz
+    curves = _sample_weights(tracks, time_s)
+    channels = [Channel(name, WEIGHT) for name in curves]
+    if turns:
+        angles = np.unwrap(find_head_angles(_turn_head(document, turns, time_s)), axis=0)
+        curves |= dict(zip(ANGLES, angles.T, strict=True))
+        channels += [Channel(name, RADIAN) for name in ANGLES]
+    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels)), Timeline(())
+
+
+def _choose_animation(document: GltfDocument, arrays: GltfArrays, path: Path) -> tuple[dict[str, Any], list[_Track]]:
+    """Return the first animation that moves a mouth, or else a face, and its tracks; warn of others."""
     animations = [
         (each, tracks) for each in document.get("animations") if (tracks := list(_read_tracks(document, arrays, each)))
     ]
@@ -113,24 +133,16 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
         mouth = [find_spoken_name(name) is not None or to_arkit(name) in ARKIT_MOUTH for name in track.names]
         return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
 
-    animation, tracks = next((each for each in animations if any(map(moves_mouth, each[1]))), animations[0])
+    which = next((n for n, (_, tracks) in enumerate(animations) if any(map(moves_mouth, tracks))), 0)
     if len(animations) > 1:
         named = [clean_name(each.get("name", "")) or "without a name" for each, _ in animations]
-        which = [each is animation for each, _ in animations].index(True)
         listed = ", ".join(named)
         LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(named), listed, named[which])
-    turns: dict[str, tuple[int, _Track]] = {}  # of the first neck and the first head, with the numbers of their nodes
-    for number, target, sampler in _list_targets(document, animation):
-        kind = find_bone_kind(document.get("nodes")[number].get("name", ""))
-        if target == "rotation" and kind in TURNING and kind not in turns:
-            turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
-    ordered = dict(turns[kind] for kind in TURNING if kind in turns)
-    longest = max(tracks, key=lambda track: len(track.time_s))
-    end_s = max(float(track.time_s[-1]) for track in tracks)
-    hertz = _find_rate(longest.time_s)
-    count = int(np.floor(end_s * hertz + ROUNDING_FRAMES)) + 1
-    document.budget.spend("numbers", count * sum(len(track.names) for track in tracks))
-    time_s = np.arange(count) / hertz
+    return animations[which]
+
+
+def _sample_weights(tracks: list[_Track], time_s: Array) -> dict[str, Array]:
+    """Return the weights at some times by the names of their targets; of one name those that move most."""
     every = [
         (known, curve)
         for track in tracks
@@ -138,13 +150,17 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
         for known in KNOWN_AS.get(name, (name,))
     ]
     columns = choose_columns([to_arkit(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
-    curves = dict(every[column] for column in columns)
-    channels = [Channel(name, WEIGHT) for name in curves]
-    if ordered:
-        angles = np.unwrap(find_head_angles(_turn_head(document, ordered, time_s)), axis=0)
-        curves |= dict(zip(ANGLES, angles.T, strict=True))
-        channels += [Channel(name, RADIAN) for name in ANGLES]
-    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels)), Timeline(())
+    return dict(every[column] for column in columns)
+
+
+def _read_turns(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> dict[int, _Track]:
+    """Return the rotations of the first neck and the first head, in this order, by the numbers of their nodes."""
+    turns: dict[str, tuple[int, _Track]] = {}
+    for number, target, sampler in _list_targets(document, animation):
+        kind = find_bone_kind(document.get("nodes")[number].get("name", ""))
+        if target == "rotation" and kind in TURNING and kind not in turns:
+            turns[kind] = number, _track(arrays, sampler, QUATERNION, 4)
+    return dict(turns[kind] for kind in TURNING if kind in turns)
 
 
 def _turn_head(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) -> Array:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.surface import build_surface, compute_normals, drop_back_sides
 from lipmotion.types import Motion
+from lipmotion_faces.characters.surface import build_surface, compute_normals, drop_back_sides
 
 Array = NDArray[np.float64]
 

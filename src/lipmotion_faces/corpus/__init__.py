@@ -1,1 +1,1 @@
-"""Corpora from videos: tracking, division of long recordings."""
+"""Corpora from recordings: finding them in folders, tracking, division of long ones."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.errors import CorpusError
 from lipmotion.pipeline.training.prompts import pronounce_sentences, read_corpus_phones
 from lipmotion.printable import printable

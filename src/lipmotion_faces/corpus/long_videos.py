@@ -13,8 +13,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.folder import LRS, VIDEO_KINDS
-from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import find_labels
 from lipmotion.speech.sound.audio_files import read_audio
@@ -22,6 +20,8 @@ from lipmotion.speech.sound.pauses import find_quietest, list_spans, measure_lev
 from lipmotion.storage.sources import list_video, open_media, read_duration
 from lipmotion.types import Audio, Monitor, Progress, TimedTranscript
 from lipmotion.units.written_forms import list_readings
+from lipmotion_faces.corpus.folder import LRS, VIDEO_KINDS
+from lipmotion_faces.corpus.source_recordings import LISTS, RecordingFolder, SourceRecording
 from lipmotion_faces.corpus.supplied import align_sound, separate_sound
 from lipmotion_faces.tracking.track import VideoScan, scan_video
 

@@ -15,9 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.folder import discover
-from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording, add_separate_sounds
-from lipmotion.corpora.store import UTTERANCES, Corpus, quantise, read_entry, write_utterance
+from lipmotion.corpora import UTTERANCES, Corpus, quantise, read_entry, write_utterance
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.extensions import find_version
 from lipmotion.pipeline.workers import open_workers, process_count
@@ -25,11 +23,13 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import confine, make_portable
 from lipmotion.storage.locks import lock_folder, remove_unfinished
-from lipmotion.storage.sources import Source, check_apart, hash_file, is_folder
+from lipmotion.storage.sources import VIDEO_SUFFIXES, Source, check_apart, hash_file, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
 from lipmotion_faces.corpus import supplied
+from lipmotion_faces.corpus.folder import discover
 from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, divide_long_videos, wrap_video
+from lipmotion_faces.corpus.source_recordings import RecordingFolder, SourceRecording, add_separate_sounds
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged
 from lipmotion_faces.tracking.frames import VideoSpan
 from lipmotion_faces.tracking.track import UNSEEN_LIMIT, track

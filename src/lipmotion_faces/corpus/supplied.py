@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lipmotion.corpora.captured_faces import MESH, list_mesh_files, read_bare_motion, read_mesh_motion
-from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.formats.base import read_motion
 from lipmotion.formats.tables import is_live_link_file, read_curve_table, read_speech_curves
@@ -21,7 +19,9 @@ from lipmotion.storage.sources import hash_file
 from lipmotion.types import Audio, Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
 from lipmotion.units.phones import SHORT_PAUSE_S
+from lipmotion_faces.corpus.captured_faces import MESH, list_mesh_files, read_bare_motion, read_mesh_motion
 from lipmotion_faces.corpus.sound_offset import measure_offset
+from lipmotion_faces.corpus.source_recordings import MotionFile, SourceRecording
 
 DIGESTS = ("sha256", "motion_sha256", "phones_sha256", "recorder_sha256")
 """Keys of the digests in the source of an utterance; if a digest changes, the recording is prepared again."""

@@ -12,9 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.folder import discover
-from lipmotion.corpora.source_recordings import SourceRecording, filter_videos
-from lipmotion.corpora.store import MANIFEST, Corpus, read_entry
+from lipmotion.corpora import MANIFEST, Corpus, read_entry
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.workers import open_workers, process_count
@@ -26,6 +24,8 @@ from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion_faces.appearance import lower_face
 from lipmotion_faces.appearance.person import FootagePictures, learn_appearance
 from lipmotion_faces.appearance.placing import cut
+from lipmotion_faces.corpus.folder import discover
+from lipmotion_faces.corpus.source_recordings import SourceRecording, filter_videos
 from lipmotion_faces.film.background import find_best_background, find_chin
 from lipmotion_faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion_faces.tracking.damaged_pictures import describe_damage, find_damaged

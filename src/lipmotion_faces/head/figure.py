@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from lipmotion.articulation.contact import smooth_step
-from lipmotion.meshes.model.surface import compute_normals
 from lipmotion_faces.base import rotate_head
+from lipmotion_faces.characters.surface import compute_normals
 from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.head import eyes, inside, palette
 from lipmotion_faces.head.part import EYE, MIDDLE, Part, find_around, join, make_grid, make_part, make_tube, to_head

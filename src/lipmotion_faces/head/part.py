@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.meshes.model.surface import compute_normals
+from lipmotion_faces.characters.surface import compute_normals
 from lipmotion_faces.characters.textures import decode_srgb
 from lipmotion_faces.rendering.lighting import Finish
 

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import Delaunay, cKDTree
 
 from lipmotion.articulation.contact import MIN_GAP, smooth_step
-from lipmotion.meshes.model.surface import compute_normals
+from lipmotion_faces.characters.surface import compute_normals
 from lipmotion_faces.head.eyes import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion_faces.head.part import MIDDLE, MOUTH_Y, find_around, find_front, find_outward, to_head
 from lipmotion_faces.head.pose import CharacterPose

@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.meshes.model.rig_tables import find_table, read_rig_table, write_rig_table
     from lipmotion.pipeline.job import open_character
     from lipmotion.storage.sources import is_file
-    from lipmotion_faces.characters.binding_files import save_binding, write_points, write_weights
+    from lipmotion_faces.characters.binding import save_binding, write_points, write_weights
     from lipmotion_faces.characters.calibration import describe_character
     from lipmotion_faces.characters.character_files import read_character
 

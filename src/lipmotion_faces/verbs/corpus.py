@@ -81,7 +81,7 @@ def run_prepare(options: argparse.Namespace) -> None:
 
 def run_info(options: argparse.Namespace) -> None:
     """Print the summary of ``lipmotion.Corpus``, and by how much its sound is late."""
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion_faces.corpus.sync import measure_offsets
 
     corpus = Corpus.open(options.corpus)
@@ -92,7 +92,7 @@ def run_info(options: argparse.Namespace) -> None:
 
 def run_motion(options: argparse.Namespace) -> None:
     """Write the tracked motion of every recording of a list as ``FOLDER/NAME.json``."""
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.formats.base import write_motion
     from lipmotion.pipeline.outputs.motion_files import as_generation
     from lipmotion.storage.files import make_folder
@@ -112,7 +112,7 @@ def run_motion(options: argparse.Namespace) -> None:
 
 def run_sync(options: argparse.Namespace) -> None:
     """Call ``lipmotion_faces.corpus.sync.remove_offsets``; print by how much the sound was moved."""
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion_faces.corpus.sync import remove_offsets
 
     corpus = Corpus.open(options.corpus)
@@ -134,7 +134,7 @@ def run_offset(options: argparse.Namespace) -> None:
 
 def run_prompts(options: argparse.Namespace) -> None:
     """Call ``prompts`` and print the sentences, each with the phones and diphones covered so far."""
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.pipeline.training.prompts import prompts
     from lipmotion.units import Lexicon
 
@@ -155,7 +155,7 @@ def run_prompts(options: argparse.Namespace) -> None:
 
 def run_coverage(options: argparse.Namespace) -> None:
     """Call ``measure_coverage`` and print it."""
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.units import Lexicon
     from lipmotion_faces.corpus.coverage import coverage_to_json, format_coverage, measure_coverage
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora import Corpus, Selection
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.measures import curves
 from lipmotion.measures.closures import clip_closure_counts, measure_closures, measure_phones

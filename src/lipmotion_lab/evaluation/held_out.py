@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora import Corpus, Selection
 from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves

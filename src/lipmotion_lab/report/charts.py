@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.formats.web_page import Html, element
+from lipmotion_lab.report.html import Html, element
 
 WIDTH, LEFT, RIGHT = 360, 8, 12
 """Width of a drawing, and its margins: on a telephone a unit is about a pixel."""

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from PIL.Image import Resampling
 
-from lipmotion.corpora.store import Corpus
-from lipmotion.formats.web_page import Html, build_page, element, joined
+from lipmotion.corpora import Corpus
 from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
@@ -23,6 +22,7 @@ from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
 from lipmotion_lab.evaluation.evaluate import BILABIAL
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
 from lipmotion_lab.report.charts import add_caption, draw_curve
+from lipmotion_lab.report.html import Html, build_page, element, joined
 from lipmotion_lab.report.section import Section, write_text
 
 FPS = 25.0

@@ -11,11 +11,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from lipmotion.corpora.source_recordings import SPLITS
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import SPLITS, Corpus
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
-from lipmotion.formats.web_page import GENERATOR
 from lipmotion.pipeline.model import GEOMETRY
 from lipmotion.pipeline.training.labels import fingerprint_training
 from lipmotion.storage import files, locks
@@ -28,6 +26,7 @@ from lipmotion_lab.engine_comparison import compare_engines
 from lipmotion_lab.folds import FOLDS, cross_validate
 from lipmotion_lab.learning_curve import run_learning_curve
 from lipmotion_lab.minnis2000 import run_minnis2000
+from lipmotion_lab.report.html import GENERATOR
 from lipmotion_lab.report.page import ClipKeeper, FinishedPart, write_html, write_videos
 from lipmotion_lab.report.section import Section, write_text
 from lipmotion_lab.report.sections import (

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lipmotion.formats.web_page import Html, element, joined
-from lipmotion.measures.evaluation_table import format_figure
 from lipmotion.printable import printable
 from lipmotion.storage.files import atomic_file, make_folder
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.text_table import as_field
 from lipmotion_lab.evaluation.evaluate import find_sign, mark_significance
+from lipmotion_lab.evaluation.table import format_figure
+from lipmotion_lab.report.html import Html, element, joined
 
 INTERVAL, DIFFERENCE = "_95", "_gain_95"
 """Endings of the keys under which a row has the interval of a figure, and that of its difference from a reference."""

@@ -23,7 +23,7 @@ from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 
 if TYPE_CHECKING:
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
     from lipmotion_lab.runner import ExperimentSettings
@@ -70,7 +70,7 @@ def run_experiment(
     ``work`` is a folder of finished parts, from which a second run goes on; None without an output, and not
     ``has_parts``. With ``--quick`` the corpus is ``runner.take_quick_part``, the same recordings for all experiments.
     """
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.storage.locks import keep_unfinished
     from lipmotion_lab.folds import cross_validate_blocks
     from lipmotion_lab.report.report import PARTS
@@ -133,7 +133,7 @@ def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentPar
 
 
 def _run_learning_curve(options: argparse.Namespace) -> None:
-    from lipmotion.corpora.source_recordings import read_names
+    from lipmotion_faces.corpus.source_recordings import read_names
     from lipmotion_lab.learning_curve import run_learning_curve
 
     def run(corpus: Corpus, **others: Any) -> dict[str, Any]:
@@ -188,9 +188,9 @@ def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def _run_xieliu2007(options: argparse.Namespace) -> None:
-    from lipmotion.corpora.source_recordings import read_names
     from lipmotion.errors import InputError
     from lipmotion.pipeline.training.other_speakers import synthesise_others
+    from lipmotion_faces.corpus.source_recordings import read_names
     from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, run_xieliu2007
     from lipmotion_lab.xie_liu2007.systems import BLSTM, REFERENCE_SYSTEM
 
@@ -269,7 +269,7 @@ def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 def run_all(options: argparse.Namespace) -> None:
     """Call ``write_report``; print what was found, and the page. Raises the error of an experiment that failed."""
     from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.units import Lexicon
     from lipmotion_lab.report.report import describe_error, write_report
     from lipmotion_lab.runner import ExperimentSettings

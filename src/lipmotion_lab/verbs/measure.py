@@ -27,8 +27,8 @@ def add_compare(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
 
 def run_compare(options: argparse.Namespace) -> None:
     """Call ``lipmotion.compare`` and print its figures."""
-    from lipmotion.measures.evaluation_table import format_comparison
     from lipmotion_lab.compare import compare
+    from lipmotion_lab.evaluation.table import format_comparison
 
     report_figures(
         options, lambda _, monitor: compare(options.reference, *options.others, monitor=monitor), format_comparison
@@ -49,12 +49,12 @@ def add_evaluate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 def run_evaluate(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
-    from lipmotion.corpora.store import Corpus, Selection
-    from lipmotion.measures.evaluation_table import format_figures
+    from lipmotion.corpora import Corpus, Selection
     from lipmotion.pipeline.model import load_model
     from lipmotion.types import Monitor
     from lipmotion.units import Lexicon
     from lipmotion_lab.evaluation.evaluate import evaluate
+    from lipmotion_lab.evaluation.table import format_figures
 
     selection = Selection(list_or_all(options.split), tuple(options.speaker))
 
@@ -94,7 +94,7 @@ def add_league(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
 def run_league(options: argparse.Namespace) -> None:
     """Call ``run_rivals``, write its page, and print its table."""
     from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.storage.locks import lock_folder
     from lipmotion_lab.league import describe_league, run_rivals, write_league
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.conversion.em_conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine

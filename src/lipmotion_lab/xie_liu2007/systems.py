@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines import Animator, engine_named
 from lipmotion.engines.coupled.arrays import coupled_to_arrays
 from lipmotion.engines.coupled.chains.structures import HMM, SYSTEMS, UNSEEN_LOSS

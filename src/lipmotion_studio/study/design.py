@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import find_version
 from lipmotion.formats.base import list_read_suffixes
@@ -22,7 +21,7 @@ from lipmotion.pipeline.outputs.output import write
 from lipmotion.pipeline.request import Outputs, Request
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import replace_folder
-from lipmotion.storage.sources import has_video, hash_file, open_media, read_text_file
+from lipmotion.storage.sources import VIDEO_SUFFIXES, has_video, hash_file, open_media, read_text_file
 from lipmotion.types import Audio, Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
 from lipmotion_faces.tracking.track import read_video_frames

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import install_command
-from lipmotion.formats.web_page import find_colour
+from lipmotion.pipeline.batch.report import insert_colours
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -89,5 +89,5 @@ def read_page(folder: Traversable, before: str = "") -> Iterator[tuple[str, tupl
         elif kind is not None:
             content = each.read_bytes()
             if each.name.endswith(".css"):
-                content = find_colour(content.decode("utf-8")).encode()
+                content = insert_colours(content.decode("utf-8")).encode()
             yield f"{before}{each.name}", (content, kind)

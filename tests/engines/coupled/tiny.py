@@ -6,7 +6,7 @@ import numpy as np
 
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, StreamGroup
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product, create_transitions, reachable
+from lipmotion.engines.coupled.chains.product import Grammar, JointState, Product, create_transitions, find_reachable
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.units import PHONES, UnitSet
@@ -47,7 +47,7 @@ def joint_product(of: Structure, seed=0) -> Product:
     """The product of chains; without a limit of asynchrony all of their joint states, each chain on its own."""
     own = grammar(of, seed)
     if of.limit is not None:
-        return reachable(of, own)
+        return find_reachable(of, own)
     steps = [(np.eye(count), np.eye(count, k=1)) for count in of.state_counts]
     for bigram, (_, moving) in zip(own.bigrams, steps, strict=True):
         moving[of.states - 1 :: of.states] = 0

@@ -20,7 +20,7 @@ from engines.selection.drawn_units import (
 from lipmotion.engines import create_engine, engine_named
 from lipmotion.engines.selection import concatenation, windows
 from lipmotion.engines.selection import costs as search
-from lipmotion.engines.selection.concatenation import concatenated, to_pieces
+from lipmotion.engines.selection.concatenation import join_pieces, to_pieces
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE, select
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.windows import list_windows
@@ -118,7 +118,7 @@ def test_units_overlap_where_table_1_says() -> None:
                 assert [piece.join for piece in pieces[1:]] == [kind]
                 middle_s = PHONE_S * (1 + share)
                 assert pieces[1].start_s == pytest.approx(middle_s), (before, after)
-                motion = concatenation.concatenated(costs.inventory, target, pieces, 61)[:, 0]
+                motion = concatenation.join_pieces(costs.inventory, target, pieces, 61)[:, 0]
                 crossing_s = np.interp(0.5, motion, np.arange(61) / 100)
                 assert crossing_s == pytest.approx(middle_s, abs=0.003), (before, after)
                 reach_s = min(share, 1 - share) * PHONE_S - 0.01  # as far from the join as it is from an edge of aa
@@ -156,7 +156,7 @@ def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
     units = inventory("s iy", "uw n", levels=(0, 1), duration_s=1.0)
     costs = costs_of(units)
     target = costs.target(windows.list_windows([timeline("s iy uw n", 1.0)]), None, None)
-    motion = concatenation.concatenated(units, target, concatenation.to_pieces(costs, target, np.arange(4)), 401)[:, 0]
+    motion = concatenation.join_pieces(units, target, concatenation.to_pieces(costs, target, np.arange(4)), 401)[:, 0]
     bent = np.flatnonzero((motion > 1e-9) & (motion < 1 - 1e-9))
     assert (bent[0], bent[-1]) == pytest.approx((200 - 0.05 * 200, 200 + 0.05 * 200), abs=1)
     assert np.diff(motion).min() >= 0
@@ -246,7 +246,7 @@ def test_closures_survive_hard_joins(phone: str) -> None:
     target = target_of(costs, f"s iy {phone} uw n")
     pieces = to_pieces(costs, target, np.arange(5))
     assert [piece.join for piece in pieces[1:]] == [ABUTTING_JOIN] * 2
-    motion = concatenated(units, target, pieces, 101)[:, 0]
+    motion = join_pieces(units, target, pieces, 101)[:, 0]
     assert motion[41:60] == pytest.approx(0, abs=1e-9)
     assert motion[[20, 80]] == pytest.approx(1)
     assert np.abs(np.diff(motion)).max() < 0.9  # bent, not cut

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion import engines, errors, types
-from lipmotion.engines.selection.concatenation import TimeMap, concatenated, list_shown_units, to_pieces
+from lipmotion.engines.selection.concatenation import TimeMap, join_pieces, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, select
 from lipmotion.engines.selection.selection_training import SEGMENT_S, build_target
 from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, find_lip_class, parse_invisible
@@ -221,7 +221,7 @@ def test_edges_of_phones_fall_on_edges_of_phones(model, engine, phones: list[str
 def test_motion_stays_within_what_was_recorded_and_no_join_is_a_jump(model, engine, phones: list[str]) -> None:
     target, pieces = laid_out(model, engine, timeline(phones))
     frames = int(target.windows.times_s[-1, 1] * 100)
-    motion, recorded = concatenated(model.inventory, target, pieces, frames), model.inventory.values
+    motion, recorded = join_pieces(model.inventory, target, pieces, frames), model.inventory.values
     jump = np.ptp(recorded, axis=0)  # by which a hard join beside a protected phone may bend the other side
     assert (motion >= recorded.min(axis=0) - jump).all()
     assert (motion <= recorded.max(axis=0) + jump).all()

@@ -8,11 +8,18 @@ import pytest
 
 from engines.selection.drawn_units import costs_of, inventory, recorded, timeline
 from lipmotion import engines, types
-from lipmotion.engines.selection.concatenation import concatenated, to_pieces
+from lipmotion.engines.selection.concatenation import join_pieces, to_pieces
 from lipmotion.engines.selection.costs import select
 from lipmotion.engines.selection.inventory import RecordedUnits, find_substitutes, index_units
 from lipmotion.engines.selection.selection_training import build_target
-from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, PHONE_NUMBER, SILENT, TABLE_1, covering, list_windows
+from lipmotion.engines.selection.windows import (
+    INVISIBLE_SYMBOL,
+    PHONE_NUMBER,
+    SILENT,
+    TABLE_1,
+    cover_recording,
+    list_windows,
+)
 from lipmotion.errors import InputError
 from lipmotion.testing import PHONES as SPOKEN
 from lipmotion.testing import examples, speech
@@ -57,7 +64,7 @@ def test_words_begin_and_end_where_the_word_changes_and_suppressed_phones_are_on
 
 
 def test_gaps_are_silence() -> None:
-    filled = covering(Timeline((Span(0.2, 0.3, Unit("b")), Span(0.5, 0.6, Unit("aa")))), 1.0)
+    filled = cover_recording(Timeline((Span(0.2, 0.3, Unit("b")), Span(0.5, 0.6, Unit("aa")))), 1.0)
     edges_s, phones = [0.0, 0.2, 0.3, 0.5, 0.6, 1.0], "sil b sil aa sil".split()
     found = [(span.start_s, span.end_s, span.label.phone) for span in filled]
     assert found == list(zip(edges_s, edges_s[1:], phones, strict=False))
@@ -145,7 +152,7 @@ def joined(units: RecordedUnits, text: str, config=PRINTED):
     costs = costs_of(units.without(config.suppressed_phones), config)
     target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
     pieces = to_pieces(costs, target, select(costs, target).units)
-    return target, concatenated(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
+    return target, join_pieces(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
 
 
 def with_spikes(units: RecordedUnits) -> RecordedUnits:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion import engines, errors, types
-from lipmotion.engines.trajectory.trajectory_training import LEAST_VARIANCE, fit_trajectory
+from lipmotion.engines.trajectory.trajectory_training import MIN_VARIANCE, fit_trajectory
 from lipmotion.motion import closure, fit_acoustic_context, frame_labels
 from lipmotion.motion.context_window import OFFSETS, SCALE
 from lipmotion.motion.frame_labels import FullContextState, label_full_context
@@ -181,7 +181,7 @@ def test_a_channel_that_never_moves_keeps_a_variance():
     for example in corpus:
         example.motion.values[:, 1] = 0.0
     emission = fit(corpus, acoustic_regression=True, acoustic_components=20).emission
-    assert (emission.variances >= LEAST_VARIANCE / 1e4).all()
+    assert (emission.variances >= MIN_VARIANCE / 1e4).all()
     rows = np.array([emission.row(state, LAYOUT) for state in label_full_context(corpus[0].speech.units, 99, LAYOUT)])
     for statistic in emission.statistics(rows, corpus[0].speech.features.values, slice(0, 99)):
         assert np.isfinite(statistic).all()

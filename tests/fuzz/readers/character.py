@@ -13,7 +13,7 @@ from PIL import Image
 from fuzz.inputs import Files, Good
 from fuzz.plausible import require
 from lipmotion.pipeline.outputs.curve_sets import make_curves
-from lipmotion_faces.characters.binding_files import save_binding, write_weights
+from lipmotion_faces.characters.binding import save_binding, write_weights
 from lipmotion_faces.characters.character_files import load_character, read_character
 from lipmotion_faces.mesh import MeshStage
 from lipmotion_faces.rendering.drawn_surface import prepare_surface

@@ -13,12 +13,12 @@ from formats.examples import of_motion, written
 from fuzz.inputs import Files, Good
 from fuzz.plausible import require, short_speech
 from lipmotion import Corpus, CueSheet
-from lipmotion.corpora.captured_faces import read_channels
-from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.cues import CUE_FORMATS
 from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline
 from lipmotion.units.phones import SHAPES
+from lipmotion_faces.corpus.captured_faces import read_channels
+from lipmotion_faces.corpus.source_recordings import MotionFile
 from lipmotion_faces.corpus.supplied import read_supplied_track
 from meshes import gltf
 from meshes.flame import head

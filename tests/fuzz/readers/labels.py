@@ -10,10 +10,10 @@ from formats.test_transcripts import OF_LINES, OF_WORDS
 from formats.timing_samples import SAMPLES
 from fuzz.inputs import Files, Good
 from fuzz.plausible import require
-from lipmotion.corpora.folder import read_aligned_words
-from lipmotion.corpora.source_recordings import LISTS, RecordingFolder, SourceRecording, assign_splits
 from lipmotion.formats.label_files import read_labels
 from lipmotion.types import TimedWord, TranscriptLine
+from lipmotion_faces.corpus.folder import read_aligned_words
+from lipmotion_faces.corpus.source_recordings import LISTS, RecordingFolder, SourceRecording, assign_splits
 from lipmotion_faces.corpus.supplied import read_supplied_phones
 
 TEXTS = {

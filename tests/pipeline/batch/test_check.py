@@ -8,7 +8,7 @@ from scipy.io import wavfile
 from lipmotion import Job, Request
 from lipmotion.pipeline.batch import BatchLine, check
 from lipmotion.pipeline.batch.check import (
-    FEWEST_LINES,
+    MIN_LINES,
     CheckedLine,
     Finding,
     _find_problems,
@@ -78,7 +78,7 @@ def test_the_measure_of_length_is_the_usual_rate():
     """What is too long among quick talkers is not among slow ones."""
 
     def lines(share: float) -> list[CheckedLine]:
-        usual = [CheckedLine(f"{n}", spoken_s=share * estimate_time(60), letters=60) for n in range(FEWEST_LINES)]
+        usual = [CheckedLine(f"{n}", spoken_s=share * estimate_time(60), letters=60) for n in range(MIN_LINES)]
         return [*usual, CheckedLine("x", spoken_s=2.6 * estimate_time(60), letters=60)]
 
     assert [each.name for each in _find_problems(lines(0.8), [])] == ["x"]

@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 
 from formats.examples import of_motion, written
 from lipmotion import Corpus, prepare
-from lipmotion.corpora.captured_faces import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
-from lipmotion.corpora.folder import discover
-from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.tables import SPEECH_CURVES
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit
 from lipmotion.units import is_silent
 from lipmotion_faces.corpus import supplied
+from lipmotion_faces.corpus.captured_faces import FLAME_MARKERS, FLAME_VERTICES, read_mesh_motion, read_vertices
+from lipmotion_faces.corpus.folder import discover
+from lipmotion_faces.corpus.source_recordings import MotionFile, SourceRecording
 from meshes.flame import head
 from meshes.live_link_app import write_take
 from meshes.speech import said

@@ -15,7 +15,6 @@ from lipmotion import evaluate as evaluated
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.measures import curves
-from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.pipeline.generation import generate_for
 from lipmotion.speech.features.speaker_similarity import rate_knowledge
 from lipmotion.speech.recognition.recogniser import open_recogniser
@@ -24,6 +23,7 @@ from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation import held_out as held_out_module
 from lipmotion_lab.evaluation.evaluate import _was_trained_on, measure_clips
 from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, load_held_out, make_speech
+from lipmotion_lab.evaluation.table import format_figures
 from meshes.speech import motion
 from pipeline import made
 from testing.toy import toy_motion, toy_sentences

@@ -11,7 +11,6 @@ from conftest import quickly
 from lipmotion import Corpus, Run, Selection, animate, evaluate, load_model, read_motion, save_model, train, write
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.measures.evaluation_table import format_figures
 from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.pipeline.training.channels import train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.labels import (
@@ -25,6 +24,7 @@ from lipmotion.speech.recognition.general import load_general
 from lipmotion.types import Span, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
+from lipmotion_lab.evaluation.table import format_figures
 from pipeline import made
 from pipeline.made import recogniser_of
 from testing.toy import SMALL, toy_sentences, toy_utterances
@@ -128,7 +128,7 @@ def test_guessed_words_are_reported(toy_corpus, tmp_path, caplog):
 def test_licence_and_attribution_go_with_the_model(toy_corpus):
     rights = [{"licence": "CC0"}, {"licence": "CC BY 4.0", "attribution": "Anna"}, {"attribution": "Anna"}, {}]
     given = [replace(u, source=source) for u, source in zip(some(toy_corpus, 4), rights, strict=True)]
-    about = describe_training(toy_corpus, given, "train", 4)
+    about = describe_training(toy_corpus, given, Selection("train"), 4)
     assert about["licence"] == ["CC BY 4.0", "CC0"]
     assert about["attribution"] == ["Anna"]
     assert about["corpus"] == ["toy"]

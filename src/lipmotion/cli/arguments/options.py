@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_options, add_output, is_pipe
-from lipmotion.cli.terminal.progress import outcome, print_lines
+from lipmotion.cli.terminal.progress import describe_outcome, print_lines
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 
@@ -141,7 +141,7 @@ def animate_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namesp
             written += each.outputs.files
             report.receive(Item(name, "animated"))
         except Exception as error:
-            known = outcome(error)
+            known = describe_outcome(error)
             if known is None:
                 raise
             failures.append((known[0], name, error))

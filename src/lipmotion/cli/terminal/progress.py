@@ -235,20 +235,20 @@ HEAD_CHARACTERS, TAIL_CHARACTERS = 700, 300
 """Characters of a long line that are shown from its beginning and from its end."""
 
 
-def outcome(error: BaseException) -> tuple[int, str] | None:
+def describe_outcome(error: BaseException) -> tuple[int, str] | None:
     """Return the exit code and the one-line message of an expected error, or one of an extension; None: a bug."""
     if isinstance(error, LipMotionError):
-        return error.exit_code, one_line(error)
+        return error.exit_code, shorten_line(error)
     if isinstance(error, MemoryError):
         return InputError.exit_code, f"not enough memory ({error}); give a shorter recording or a smaller file"
     if isinstance(error, OSError):  # what the operating system refuses: no permission, a name too long
         nameless = (error.errno, error.strerror, error.filename) == (errno.ENOENT, os.strerror(errno.ENOENT), None)
-        return InputError.exit_code, one_line(GONE if nameless else error)  # the current folder
+        return InputError.exit_code, shorten_line(GONE if nameless else error)  # the current folder
     failed = describe_failed_extension(error)
-    return None if failed is None else (InputError.exit_code, one_line(failed))
+    return None if failed is None else (InputError.exit_code, shorten_line(failed))
 
 
-def one_line(message: object) -> str:
+def shorten_line(message: object) -> str:
     """Return a message as a printable line of limited length; of a longer one, the middle is left out."""
     line = printable(message)
     return (
@@ -293,7 +293,7 @@ def print_status_lines(options: argparse.Namespace) -> Iterator[Callable[[float]
         if isinstance(events, RhubarbStatus):
             events.succeed()
     except Exception as error:
-        known = outcome(error)
+        known = describe_outcome(error)
         note("fatal", f"Application terminating with error: {known[1] if known else error!r}")
         raise
     finally:

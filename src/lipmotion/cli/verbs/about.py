@@ -3,14 +3,75 @@
 from __future__ import annotations
 
 import argparse
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_input, add_output
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.terminal.progress import print_line, print_lines, report_progress
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.types.progress import Item
+
+LIPMOTION, EIGENLIPS, ADAPTATION, GRID = "lipmotion", "xieliu2007", "gales1998", "cooke2006"
+"""Keys of the software itself, of the methods of eigenlips and of adaptation, and of the GRID corpus."""
+ENGINE_KEYS: Mapping[str, tuple[str, ...]] = {
+    "trajectory": ("hofer2008", "tokuda2000", "tokuda1999", "shinoda2000", "fujinaga2001", "silen2012"),
+    "coupled": ("xieliu2007", "tokuda2000", "fujinaga2001", "silen2012"),
+    "selection": ("minnisbreen2000", "verhelst1993"),
+    "joint": ("hofer2008", "tokuda2000", "tokuda1999", "shinoda2000"),
+}
+"""Keys of the papers that each built-in engine implements, with its default options."""
+
+
+@cache
+def bibliography() -> Mapping[str, str]:
+    """Return all BibTeX entries by citation key, in the order of ``citations.bib``."""
+    text = (resources.files("lipmotion") / "citations.bib").read_text(encoding="utf-8")
+    entries = [entry.strip() for entry in re.split(r"^(?=@)", text, flags=re.MULTILINE) if entry.strip()]
+    return {entry[entry.index("{") + 1 : entry.index(",")]: entry for entry in entries}
+
+
+def list_engine_citations(name: str) -> str:
+    """Return the BibTeX entries of lipmotion and of an engine's papers; of another package's engine, a remark."""
+    return _entries((LIPMOTION, *ENGINE_KEYS.get(name, ())), _list_engine_remarks(name))
+
+
+def list_model_citations(header: Mapping[str, Any]) -> str:
+    """Return the BibTeX entries of lipmotion, of a model's engine and methods, and of the corpus that it learned from.
+
+    header : of a model file. Recordings other than those of GRID are named in a BibTeX comment
+    """
+    engine = str(header.get("engine"))
+    attribution = header.get("attribution") or []
+    owners = [
+        " ".join(str(owner).split()) for owner in (attribution if isinstance(attribution, list) else [attribution])
+    ]
+    others = [owner for owner in owners if "GRID corpus" not in owner]
+    keys = [LIPMOTION, *ENGINE_KEYS.get(engine, ())]
+    if header.get("visual", "geometry") != "geometry":
+        keys.append(EIGENLIPS)
+    if "adapted" in header:
+        keys.append(ADAPTATION)
+    if len(others) < len(owners):
+        keys.append(GRID)
+    return _entries(keys, [*_list_engine_remarks(engine), *(f"% recordings: {owner}" for owner in others)])
+
+
+def _list_engine_remarks(name: str) -> list[str]:
+    """Return a BibTeX comment for an engine of another package; nothing for a built-in one."""
+    if name in ENGINE_KEYS:
+        return []
+    return [f"% the engine {name!r} comes with another package: cite what its documentation names"]
+
+
+def _entries(keys: Iterable[str], remarks: Iterable[str]) -> str:
+    """Return the entries of some keys, each once, and the remarks, separated by empty lines."""
+    return "\n\n".join([*(bibliography()[key] for key in dict.fromkeys(keys)), *remarks])
+
 
 if TYPE_CHECKING:
     Verbs = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -45,7 +106,7 @@ def add_cite(verbs: Verbs) -> None:
 
 def _run_cite(options: argparse.Namespace) -> None:
     """Print the entries. Raises InputError: nothing has that name.  Raises ModelFormatError: the file is no model."""
-    from lipmotion.citations import bibliography, list_engine_citations, list_model_citations
+    from lipmotion.cli.verbs.about import bibliography, list_engine_citations, list_model_citations
     from lipmotion.engines import ENGINES
     from lipmotion.pipeline.model import find_shipped, read_header
 

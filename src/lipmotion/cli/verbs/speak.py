@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _speak(options: argparse.Namespace, report: Report) -> None:
-    from lipmotion.corpora.store import Corpus
+    from lipmotion.corpora import Corpus
     from lipmotion.pipeline.analysis.read_request import read_lexicon
     from lipmotion.pipeline.generate.speak import read_text, speak
     from lipmotion.pipeline.model import load_model

@@ -77,7 +77,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
     from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.corpora.store import Corpus, Selection
+    from lipmotion.corpora import Corpus, Selection
     from lipmotion.engines import create_engine, find_visual
     from lipmotion.pipeline.model import GEOMETRY, save_model
     from lipmotion.pipeline.training.other_speakers import synthesise_others

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import StreamGroup
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains, VisualStream
-from lipmotion.engines.coupled.chains.product import Grammar, Transitions, reachable
+from lipmotion.engines.coupled.chains.product import Grammar, Transitions, find_reachable
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
@@ -206,7 +206,7 @@ def _transitions(arrays: Arrays, structure: Structure) -> Transitions | Factoria
                 raise ValueError(f"chain_{number}/advance of {len(advance[number])} states, required {count}")
             check_index(f"pairs of chain {number}", own_density_states[:, number], count)
         return FactorialTransitions(FactorialProduct(structure, grammar), (first, second), own_density_states)
-    product = reachable(structure, grammar)
+    product = find_reachable(structure, grammar)
     rows = tuple(check_arrays(own, ROWS, J=len(product.joint_states))["rows"] for own in of_chains)
     for number, row in enumerate(rows):
         blocks = 1 << number if structure.moves_together else 1

@@ -93,7 +93,7 @@ def _regressions(model: CoupledModel) -> Iterator[str]:
 
 
 Array = NDArray[np.float64]
-MOST_STATES = 3
+MAX_STATES = 3
 """Greatest number of states of a chain that an explanation names."""
 REST = "rest"
 MIN_PROBABILITY = 0.005
@@ -128,10 +128,10 @@ def list_chain_states(chains: Chains, posteriors: LatticePosteriors, row: int) -
             _rank_by_probability(
                 [structure.state_name(number, state) for state in range(count)], posteriors.chains[number][row]
             ),
-            dict(zip(leads(chains, number), lead[row].tolist(), strict=True)),
+            dict(zip(list_leads(chains, number), lead[row].tolist(), strict=True)),
         )
         for number, (unit_set, count, lead) in enumerate(
-            zip(structure.chains, structure.state_counts, lead_posteriors(chains, posteriors), strict=True)
+            zip(structure.chains, structure.state_counts, sum_lead_posteriors(chains, posteriors), strict=True)
         )
     )
 
@@ -145,17 +145,17 @@ def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) ->
     return NamedProbability(name, float(posteriors.joint.probability[row, best]))
 
 
-def leads(chains: Chains, chain: int) -> tuple[int, ...]:
+def list_leads(chains: Chains, chain: int) -> tuple[int, ...]:
     """Return by how many states a chain may be ahead of the first; empty: it is the first, or there is no limit."""
     limit = chains.structure.limit
     return () if limit is None or chain == 0 else tuple(range(-limit, limit + 1))
 
 
-def lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[Single]:
-    """Return, for each chain, the posteriors of its ``leads`` [each shape=(T, len(leads))]."""
+def sum_lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[Single]:
+    """Return, for each chain, the posteriors of its ``list_leads`` [each shape=(T, len(leads))]."""
     product, result = chains.transitions.product, []
     for chain in range(len(chains.structure.chains)):
-        ahead = np.array(leads(chains, chain), np.intp)
+        ahead = np.array(list_leads(chains, chain), np.intp)
         lead = np.zeros((len(posteriors.most_probable), len(ahead)), np.float32)
         if isinstance(product, Product) and posteriors.joint is not None:
             own = product.lead[chain][posteriors.joint.states]
@@ -172,23 +172,23 @@ def infer_units(chains: Chains, posteriors: LatticePosteriors, kept: slice) -> l
             unit_set.name,
             units,
             posteriors.chains[number][kept].reshape(-1, len(units), structure.states).sum(axis=2),
-            leads(chains, number),
+            list_leads(chains, number),
             lead[kept],
         )
         for number, (unit_set, units, lead) in enumerate(
-            zip(structure.chains, structure.units, lead_posteriors(chains, posteriors), strict=True)
+            zip(structure.chains, structure.units, sum_lead_posteriors(chains, posteriors), strict=True)
         )
     ]
 
 
-def concatenated(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
+def join_posteriors(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
     """Return the posteriors of one chain in successive parts of an utterance as one."""
     probability, lead = (np.concatenate([getattr(part, name) for part in parts]) for name in ("probability", "lead"))
     return replace(parts[0], probability=probability, lead=lead)
 
 
 def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
-    best = np.argsort(-probability, kind="stable")[:MOST_STATES]
+    best = np.argsort(-probability, kind="stable")[:MAX_STATES]
     named = [NamedProbability(names[i], float(probability[i])) for i in best]
     return (named[0], *(state for state in named[1:] if state.probability >= MIN_PROBABILITY))
 
@@ -392,7 +392,7 @@ class CoupledEngine(Engine[CoupledModel]):
             inference = self.infer(model, speech, outer)
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
             blocks.append(infer_units(model.chains, inference.posteriors, kept))
-        return tuple(concatenated(parts) for parts in zip(*blocks, strict=True))
+        return tuple(join_posteriors(parts) for parts in zip(*blocks, strict=True))
 
     def describe(self, model: CoupledModel) -> str:  # noqa: D102
         return describe(model)

@@ -26,9 +26,9 @@ from lipmotion.units import PHONES, SILENCE, is_silent
 Array = NDArray[np.float64]
 SMOOTHED_SHARE = 0.05
 """Share of two abutting pieces, at the end of the first and at the start of the second, that is smoothed (§4)."""
-LEAST_OVERLAP_S, MOST_OVERLAP_S = 0.02, 0.15
+MIN_OVERLAP_S, MAX_OVERLAP_S = 0.02, 0.15
 """Pieces overlap from at least so much, two frames, to at most so much before and after a soft join."""
-LEAST_WEIGHT = 1e-9
+MIN_WEIGHT = 1e-9
 ROUNDING_S = 1e-6
 SHORTEST_S = 1e-3
 """Two joins are never closer."""
@@ -69,13 +69,13 @@ def to_pieces(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
             shared = first - 1 if kinds[first] == JOIN_BEFORE else first
             share, (begin_s, end_s) = costs.forward_share(target, shared), times_s[shared].tolist()
             start_s = begin_s + share * (end_s - begin_s)
-            overlap_s = float(np.clip(min(share, 1 - share) * (end_s - begin_s), LEAST_OVERLAP_S, MOST_OVERLAP_S))
+            overlap_s = float(np.clip(min(share, 1 - share) * (end_s - begin_s), MIN_OVERLAP_S, MAX_OVERLAP_S))
         start_s = latest_s = max(start_s, latest_s + SHORTEST_S)
         pieces.append(Piece(first, stop, int(units[first]), kinds[first], start_s, overlap_s))
     return pieces
 
 
-def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], frames: int) -> Array:
+def join_pieces(inventory: RecordedUnits, target: Target, pieces: list[Piece], frames: int) -> Array:
     """Return the motion of some pieces in the motion space, 100 frames a second [shape=(frames, Q)].
 
     Where pieces overlap, the weight of the next one rises from 0 to 1 along a raised cosine. Abutting pieces are bent
@@ -97,7 +97,7 @@ def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], 
             weight = weight * (1 - _rise(time_s[used], following))
         result[used] += weight[:, None] * motion
         total[used] += weight[:, None]
-    result /= np.maximum(total, LEAST_WEIGHT)
+    result /= np.maximum(total, MIN_WEIGHT)
     for sides in pairwise(zip(pieces, clocks, strict=True)):
         if sides[1][0].join == ABUTTING_JOIN:
             _smooth(inventory, target, sides, time_s, result)
@@ -184,7 +184,7 @@ def _smooth(
         SMOOTHED_SHARE * (times_s[after.stop - 1, 1] - join_s),
     )
     for side, (share, span_s) in enumerate(zip(shares, spans_s, strict=True)):
-        width_s = float(np.clip(span_s, LEAST_OVERLAP_S, MOST_OVERLAP_S))
+        width_s = float(np.clip(span_s, MIN_OVERLAP_S, MAX_OVERLAP_S))
         away_s = (join_s - time_s) if side == 0 else (time_s - join_s)
         near = (away_s > 0 if side == 0 else away_s >= 0) & (away_s < width_s)
         bend = (1 + np.cos(np.pi * away_s[near] / width_s)) / 2
@@ -215,7 +215,7 @@ def join_motion(
 ) -> tuple[Motion, ReducedVariance]:
     """Return the motion of chosen units, lips closed if wanted, and its variance, as ``LearnedMotion.generate``."""
     frames = len(speech.features.values)
-    track = concatenated(costs.inventory, chosen.target, chosen.pieces, frames)
+    track = join_pieces(costs.inventory, chosen.target, chosen.pieces, frames)
     always = not is_silent(costs.stand_ins.get(SILENCE, SILENCE))
     resting = _resting(np.asarray(speech.features.values), speech.units, always=always)[:, None]
     means = with_dynamics(track + resting * (model.rest - track))

@@ -27,7 +27,7 @@ from lipmotion.types import FRAME_RATE_HZ, Example, Speech
 from lipmotion.types.motion import interpolate_rows
 from lipmotion.units import PHONES
 
-LEAST_EXPANSION, MOST_EXPANSION = 1.0, 1.6
+MIN_EXPANSION, MAX_EXPANSION = 1.0, 1.6
 NEW_SPEECH_EXPANSION = 1.05
 """Predictions for new recordings are so much narrower again than those for recordings of the training."""
 
@@ -54,7 +54,7 @@ def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequenc
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     predicted = np.concatenate([predictor.predict(e.speech)[0][e.valid] for e in examples])
     ratio = NEW_SPEECH_EXPANSION * recorded.std(axis=0) / np.maximum(predicted.std(axis=0), 1e-9)
-    return Guide(predictor, recorded.mean(axis=0), np.clip(ratio, LEAST_EXPANSION, MOST_EXPANSION))
+    return Guide(predictor, recorded.mean(axis=0), np.clip(ratio, MIN_EXPANSION, MAX_EXPANSION))
 
 
 def interpolate_at(motion: Array, times_s: Array) -> Array:

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.concatenation import Chosen, concatenated, join_motion, to_pieces
+from lipmotion.engines.selection.concatenation import Chosen, join_motion, join_pieces, to_pieces
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import Guide, SelectionModel, fit_guide, interpolate_at
-from lipmotion.engines.selection.windows import covering, list_windows
+from lipmotion.engines.selection.windows import cover_recording, list_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
@@ -29,7 +29,7 @@ from lipmotion.units import SILENCE, is_silent
 
 SEGMENT_S = 0.1
 """Duration of the segments of speech whose phones cannot be relied on."""
-LEAST_RELIABILITY = 0.5
+MIN_RELIABILITY = 0.5
 """Mean reliability of the phones from which on they choose."""
 
 
@@ -42,11 +42,11 @@ def build_target(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     """
     frames = len(speech.features.values)
     duration_s = (frames - 1) / FRAME_RATE_HZ
-    units, guide = covering(speech.units, duration_s), model.guide
+    units, guide = cover_recording(speech.units, duration_s), model.guide
     if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
         return costs.target(costs.shown(list_windows([units])), None, None)
     motion, distortion = guide.predict(speech)
-    by_sound = bool(rate_phones(speech, distortion, frames).mean() < LEAST_RELIABILITY)
+    by_sound = bool(rate_phones(speech, distortion, frames).mean() < MIN_RELIABILITY)
     windows = list_windows([_segments(duration_s)]) if by_sound else costs.shown(list_windows([units]))
     predicted = interpolate_at(motion, windows.times_s)
     return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
@@ -64,7 +64,7 @@ LEFT_OUT_RECORDINGS = 24
 """Recordings that are generated without their own units, which come back as they were; spread evenly over all."""
 REST_AWAY_S = 0.3
 """The rest pose is that of silence further than this from speech,"""
-LEAST_REST_FRAMES = 20
+MIN_REST_FRAMES = 20
 """or, where there are fewer frames of it, that of the frames with the smallest openings."""
 KEPT_SILENCE_S = 0.5
 """Silence further than this from speech is not stored (§6: "to edit out this data but maintain synchronisation")."""
@@ -106,7 +106,7 @@ def fit_selection(
     errors = []
     for one in left_out:
         original, chosen = values[one.number], one.chosen
-        joined = concatenated(costs.inventory, chosen.target, chosen.pieces, len(original))
+        joined = join_pieces(costs.inventory, chosen.target, chosen.pieces, len(original))
         errors.append(with_dynamics(original - joined)[one.frames])
     spread = with_dynamics(recorded).var(axis=0)
     variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
@@ -124,7 +124,7 @@ def fit_selection(
 
 def build_inventory(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
     """Return the inventory of some examples, from reduced motion. Raises CorpusError: no phone was measured whole."""
-    timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
+    timelines = [cover_recording(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
     windows = list_windows(timelines)
     first = np.concatenate([[0], np.cumsum([len(x) for x in values])]).astype(np.intp)
     known = np.concatenate([example.valid for example in examples])
@@ -164,7 +164,7 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
             for example, x in zip(examples, values, strict=True)
         ]
     )
-    if len(poses) < LEAST_REST_FRAMES:
+    if len(poses) < MIN_REST_FRAMES:
         poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
         if OPENING in space.direct_names:
             opening = poses[:, space.direct_names.index(OPENING)]

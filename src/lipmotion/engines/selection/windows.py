@@ -166,7 +166,7 @@ class PhoneWindows:
         return replace(others, times_s=times_s)
 
 
-def covering(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
+def cover_recording(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:
     """Return phones in time without gaps, and without phones of no duration; at least one."""
     spans = tuple(span for span in close_gaps(units, duration_s) if span.duration_s > 0)
     return Timeline(spans or (Span(0.0, SHORTEST_S, Unit(SILENCE)),))

@@ -11,24 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
-from lipmotion.engines.trajectory.config import TrajectoryConfig
-from lipmotion.engines.trajectory.model import Experts, TrajectoryModel, model_arrays, model_from_arrays
+from lipmotion.engines.trajectory.model import (
+    Experts,
+    TrajectoryConfig,
+    TrajectoryModel,
+    model_arrays,
+    model_from_arrays,
+)
 from lipmotion.motion.frame_labels import find_digital_silence, label_full_context, with_unit_names
 from lipmotion.motion.general_motion import hear_articulators
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import (
-    Configuration,
-    Constraints,
-    Example,
-    Generation,
-    Monitor,
-    Speech,
-    StateTrace,
-    Timeline,
-    Unit,
-)
+from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
 
 
 @final

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.trajectory.config import TrajectoryConfig
 from lipmotion.engines.trajectory.model import (
     NETWORK_SHARE,
     AcousticRegression,
     Emission,
     Experts,
+    TrajectoryConfig,
     TrajectoryModel,
     add_acoustic_regression,
 )
@@ -175,7 +175,7 @@ def _variances(
     return np.maximum(after, 1e-3 * before).astype(np.float32)
 
 
-LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
+MIN_VARIANCE_SHARE, MIN_VARIANCE = 1e-3, 1e-12
 """Smallest variance: a share of the variance of all frames, and a constant for dimensions that never move."""
 
 
@@ -292,7 +292,7 @@ def _fit_emission(clips: Sequence[TrainingClip], options: TrajectoryConfig, layo
         [clip.rows[[state != layout.rest for state in clip.training_states]] for clip in clips], dtype=np.float64
     )
     centre, overall = moving.mean(axis=0), moving.var(axis=0)
-    least = np.maximum(LEAST_VARIANCE_SHARE * overall, LEAST_VARIANCE)
+    least = np.maximum(MIN_VARIANCE_SHARE * overall, MIN_VARIANCE)
     scale = np.sqrt(np.maximum(overall, least))
     grouped = _sum_context_moments(clips, layout, centre, scale)
     forest = {name: _grow_tree(contexts, 2 * overall.size, options, layout) for name, contexts in grouped.items()}

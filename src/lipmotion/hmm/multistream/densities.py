@@ -258,9 +258,7 @@ class TiedDensities:
             statistics.frames[leaf] += (known if self.voiced is None else posteriors[pairs]).sum()
 
     def reestimate(self, statistics: GaussianStatistics, floor: float) -> TiedDensities:
-        """Return the densities of an M-step; Gaussians with less than ``MIN_FRAMES`` stay, so the likelihood never
-        falls.
-        """
+        """Return the densities of an M-step; Gaussians of under ``MIN_FRAMES`` stay, so the likelihood never falls."""
         count, first, second = np.split(statistics.moments, [1, 1 + self.mixtures.size[2]], axis=2)
         enough = count >= MIN_FRAMES
         safe = np.maximum(count, MIN_FRAMES)

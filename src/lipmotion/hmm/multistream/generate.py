@@ -120,9 +120,7 @@ def _solve(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int
 
 
 def _collect_gaussians(hmm: JointHmm) -> tuple[StreamModel, Array, Array]:
-    """Return the model of motion, its leaves' means and weighted precisions [shape=(G, M, 3, Q)]. Raises InputError:
-    none.
-    """
+    """Return the motion model, its leaves' means and weighted precisions [shape=(G, M, 3, Q)]. Raises InputError."""
     weight = hmm.config.synthesis.motion
     if MOTION not in hmm.models or not weight:
         raise InputError("the model has no motion, or it is switched off in synthesis; train on recordings with a face")

@@ -324,9 +324,7 @@ def grow_joint(
 def _start(
     utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig
 ) -> tuple[JointHmm, PreparedUtterances]:
-    """Return models without context, from states of equal length inside known bounds, and the utterances. Raises as
-    ``grow_joint``.
-    """
+    """Return the utterances and models without context, from states of equal length. Raises as ``grow_joint``."""
     if not utterances:
         raise CorpusError("no utterances to train on; give at least one")
     streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]

@@ -21,7 +21,7 @@ from lipmotion.units import UNIT_SETS, is_silent
 
 PHONES = UNIT_SETS["phone"]
 CONFIG = JointConfig(mixtures=16)
-LEAST_MINUTES = 8.0
+MIN_MINUTES = 8.0
 """Smallest amount of speech for training; with less, the models of many voices recognise phones better."""
 LONGEST_S = 120.0
 """Longer recordings are left to the shared recogniser, which works block by block."""
@@ -64,7 +64,7 @@ def fit_phone_recogniser(
     values: Sequence[NDArray[np.float64]],
     monitor: Monitor,
     checkpoint: Checkpoint,
-    min_minutes: float = LEAST_MINUTES,
+    min_minutes: float = MIN_MINUTES,
 ) -> OwnPhoneRecogniser | None:
     """Return a recogniser of phones that is trained on sound and motion, or None if there is too little speech.
 

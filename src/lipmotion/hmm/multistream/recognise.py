@@ -242,9 +242,7 @@ class JointRecogniser:
             raise InputError("recognition uses no motion: give the stream motion the weight 0")
 
     def recognise(self, observed: StreamObservations, beam: float | None = None) -> list[RecognisedUnit]:
-        """Return the most probable units, in order. Raises InputError: no active stream. Raises AlignmentError: too few
-        frames.
-        """
+        """Return the likeliest units. Raises InputError: no active stream. Raises AlignmentError: too few frames."""
         units, starts = decode_units(self._loop.network, self._log_likelihoods(observed), beam)
         return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 

@@ -71,9 +71,7 @@ class Inventory:
         return 0 if unit in self.free else (middle > 0) - (middle < 0)
 
     def contexts(self, units: Sequence[str]) -> list[Context]:
-        """Return the (left, unit, right) of every unit of a sequence, silence beyond its ends. Raises InputError: an
-        unknown unit.
-        """
+        """Return each unit of a sequence in context (left, unit, right), silence at its ends. Raises InputError."""
         unknown = sorted(set(units) - set(self.names))
         if unknown:
             raise InputError(f"unknown unit {unknown[0]!r}; the model's units: {' '.join(self.names)}")
@@ -146,9 +144,7 @@ def units_to_frames(
 def frames_to_units(
     recognised: Sequence[RecognisedUnit], duration_s: float, label_of: Callable[[str], Unit] = Unit
 ) -> Timeline[Unit]:
-    """Return recognised units in time, from 0 s to ``duration_s``: frame n covers (n ± ½) · 10 ms; labels by
-    ``label_of``.
-    """
+    """Return recognised units from 0 s to ``duration_s``, labelled by ``label_of``: frame n covers (n ± ½) · 10 ms."""
     edges = np.clip((np.array([unit.first for unit in recognised]) - 0.5) / FRAME_RATE_HZ, 0, duration_s).tolist()
     spans = zip(edges, [*edges[1:], duration_s], recognised, strict=True)
     return Timeline(tuple(Span(start_s, end_s, label_of(unit.unit)) for start_s, end_s, unit in spans))

@@ -26,7 +26,7 @@ from lipmotion.articulation.lip_points import (
     UPPER_EDGE,
     build_mouth,
 )
-from lipmotion.articulation.mouth import LEAST_CHIN_DROP_SHARE, SpokenMouth, find_mouth, measure_jaw_drop, weigh_upper
+from lipmotion.articulation.mouth import MIN_CHIN_DROP_SHARE, SpokenMouth, find_mouth, measure_jaw_drop, weigh_upper
 from lipmotion.articulation.rest import find_rest_frames
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.face_shapes import FaceShapes
@@ -289,7 +289,7 @@ def move_points(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     forward = np.maximum(MIN_PROTRUSION * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
     moved[:, lips, 2] += forward[:, None]
     moved[:, :, 1] += _separate_lips(moved[:, :, 1], across, mouth.gap)
-    higher = moved[:, template.row(CHIN), 1] + LEAST_CHIN_DROP_SHARE * measure_jaw_drop(mouth.gap) * (1 - mouth.tuck)
+    higher = moved[:, template.row(CHIN), 1] + MIN_CHIN_DROP_SHARE * measure_jaw_drop(mouth.gap) * (1 - mouth.tuck)
     moved[:, template.jaw, 1] -= np.maximum(higher, 0)[:, None]
     return PointMotion(moved, mouth)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +17,80 @@ from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import move_points
-from lipmotion.meshes.fitting.lip_placement import (
-    LipPlacement,
-)
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights, weigh_expressions, with_gap
-from lipmotion.meshes.model.binding import ControlBinding
-from lipmotion.meshes.model.face_shapes import FaceShapes, group_by_name, measure_lip_parting
+from lipmotion.meshes.model.face_shapes import FaceShapes, LipPlacement, group_by_name, measure_lip_parting
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.rig_tables import RigRow, apply_rig, find_table
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, find_spoken_name, to_arkit
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+
+def skin_vertices(weights: csr_array, matrices: Array, vertices: Array) -> Array:
+    """Return the vertices under the blended transformations of the control points [shape=(N, 3)].
+
+    weights  : of each control point on each vertex [shape=(N, C), sparse rows]; a row of sum below 1 leaves the rest of
+               its vertex where it is
+    matrices : rotation, scale and shift of each control point [shape=(C, 3, 4)]
+    vertices : at rest [shape=(N, 3)]
+    v′ = Σ wᵢ Mᵢ v + (1 − Σ wᵢ) v: the matrices are blended, then applied, which is the same and costs less.
+    Source: Hofer 2008, Eq. 12.  Deviation: a fixed control point has what the weights leave of 1, so that the face
+    beyond the mouth stands still.
+    Cost: O(12 · (number of weights) + 12 N).
+    """
+    blended = (weights @ (matrices - np.eye(3, 4)).reshape(len(matrices), 12)).reshape(-1, 3, 4)
+    moved: Array = blended[:, :, 0] * vertices[:, :1]
+    moved += blended[:, :, 1] * vertices[:, 1:2]
+    moved += blended[:, :, 2] * vertices[:, 2:]
+    moved += blended[:, :, 3]
+    moved += vertices
+    return moved
+
+
+@dataclass(frozen=True, eq=False)
+class ControlBinding:
+    """Weights of control points on the vertices of a mesh.
+
+    placement : the control points: lip and jaw points of motion, each at a vertex
+    rows      : the vertices that follow any of them, ascending [shape=(N,)]
+    controls  : which control points a vertex follows, as rows of the placement; unused ones have weight 0
+                [shape=(N, K)]
+    weights   : how much, 0 to 1; what they leave of 1 is fixed to the head [shape=(N, K)]
+    """
+
+    placement: LipPlacement
+    rows: Rows
+    controls: Rows
+    weights: Array
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        """The weights as sparse rows [shape=(N, C)]."""
+        from scipy.sparse import csr_array
+
+        count = self.controls.shape[1]
+        starts = np.arange(0, self.controls.size + 1, count)
+        shape = (len(self.rows), len(self.placement.points))
+        return csr_array((self.weights.reshape(-1), self.controls.reshape(-1), starts), shape=shape)
+
+    def moved(self, mesh: Mesh, displacements: Array) -> Array:
+        """Return the vertices [shape=(V, 3)] under displacements of control points, eye distances [shape=(C, 3)]."""
+        matrices = np.tile(np.eye(3, 4), (len(displacements), 1, 1))
+        matrices[:, :, 3] = self.placement.to_mesh(displacements)
+        return self.transformed(mesh, matrices)
+
+    def transformed(self, mesh: Mesh, matrices: Array) -> Array:
+        """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)] (Hofer 2008,
+        Eq. 12).
+        """
+        vertices = mesh.vertices.copy()
+        vertices[self.rows] = skin_vertices(self.matrix, matrices, mesh.vertices[self.rows])
+        return vertices
 
 
 def _solve_with_table(
@@ -92,9 +154,7 @@ def _find_solved_name(shape: Blendshape, shapes: FaceShapes) -> str | None:
 
 
 class DrivenPose(NamedTuple):
-    """What moves a character in one frame: weights of its mouth's shapes, or displacements of points [shape=(52, 3)],
-    and of others.
-    """
+    """What moves a character in one frame: weights of its mouth's shapes, or places' shifts [shape=(52, 3)]; others."""
 
     mouth: Array
     others: Array
@@ -210,9 +270,7 @@ class DrivenCharacter:
         return known in others or (self.shapes is not None and known in self.shapes.known)
 
     def weigh_others(self, others: Mapping[str, Array], count: int) -> dict[str, Array]:
-        """Return the weights of the blendshapes of eyes and brows over ``count`` frames, by the mesh's names; missing
-        ones are 0.
-        """
+        """Return weights of eyes' and brows' blendshapes over ``count`` frames, by the mesh's names; missing: 0."""
         nothing = np.zeros(count)
         return {row.control: row.alone(others.get(row.source, nothing)) for row in self._other_rows}
 

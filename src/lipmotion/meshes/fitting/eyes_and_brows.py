@@ -112,9 +112,7 @@ def with_movements(moved: Liveliness, curves: Mapping[str, Array]) -> Liveliness
 
 
 def weights_to_gaze(weights: Mapping[str, Array]) -> Array:
-    """Return where both eyes look in the mean, left and up, in radians [shape=(F, 2)], by ARKit's weights [each
-    shape=(F,)].
-    """
+    """Return both eyes' mean direction, left and up, radians [shape=(F, 2)], by ARKit's weights [each shape=(F,)]."""
     looks = {name: weights[f"eyeLook{name}"] for name in LOOKS}
     across = looks["OutLeft"] - looks["InLeft"] + looks["InRight"] - looks["OutRight"]
     upwards = looks["UpLeft"] - looks["DownLeft"] + looks["UpRight"] - looks["DownRight"]

@@ -178,9 +178,7 @@ PRESS_WEIGHT, UPPER_ROLL_WEIGHT, LOWER_ROLL_WEIGHT, TONGUE_WEIGHT = 0.4, 0.1, 0.
 
 @dataclass(frozen=True)
 class CurveCosts:
-    """Costs of curves beside their targets: of squared weights (``ridge``), and of squared second differences
-    (``smooth``).
-    """
+    """Costs of curves: of squared weights (``ridge``), and of squared second differences (``smooth``)."""
 
     ridge: float = 1e-3
     smooth: float = 1e-1

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +11,6 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shorten
 
 HEAD, NECK, JAW, LEFT_EYE, RIGHT_EYE = "head", "neck", "jaw", "leftEye", "rightEye"
-_ENDS = {"top", "end", "nub", "tip", "target", "ctrl"}
-_SIDES = {"l": LEFT_EYE, "left": LEFT_EYE, "r": RIGHT_EYE, "right": RIGHT_EYE}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,37 +29,6 @@ class Bone:
     shares: NDArray[np.float64]
 
 
-def find_bone_kind(name: str) -> str | None:
-    """Return which bone of the head a name stands for, or None: ``mixamorig:Head``, ``J_Bip_C_Neck``, ``JawBone``.
-
-    >>> find_bone_kind("J_Adj_L_FaceEye"), find_bone_kind("CC_Base_JawRoot"), find_bone_kind("HeadTop_End")
-    ('leftEye', 'jaw', None)
-    """
-    words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)]
-    words = [re.sub(r"^mixamorig", "", word) or word for word in words]
-    plain = {re.sub(r"(bone|root|joint)$", "", word) or word for word in words}
-    if plain & _ENDS:
-        return None
-    if plain & {"eye", "eyeball"}:
-        return next((_SIDES[word] for word in words if word in _SIDES), None)
-    return next((kind for kind in (JAW, HEAD, NECK) if kind in plain), None)
-
-
-def merge_bones(bones: Iterable[Bone]) -> tuple[Bone, ...]:
-    """Return one bone of each kind: its vertices are those of all bones of this kind, its place that of the first."""
-    by_kind: dict[str, list[Bone]] = {}
-    for bone in bones:
-        if len(bone.rows):
-            by_kind.setdefault(bone.kind, []).append(bone)
-    merged = []
-    for kind, same in by_kind.items():
-        rows, inverse = np.unique(np.concatenate([bone.rows for bone in same]), return_inverse=True)
-        shares = np.zeros(len(rows))
-        np.maximum.at(shares, inverse.reshape(-1), np.concatenate([bone.shares for bone in same]))
-        merged.append(Bone(kind, same[0].place, rows, shares))
-    return tuple(merged)
-
-
 Array = NDArray[np.float64]
 ANGLES = ("headYaw", "headPitch", "headRoll")
 """Channels of motion, in radians: to the character's left, up, and to its left shoulder."""
@@ -71,9 +37,7 @@ ORDER = "YXZ"
 
 
 def turn_head(angles: Array) -> Array:
-    """Return rotations of a head as quaternions x, y, z, w [shape=(T, 4)], near their neighbours, from ``ANGLES``
-    [shape=(T, 3)].
-    """
+    """Return a head's quaternions x, y, z, w [shape=(T, 4)], near their neighbours, from ``ANGLES`` [shape=(T, 3)]."""
     from scipy.spatial.transform import Rotation
 
     turned = Rotation.from_euler(ORDER, angles * SIGNS).as_quat()
@@ -166,23 +130,6 @@ class MeshPart:
     first: int
     stop: int
     material: Material = Material()
-
-
-class PartNames:
-    """Gives parts names that no other part has."""
-
-    def __init__(self) -> None:
-        self._numbers: dict[str, int] = {}
-
-    def unused(self, owner: str, material: str) -> str:
-        """Return the name of the owner, with that of the material where it is taken, and a number where both are."""
-        both = f"{owner} {material}".strip()
-        name = owner if owner not in self._numbers else both
-        while name in self._numbers:
-            self._numbers[both] += 1
-            name = f"{both} {self._numbers[both]}"
-        self._numbers[name] = 1
-        return name
 
 
 @dataclass(frozen=True, eq=False)

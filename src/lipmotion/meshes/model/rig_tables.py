@@ -102,9 +102,7 @@ def suggest_names(name: str, names: Iterable[str]) -> str:
 
 
 def apply_rig(rows: Sequence[RigRow], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
-    """Return a rig's controls over time, in order, of curves by name [each shape=(T,)]. Raises InputError: one is
-    missing.
-    """
+    """Return a rig's controls over time, of curves by name [each shape=(T,)]. Raises InputError: one is missing."""
     curves: dict[str, NDArray[np.float64]] = {}
     limits: dict[str, tuple[float, float]] = {}
     for row in rows:
@@ -136,9 +134,7 @@ def find_table(character: Path) -> Path:
 
 
 def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
-    """Return the rows of the table beside a character by its blendshapes, None without one. Raises InputError: a
-    damaged table.
-    """
+    """Return the rows of the table beside a character, by blendshape; none without it. Raises InputError: damaged."""
     path = find_table(character)
     if not is_file(path):
         return {}

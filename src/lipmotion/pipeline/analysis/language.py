@@ -16,11 +16,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.network.posteriors import (
-    WORD_BOUNDARY,
-    find_installed,
-    find_stretches,
-)
+from lipmotion.speech.recognition.network.posteriors import WORD_BOUNDARY, find_installed_recogniser, find_stretches
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, open_recogniser
 from lipmotion.storage.files import atomic_file, check_distinct, check_target
@@ -98,7 +94,7 @@ def detect_english(audio: Audio) -> bool | None:
     audio : at 16 kHz
     The network writes every language with the phones of English: it cannot say which other one it is.
     """
-    name = find_installed()
+    name = find_installed_recogniser()
     if name is None:
         return None
     part = analysed(Audio(audio.samples[: int(PART_S * audio.rate_hz)], audio.rate_hz))

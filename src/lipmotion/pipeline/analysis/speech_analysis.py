@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -27,7 +27,7 @@ from lipmotion.speech.features.speaker_similarity import rate_knowledge
 from lipmotion.speech.features.voice_events import find_voice_events, silence_units
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.beam_search import load_english
-from lipmotion.speech.recognition.network.posteriors import infer_tokens
+from lipmotion.speech.recognition.network.posteriors import infer_posteriors
 from lipmotion.speech.recognition.recognised_speech import (
     WORD_POSTERIORS,
     Recognition,
@@ -36,12 +36,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     place_units,
     select_reliable,
 )
-from lipmotion.speech.recognition.recogniser import (
-    RECOGNISER_KINDS,
-    Recogniser,
-    find_network,
-    open_recogniser,
-)
+from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser, find_network, open_recogniser
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
@@ -82,7 +77,7 @@ LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
 TIME_UNITS = {"milliseconds": 1e3, "samples": 16e3, "samples of 48 kHz": 48e3, "ticks of 100 ns": 1e7}
 """How many of them a second has: given times that end near so many times the recording are in this unit."""
-SHORTEST_PHONE_S, FEWEST_TIMED = 0.02, 5
+SHORTEST_PHONE_S, MIN_TIMED = 0.02, 5
 """Given phones, of which half are shorter, are faster than speech; so many are needed to tell."""
 REACH_S = 0.1
 """Phones are recognised so far around the first and the last one that is heard."""
@@ -316,7 +311,7 @@ def build_speech(
     spectrum = rows(lambda sound: sound.spectrum) if inputs.conditions else None
     encoding = rows(lambda sound: sound.encoding) if inputs.encoding else None
     network = find_network(kind) if inputs.posteriors else None
-    posteriors = infer_tokens(network, audio, each, dense=audio.is_passage) if network is not None else None
+    posteriors = infer_posteriors(network, audio, each, dense=audio.is_passage) if network is not None else None
     parts = None
     if not audio.is_passage:
         parts = tuple(
@@ -434,9 +429,29 @@ def _follow_units(
     Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
     else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
     """
-    from lipmotion.pipeline.analysis.transcribe import compute_phone_posteriors, format_places, warn_of_label_misfit
+    from lipmotion.pipeline.analysis.transcribe import compute_phone_posteriors, warn_of_label_misfit
     from lipmotion.speech.recognition.agreement import label_fit
-    from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
+
+    spans, guessed = _complete_units(model, request, audio, recognised)
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
+    if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
+        return units, None
+    name = find_network(kind) if request.language == ENGLISH else None
+    posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
+    is_sure = sure >= WORD_POSTERIORS[0]
+    fit = label_fit(audio, units, posteriors if is_sure else None)
+    filling = _fill_open(spans, fit.missing if is_sure else (), audio.duration_s, recognised)
+    warn_of_label_misfit(fit, filled=bool(filling))
+    spans = sorted([*spans, *filling], key=lambda span: span.start_s)
+    units = close_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
+    return units, replace(fit, missing=(*fit.missing, *guessed))
+
+
+def _complete_units(
+    model: Model, request: Request, audio: AnalysedAudio, recognised: Callable[[], Timeline[Unit]]
+) -> tuple[list[Span[Unit]], list[tuple[float, float]]]:
+    """Return the given phones, unknown ones aligned with their word or recognised, and where they are recognised."""
+    from lipmotion.pipeline.analysis.transcribe import format_places
 
     given = cast("Timeline[Unit]", request.units)  # of ``read_request``
     _check_units(given, audio.duration_s)
@@ -460,25 +475,26 @@ def _follow_units(
         LOG.warning("the units do not say the phones of %s: they are those of the dictionary", ", ".join(aligned))
     if guessed:
         LOG.warning("the units do not say which phones are said at %s: they are recognised", format_places(guessed))
-    units = close_gaps(Timeline(tuple(spans)), audio.duration_s)
-    if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
-        return units, None
-    name = find_network(kind) if request.language == ENGLISH else None
-    posteriors, sure = compute_phone_posteriors(name, audio) if name is not None else (None, 0.0)
-    is_sure = sure >= WORD_POSTERIORS[0]
-    fit = label_fit(audio, units, posteriors if is_sure else None)
-    edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), audio.duration_s]
-    filling = [
+    return spans, guessed
+
+
+def _fill_open(
+    spans: list[Span[Unit]],
+    missing: Sequence[tuple[float, float]],
+    duration_s: float,
+    recognised: Callable[[], Timeline[Unit]],
+) -> list[Span[Unit]]:
+    """Return the recognised phones of stretches that the spans leave open and in which speech was heard."""
+    from lipmotion.speech.recognition.transcript_evidence import MIN_GAP_S
+
+    edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), duration_s]
+    return [
         phone
         for open_s, close_s in zip(edges_s[::2], edges_s[1::2], strict=True)
-        for start_s, end_s in (fit.missing if is_sure else ())
-        if min(close_s, end_s) - max(open_s, start_s) >= LEAST_GAP_S
+        for start_s, end_s in missing
+        if min(close_s, end_s) - max(open_s, start_s) >= MIN_GAP_S
         for phone in _cut_phones(recognised(), max(open_s, start_s - REACH_S), min(close_s, end_s + REACH_S))
     ]
-    warn_of_label_misfit(fit, filled=bool(filling))
-    spans = sorted([*spans, *filling], key=lambda span: span.start_s)
-    units = close_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
-    return units, replace(fit, missing=(*fit.missing, *guessed))
 
 
 def _cut_phones(units: Timeline[Unit], start_s: float, end_s: float) -> list[Span[Unit]]:
@@ -510,7 +526,7 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
         LOG.warning(
             "the units go on to %.2f s, the recording ends at %.2f s: are %s?", units[-1].end_s, duration_s, guess
         )
-    elif len(spoken_s) >= FEWEST_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
+    elif len(spoken_s) >= MIN_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
         LOG.warning(
             "the units last %.1f ms each and end at %.2f s of %.2f s, faster than anybody speaks: are their times in "
             "seconds?",

@@ -28,7 +28,7 @@ from lipmotion.speech.recognition.network.posteriors import (
 from lipmotion.speech.recognition.recognised_speech import PHONE_POSTERIORS, WORD_POSTERIORS
 from lipmotion.speech.recognition.recogniser import Recogniser, find_network
 from lipmotion.speech.recognition.transcript_evidence import (
-    LEAST_GAP_S,
+    MIN_GAP_S,
     SURE_COSTS,
     WORD_COSTS,
     OtherSpeech,
@@ -54,7 +54,7 @@ MIN_INSERTED = 2
 """Fewer phones between words than this belong to them: recognition errs by one."""
 ALIKE_SHARE = 0.34
 """Words are said all the same where recognition finds their phones, but for so small a share."""
-MOST_REPLACED = 2
+MAX_REPLACED = 2
 """So few words are said in place of others; more are of another sentence, which may have words of this one."""
 
 
@@ -166,7 +166,7 @@ def _compare(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Transc
         before_s = words[before].end_s if before >= 0 else 0.0
         after_s = words[after].start_s if after < len(words) else np.inf
         between = others_said[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
-        lasts = between and between[-1].end_s - between[0].start_s >= LEAST_GAP_S
+        lasts = between and between[-1].end_s - between[0].start_s >= MIN_GAP_S
         is_more = (before + 1, after) in known or (evidence.gaps and len(between) >= MIN_INSERTED)
         if after > before + 1 or (lasts and is_more):
             start_s, end_s = (between[0].start_s, between[-1].end_s) if between else (before_s, before_s)
@@ -189,7 +189,7 @@ def _match_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> t
         shares = [len(matched.get(number, ())) / len(words[number].phones) for number in left_out]
         unlike = [number for number, share in zip(left_out, shares, strict=True) if share < 1]
         if min(shares, default=1.0) < 1 - ALIKE_SHARE:
-            few = unlike[-1] - unlike[0] < MOST_REPLACED
+            few = unlike[-1] - unlike[0] < MAX_REPLACED
             doubted.update(range(unlike[0], unlike[-1] + 1) if few else left_out)
     taken, end = set[int](), 0
     for number, word in enumerate(words):

@@ -33,7 +33,7 @@ SILENT_DB = -60.0
 """A recording that is nowhere louder, in dB of full scale, is silent."""
 MIN_SPOKEN_S = 0.1
 """A recording with less sound above its quiet level has nothing said in it."""
-SHORTEST_TOLD_S, FEWEST_TOLD_WORDS = 8.0, 5
+SHORTEST_TOLD_S, MIN_TOLD_WORDS = 8.0, 5
 """The language of shorter speech, or of fewer words, is not told: it takes a dozen long words to be sure."""
 LETTERS_OF = {"CJK": 4.0, "HANGUL": 3.0, "HIRAGANA": 2.0, "KATAKANA": 2.0}
 """How many Latin letters take as long to say as one of a script."""
@@ -77,7 +77,7 @@ def check_line(line: BatchLine, request: Request) -> CheckedLine:
     spoken_s = sum(end_s - start_s for start_s, end_s in list_spans(levels))
     if spoken_s < MIN_SPOKEN_S:
         return CheckedLine(line.name, "silent", "no sound longer than a click")
-    detected = detect_language(words) if len(words) >= FEWEST_TOLD_WORDS else ""
+    detected = detect_language(words) if len(words) >= MIN_TOLD_WORDS else ""
     required, reason = request.language if request.language != AUTO else detected, ""
     if detected and required in COMMON_WORDS and detected != required:
         reason = f"the words are in {detected}, required {required}"
@@ -116,9 +116,9 @@ PAUSE_S, LETTERS_PER_S = 0.3, 15.0
 SHORT, LONG, LONGER_S = 0.5, 2.0, 1.0
 """A recording is too short or too long for its words below and above these shares of what they take; the last is how
 much longer a drawn out word may be."""
-FEWEST_LINES, SLOWEST = 10, 2.0
+MIN_LINES, SLOWEST = 10, 2.0
 """From so many lines with words on, their own median rate is the measure, at most so many times slower or faster."""
-FEWEST_SAME_WORDS = 4
+MIN_SAME_WORDS = 4
 """Shorter lines, as "Yes, sir", may well be said twice."""
 
 
@@ -189,7 +189,7 @@ def check(
 def _find_problems(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> Iterator[Finding]:
     """Yield what is wrong, line after line, and then what is there twice, and the recordings of no line."""
     rates = [each.spoken_s / estimate_time(each.letters) for each in checked if each.letters]
-    usual = min(max(median(rates), 1 / SLOWEST), SLOWEST) if len(rates) >= FEWEST_LINES else 1.0
+    usual = min(max(median(rates), 1 / SLOWEST), SLOWEST) if len(rates) >= MIN_LINES else 1.0
     for each in checked:
         if each.problem:
             yield Finding(each.problem, each.name, each.reason)
@@ -204,7 +204,7 @@ def _find_problems(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> It
             yield Finding("too long", each.name, text)
     yield from _find_doubles("same sound", checked, lambda each: each.digest)
     yield from _find_doubles(
-        "same words", checked, lambda each: each.words if len(each.words) >= FEWEST_SAME_WORDS else ()
+        "same words", checked, lambda each: each.words if len(each.words) >= MIN_SAME_WORDS else ()
     )
     yield from (Finding("orphaned", path, "no line has this recording") for path in orphans)
 

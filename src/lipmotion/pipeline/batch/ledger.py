@@ -28,7 +28,7 @@ from lipmotion.pipeline.batch.lines import CONTROL, OWN_FILES, OWN_FOLDER, Batch
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import find_shipped
 from lipmotion.pipeline.outputs.cues import SHEET
-from lipmotion.speech.recognition.network.posteriors import find_installed
+from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser
 from lipmotion.storage.files import TEMPORARY, atomic_file, check_own, confine, make_folder, open_own, remove
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.locks import lock_folder
@@ -85,7 +85,7 @@ def fingerprint_job(job: Job) -> str:
     table = find_table(job.outputs.character) if job.outputs.character else None
     if table and is_file(table):
         parts.append({"table": hash_file(table)})
-    return _digest(as_json([*parts, find_version(), find_installed()]))
+    return _digest(as_json([*parts, find_version(), find_installed_recogniser()]))
 
 
 def fingerprint_line(line: BatchLine, of_settings: str) -> str:

@@ -11,11 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shorten
 from lipmotion.formats.base import list_suffixes
 from lipmotion.storage.files import make_portable
-from lipmotion.storage.sources import check_listable, read_text_file
+from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, check_listable, read_text_file
 from lipmotion.storage.text_table import read_table
 
 LOG = logging.getLogger("lipmotion")

@@ -15,7 +15,6 @@ from typing import Any
 from urllib.parse import quote
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.web_page import find_colour
 from lipmotion.pipeline.batch.ledger import FAILED, Ledger, Record
 from lipmotion.pipeline.batch.lines import LARGEST_LIST_BYTES, BatchLine
 from lipmotion.printable import printable
@@ -95,6 +94,7 @@ UNSURE_WORDS, UNSURE_PHONES = 80.0, 25.0
 """Doubt of words of which nothing is sure, and of sounds that were recognised without words."""
 ROWS, BETWEEN = "/*ROWS*/", " | "
 """Where the page has its rows; what stands between several texts in a field of the CSV file."""
+SHARED_COLOURS = "/*COLOURS*/"
 BASIS = "/*BASIS*/"
 """Where the page has the digest of the marks that it shows."""
 
@@ -111,7 +111,7 @@ def write_reports(
     order = sorted(range(len(lines)), key=lambda number: (-doubts[number], lines[number].name))
     table, page = out / CSV_REPORT, out / HTML_REPORT
     marks = marks or {}
-    page_text = find_colour(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
+    page_text = insert_colours(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
     rows_of_marks = as_json([[name, mark.kind, mark.when] for name, mark in marks.items()])
     page_text = page_text.replace(BASIS, hashlib.sha256(rows_of_marks.encode()).hexdigest())
     before, _, after = page_text.partition(ROWS)
@@ -185,3 +185,8 @@ def _visible(value: Any) -> Any:
     if isinstance(value, list):
         return [printable(text) for text in value]
     return printable(value) if isinstance(value, str) else value
+
+
+def insert_colours(style: str) -> str:
+    """Return a style with the colours of all pages, light and dark, in the place of ``SHARED_COLOURS``."""
+    return style.replace(SHARED_COLOURS, resources.files(__package__).joinpath("colours.css").read_text("utf-8"))

@@ -150,9 +150,9 @@ def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
             side = f"states {'ahead of' if chain.expected_lead >= 0 else 'behind'} {explanation.chains[0].name}"
             yield "asynchrony", f"{chain.name} {abs(chain.expected_lead):.2f} {side}   ({'   '.join(shares)})"
     for gaussian in explanation.gaussians:
-        parse_number = f" number {gaussian.component} of {gaussian.components}" if gaussian.components > 1 else ""
+        which = f" number {gaussian.component} of {gaussian.components}" if gaussian.components > 1 else ""
         distance = f", {gaussian.distance:.2f} deviations away" if gaussian.distance is not None else ""
-        text = f"{gaussian.density}{parse_number}, responsible for {gaussian.responsibility:.2f}{distance}"
+        text = f"{gaussian.density}{which}, responsible for {gaussian.responsibility:.2f}{distance}"
         yield f"Gaussian of {gaussian.stream}", text
         yield from _list_values(gaussian.channels)
     for regression in explanation.regressions:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus, quantise
+from lipmotion.corpora import Corpus, quantise
 from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
 from lipmotion.formats.subtitles import is_subtitles, strip_markup

@@ -17,7 +17,7 @@ from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.pipeline.model import BOTH, GEOMETRY, VISUALS
 from lipmotion.printable import printable
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.network.posteriors import find_installed, infer_tokens
+from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser, infer_posteriors
 from lipmotion.speech.sound.acoustic_conditions import list_conditions
 from lipmotion.stats.pca import choose_evenly
 from lipmotion.types import (
@@ -152,10 +152,10 @@ def with_sound_inputs(
     inputs = engine.inputs(sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ)
     recordings, count = [sound[example.name] for example in examples], len(examples)
     result = list(examples)
-    name = find_installed() if inputs.posteriors else None
+    name = find_installed_recogniser() if inputs.posteriors else None
     if name is not None:
         report = sub_monitor(monitor, 0, 0.5)
-        for number, posteriors in enumerate(each(partial(infer_tokens, name), recordings)):
+        for number, posteriors in enumerate(each(partial(infer_posteriors, name), recordings)):
             result[number] = replace(result[number], speech=replace(result[number].speech, posteriors=posteriors))
             if (number + 1) % BLOCK == 0:
                 report(Progress("posteriors of phones", number + 1, count, (number + 1) / count))

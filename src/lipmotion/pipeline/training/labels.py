@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus
+from lipmotion.corpora import Corpus
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.extensions import find_version
@@ -25,7 +25,7 @@ from lipmotion.kernels.compiler import list_blas_kernels
 from lipmotion.pipeline.model import GEOMETRY, Model
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.agreement import measure_fit
-from lipmotion.speech.recognition.network.posteriors import find_installed
+from lipmotion.speech.recognition.network.posteriors import find_installed_recogniser
 from lipmotion.storage.archive import Checkpoint
 from lipmotion.storage.sources import hash_file
 from lipmotion.types import Item, Monitor, Progress, Span, Timeline, Unit, Utterance
@@ -183,7 +183,7 @@ def fingerprint_training(
         "words": lexicon.user,
         "visual": visual,
         "versions": [find_version(), *map(metadata.version, ("numpy", "scipy", "pocketsphinx"))],
-        "phone recogniser": find_installed(),
+        "phone recogniser": find_installed_recogniser(),
         "machine": [platform.machine(), list_blas_kernels()],
     }
     if prior is not None:

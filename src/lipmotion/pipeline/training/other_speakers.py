@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shorten
 from lipmotion.formats.label_files import CHAPTER, find_labels
 from lipmotion.pipeline.analysis.transcribe import align_or_recognise
@@ -25,7 +24,7 @@ from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import SYNTHESISERS, list_installed, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.storage.sources import check_listable
+from lipmotion.storage.sources import AUDIO_SUFFIXES, check_listable
 from lipmotion.types import Audio, Item, Monitor, Span, Timeline, Unit, silent_monitor
 from lipmotion.units import SILENCE, Lexicon, is_silent
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.store import Corpus, read_entry
+from lipmotion.corpora import Corpus, read_entry
 from lipmotion.errors import InputError
 from lipmotion.formats.label_files import read_plain_text
 from lipmotion.units import SILENCE, VISEME_OF, Lexicon, is_silent, split_words

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.corpora import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.extensions import find_version
@@ -68,7 +68,7 @@ from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 
 WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
 """Warps of the frequencies, of one recording after the other."""
-FEWEST_WARPED_RECORDINGS = 60
+MIN_WARPED_RECORDINGS = 60
 """Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
 
 
@@ -87,7 +87,7 @@ def train_phone_models(
     Raises CorpusError: no transcript fits into its recording.
     Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """
-    turns = WARP_CYCLE if len(spoken) >= FEWEST_WARPED_RECORDINGS else (1.0,)
+    turns = WARP_CYCLE if len(spoken) >= MIN_WARPED_RECORDINGS else (1.0,)
     utterances = [
         TranscribedUtterance(analysed(audio).mfcc(warp).values, tuple(lexicon.pronunciations(word) for word in words))
         for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
@@ -198,41 +198,29 @@ def train(  # noqa: PLR0913
         monitor = sub_monitor(run.monitor, 0, 0.5)
         phones, examples, skipped = fit_phones(utterances, recogniser, lexicon, monitor, checkpoint)
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
-        people, speakers = [speaker_of[example.name] for example in examples], None
-        if len(set(filter(None, people))) > 1:
-            examples, speakers = map_to_mean_person(examples, people)
+        people = [speaker_of[example.name] for example in examples]
+        several = len(set(filter(None, people))) > 1
+        examples, speakers = map_to_mean_person(examples, people) if several else (examples, None)
         sound = {utterance.name: utterance.audio for utterance in utterances}
         examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), each)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
         learning = sub_monitor(run.monitor, 0.6, 1, "learning motion: ")
         fit = engine.fit([*examples, *speech_examples], learning, checkpoint)
-    if not fit.uses_prior:
-        prior = None
     used = tuple(example.name for example in examples)
-    about = describe_training(
-        corpus, utterances, "given names" if selection.names is not None else selection.split or "all", len(used)
-    )
-    if selection.speakers and selection.names is None:
-        about["speakers"] = sorted(set(selection.speakers))
-    if speech_examples:
-        about["voices"] = sorted({example.name for example in speech_examples})
-    if eigenlips is not None:
-        about |= {"visual": visual, "eigenlips": eigenlips.summary}
+    about = describe_training(corpus, utterances, selection, len(used))
+    about |= {"voices": sorted({example.name for example in speech_examples})} if speech_examples else {}
+    about |= {"visual": visual, "eigenlips": eigenlips.summary} if eigenlips is not None else {}
     if speakers is not None:
         generated = (engine.generate(fit.model, example.speech).motion.values for example in examples)
         speakers = add_habits(speakers, examples, people, generated)
         about["speakers"] = list(speakers.names)
-    return Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers), TrainReport(
-        used, skipped, fit.figures
-    )
+    prior = prior if fit.uses_prior else None
+    model = Model(phones, engine, fit.model, about, eigenlips=eigenlips, prior=prior, speakers=speakers)
+    return model, TrainReport(used, skipped, fit.figures)
 
 
 def fit_phones(
-    utterances: Sequence[Utterance],
-    recogniser: HmmConfig,
-    lexicon: Lexicon,
-    monitor: Monitor,
-    checkpoint: Checkpoint,
+    utterances: Sequence[Utterance], recogniser: HmmConfig, lexicon: Lexicon, monitor: Monitor, checkpoint: Checkpoint
 ) -> tuple[UnitHmm, list[Example], dict[str, str]]:
     """Return phone models, the examples for an engine, and the reason for every utterance that is not used.
 
@@ -293,11 +281,7 @@ def label_phones(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> 
 
 
 def _train_phone_models(
-    utterances: Sequence[Utterance],
-    lexicon: Lexicon,
-    config: HmmConfig,
-    monitor: Monitor,
-    checkpoint: Checkpoint,
+    utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor, checkpoint: Checkpoint
 ) -> UnitHmm:
     """Return phone models of all transcribed or labelled utterances, or those of the shipped model."""
     transcribed: list[tuple[Audio, tuple[str, ...]]] = []
@@ -329,23 +313,26 @@ def _train_phone_models(
     return train_phone_models([*transcribed, *labelled], lexicon, config, monitor, checkpoint)
 
 
-def describe_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, used: int) -> dict[str, Any]:
+def describe_training(
+    corpus: Corpus, utterances: Sequence[Utterance], selection: Selection, used: int
+) -> dict[str, Any]:
     """Return the part of the header of a model that is for users: corpus, licence, attribution, versions.
 
-    split      : name of their list, ``all``, or ``given names``
-    used       : how many of them could be used
+    used : how many of the selected utterances could be used
     """
+    speakers = sorted(set(selection.speakers)) if selection.speakers and selection.names is None else []
     sources = [utterance.source for utterance in utterances]
     minutes = sum(utterance.audio.duration_s for utterance in utterances) / 60
     return {
         "corpus": sorted({source["collection"] for source in sources if "collection" in source}) or [corpus.path.name],
-        "split": split,
+        "split": "given names" if selection.names is not None else selection.split or "all",
         "seed": "fixed: the same corpus gives the same model",
         "utterances": used,
         "minutes": round(minutes, 1),
         "licence": sorted({source["licence"] for source in sources if "licence" in source}),
         "attribution": sorted({source["attribution"] for source in sources if "attribution" in source}),
         "versions": {"lipmotion": find_version()} | {name: metadata.version(name) for name in ("numpy", "scipy")},
+        **({"speakers": speakers} if speakers else {}),
     }
 
 

@@ -232,7 +232,7 @@ def _window(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.abs(time + 0.5 - _WINDOW / 2) < _WINDOW / 2, np.sin(np.pi * (time + 0.5) / _WINDOW) ** 2, 0)
 
 
-LEAST_POWER = 1e-9
+MIN_POWER = 1e-9
 """Power that is added to every frame's: digital silence is at -90 dB."""
 
 
@@ -246,4 +246,4 @@ def find_prosody(audio: Audio) -> Prosody:
     centre = np.arange(frames) * HOP
     length = np.minimum(centre + HOP, len(samples)) - np.maximum(centre - HOP, 0)
     mean = (energy + np.concatenate([[0.0], energy[:-1]])) / np.maximum(length, 1)
-    return Prosody(10 * np.log10(mean + LEAST_POWER), log_f0(Audio(audio.samples, SPEECH_RATE_HZ)))
+    return Prosody(10 * np.log10(mean + MIN_POWER), log_f0(Audio(audio.samples, SPEECH_RATE_HZ)))

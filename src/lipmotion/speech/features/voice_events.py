@@ -32,7 +32,7 @@ from lipmotion.units import VOWELS, is_silent
 
 APART_FRAMES = (11, 40)
 """Calls of one bout are so far apart, least and most."""
-LEAST_CALLS = 4
+MIN_CALLS = 4
 RISE_DB, LOWEST_DB = 6.0, -35.0
 """A call is so much louder than what is beside it, and its level beside the loudest one is at least the second."""
 EDGE_FRAMES = 5
@@ -60,14 +60,14 @@ class Bout(NamedTuple):
     probability: float
 
 
-def laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_]) -> Iterator[Bout]:
+def find_laughter(samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_]) -> Iterator[Bout]:
     """Yield the bouts of a recording at 16 kHz that are probably laughter, in order.
 
     level_db : smoothed level of every frame of 10 ms [shape=(T,)]
     voiced   : whether it is voiced [shape=(T,)]
     """
     for calls in find_calls(level_db):
-        figures = figures_of(samples, level_db, voiced, calls)
+        figures = measure_bout(samples, level_db, voiced, calls)
         if figures is None:
             continue
         probability = float(1 / (1 + np.exp(-np.dot(WEIGHTS, [*figures, 1.0]))))
@@ -83,7 +83,7 @@ def find_calls(level_db: Curve) -> Iterator[tuple[int, ...]]:
     gaps = np.diff(peaks)
     breaks = np.flatnonzero((gaps < APART_FRAMES[0]) | (gaps > APART_FRAMES[1])) + 1
     for run in np.split(peaks, breaks):
-        if len(run) >= LEAST_CALLS:
+        if len(run) >= MIN_CALLS:
             yield tuple(run.tolist())
 
 
@@ -114,7 +114,7 @@ def _find_fall(heights: Curve, lowest: Curve) -> Curve:
     return np.array(found)
 
 
-def figures_of(
+def measure_bout(
     samples: NDArray[np.float32], level_db: Curve, voiced: NDArray[np.bool_], calls: tuple[int, ...]
 ) -> tuple[float, ...] | None:
     """Return the figures of a run that ``WEIGHTS`` weigh; None: its voiced share is not that of laughter.
@@ -142,23 +142,23 @@ Voiced = NDArray[np.bool_]
 
 SMOOTHING_FRAMES = 2.0
 """Standard deviation of the window that levels are smoothed with."""
-WORD_CONFIDENCE, MOST_WORD_SHARE = 0.5, 0.2
+WORD_CONFIDENCE, MAX_WORD_SHARE = 0.5, 0.2
 """Phones of this confidence, and those that are known, are words; in laughter they have at most this share."""
-PHRASE_PAUSE_S, LEAST_PHRASE_S, LEAST_VOWELS = 0.25, 0.6, 2
+PHRASE_PAUSE_S, MIN_PHRASE_S, MIN_VOWELS = 0.25, 0.6, 2
 """Phrases are divided by such pauses, and judged from so much speech, and so many vowels, on."""
 LOUD_DB = 20.0
 """The frames of a phrase that are at most so far under its loudest are judged."""
-LEAST_SNR_DB, BELOW_LOUDEST_DB = 12.0, 20.0
+MIN_SNR_DB, BELOW_LOUDEST_DB = 12.0, 20.0
 """Whispering is judged in phrases whose loudest frames are so much louder than the quiet of the recording, as noise
 hides a voice; and half of whose frames are at most so far under its loudest ones, beside which no F0 is found."""
 WHISPERED_SHARES = (0.12, 0.24)
 """A phrase is whispered up to the first share of voiced frames, and not from the second one on."""
-LEAST_PHRASES = 5
+MIN_PHRASES = 5
 """A shout is one beside the other phrases of a recording: at least so many."""
 SHOUT_SEMITONES, SHOUT_TILT_DB, SHOUT_DB = (4.0, 8.0), (3.0, 7.0), (4.0, 8.0)
 """How much higher, brighter (1 to 4.5 kHz beside what is lower) and louder than the median phrase a shout is: where it
 begins, and where it is one. The least of the three counts."""
-LEAST_VOICED = 15
+MIN_VOICED = 15
 """Frames without which a phrase has no pitch."""
 BREATH_S, BREATH_PAUSE_S = (0.16, 1.2), 0.25
 """Least and most duration of a breath, and the least one of the pause that it is in."""
@@ -237,10 +237,10 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
     """Yield laughter where hardly any words are known or confirmed."""
     sure = (span for span in units if span.label.confidence is None or span.label.confidence >= WORD_CONFIDENCE)
     words = [span for span in sure if not is_silent(span.label.phone)]
-    for bout in laughter(audio.samples, level_db, voiced):
+    for bout in find_laughter(audio.samples, level_db, voiced):
         start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
         said_s = sum(_find_overlap((span.start_s, span.end_s), (start_s, end_s)) for span in words)
-        if said_s <= MOST_WORD_SHARE * (end_s - start_s):
+        if said_s <= MAX_WORD_SHARE * (end_s - start_s):
             loudness = 2 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 10)
             calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
             yield VoiceEvent(start_s, end_s, LAUGHTER, bout.probability, tuple(calls))
@@ -258,7 +258,7 @@ def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
             found[-1] = start_s, span.end_s, said_s + span.duration_s, vowels + vowel
         else:
             found.append((span.start_s, span.end_s, span.duration_s, vowel))
-    return [each[:2] for each in found if each[2] >= LEAST_PHRASE_S and each[3] >= LEAST_VOWELS]
+    return [each[:2] for each in found if each[2] >= MIN_PHRASE_S and each[3] >= MIN_VOWELS]
 
 
 def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
@@ -266,7 +266,7 @@ def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, fl
     for start_s, end_s in phrases:
         frames = _frames(start_s, end_s)
         middle_db, loudest_db = np.percentile(level_db[frames], (50, 95)) if len(level_db[frames]) else (quiet_db,) * 2
-        if loudest_db - quiet_db < LEAST_SNR_DB or middle_db - most_db < -BELOW_LOUDEST_DB:
+        if loudest_db - quiet_db < MIN_SNR_DB or middle_db - most_db < -BELOW_LOUDEST_DB:
             continue
         share = float(voiced[frames][level_db[frames] > loudest_db - LOUD_DB].mean())
         strength = _risen(-share, (-WHISPERED_SHARES[1], -WHISPERED_SHARES[0]))
@@ -283,7 +283,7 @@ def _efforts(
     for phrase in phrases:
         frames = _frames(*phrase)
         voiced = np.flatnonzero(np.isfinite(pitch[frames]))
-        if len(voiced) < LEAST_VOICED:
+        if len(voiced) < MIN_VOICED:
             continue
         levels = level_db[frames][voiced]
         loud = voiced[levels > np.median(levels) - 6]
@@ -294,7 +294,7 @@ def _efforts(
 
 def _shouts(judged: Sequence[tuple[float, float, tuple[float, float, float]]]) -> Iterator[VoiceEvent]:
     """Yield the phrases that are higher, brighter and louder than the others, of which the efforts are given."""
-    if len(judged) < LEAST_PHRASES:
+    if len(judged) < MIN_PHRASES:
         return
     efforts = np.array([effort for *_, effort in judged])
     for (start_s, end_s, _), values in zip(judged, (efforts - np.median(efforts, axis=0)).tolist(), strict=True):

@@ -22,14 +22,14 @@ WORST_SCORE = -9.0
 """No frame counts for less: a sound that a voice makes in its own way, as synthetic ones do, does not decide alone."""
 FRAME_STEP = 4
 """Only every fourth frame is scored: its neighbours are much like it."""
-LONG_PHONE_S, LONG_PHONE_SCORE, LEAST_LOUD_S = 0.35, -4.0, 0.2
+LONG_PHONE_S, LONG_PHONE_SCORE, MIN_LOUD_S = 0.35, -4.0, 0.2
 """A phone that lasts as long, agrees with the sound less and is loud for as long is stretched over speech that the
 transcript leaves out. A sound that is drawn out lasts longer, too, but agrees; a pause before a word is quiet."""
-LEAST_VOICE_S = 1.0
+MIN_VOICE_S = 1.0
 """Silence with so much loud sound in it is speech that the transcript leaves out; breath and coughs are shorter."""
-LEAST_IDLE_S = 0.3
+MIN_IDLE_S = 0.3
 """Given phones in silence for so long are doubted."""
-LEAST_FITTING_SHARE = 0.9
+MIN_FITTING_SHARE = 0.9
 """A transcript that fits less of the speech is worth a remark."""
 JOINED_S = 0.5
 """Places nearer than this are one stretch."""
@@ -79,7 +79,7 @@ class TranscriptFit:
     @property
     def is_partial(self) -> bool:
         """Whether the transcript fits so little of the speech that this is worth a remark."""
-        return self.share < LEAST_FITTING_SHARE
+        return self.share < MIN_FITTING_SHARE
 
     def of_frames(self, count: int) -> NDArray[np.float64]:
         """Return in which frames the transcript fits: 1; 0 where it does not [shape=(count,)]."""
@@ -94,7 +94,7 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
 
     audio, units : as of ``score_agreement``
     Forced alignment finds a place for every word, and fills the recording with them: where the transcript leaves words
-    out, it stretches phones of their neighbours (``LONG_PHONE_S``), or calls loud sound silence (``LEAST_VOICE_S``).
+    out, it stretches phones of their neighbours (``LONG_PHONE_S``), or calls loud sound silence (``MIN_VOICE_S``).
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
     analysis = analysed(audio)
@@ -104,12 +104,12 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     for span in units:
         loud_s = (_first_frame(span.start_s) + np.flatnonzero(loud[_frames_of(span)])) / FRAME_RATE_HZ
         if is_silent(span.label.phone):
-            if len(loud_s) >= LEAST_VOICE_S * FRAME_RATE_HZ:
+            if len(loud_s) >= MIN_VOICE_S * FRAME_RATE_HZ:
                 missing.append((float(loud_s[0]), float(loud_s[-1]) + 1 / FRAME_RATE_HZ))
                 speech_s += missing[-1][1] - missing[-1][0]
         else:
             speech_s += span.duration_s
-            if span.duration_s >= LONG_PHONE_S and len(loud_s) >= LEAST_LOUD_S * FRAME_RATE_HZ:
+            if span.duration_s >= LONG_PHONE_S and len(loud_s) >= MIN_LOUD_S * FRAME_RATE_HZ:
                 inside = slice(*np.searchsorted(scored.frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
                 if float(scored.scores[inside].mean()) < LONG_PHONE_SCORE:
                     missing.append((span.start_s, span.end_s))
@@ -134,7 +134,7 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
     else:
         quiet = find_quiet_frames(audio.log_energy)
         silent = _joined([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
-        idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= LEAST_IDLE_S)
+        idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= MIN_IDLE_S)
         missing, wrong = measure_fit(audio, units).missing, ()
     fit = TranscriptFit(0.0, missing, sum(span.duration_s for span in spoken), None, idle, wrong)
     return replace(fit, speech_s=fit.speech_s + fit.missing_s)

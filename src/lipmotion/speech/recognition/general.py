@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import StateTable, UnitHmm
 from lipmotion.hmm.network import DensitySelection, LogLikelihoods
-from lipmotion.speech.features.mfcc import FFT_SIZE, build_cosine, check_samples, log_mel, triangles
+from lipmotion.speech.features.mfcc import FFT_SIZE, build_cosine, check_samples, log_mel, make_triangles
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.mixture import Mixtures
@@ -38,7 +38,7 @@ BLOCK = 128
 """Frames computed at a time: the values of their 5,376 Gaussians fit into the cache."""
 THREADS = 2
 """Threads that compute blocks: NumPy lets them run at the same time."""
-LEAST_VARIANCE = 1e-4
+MIN_VARIANCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ def load_general() -> GeneralModel:
         ) from error
     forms, constants = [], []
     for stream in STREAMS:
-        mean, precision = means[:, stream], 1 / np.maximum(variances[:, stream], LEAST_VARIANCE)
+        mean, precision = means[:, stream], 1 / np.maximum(variances[:, stream], MIN_VARIANCE)
         forms.append(np.concatenate([mean * precision, precision / -2], axis=1).transpose(1, 0, 2))
         size = stream.stop - stream.start
         log_norm = size * np.log(2 * np.pi) - np.log(precision).sum(axis=1) + (mean * mean * precision).sum(axis=1)
@@ -192,7 +192,7 @@ def _filters() -> NDArray[np.float32]:
     mel = np.linspace(2595 * np.log10(1 + LOWEST_HZ / 700), 2595 * np.log10(1 + HIGHEST_HZ / 700), FILTERS + 2)
     edges = (np.round(700 * (10 ** (mel / 2595) - 1) / bin_hz) * bin_hz).astype(np.float64)
     hertz = np.arange(FFT_SIZE // 2 + 1) * bin_hz
-    return (triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])).astype(np.float32)
+    return (make_triangles(hertz, edges) * 2 / (edges[2:] - edges[:-2])).astype(np.float32)
 
 
 PROBABILITY_SHARE = {

@@ -35,7 +35,7 @@ from lipmotion.speech.recognition.anchors import Anchors, align_within, count_mi
 from lipmotion.speech.recognition.general import CombinedPhones, combine_likelihoods, combine_phones
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
-    find_installed,
+    find_installed_recogniser,
     find_stretches,
     mean_posterior,
 )
@@ -192,12 +192,7 @@ class Recogniser:
         return [LabelledFrames(frame, span.label.phone) for frame, span in zip(frames, aligned, strict=True)]
 
     def align(
-        self,
-        audio: Audio,
-        features: Features,
-        words: Sequence[str],
-        lexicon: Lexicon,
-        anchors: Anchors | None = None,
+        self, audio: Audio, features: Features, words: Sequence[str], lexicon: Lexicon, anchors: Anchors | None = None
     ) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
 
@@ -331,7 +326,7 @@ def _recognition(
 
 def find_network(kind: str) -> str | None:
     """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
-    return find_installed() if kind == "auto" else None
+    return find_installed_recogniser() if kind == "auto" else None
 
 
 @lru_cache(maxsize=4)

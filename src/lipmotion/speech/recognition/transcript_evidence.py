@@ -28,22 +28,22 @@ GAP_COST, WORD_COST, PHONE_COST = 6.0, 9.0, 1.0
 """What it costs, in nats, that anything is said; that words are left out there; and each phone of these words."""
 WORD_COSTS, SURE_COSTS = (WORD_COST, PHONE_COST), (4.0, 0.5)
 """The last two; and where a recogniser is sure of what it hears, so that a single wrong word is noticed."""
-LEAST_HEARD = 1.0
+MIN_HEARD = 1.0
 """Something is said in a frame in which any phone is so many nats more probable than none."""
-LEAST_GAP_S = 0.1
+MIN_GAP_S = 0.1
 """Where something else is said for a shorter time, no speech is missing."""
-LEAST_SAID_SHARE = 0.25
+MIN_SAID_SHARE = 0.25
 """A transcript of which so small a share of the phones is said is not that of the recording."""
-LEAST_LOG_POSTERIOR = -23.0
+MIN_LOG_POSTERIOR = -23.0
 """No frame counts for less: what the network holds for impossible is as good as any other mistake."""
 LARGEST_SEARCH = 20_000_000
 """Frames times phones that are searched at once, about three minutes of speech."""
-LEAST_STRETCH_S, LONGEST_STRETCH_S = 10.0, 30.0
+MIN_STRETCH_S, LONGEST_STRETCH_S = 10.0, 30.0
 """A longer recording is divided at the first silence after so many seconds, or else at the first word after so many."""
 
-LABEL_REACH_S, COMPARED, LEAST_AGREEING = 0.1, 9, 0.4
+LABEL_REACH_S, COMPARED, MIN_AGREEING = 0.1, 9, 0.4
 """Given phones are compared with what is heard so near to them; of so many together fewer agree if they are wrong."""
-RUN_PAUSE_S, LEAST_RUN, LEAST_DOUBT_S = 0.5, 3, 0.3
+RUN_PAUSE_S, MIN_RUN, MIN_DOUBT_S = 0.5, 3, 0.3
 """What is doubted is a stretch if it is nearer to one another, and so much and so long together."""
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ class TranscriptEvidence:
     @property
     def gaps(self) -> tuple[tuple[float, float], ...]:
         """Where speech is left out of the transcript, in seconds."""
-        return tuple((each.start_s, each.end_s) for each in self.others if each.end_s - each.start_s >= LEAST_GAP_S)
+        return tuple((each.start_s, each.end_s) for each in self.others if each.end_s - each.start_s >= MIN_GAP_S)
 
     @property
     def unsaid(self) -> tuple[WordEvidence, ...]:
@@ -99,7 +99,7 @@ class TranscriptEvidence:
     @property
     def is_doubtful(self) -> bool:
         """Whether the transcript as a whole is something else than what is said."""
-        return self.said_share < LEAST_SAID_SHARE
+        return self.said_share < MIN_SAID_SHARE
 
 
 def find_evidence(
@@ -119,7 +119,7 @@ def find_evidence(
         raise ValueError(f"posteriors of {len(log_posteriors) * frame_s:.2f} s, required {spoken_s:.2f}")
     if log_posteriors.shape[1] != len(PHONES) + 1:
         raise ValueError(f"posteriors of {log_posteriors.shape[1]} classes, required {len(PHONES) + 1}")
-    log_posteriors = np.maximum(log_posteriors, LEAST_LOG_POSTERIOR)
+    log_posteriors = np.maximum(log_posteriors, MIN_LOG_POSTERIOR)
     words: list[WordEvidence] = []
     others: list[OtherSpeech] = []
     for part in _parts(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
@@ -158,7 +158,7 @@ def _parts(units: Timeline[Unit], divided: bool) -> Iterator[_Part]:
         if silent:
             continue
         pause_s, so_far_s = spans[0].start_s - before_s, before_s - start_s
-        if divided and words and so_far_s > (LEAST_STRETCH_S if pause_s > 0 else LONGEST_STRETCH_S):
+        if divided and words and so_far_s > (MIN_STRETCH_S if pause_s > 0 else LONGEST_STRETCH_S):
             cut_s = before_s + pause_s / 2
             yield _Part(start_s, cut_s, words, is_last=False)
             start_s, words = cut_s, []
@@ -256,7 +256,7 @@ def _trace(
                 word -= 1
             place = int(edges[word])
             if how == FREE and ways[t, 0, word] == BEGAN:
-                loud = t + np.flatnonzero(heard[t : last[0]] > LEAST_HEARD)
+                loud = t + np.flatnonzero(heard[t : last[0]] > MIN_HEARD)
                 where = (int(loud[0]), int(loud[-1]) + 1) if len(loud) else (t, t)
                 free.append((where, (word, last[1])))
                 last, how = None, int(arrivals[t, place])
@@ -305,13 +305,13 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     share = (
         np.convolve(right, window, "same") / np.convolve(np.ones(len(right)), window, "same") if len(right) else right
     )
-    doubted_s = compared_s[order][share < LEAST_AGREEING]
+    doubted_s = compared_s[order][share < MIN_AGREEING]
     idle, wrong = _runs(starts_s[~is_near], ends_s[~is_near]), _runs(doubted_s, doubted_s)
-    return LabelEvidence(_runs(times_s[alone], times_s[alone], LEAST_GAP_S), idle, wrong)
+    return LabelEvidence(_runs(times_s[alone], times_s[alone], MIN_GAP_S), idle, wrong)
 
 
-def _runs(starts_s: Array, ends_s: Array, least_s: float = LEAST_DOUBT_S) -> tuple[tuple[float, float], ...]:
-    """Return stretches of at least ``LEAST_RUN`` times near one another."""
+def _runs(starts_s: Array, ends_s: Array, least_s: float = MIN_DOUBT_S) -> tuple[tuple[float, float], ...]:
+    """Return stretches of at least ``MIN_RUN`` times near one another."""
     if not len(starts_s):
         return ()
     cuts = np.flatnonzero(starts_s[1:] - ends_s[:-1] > RUN_PAUSE_S) + 1
@@ -319,7 +319,7 @@ def _runs(starts_s: Array, ends_s: Array, least_s: float = LEAST_DOUBT_S) -> tup
     return tuple(
         (float(first[0]), float(last[-1]))
         for first, last in runs
-        if len(first) >= LEAST_RUN and last[-1] - first[0] >= least_s
+        if len(first) >= MIN_RUN and last[-1] - first[0] >= least_s
     )
 
 

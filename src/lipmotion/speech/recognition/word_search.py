@@ -133,7 +133,7 @@ WORD_FIT, STRETCH_FIT = -2.0, -1.5
 WORD_BONUS = 2.0
 """Where words are not believed, their phones are still more probable than others, by so many nats a frame."""
 FIT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.62, 3.4, -1.9
-LEAST_FIT, MOST_FIT = -4.0, 1.0
+MIN_FIT, MAX_FIT = -4.0, 1.0
 """Coefficients of the confidence; fits count within these limits."""
 SHORT_FRAMES = 3000
 """The words of so little sound are recognised in this process: to start another one would take as long."""
@@ -200,7 +200,7 @@ class WordSearch:
         values = self.aligning.stretch(*stretch)
         aligned = _align(self.hmm, values, self.loud[slice(*stretch)], words, DICTIONARY)
         if aligned is None:
-            return [], [LEAST_FIT] * len(words)
+            return [], [MIN_FIT] * len(words)
         fits, fit = aligned.fits(values, self.path[slice(*stretch)])
         believed = np.full(len(words), self.believing or fit > STRETCH_FIT) | (fits > WORD_FIT)
         decided = list(label_words(aligned, stretch, believed, first_word))
@@ -217,7 +217,7 @@ def score_words(fit: float, posterior: float) -> float:
 
     fit       : of the word (``AlignedWords.fits``), in nats
     """
-    score = FIT_WEIGHT * min(max(fit, LEAST_FIT), MOST_FIT) + POSTERIOR_WEIGHT * posterior + CONSTANT
+    score = FIT_WEIGHT * min(max(fit, MIN_FIT), MAX_FIT) + POSTERIOR_WEIGHT * posterior + CONSTANT
     return float(1 / (1 + np.exp(-score)))
 
 

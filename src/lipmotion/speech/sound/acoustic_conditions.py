@@ -17,11 +17,11 @@ from lipmotion.speech.sound.voice_activity import find_passages
 from lipmotion.types import Audio, ConditionSpectrum
 
 NOISE_KINDS = ("white", "babble")
-FEWEST_TALKERS = 2
+MIN_TALKERS = 2
 """One other talker is an interruption, not a babble."""
 SILENT_RMS = 1e-6
 """Speech of a lower root mean square, full scale 1, is silence."""
-HUM, LEAST_HUM, MAX_HUM_BLOCKS, HUM_RATIO, HUM_WIDTH = 16_000, 32_000, 200, 8.0, 61
+HUM, MIN_HUM, MAX_HUM_BLOCKS, HUM_RATIO, HUM_WIDTH = 16_000, 32_000, 200, 8.0, 61
 HUM_SHARE, HUM_REST = 0.03, 1e-5
 """Hum is looked for in blocks of a second, in sound of two and more: bins of a hertz of so much more amplitude than
 those around, also where all else pauses, and this share of the loudest. Without it, this share of the power is left."""
@@ -33,7 +33,7 @@ def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return sound at 16 kHz [shape=(N,)] without lines of its spectrum that never pause, if a voice is beside them."""
     from scipy.ndimage import binary_dilation, median_filter
 
-    if len(samples) < LEAST_HUM:
+    if len(samples) < MIN_HUM:
         return samples
     padded = np.concatenate([samples[: HUM // 2], samples, samples[-HUM // 2 :]])  # by whole periods of any mains
     blocks, window, part = sliding_window_view(padded, HUM)[:: HUM // 4], np.hanning(HUM + 1)[:-1], HUM // 10
@@ -103,14 +103,14 @@ def make_hiss(samples: int, seed: int = 0) -> Noise:
 def make_babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> Noise:
     """Return the sum of several talkers, each with the same power [shape=(samples,)].
 
-    voices : at least ``FEWEST_TALKERS`` recordings at 16 kHz, none of them of the speaker to whom they are added
+    voices : at least ``MIN_TALKERS`` recordings at 16 kHz, none of them of the speaker to whom they are added
     Every recording begins at a random sample and is repeated from its start at its end. All have mean power 1 over
     their samples of speech.
     Raises InputError: too few recordings, another rate, a recording too short or silent, or fewer than 1 sample.
     """
     _check_length(samples)
-    if len(voices) < FEWEST_TALKERS:
-        raise InputError(f"a babble of {len(voices)} talkers; required at least {FEWEST_TALKERS}")
+    if len(voices) < MIN_TALKERS:
+        raise InputError(f"a babble of {len(voices)} talkers; required at least {MIN_TALKERS}")
     rng = np.random.default_rng(seed)
     total = np.zeros(samples)
     for voice in voices:
@@ -161,7 +161,7 @@ ROOM_S, ROOM_DB = (0.15, 0.9), (-12.0, 0.0)
 """Reverberation times, and energies of the reverberation relative to the direct sound."""
 TALKERS = 7
 """Largest number of voices of a babble."""
-LEAST_DISTORTION_DB = -30.0
+MIN_DISTORTION_DB = -30.0
 """Noise and reverberation this far under the speech count as no distortion; as loud as the speech, as 1."""
 MU = 255.0
 
@@ -221,7 +221,7 @@ def apply_condition(audio: Audio, voices: Sequence[Audio], rng: np.random.Genera
     if rng.random() < CLIPPING_PROBABILITY:
         limit = np.abs(samples).max() * rng.uniform(0.2, 0.7)
         samples = np.clip(samples, -limit, limit)
-    distortion = 1 - 10 * np.log10(max(added, 1e-9)) / LEAST_DISTORTION_DB
+    distortion = 1 - 10 * np.log10(max(added, 1e-9)) / MIN_DISTORTION_DB
     return Audio(samples.astype(np.float32), audio.rate_hz), float(np.clip(distortion, 0, 1))
 
 

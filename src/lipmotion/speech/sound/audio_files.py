@@ -21,15 +21,15 @@ HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
 LONGEST_HOLE_S = 600.0
 """A hole longer than this means that the time stamps are wrong."""
-MOST_SILENCE_RATIO = 20.0
+MAX_SILENCE_RATIO = 20.0
 """All holes together may last as long as the longest one allowed, and this many times the sound: a codec that sends
 nothing in pauses still sends 20 ms of every 400. More silence than that is no recording, but would fill the memory."""
-LEAST_BYTES_PER_S = 20.0
+MIN_BYTES_PER_S = 20.0
 """Bytes of the file that every second takes at least, not counting as long as the longest hole allowed: no codec for
 speech needs less than 56, digital silence in FLAC 27. A small file must not fill the memory with sound."""
 LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
 """Lowest and highest sampling rate: below, speech is not intelligible; no recorder samples at a higher one."""
-MOST_CHANNELS = 64
+MAX_CHANNELS = 64
 PIECE_BYTES = 1 << 20
 """Sound is collected in pieces of this size, and without digital silence."""
 
@@ -69,8 +69,8 @@ def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
         raise InputError(
             f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; export the recording again"
         )
-    if not 1 <= channels <= MOST_CHANNELS:
-        raise InputError(f"{name}: has {channels} channels, required 1 to {MOST_CHANNELS}; export the recording again")
+    if not 1 <= channels <= MAX_CHANNELS:
+        raise InputError(f"{name}: has {channels} channels, required 1 to {MAX_CHANNELS}; export the recording again")
 
 
 class _TrackDecoder:
@@ -162,7 +162,7 @@ class _TrackDecoder:
         return round(duration_s * self._rate_hz)
 
     def _check_silence(self) -> None:
-        most_s = LONGEST_HOLE_S + MOST_SILENCE_RATIO * self._sound_s
+        most_s = LONGEST_HOLE_S + MAX_SILENCE_RATIO * self._sound_s
         if self._silence_s > most_s:
             raise InputError(
                 f"{self._name}: the time stamps of its sound leave holes of {self._silence_s:.0f} s beside "
@@ -171,11 +171,11 @@ class _TrackDecoder:
         self._check_length(self._sound_s + self._silence_s)
 
     def _check_length(self, length_s: float) -> None:
-        most_s = LONGEST_HOLE_S + self._size / LEAST_BYTES_PER_S
+        most_s = LONGEST_HOLE_S + self._size / MIN_BYTES_PER_S
         if length_s > most_s:
             raise InputError(
                 f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s, required at most {most_s:.0f} s "
-                f"({LEAST_BYTES_PER_S:.0f} bytes a second); export the recording again"
+                f"({MIN_BYTES_PER_S:.0f} bytes a second); export the recording again"
             )
 
     def _resample(self, frame: Any) -> None:
@@ -221,7 +221,7 @@ CANCELLED_SHARE = 0.05
 """The mean of the channels must have this share of the loudest channel's energy; else they cancel one another."""
 USABLE_SHARE = 0.5
 """A damaged recording is refused when less than this share of its sound can be decoded."""
-LEAST_HOLES_S = 0.005
+MIN_HOLES_S = 0.005
 """Holes that last less together are not mentioned: they would be rounded to 0."""
 CUT_SHORT_SHARE = 0.9
 """A recording is called cut short when it holds less than this share of the duration that it states."""
@@ -262,7 +262,7 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
         raise InputError(f"{path}: damaged: {found}; required: at least half of them; export the recording again")
     if sound.damaged or sound.silence_s >= SHORTEST_S:
-        holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= LEAST_HOLES_S else ""
+        holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= MIN_HOLES_S else ""
         LOG.log(level, "%s: damaged: %s%s", path, found, holes)
     stated_s = sound.stated_s if held_s < CUT_SHORT_SHARE * sound.stated_s else held_s + sound.missing_s
     if (missing_s := stated_s - held_s) >= SHORTEST_S:

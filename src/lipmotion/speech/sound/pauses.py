@@ -17,9 +17,9 @@ BLOCK_S = 30.0
 QUIET_PERCENTILE, LOUD_PERCENTILE = 10, 95
 SPEECH_SHARE = 0.35
 """Speech is louder than the quiet level by this share of the distance between the quiet and the loud one, in dB."""
-LEAST_RANGE_DB = 10.0
+MIN_RANGE_DB = 10.0
 """Where loud and quiet differ by less (music, noise), there are no pauses: all of it counts as speech."""
-LEAST_PAUSE_S = 0.2
+MIN_PAUSE_S = 0.2
 """A shorter silence is part of a word, or of no use to divide at."""
 MIN_SPEECH_S = 0.1
 """Shorter sounds are clicks."""
@@ -68,7 +68,7 @@ def list_spans(levels: Array) -> list[tuple[float, float]]:
         middle = (block + 0.5) * len(levels) / count
         part = levels[max(0, round(middle - size)) : round(middle + size)]
         low, high = np.percentile(part, [QUIET_PERCENTILE, LOUD_PERCENTILE]) if part.size else (0.0, 0.0)
-        flat = high - low < LEAST_RANGE_DB
+        flat = high - low < MIN_RANGE_DB
         values.append(QUIETEST_DB - 1 if flat else low + SPEECH_SHARE * (high - low))
     middles = (np.arange(count) + 0.5) * len(levels) / count
     loud = levels > np.interp(np.arange(len(levels)), middles, values)
@@ -76,7 +76,7 @@ def list_spans(levels: Array) -> list[tuple[float, float]]:
     starts_s, ends_s = edges[::2] * STEP_S, edges[1::2] * STEP_S
     joined: list[tuple[float, float]] = []
     for start_s, end_s in zip(starts_s.tolist(), ends_s.tolist(), strict=True):
-        if joined and start_s - joined[-1][1] < LEAST_PAUSE_S:
+        if joined and start_s - joined[-1][1] < MIN_PAUSE_S:
             joined[-1] = (joined[-1][0], end_s)
         else:
             joined.append((start_s, end_s))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import DECIBEL, LEAST_RANGE, average_power, find_loud_frames, find_sound_runs, smooth_level
+from lipmotion.hmm.loudness import DECIBEL, MIN_RANGE, average_power, find_loud_frames, find_sound_runs, smooth_level
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW
 from lipmotion.types import Audio
 from lipmotion.types.audio import to_sixteen_bits
@@ -148,7 +148,7 @@ def _margin(log_energy: NDArray[np.float32], floor: float, reaching: int) -> int
     count = max(int(zeros[0]) - reaching, 0) if len(zeros) else len(log_energy)
     for cut in range(CUT_FROM, count - CUT_FRAMES):
         room, other = log_energy[cut - CUT_FRAMES : cut - 1], log_energy[cut + 1 : count]
-        step = CUT_STEP if np.ptp(room) < LEAST_RANGE else 2 * CUT_STEP  # a sound that fades becomes softer by itself
+        step = CUT_STEP if np.ptp(room) < MIN_RANGE else 2 * CUT_STEP  # a sound that fades becomes softer by itself
         if other.max() < room.min() - step or other.min() > room.max() + step:
             return cut - 1
     return count

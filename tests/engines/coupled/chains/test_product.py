@@ -20,7 +20,7 @@ from engines.coupled.tiny import (
 from lipmotion.engines import create_engine
 from lipmotion.engines.coupled.chains import densities, model, structures
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
-from lipmotion.engines.coupled.chains.product import JointState, Transitions, create_transitions, reachable
+from lipmotion.engines.coupled.chains.product import JointState, Transitions, create_transitions, find_reachable
 from lipmotion.engines.coupled.chains.structures import list_unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert, sum_precisions
 from lipmotion.engines.coupled.training.chain_training import MIN_FRAMES, with_joint_state_densities
@@ -29,7 +29,7 @@ from oracles import coupled as oracle
 
 
 def even(of):
-    return reachable(of, grammar(of))
+    return find_reachable(of, grammar(of))
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from engines.coupled.tiny import (
 from lipmotion import engines, errors
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.chains import densities, model
-from lipmotion.engines.coupled.chains.densities import LEAST_COMPONENT_FRAMES, AudioVisualObservations, reestimate_group
+from lipmotion.engines.coupled.chains.densities import MIN_COMPONENT_FRAMES, AudioVisualObservations, reestimate_group
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.structures import list_unit_sets
 from lipmotion.engines.coupled.conversion.em_conversion import EXACT, VITERBI, ConversionSettings, convert
@@ -301,7 +301,7 @@ def learned(before: Any, density: int, gamma: np.ndarray, x: np.ndarray, floor: 
     weight = np.exp(parts - np.logaddexp.reduce(parts, axis=1)[:, None]) * gamma[:, None]
     total = weight.sum(axis=0)
     means, variances = before.means[density].astype(float), before.variances[density].astype(float)
-    for part in np.flatnonzero(total > LEAST_COMPONENT_FRAMES):
+    for part in np.flatnonzero(total > MIN_COMPONENT_FRAMES):
         means[part] = weight[:, part] @ x / total[part]
         variances[part] = np.maximum(weight[:, part] @ (x - means[part]) ** 2 / total[part], floor)
     return total / total.sum(), means, variances

@@ -12,7 +12,7 @@ from lipmotion.stats.mixture import Mixtures, QuadraticForm, normalise_component
 
 Index = NDArray[np.intp]
 Single = NDArray[np.float32]
-LEAST_COMPONENT_FRAMES = 0.1
+MIN_COMPONENT_FRAMES = 0.1
 """A component with less data than so many frames keeps its mean and variance."""
 
 
@@ -176,7 +176,7 @@ def reestimate_group(
             continue
         frames = products[:, enough, -1].T[:, :, None]
         first, second = np.split(products[:, enough, :-1].transpose(1, 0, 2), 2, axis=2)
-        known = frames > LEAST_COMPONENT_FRAMES
+        known = frames > MIN_COMPONENT_FRAMES
         divisor = np.where(known, frames, 1)
         mean = first / divisor
         variance = np.maximum(second / divisor - mean * mean, floor)

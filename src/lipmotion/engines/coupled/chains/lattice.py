@@ -97,7 +97,7 @@ def tie_posteriors(posterior: Single, tie: Index, count: int) -> Single:
 
 
 Array = NDArray[np.float64]
-LEAST_ADVANCE = 1e-5
+MIN_ADVANCE = 1e-5
 """Least probability of moving on, and of staying."""
 VISIBLE_FRAMES = 10
 """The lips may be in a unit this many frames before and after the voice."""
@@ -147,7 +147,7 @@ class FactorialTransitions:
             np.where(moved + stayed > 0, moved / np.maximum(moved + stayed, 1e-300), old)
             for moved, stayed, old in zip(parts[::2], parts[1::2], self.advance, strict=True)
         )
-        least, most = LEAST_ADVANCE, 1 - LEAST_ADVANCE
+        least, most = MIN_ADVANCE, 1 - MIN_ADVANCE
         return replace(self, advance=(np.clip(first, least, most), np.clip(second, least, most)))
 
     def loop(self, chain: int, units: Index) -> Loop:

@@ -85,7 +85,7 @@ class Product:
         return self.structure.name(self.chain_states[:, state].tolist())
 
 
-def reachable(structure: Structure, grammar: Grammar) -> Product:
+def find_reachable(structure: Structure, grammar: Grammar) -> Product:
     """Return the product of chains: the joint states that can be reached from the beginning of an utterance.
 
     All chains go through corresponding units; those without a limit of asynchrony are not listed, but ``lattice``'s.
@@ -200,9 +200,9 @@ INITIAL_ADVANCE = 0.2
 """Probability of moving on in a frame before training: a state lasts 50 ms on average."""
 MIN_FRAMES = 50.0
 """A joint state with fewer frames in training shares its row with all that have the same own state and asynchrony."""
-LEAST_ADVANCE = 1e-5
+MIN_ADVANCE = 1e-5
 """Least probability of moving on, and of staying."""
-MOST_SWEEPS, CONVERGENCE_TOLERANCE = 50, 1e-6
+MAX_SWEEPS, CONVERGENCE_TOLERANCE = 50, 1e-6
 """Iterative scaling ends after so many sweeps, or when no probability changes by as much."""
 
 
@@ -261,7 +261,7 @@ class Transitions:
             self.product.arc_from
         ]
         current = self
-        for _ in range(MOST_SWEEPS):
+        for _ in range(MAX_SWEEPS):
             before = current.advance
             for chain in range(len(self.rows)):
                 current = current._rescaled(chain, counts, left * np.exp(current.arc_log))
@@ -300,7 +300,7 @@ class Transitions:
         rows, old = self._arc_rows(chain), self.advance[chain]
         moved = np.bincount(rows, counts * self.product.moves[chain], len(old))
         share = (moved + old) / (np.bincount(rows, counts, len(old)) + 1)
-        return np.clip(share, LEAST_ADVANCE, 1 - LEAST_ADVANCE)
+        return np.clip(share, MIN_ADVANCE, 1 - MIN_ADVANCE)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
         """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs."""
@@ -315,7 +315,7 @@ class Transitions:
         total = entries[0] + entries[1]
         known = total > 0
         advance = np.where(known, entries[0] / np.where(known, total, 1), self.advance[chain])
-        advance = np.clip(advance, LEAST_ADVANCE, 1 - LEAST_ADVANCE)
+        advance = np.clip(advance, MIN_ADVANCE, 1 - MIN_ADVANCE)
         return replace(self, advance=(*self.advance[:chain], advance, *self.advance[chain + 1 :]))
 
 

@@ -7,12 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import (
-    AudioVisualObservations,
-    Single,
-    StreamGroup,
-    infer_components,
-)
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single, StreamGroup, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Chains, Inference
 from lipmotion.stats.em import run_em
@@ -73,7 +68,7 @@ def convert(
             lambda streams: chains.infer(_with_visual_streams(speech, streams), lattice),
             lambda _, inference: _update_streams(chains, inference, settings.update),
             settings.most_steps,
-            least_gain=CONVERGENCE_GAIN,
+            min_gain=CONVERGENCE_GAIN,
             maximise_converged=False,
         )
         streams, log_likelihoods = result.model, result.log_likelihoods

@@ -36,7 +36,7 @@ SHARED_RIDGE = 1e-4
 """Strength of the ridge towards 0, a frame."""
 OWN_RIDGE = 5.0
 """Strength of the ridges towards the regression of the viseme, and towards that of all."""
-LEAST_WEIGHT = 0.01
+MIN_WEIGHT = 0.01
 """A regression with less weight in a frame is left out there."""
 MIN_FRAMES = 20.0
 """The variance of all states counts as so many frames in that of each."""
@@ -99,7 +99,7 @@ class VisualRegression:
 def weigh_regressions(posterior: Single, regression_of_state: NDArray[np.intp], count: int) -> Single:
     """Return the weight of each regression [shape=(T, count)], rows summing to 1, by posteriors of states."""
     weight = posterior @ np.eye(count, dtype=np.float32)[regression_of_state]
-    weight[weight < LEAST_WEIGHT] = 0
+    weight[weight < MIN_WEIGHT] = 0
     return weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
 
 

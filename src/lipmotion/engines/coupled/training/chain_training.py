@@ -20,7 +20,7 @@ from lipmotion.engines.coupled.chains.densities import (
 )
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions, Lattice
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.product import Transitions, create_transitions, reachable
+from lipmotion.engines.coupled.chains.product import Transitions, create_transitions, find_reachable
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
 from lipmotion.engines.coupled.training.alignment import (
     AlignedUtterance,
@@ -36,9 +36,9 @@ from lipmotion.units import find_similar_phone
 
 SHARD = 16
 """Utterances of a shard of the E-step."""
-LEAST_DENSITY_FRAMES = 3.0
+MIN_DENSITY_FRAMES = 3.0
 """A density with less data than so many frames stays as it is."""
-FLOOR_SHARE, LEAST_VARIANCE = 0.01, 1e-4
+FLOOR_SHARE, MIN_VARIANCE = 0.01, 1e-4
 """No variance falls under this share of the stream's own variance, or under this least variance."""
 
 
@@ -101,7 +101,7 @@ def m_step(
 ) -> Chains:
     """Return the chains that maximise the expected log likelihood, with variances of ``floors`` at least."""
     groups = [
-        reestimate_group(group, own, [floors[s] for s in group.streams], LEAST_DENSITY_FRAMES, streams)
+        reestimate_group(group, own, [floors[s] for s in group.streams], MIN_DENSITY_FRAMES, streams)
         if set(group.streams) & set(streams)
         else group
         for group, own in zip(chains.groups, statistics.emissions, strict=True)
@@ -121,7 +121,7 @@ def compute_variance_floors(observations: Sequence[AudioVisualObservations]) -> 
             utterance.streams[stream] if mask is None else utterance.streams[stream][mask]
             for utterance, mask in zip(observations, masks, strict=True)
         ]
-        floors.append(np.maximum(FLOOR_SHARE * np.concatenate(rows).var(axis=0), LEAST_VARIANCE).astype(np.float32))
+        floors.append(np.maximum(FLOOR_SHARE * np.concatenate(rows).var(axis=0), MIN_VARIANCE).astype(np.float32))
     return tuple(floors)
 
 
@@ -227,7 +227,7 @@ def create_chains(
         if structure.limit is None
         else structure
     )
-    transitions = create_transitions(reachable(limited, estimate_grammar(limited, data)))
+    transitions = create_transitions(find_reachable(limited, estimate_grammar(limited, data)))
     chains = _create_untrained_chains(streams, transitions, data, weights)
     utterances = [build_lattice_utterance(chains, utterance) for utterance in data]
     paths = [split_evenly(transitions.product, utterance.phones, utterance.observations.frames) for utterance in data]
@@ -405,7 +405,7 @@ def train_to_convergence(
         lambda chains, statistics: m_step(chains, statistics, floors, streams=streams, transitions=not speech_only),
         most_steps,
         lambda _, chains, statistics: report(TrainingStep(count_components(chains), statistics.mean_log_likelihood)),
-        least_gain=CONVERGENCE_GAIN,
+        min_gain=CONVERGENCE_GAIN,
     )
 
 

@@ -160,7 +160,7 @@ def grow_models(
         encoding = PREDICTORS.load("encoding").fit(PredictorTraining(moving, values, len(space.direct))).predictor
     first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
-    def finished(grown: EmResult[Chains, ChainStatistics]) -> Fit[CoupledModel]:
+    def finish(grown: EmResult[Chains, ChainStatistics]) -> Fit[CoupledModel]:
         chains = grown.model
         if speech_only:
             second_monitor = sub_monitor(monitor, first_share, second_share)
@@ -190,7 +190,7 @@ def grow_models(
     most_steps = schedule.most_steps * max(schedule.mixtures).bit_length()
     report = _reporter("chains", most_steps, sub_monitor(monitor, 0, first_share))
     for grown in grow_chains(structure, names, data, schedule, report, work):
-        yield partial(finished, grown)
+        yield partial(finish, grown)
 
 
 def _observations(

@@ -28,13 +28,13 @@ from lipmotion.units.phones import FULL_FORMS
 SOUNDS = tuple(phone for phone in PHONES if not is_silent(phone) and phone not in FULL_FORMS)
 """The phones of the dictionary."""
 NUMBER = {spelling: number for number, phone in enumerate(SOUNDS) for spelling in (phone, phone.upper())}
-MOST_WORDS = 40_000
+MAX_WORDS = 40_000
 """So many words are searched, the most probable ones."""
 LONGEST_WORD = 20
 """Words of more phones are not searched."""
 LANGUAGE_WEIGHT = 0.8
 """Weight of the logarithms of the probabilities of words beside those of the posteriors."""
-LEAST_LOG_PROBABILITY = -40.0
+MIN_LOG_PROBABILITY = -40.0
 """Words that are less probable are not in the language model."""
 NO_WORD = -1
 
@@ -111,8 +111,8 @@ def load_english() -> EnglishWords:
     pronounced = _pronunciations()
     names = list(pronounced)
     scores = np.array([model.prob([word]) for word in pronounced]) * base
-    chosen = np.argsort(-scores, kind="stable")[:MOST_WORDS]
-    chosen = chosen[scores[chosen] > LEAST_LOG_PROBABILITY]
+    chosen = np.argsort(-scores, kind="stable")[:MAX_WORDS]
+    chosen = chosen[scores[chosen] > MIN_LOG_PROBABILITY]
     words = np.array([names[number] for number in chosen.tolist()])
     coded = ([bytes(map(NUMBER.__getitem__, said.split())) for said in pronounced[word]] for word in words.tolist())
     numbers = [[phones for phones in each if len(phones) <= LONGEST_WORD] for each in coded]
@@ -183,11 +183,11 @@ def build_word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float6
     )
 
 
-BEAM, MOST_PATHS = 10.0, 1000
+BEAM, MAX_PATHS = 10.0, 1000
 """Paths that are so many nats less probable than the best one, or not among so many best ones, are given up."""
-MOST_ENDS = 60
+MAX_ENDS = 60
 """Words end in so many paths of a row at most."""
-LEAST_POSTERIOR = 1e-3
+MIN_POSTERIOR = 1e-3
 """No posterior counts as less: the network is sure too often."""
 BLANK_LOSS = 1.0
 """Nats by which no phone is less probable than the network says: it leaves phones out rather than adding some."""
@@ -238,7 +238,7 @@ def score_stretch(posteriors: PhonePosteriors) -> Scored:
     blank = (phones[:, -1] - boundary).clip(min=0) * np.exp(-BLANK_LOSS)
     total = sounds.sum(axis=1) + blank + boundary
     sounds, blank, boundary = (
-        each / total.reshape(-1, *[1] * (each.ndim - 1)) + LEAST_POSTERIOR for each in (sounds, blank, boundary)
+        each / total.reshape(-1, *[1] * (each.ndim - 1)) + MIN_POSTERIOR for each in (sounds, blank, boundary)
     )
     inside = blank + boundary * np.exp(-INNER_BOUNDARY_LOSS)
     return Scored(np.log(sounds), np.log(inside), np.log(np.maximum(blank, boundary)))
@@ -336,8 +336,8 @@ class _BeamSearch:
         after = self._with_ended_words(after, least, row)
         best = after.best
         kept = best > best.max() - BEAM
-        if kept.sum() > MOST_PATHS:
-            kept = best >= np.partition(best, -MOST_PATHS)[-MOST_PATHS]
+        if kept.sum() > MAX_PATHS:
+            kept = best >= np.partition(best, -MAX_PATHS)[-MAX_PATHS]
         return after.chosen(kept)
 
     def _enter(self, paths: _Paths, sounds: Scores) -> _Paths:
@@ -356,8 +356,8 @@ class _BeamSearch:
         """Return the paths with those whose word ends in a row, which are at the root again."""
         tree = self.english.tree
         ending = np.flatnonzero(tree.is_end[paths.node] & (paths.sound > least))
-        if len(ending) > MOST_ENDS:
-            ending = ending[np.argsort(-paths.sound[ending], kind="stable")[:MOST_ENDS]]
+        if len(ending) > MAX_ENDS:
+            ending = ending[np.argsort(-paths.sound[ending], kind="stable")[:MAX_ENDS]]
         ended: WordEnds = {}
         for place in ending.tolist():
             node, before = int(paths.node[place]), self.named[int(paths.context[place])]

@@ -33,7 +33,7 @@ from lipmotion.units.ipa_phones import read_tokens
 POSTERIOR_STEP = 2
 """Frames of 10 ms from one row of posteriors to the next."""
 BLANK, WORD_BOUNDARY = "<blank>", "<wb>"
-LEAST_LOG_POSTERIOR = -16.0
+MIN_LOG_POSTERIOR = -16.0
 """The logarithm of what is taken to be impossible."""
 SHORT_FRAMES = 1500
 """So little sound is recognised in this process: to start another one would take as long."""
@@ -75,7 +75,7 @@ PHONE_RECOGNISERS: Registry[type[PhoneRecogniser]] = Registry(
 
 
 @cache
-def phone_recogniser(name: str) -> PhoneRecogniser:
+def load_phone_recogniser(name: str) -> PhoneRecogniser:
     """Return a phone recogniser of this process; it is loaded once.
 
     Raises InputError: there is none of this name. Raises MissingDependencyError: it is not installed.
@@ -90,7 +90,7 @@ def phone_recogniser(name: str) -> PhoneRecogniser:
 
 
 @cache
-def find_installed() -> str | None:
+def find_installed_recogniser() -> str | None:
     """Return the name of the first phone recogniser that can be used on this machine; None: there is none."""
     return next((name for name in PHONE_RECOGNISERS.names if PHONE_RECOGNISERS.load(name).is_installed()), None)
 
@@ -168,28 +168,27 @@ class PosteriorStretch(NamedTuple):
 def find_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> list[PosteriorStretch]:
     """Return the posteriors in all stretches of sound of a recording; they are computed once.
 
-    Raises InputError, MissingDependencyError: as ``phone_recogniser``.
+    Raises InputError, MissingDependencyError: as ``load_phone_recogniser``.
     """
-
     key = f"posteriors of {name}"
 
-    def found() -> list[PosteriorStretch]:
-        tokens = phone_recogniser(name).tokens
-        places = [(part, each_of) for part in audio.passages for each_of in find_sound(part.audio.log_energy)]
+    def compute() -> list[PosteriorStretch]:
+        tokens = load_phone_recogniser(name).tokens
+        places = [(part, stretch) for part in audio.passages for stretch in find_sound(part.audio.log_energy)]
         chosen = each if sum(stretch.end - stretch.first for _, stretch in places) > SHORT_FRAMES else map
         sounds = (read_stretch(part.audio, stretch) for part, stretch in places)
         rows = chosen(partial(infer_stretch, name), sounds)
         by_passage: dict[int, list[PosteriorStretch]] = {part.first: [] for part in audio.passages}
         for (part, stretch), values in zip(places, rows, strict=True):
-            found_here = PhonePosteriors(values.astype(np.float32), tokens)
-            by_passage[part.first].append(PosteriorStretch(stretch, found_here))
+            posteriors = PhonePosteriors(values.astype(np.float32), tokens)
+            by_passage[part.first].append(PosteriorStretch(stretch, posteriors))
         if audio.is_passage:
             return by_passage[0]
         for part in audio.passages:
             part.audio.cached(key, partial(by_passage.__getitem__, part.first))
-        return [each_of for part in audio.passages for each_of in _place_stretches(by_passage[part.first], part)]
+        return [placed for part in audio.passages for placed in _place_stretches(by_passage[part.first], part)]
 
-    return audio.cached(key, found)
+    return audio.cached(key, compute)
 
 
 def _place_stretches(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
@@ -215,14 +214,14 @@ def read_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) ->
     """
 
     def joined() -> PhonePosteriors:
-        return PhonePosteriors(np.asarray(_join_posteriors(name, audio, each)), phone_recogniser(name).tokens)
+        return PhonePosteriors(np.asarray(_join_posteriors(name, audio, each)), load_phone_recogniser(name).tokens)
 
     return audio.cached(f"all posteriors of {name}", joined)
 
 
 def _join_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap) -> JoinedRows:
-    tokens = phone_recogniser(name).tokens
-    silence = np.full(len(tokens), LEAST_LOG_POSTERIOR, np.float16)  # as stretches are computed
+    tokens = load_phone_recogniser(name).tokens
+    silence = np.full(len(tokens), MIN_LOG_POSTERIOR, np.float16)  # as stretches are computed
     silence[tokens.index(BLANK)] = 0
     rows, end, parts = -(-audio.frames // POSTERIOR_STEP), 0, list[NDArray[np.float16]]()
     for stretch, posteriors in find_stretches(name, audio, each):
@@ -235,7 +234,7 @@ def _join_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap) -> Join
     return JoinedRows([*parts, np.broadcast_to(silence, (rows - end, len(tokens)))])
 
 
-def infer_tokens(name: str, audio: Audio, each: ParallelMap = map, *, dense: bool = True) -> TokenPosteriors:
+def infer_posteriors(name: str, audio: Audio, each: ParallelMap = map, *, dense: bool = True) -> TokenPosteriors:
     """Return the posteriors in a recording as the input of an engine.
 
     audio      : an ``AnalysedAudio`` shares them with what recognises its phones
@@ -245,7 +244,7 @@ def infer_tokens(name: str, audio: Audio, each: ParallelMap = map, *, dense: boo
     audio = analysed(audio)
     values: Any = read_posteriors(name, audio, each).values if dense else _join_posteriors(name, audio, each)
     mean = mean_posterior(find_stretches(name, audio, each))
-    return TokenPosteriors(values, phone_recogniser(name).source, mean)
+    return TokenPosteriors(values, load_phone_recogniser(name).source, mean)
 
 
 def infer_stretch(name: str, samples: bytes) -> NDArray[np.float16]:
@@ -254,7 +253,7 @@ def infer_stretch(name: str, samples: bytes) -> NDArray[np.float16]:
     samples : 16-bit integers at 16 kHz
     """
     numbers = from_sixteen_bits(np.frombuffer(samples, "<i2"))
-    return phone_recogniser(name).log_posteriors(numbers).astype(np.float16)
+    return load_phone_recogniser(name).log_posteriors(numbers).astype(np.float16)
 
 
 @cache
@@ -273,7 +272,7 @@ def _sum_phones(tokens: tuple[str, ...]) -> NDArray[np.float32]:
 LIBRARIES = {("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "x86_64"), ("darwin", "arm64")}
 """Systems and processors that the package has a library for."""
 WEIGHTS = "asr_waveform.hama"
-LEAST_SAMPLES = 1600
+MIN_SAMPLES = 1600
 """Shorter sound is filled up with silence: the network has no row for it."""
 
 
@@ -295,7 +294,7 @@ class Hama(PhoneRecogniser):
 
     def log_posteriors(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return natural logarithms of the posteriors, as ``PhoneRecogniser.log_posteriors``."""
-        filled = np.pad(samples, (0, max(0, LEAST_SAMPLES - len(samples)))).astype(np.float32)
+        filled = np.pad(samples, (0, max(0, MIN_SAMPLES - len(samples)))).astype(np.float32)
         values, rows = _model().session.run(
             ["log_probs", "out_lengths"],
             {"waveform": filled[None], "waveform_lengths": np.array([len(filled)], np.int64)},

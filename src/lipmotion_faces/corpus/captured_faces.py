@@ -17,21 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.folder import gather_recordings
-from lipmotion.corpora.source_recordings import (
-    AUDIO_SUFFIXES,
-    LISTS,
-    MotionFile,
-    RecordingFolder,
-    SourceRecording,
-    assign_splits,
-)
 from lipmotion.errors import InputError, shorten
 from lipmotion.formats.label_files import find_labels
 from lipmotion.formats.markers import measure_markers, to_head_frame
 from lipmotion.storage.archive import take_array
-from lipmotion.storage.sources import check_regular
+from lipmotion.storage.sources import AUDIO_SUFFIXES, check_regular
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.corpus.folder import gather_recordings
+from lipmotion_faces.corpus.source_recordings import LISTS, MotionFile, RecordingFolder, SourceRecording, assign_splits
 
 KIND = "VOCASET meshes"
 MESHES, SOUNDS = "unposedcleaneddata", "audio"

@@ -11,10 +11,14 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lipmotion.corpora.source_recordings import (
-    AUDIO_SUFFIXES,
+from lipmotion.errors import CorpusError, InputError, shorten
+from lipmotion.extensions import Registry
+from lipmotion.formats.label_files import find_labels, read_labels
+from lipmotion.formats.tables import is_live_link_file
+from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, check_listable, read_text_file
+from lipmotion.units import split_words
+from lipmotion_faces.corpus.source_recordings import (
     LISTS,
-    VIDEO_SUFFIXES,
     MotionFile,
     RecordingFolder,
     SourceRecording,
@@ -22,12 +26,6 @@ from lipmotion.corpora.source_recordings import (
     filter_videos,
     is_of_recorder,
 )
-from lipmotion.errors import CorpusError, InputError, shorten
-from lipmotion.extensions import Registry
-from lipmotion.formats.label_files import find_labels, read_labels
-from lipmotion.formats.tables import is_live_link_file
-from lipmotion.storage.sources import check_listable, read_text_file
-from lipmotion.units import split_words
 
 VIDEOS, SOUNDS, BOTH = "folder of videos", "folder of sounds with motion", "folder of videos, and of sounds with motion"
 VIDEO_KINDS = (VIDEOS, BOTH)
@@ -118,11 +116,11 @@ READERS: Registry[CorpusReader] = Registry(
     "corpus reader",
     "lipmotion.corpus_readers",
     {
-        "grid": "lipmotion.corpora.folder:read_grid",
-        "facegood": "lipmotion.corpora.captured_faces:read_facegood",
-        "vocaset": "lipmotion.corpora.captured_faces:read_vocaset",
-        "layouts": "lipmotion.corpora.folder:read_layouts",
-        "folder": "lipmotion.corpora.folder:read_folder",
+        "grid": "lipmotion_faces.corpus.folder:read_grid",
+        "facegood": "lipmotion_faces.corpus.captured_faces:read_facegood",
+        "vocaset": "lipmotion_faces.corpus.captured_faces:read_vocaset",
+        "layouts": "lipmotion_faces.corpus.folder:read_layouts",
+        "folder": "lipmotion_faces.corpus.folder:read_folder",
     },
 )
 

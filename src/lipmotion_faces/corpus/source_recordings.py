@@ -7,17 +7,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from lipmotion.corpora import SPLITS
 from lipmotion.errors import CorpusError, InputError, shorten
-from lipmotion.storage.sources import read_text_file
+from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, read_text_file
 from lipmotion.storage.text_table import read_table
 from lipmotion.types import Channel, Timeline, Unit
-
-VIDEO_SUFFIXES = frozenset(
-    f".{name}" for name in "3gp avi flv m2ts m4v mkv mov mp4 mpeg mpg mts mxf ogv ts vob webm wmv".split()
-)
-
-
-AUDIO_SUFFIXES = frozenset(f".{name}" for name in "aac aif aiff flac m4a mp3 oga ogg opus wav wma".split())
 
 
 @dataclass(frozen=True)
@@ -85,7 +79,6 @@ def filter_videos(paths: Iterable[Path]) -> list[Path]:
     return sorted(path for path in paths if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file())
 
 
-SPLITS = ("train", "val", "test")
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
 LARGEST_LIST_BYTES = 1 << 24
 """Most bytes of a list of names."""

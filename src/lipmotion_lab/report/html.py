@@ -1,11 +1,11 @@
-"""Pages of HTML that need no network: elements that escape what they hold, and the look that all pages share."""
+"""Pages of HTML that need no network: elements that escape what they hold."""
 
 from __future__ import annotations
 
 import re
 from html import escape
-from importlib import resources
 
+from lipmotion.pipeline.batch.report import insert_colours
 from lipmotion.printable import printable
 
 VOID = frozenset({"br", "img", "link", "meta"})
@@ -13,8 +13,6 @@ VOID = frozenset({"br", "img", "link", "meta"})
 SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
 GENERATOR = '<meta name="generator" content="lipmotion">'
 """What pages of this program hold."""
-SHARED_COLOURS = "/*COLOURS*/"
-"""Where a style has the colours of all pages."""
 
 
 class Html(str):
@@ -63,16 +61,11 @@ def build_page(title: str, style: str, *content: str, script: str = "") -> str:
         element("meta", name_="viewport", content_="width=device-width, initial-scale=1"),
         Html(GENERATOR),
         element("title", title),
-        Html(f"<style>\n{find_colour(style)}</style>"),
+        Html(f"<style>\n{insert_colours(style)}</style>"),
     )
     scripts = Html(f"<script>\n{script}</script>" if script else "")
     body = element("body", *content, scripts)
     return f'<!DOCTYPE html>\n<html lang="en">\n{element("head", head)}\n{body}\n</html>\n'
-
-
-def find_colour(style: str) -> str:
-    """Return a style with the colours of all pages, light and dark."""
-    return style.replace(SHARED_COLOURS, resources.files(__package__).joinpath("colours.css").read_text("utf-8"))
 
 
 def _simple(name: str) -> str:

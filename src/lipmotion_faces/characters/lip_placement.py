@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
@@ -12,9 +11,10 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE, build_mouth
 from lipmotion.errors import InputError, shorten
+from lipmotion.meshes.model.face_shapes import LipPlacement
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import find_viseme, find_vowel, to_arkit
-from lipmotion.meshes.model.surface import MeshSurface, build_surface
+from lipmotion_faces.characters.surface import MeshSurface, build_surface
 
 Rows = NDArray[np.int64]
 Places = NDArray[np.float64]
@@ -41,34 +41,6 @@ around the mouth, only some vertices are compared."""
 DISTANCES_AT_ONCE = 1 << 22
 NEEDED = (RIGHT_CORNER, LEFT_CORNER, UPPER_MIDDLE, LOWER_MIDDLE)
 """The points that a list must name, where nothing is found by blendshapes."""
-
-
-@dataclass(frozen=True, eq=False)
-class LipPlacement:
-    """The vertex of each lip and jaw point, and how motion maps to the mesh.
-
-    points   : numbers of the points, those of the template [52]
-    vertices : the vertex of each [shape=(52,)]
-    scale    : units of the mesh in one eye distance of motion: widths of the two mouths, divided
-    axes     : the x, y and z of motion, as columns in the frame of the mesh [shape=(3, 3)]
-    """
-
-    points: tuple[int, ...]
-    vertices: Rows
-    scale: float
-    axes: Places
-
-    def row(self, point: int) -> int:
-        """Return the row of a point."""
-        return self.points.index(point)
-
-    def to_mesh(self, displacements: Places) -> Places:
-        """Return displacements of motion, eye distances, in the mesh [shape=(..., 3), both]."""
-        return self.scale * displacements @ self.axes.T
-
-    def to_motion(self, displacements: Places) -> Places:
-        """Return displacements of the mesh in eye distances of motion [shape=(..., 3), both]."""
-        return displacements @ self.axes / self.scale
 
 
 def place_lips_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
@@ -145,9 +117,7 @@ def place_lips_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, i
 
 
 def separate_named_lips(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
-    """Return how a mesh hangs together, its named lips apart even where they touch. Raises InputError: as
-    ``place_lips_by_points``.
-    """
+    """Return a mesh's surface, its named lips apart even where they touch. Raises as ``place_lips_by_points``."""
     _check_named(named, len(mesh.vertices))
     surface = build_surface(mesh)
     if surface.places[named[UPPER_MIDDLE]] != surface.places[named[LOWER_MIDDLE]]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.normals import sum_normals
 from lipmotion.meshes.model.mesh import Mesh
+from lipmotion_faces.kernels.normals import sum_normals
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -41,9 +41,7 @@ class MeshSurface:
     normals: NDArray[np.float64]
 
     def distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:
-        """Return distances along edges from sources to every vertex [shape=(len(sources), V)]; infinite beyond
-        ``limit``.
-        """
+        """Return distances along edges from N sources to every vertex [shape=(N, V)]; infinite beyond ``limit``."""
         return self.place_distances(sources, limit)[:, self.places]
 
     def place_distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:

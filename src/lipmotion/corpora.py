@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.source_recordings import SPLITS
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
 from lipmotion.extensions import install_command
 from lipmotion.storage.files import TEMPORARY, atomic_file, confine, make_folder, make_portable, replace_folder
@@ -39,6 +38,7 @@ from lipmotion.types import (
 )
 from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, truth, whole
 
+SPLITS = ("train", "val", "test")
 ENTRY = "entry.json"
 KEYS = frozenset(
     "name words split audio_rate_hz duration_s rate_hz frames unseen_frames channels crops source settings".split()

@@ -1,1 +1,0 @@
-"""Source recordings in folders, and the corpus that is prepared from them."""
