@@ -301,7 +301,7 @@ class Session:
 
     def _with_locks(self, steps: tuple[Step, ...]) -> Generation:
         """Return the motion after some edits, with locked spans as they were when they were locked."""
-        self._edited_units(steps)  # refuses phones that change what is locked
+        self._edited_units(steps)  # hears the recording; refuses phones that change what is locked
         generation = self._with_curves(tuple(step for step in steps if not isinstance(step, LockStep | UnlockStep)))
         locks = find_locks(steps)
         if not locks:

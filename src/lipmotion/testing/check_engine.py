@@ -45,6 +45,7 @@ def check_exporter(exporter: MotionFormat) -> None:
     >>> from lipmotion.formats.base import MOTION_FORMATS
     >>> check_exporter(MOTION_FORMATS.load("csv"))
     """
+    require(isinstance(exporter, MotionFormat), f"found {exporter!r}, required a MotionFormat")
     one = example(("m", "aa"))
     given = make_curves(one.motion, one.speech.units, exporter.curves) if exporter.curves else one.motion
     if all(channel.unit == FAP for channel in given.channels):
