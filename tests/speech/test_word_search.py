@@ -18,7 +18,7 @@ from lipmotion.speech.recognition.word_search import list_spoken, list_wordless
 from lipmotion.speech.sound.acoustic_conditions import mix_noise
 from lipmotion.speech.sound.voice_activity import Stretch, read_stretch
 from lipmotion.types import Audio
-from lipmotion.units import Lexicon, is_silent
+from lipmotion.units import Lexicon, is_silent, lexicon
 from lipmotion.units.phones import count_phone_edits
 from pipeline.made import read_sound, read_welcome, recogniser_of
 
@@ -27,11 +27,14 @@ SAID = "please speak and my lips will move five big blue boats float by".split()
 
 @pytest.fixture
 def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Words are searched by pocketsphinx where no phone recogniser is installed."""
+    """Words are searched by pocketsphinx, and read by rules, where ``hama`` is not installed."""
     monkeypatch.setitem(sys.modules, "hama", None)
-    find_installed_recogniser.cache_clear()
+    cached = (find_installed_recogniser, lexicon._network, lexicon.pronounce_by_network)
+    for each in cached:
+        each.cache_clear()
     yield
-    find_installed_recogniser.cache_clear()
+    for each in cached:
+        each.cache_clear()
 
 
 @pytest.fixture
@@ -339,15 +342,11 @@ def test_a_recogniser_that_is_not_installed_or_is_none_is_refused() -> None:
 
 
 @pytest.mark.skipif(not posteriors.Hama.is_installed(), reason="hama has no library here")
-def test_unsure_posteriors_leave_phones_to_the_models(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unsure_posteriors_leave_phones_to_the_models(request: pytest.FixtureRequest) -> None:
     noisy = read_sound(mix_noise(read_welcome(), "white", -5))
     found = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
-    monkeypatch.setitem(sys.modules, "hama", None)
-    posteriors.find_installed_recogniser.cache_clear()
-    try:
-        alone = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
-    finally:
-        posteriors.find_installed_recogniser.cache_clear()
+    request.getfixturevalue("without_a_phone_recogniser")
+    alone = recogniser_of(load_model(), "auto").recognition(noisy, noisy.mfcc())
     assert found.units == alone.units
     assert found.posterior is None
 

@@ -197,7 +197,7 @@ CORNER_FADE_SHARE = 0.4
 
 
 def paint_skin(skin: Skin) -> Real:
-    """Return the diffuse reflection of all vertices of the skin, decode_srgb [shape=(V, 3)]."""
+    """Return the diffuse reflection of all vertices of the skin, linear [shape=(V, 3)]."""
     x, y, z = np.abs(skin.rest[:, 0]), skin.rest[:, 1], skin.rest[:, 2]
     colour = np.broadcast_to(np.array(palette.SKIN), skin.rest.shape).copy()
 
@@ -262,7 +262,7 @@ class Figure:
 
     triangles : of all parts [shape=(F, 3)]
     head      : the rows of the vertices that move; those of the body, behind them, never do
-    colours   : diffuse reflection of the vertices, decode_srgb [shape=(V, 3)]
+    colours   : diffuse reflection of the vertices, linear [shape=(V, 3)]
     """
 
     def __init__(self) -> None:

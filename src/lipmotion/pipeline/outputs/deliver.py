@@ -100,7 +100,7 @@ def deliver_to_face(
 ) -> Generation:
     """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
 
-    character : whose weights are deliver_to_face, if the face is a character with blendshapes
+    character : whose weights are shown, where the face is a character with blendshapes
     staging, prosody : as of ``show_edited_curves``, which all other edits of curves go through
     """
     moved = with_drawn_channels(deliver(generation, delivery))
