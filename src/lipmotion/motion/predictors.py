@@ -1,7 +1,7 @@
 """Predictors: methods that predict motion from speech, beside the states or recorded units of an engine.
 
-A model has one at most, which may contain another. Engines know the interface alone, ``Predictor``; the registry knows the classes
-(docs/extend/predictor.md).
+A model has one at most, which may contain another. Engines know the interface alone, ``Predictor``; the registry knows
+the classes (docs/extend/predictor.md).
 """
 
 from __future__ import annotations
