@@ -35,13 +35,16 @@ def test_files_of_lipmotion_are_read(tmp_path, generation, suffix):
         assert spelt[spelling(name)] == pytest.approx(generation.motion[name].tolist(), abs=1e-5)
 
 
-def test_a_take_at_30_frames_keeps_its_time(tmp_path):
+def test_a_take_at_30_frames_keeps_its_time_and_rows_of_the_time_before_are_left_out(tmp_path):
     codes = [f"01:59:59:{frame:02d}.500" for frame in (50, 52, 54, 56, 58)] + ["02:00:00:00.500"]
     rows = "".join(f"{code},61,0.5\n" for code in codes) + "02:00:00:02.500,0\n"
     (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n" + rows)
     curves, times = read_motion(str(tmp_path / "take.csv"))
     assert times == pytest.approx([number / 30 for number in range(7)])
     assert curves["JawOpen"] == [0.5] * 6 + [0.0]
+    rows = "".join(f"10:00:00:{frame:02d}.000,61,{n / 10}\n" for n, frame in enumerate((10, 12, 12, 11, 14)))
+    (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n" + rows)
+    assert read_motion(str(tmp_path / "take.csv"))[0] == {"JawOpen": [0.0, 0.1, 0.4]}
 
 
 def _drop_frame(number: int) -> str:
@@ -94,21 +97,12 @@ def test_a_take_that_is_damaged_and_other_files_are_refused(tmp_path):
                 read_motion(str(tmp_path / name))
 
 
-def test_a_row_of_the_time_before_is_left_out(tmp_path):
-    rows = "".join(f"10:00:00:{frame:02d}.000,61,{n / 10}\n" for n, frame in enumerate((10, 12, 12, 11, 14)))
-    (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n" + rows)
-    assert read_motion(str(tmp_path / "take.csv"))[0] == {"JawOpen": [0.0, 0.1, 0.4]}
-
-
-def test_spellings_of_one_name():
-    names = ("mouthSmile_L", "mouthSmileLeft", "MouthSmileLeft", "head.mouthSmile_L", "Mouth Smile l")
-    assert {spelling(name) for name in names} == {"mouthsmileleft"}
-
-
-def test_curves_find_their_shape_keys():
+def test_curves_find_their_shape_keys_by_any_spelling_of_one_name():
     keys = ["Basis", "head.jawOpen", "mouthSmile_R", "mouthSmileLeft", "mouthSmile_L"]
     found = matched(["jawOpen", "mouthSmileLeft", "mouthSmileRight", "tongueOut"], keys)
     assert found == {"jawOpen": "head.jawOpen", "mouthSmileLeft": "mouthSmileLeft", "mouthSmileRight": "mouthSmile_R"}
+    names = ("mouthSmile_L", "mouthSmileLeft", "MouthSmileLeft", "head.mouthSmile_L", "Mouth Smile l")
+    assert {spelling(name) for name in names} == {"mouthsmileleft"}
 
 
 def test_controls_are_told_from_shapes():
@@ -119,25 +113,21 @@ def test_controls_are_told_from_shapes():
     assert control("Jaw.rotateX") is None
 
 
-def test_frames_lie_on_straight_lines_between_values():
+def test_frames_lie_on_straight_lines_and_lips_that_close_between_two_are_closed_at_the_nearer():
     times = [number / 100 for number in range(101)]
     curves = {"tongueOut": [float(number**2) for number in range(101)]}
     frames = at_frames(curves, times, 24.0)["tongueOut"]
     assert len(frames) == 25
     assert frames == pytest.approx(np.interp(np.arange(25) / 24, times, curves["tongueOut"]).tolist())
-
-
-def test_lips_that_close_between_two_frames_are_closed_at_the_nearer_one():
-    times = [number / 100 for number in range(101)]
     jaw = [0.3 + 0.0 * time_s for time_s in times]
     close = [0.0 if number != 52 else 0.3 for number in range(101)]
     eyes = [number / 100 for number in range(101)]
     curves = {"jawOpen": jaw, "mouthClose": close, "eyeBlinkLeft": eyes}
     assert closures(curves, 101) == [52]
-    frames = at_frames(curves, times, 25.0)
-    assert frames["mouthClose"][13] == pytest.approx(0.3)
-    assert sum(frames["mouthClose"]) == pytest.approx(0.3)
-    assert frames["eyeBlinkLeft"] == pytest.approx([number / 25 for number in range(26)])
+    sampled = at_frames(curves, times, 25.0)
+    assert sampled["mouthClose"][13] == pytest.approx(0.3)
+    assert sum(sampled["mouthClose"]) == pytest.approx(0.3)
+    assert sampled["eyeBlinkLeft"] == pytest.approx([number / 25 for number in range(26)])
     late = at_frames({"jawOpen": jaw, "mouthClose": [0.3 if n == 51 else 0.0 for n in range(101)]}, times, 25.0)
     assert late["mouthClose"][13] == pytest.approx(0.3)
 
@@ -147,17 +137,14 @@ def test_curves_that_are_no_blendshapes_have_no_closures():
     assert at_frames({"a": []}, [], 24.0) == {"a": []}
 
 
-def test_held_curves_are_not_interpolated():
+def test_held_curves_are_not_interpolated_and_last_as_long_at_other_frames():
     curves = {"browInnerUp": [0.0, 1.0, 0.0], "a": [0.0, 1.0, 0.0]}
     found = at_frames(curves, [0.0, 0.1, 0.2], 20.0, ("a",))
     assert found["browInnerUp"] == pytest.approx([0, 0.5, 1, 0.5, 0])
     assert found["a"] == pytest.approx([0, 0, 1, 1, 0])
-
-
-def test_held_poses_last_as_long_at_other_frames():
     jaw = np.repeat([0.3, 0.0, 0.4], [10, 10, 10]).tolist()
-    found = at_frames({"jawOpen": jaw}, (np.arange(30) / 100).tolist(), 24.0, ("jawOpen",))
-    assert found["jawOpen"] == pytest.approx([0.3, 0.3, 0.3, 0.0, 0.0, 0.4, 0.4])
+    poses = at_frames({"jawOpen": jaw}, (np.arange(30) / 100).tolist(), 24.0, ("jawOpen",))
+    assert poses["jawOpen"] == pytest.approx([0.3, 0.3, 0.3, 0.0, 0.0, 0.4, 0.4])
 
 
 class Strips(list[Any]):

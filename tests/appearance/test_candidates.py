@@ -64,14 +64,11 @@ def test_chosen_mouths_cover_the_others_better_than_evenly_spaced_and_random_one
         assert ours.max() < 0.9 * others.max()
 
 
-def test_the_choice_is_ascending_distinct_and_repeatable() -> None:
+def test_the_choice_is_ascending_distinct_and_repeatable_and_all_where_there_are_few() -> None:
     chosen = choose_candidates(mouths(), 50)
     assert (np.diff(chosen) > 0).all()
     assert 45 <= len(chosen) <= 50
     assert np.array_equal(chosen, choose_candidates(mouths(), 50))
-
-
-def test_all_are_chosen_where_there_are_few_and_equal_ones_once() -> None:
     few = mouths()[:7]
     assert choose_candidates(few, 500).tolist() == list(range(7))
     assert len(choose_candidates(np.repeat(few, 3, axis=0), 500)) == 7
@@ -94,8 +91,8 @@ def test_squared_distances_are_those_of_the_definition() -> None:
     assert square_distances(some, others) == pytest.approx(np.array(expected), rel=1e-4, abs=1e-2)
 
 
-def test_a_candidate_is_its_eigenlips_and_its_detail(space: Eigenlips) -> None:
-    images = HELD_OUT[:20]
+def test_a_candidate_is_its_eigenlips_and_its_detail_and_a_damaged_picture_is_none(space: Eigenlips) -> None:
+    images = HELD_OUT[:20].copy()
     candidates = make_candidates(space, images)
     assert (len(candidates), candidates.size) == (20, (9, 12))
     again = np.rint(space.expand(candidates.coefficients) + candidates.details)
@@ -104,10 +101,6 @@ def test_a_candidate_is_its_eigenlips_and_its_detail(space: Eigenlips) -> None:
         [candidates.details[..., c].reshape(20, -1).astype(float) @ space.basis[c].T for c in range(3)]
     )
     assert np.abs(detail_coefficients).max() < 3  # of rounding alone: detail has no part in the space of the eigenlips
-
-
-def test_a_damaged_picture_is_no_candidate(space: Eigenlips) -> None:
-    images = HELD_OUT[:20].copy()
     images[7, :3, :3] = 255, 0, 255
     candidates = make_candidates(space, images)
     assert len(candidates) == 19

@@ -23,7 +23,7 @@ def pins(name: str) -> set[str]:
     return set(PIN.findall((ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")))
 
 
-def test_what_is_copied_is_there():
+def test_what_is_copied_is_there_and_the_base_and_the_command_are_right():
     copied = [name for line in after("COPY") for name in line.split()[:-1]]
     project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     packed = re.findall(r'^"(\w+)/\w+" = ', project.split("wheel.force-include]")[1].split("\n[")[0], re.MULTILINE)
@@ -33,12 +33,8 @@ def test_what_is_copied_is_there():
     kept = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
     assert kept[0] == "*"
     assert set(kept[1:]) == {f"!{name}" for name in copied}
-
-
-def test_the_base_and_the_command():
     (base,) = after("FROM")
     assert re.fullmatch(r"python:3\.1[0-2]-slim", base), "face tracking needs Python 3.10 to 3.12"
-    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     (entry,) = after("ENTRYPOINT")
     assert f"{json.loads(entry)[0]} = " in project.split("[project.scripts]")[1]
     for name in re.findall(r"LIST=(\w+)", "\n".join(LINES)):

@@ -49,12 +49,9 @@ def light_of(normal, *, reaches=(1.0, 1.0)) -> np.ndarray:
     )[0]  # fmt: skip
 
 
-def test_a_surface_that_faces_the_lamp_is_brightest():
+def test_a_surface_that_faces_the_lamp_is_brightest_and_what_is_hidden_is_dark():
     facing, turned, away = (float(light_of(n)[0]) for n in ([0, 0, 1], [0.8, 0, 0.6], [0.99, 0, -0.14]))
     assert facing > turned > away > 0
-
-
-def test_what_is_hidden_from_lamp_and_sky_is_dark():
     open_, shaded, hidden = (float(light_of([0, 0, 1], reaches=r)[0]) for r in ((1, 1), (1, 0), (0, 0)))
     assert open_ > shaded > hidden
     assert hidden == pytest.approx(0)

@@ -117,18 +117,14 @@ def test_a_step_of_a_vertical_edge_has_half_its_height_on_two_pixels():
     assert np.isnan(slopes.seam)
 
 
-def test_skin_beside_an_outline_lies_on_either_side():
+def test_beside_an_outline_a_redder_patch_has_an_offset_and_one_that_reddens_a_drift():
     region = rectangle()
     inside, outside = skin_beside(region)
     assert region[inside].all()
     assert not region[outside].any()
     assert inside[HEIGHT // 2, 16:24].tolist() == [False, False, True, True, True, True, False, False]
     assert outside[HEIGHT // 2, 8:16].tolist() == [False, False, True, True, True, True, False, False]
-
-
-def test_a_redder_patch_has_an_offset_and_one_that_reddens_a_drift():
-    true, region, steps = blobs(5, 6).astype(float), rectangle(), np.arange(6) - 2.5
-    inside, outside = skin_beside(region)
+    true, steps = blobs(5, 6).astype(float), np.arange(6) - 2.5
     red = np.array([1.0, 0, 0]) * region[..., None]
     for made, offset, drift in (
         (true + 6 * red, 2, 0),

@@ -39,7 +39,7 @@ def _moved(binding, mesh, chosen, way):
     return (binding.moved(mesh, displacements) - mesh.vertices) / binding.placement.scale
 
 
-def test_the_lower_lip_does_not_drag_the_upper(binding, mesh):
+def test_the_lower_lip_does_not_drag_the_upper_and_teeth_follow_the_jaw(binding, mesh):
     template = build_mouth()
     moved = _moved(binding, mesh, template.lower | template.jaw, [0, -1, 0])
     middle = np.abs(template.places[:, 0]) < 0.2
@@ -49,6 +49,10 @@ def test_the_lower_lip_does_not_drag_the_upper(binding, mesh):
     assert moved[lower, 1].max() < -0.9
     chin = binding.placement.vertices[template.row(152)]
     assert moved[chin, 1] < -0.9
+    teeth = next(part for part in mesh.parts if part.name == "teeth")
+    rows = np.unique(mesh.triangles[teeth.first : teeth.stop])
+    moved = _moved(binding, mesh, template.jaw, [0, -0.5, 0])
+    np.testing.assert_allclose(moved[rows], np.tile([0, -0.5, 0], (3, 1)), atol=1e-9)
 
 
 def test_the_face_beyond_the_mouth_stands_still(binding, mesh):
@@ -61,14 +65,6 @@ def test_the_face_beyond_the_mouth_stands_still(binding, mesh):
     assert np.abs(moved[far]).max() < 1e-9
     held = binding.placement.vertices[~template.jaw]
     np.testing.assert_allclose(moved[held], np.tile([0.3, 0.2, 0.1], (len(held), 1)), atol=1e-6)
-
-
-def test_teeth_follow_the_jaw(binding, mesh):
-    template = build_mouth()
-    teeth = next(part for part in mesh.parts if part.name == "teeth")
-    rows = np.unique(mesh.triangles[teeth.first : teeth.stop])
-    moved = _moved(binding, mesh, template.jaw, [0, -0.5, 0])
-    np.testing.assert_allclose(moved[rows], np.tile([0, -0.5, 0], (3, 1)), atol=1e-9)
 
 
 def test_skinning_is_the_weighted_sum_of_the_transformed_vertices(binding, mesh):
@@ -269,30 +265,23 @@ def test_shapes_that_undo_each_other_are_not_there_at_once(weights):
     assert not np.minimum(live[weights.names.index("mouthPucker")], live[weights.names.index("mouthStretchLeft")])
 
 
-def test_the_gap_is_that_of_the_motion(weights, shapes):
+def test_the_gap_is_that_of_the_motion_and_lips_close_in_p_and_m_and_in_silence(weights, shapes):
     gap = weights.values @ shapes.gap
     wanted = blendshape_motion.move_points(motion(), units()).mouth.gap
     phone = np.array([name for name, start, end in PHONES for _ in range(round(100 * (end - start)))] + ["sil"])
     free = ~np.isin(phone, ["p", "m"])
     assert np.abs(gap - wanted)[free].max() < 0.012
     assert np.corrcoef(gap, wanted)[0, 1] > 0.995
-
-
-def test_lips_close_in_p_and_m_and_in_silence(weights, shapes):
-    gap = weights.values @ shapes.gap
     assert gap[[55, 95]].max() < 1e-6
     assert gap[:40].max() < 1e-6
     assert weights.values[5:40].max() < 0.03
 
 
-def test_the_jaw_stays_open_behind_closed_lips(shapes):
+def test_the_jaw_stays_open_behind_lips_that_are_pressed_in_p_as_captures_press_them(shapes):
     weights = shape_weights.solve_shape_weights(motion(), units(), shapes)
     assert weights["jawOpen"][95] > 0.05
     assert weights["mouthClose"][95] > 0.05
-
-
-def test_lips_are_pressed_in_p_as_captures_press_them(shapes):
-    assert 0.35 < shape_weights.solve_shape_weights(motion(), units(), shapes)["mouthPressLeft"][95] < 0.66
+    assert 0.35 < weights["mouthPressLeft"][95] < 0.66
 
 
 def test_known_weights_come_back():

@@ -216,7 +216,7 @@ def motion(frames: int = 50) -> np.ndarray:
     return np.random.default_rng(1).normal(0.2, 1, (frames, 5)) * [1, 2, 0.5, 3, 0.1]
 
 
-def test_distances_are_modelled_as_they_are_and_points_in_components():
+def test_distances_are_modelled_as_they_are_points_in_components_and_variance_is_carried_through():
     space = fit_space(CHANNELS, motion(), components=2)
     assert space.direct_names == ("opening", "jaw_open")
     assert space.reduce(motion()).shape == (50, 4)
@@ -224,10 +224,6 @@ def test_distances_are_modelled_as_they_are_and_points_in_components():
     values, _ = space.restore(space.reduce(motion()), np.ones((50, 4)))
     least = np.linalg.eigvalsh(np.cov(motion()[:, [0, 2, 4]].T, bias=True))[0]  # that any two components lose
     assert np.square(motion() - values).sum(axis=1).mean() == pytest.approx(least)
-
-
-def test_variance_is_carried_through_the_basis():
-    space = fit_space(CHANNELS, motion(), components=2)
     variance = np.random.default_rng(2).uniform(0.1, 1, (1, 4))
     _, spread = space.restore(np.zeros((1, 4)), variance)
     assert spread[0, [1, 3]] == pytest.approx(variance[0, :2])

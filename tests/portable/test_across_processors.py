@@ -65,15 +65,10 @@ def test_phones_are_the_same(both):
             assert there[name].tolist() == values.tolist(), name
 
 
-def test_features_of_silence_and_constants_are_zero(both):
+def test_features_of_silence_and_constants_are_zero_and_silence_is_silence(both):
     for results in both:
         for name, values in results.items():
             if name.startswith("features of") and name != "features of speech":
                 assert not values.any(), name
-
-
-def test_silence_is_silence(both):
-    for results in both:
-        for name, values in results.items():
             if name.endswith("silence: phones"):
                 assert values.tolist() == ["sil"], name

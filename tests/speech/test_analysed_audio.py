@@ -132,7 +132,9 @@ def test_where_nothing_is_said_all_features_are_0() -> None:
         assert all(len(values) == 101 and not values.any() for values in kinds(audio))
 
 
-def test_a_passage_is_not_divided_further_and_what_keeps_its_features_stays_itself(sentence: ToySentence) -> None:
+def test_a_passage_is_not_divided_further_what_keeps_its_features_stays_itself_and_so_does_a_stretch(
+    sentence: ToySentence,
+) -> None:
     audio = analysed_audio.analysed(sentence.audio)
     (passage,) = audio.passages
     assert (audio.is_passage, passage.audio.is_passage) == (False, True)
@@ -149,10 +151,6 @@ def test_a_passage_is_not_divided_further_and_what_keeps_its_features_stays_itse
     assert audio.duration_s == sentence.audio.duration_s
     with pytest.raises(errors.InputError, match="need 16000 Hz, found 44100 Hz"):
         analysed_audio.analysed(types.Audio(np.zeros(44_100, np.float32), 44_100)).mfcc()
-
-
-def test_a_stretch_has_the_features_of_the_whole(sentence: ToySentence) -> None:
-    audio = analysed_audio.analysed(sentence.audio)
     stretch = audio.stretch(60, 160)
     assert len(stretch.samples) == 16_000
     for whole, part in zip(kinds(audio), kinds(stretch), strict=True):

@@ -24,7 +24,7 @@ def test_gradients_are_those_of_differences() -> None:
     assert np.corrcoef(differences, gradients)[0, 1] > 0.995
 
 
-def test_steps_beyond_the_reach_change_nothing_and_those_within_do() -> None:
+def test_steps_beyond_the_reach_change_nothing_also_over_the_borders_of_blocks() -> None:
     network = convolution.make_network(3, 8, 2, (1, 2, 4), seed=0)
     x = sequence(60).inputs.astype(np.float32)
     changed = x.copy()
@@ -34,10 +34,6 @@ def test_steps_beyond_the_reach_change_nothing_and_those_within_do() -> None:
     assert not moved[: 30 - 7].any()
     assert not moved[30 + 8 :].any()
     assert moved[30]
-
-
-def test_long_sequences_are_computed_in_blocks() -> None:
-    network = convolution.make_network(3, 8, 2, (1, 2, 4), seed=0)
     x = sequence(convolution.BLOCK + 100).inputs.astype(np.float32)
     border = slice(convolution.BLOCK - 40, convolution.BLOCK + 40)
     alone = network(x[border.start - 7 : border.stop + 7])[7:-7]

@@ -107,13 +107,10 @@ def test_there_and_back() -> None:
         assert ("é" in written) == (text == "é")
 
 
-def test_numbers_that_json_does_not_have() -> None:
+def test_numbers_that_json_does_not_have_are_refused_or_null() -> None:
     for content in (NAN, {"a": [1.0, INFINITE]}, [-INFINITE]):
         with pytest.raises(ExportError, match="every number must be finite"):
             as_json(content)
-
-
-def test_a_figure_that_nothing_defines_is_null() -> None:
     nested = {"a": [1.5, NAN, (INFINITE, "b", -INFINITE)], "c": 2, "d": "nan", "e": None, "f": True}
     assert replace_nan(nested) == {"a": [1.5, None, (None, "b", None)], "c": 2, "d": "nan", "e": None, "f": True}
 

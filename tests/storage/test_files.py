@@ -168,7 +168,7 @@ def test_unfinished_work_is_found_again(tmp_path: Path) -> None:
         assert names(folder) == [LOCK, "stage"]
 
 
-def test_a_link_is_written_through(tmp_path: Path) -> None:
+def test_a_link_is_written_through_and_unfinished_work_lies_beside_what_it_points_to(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     for name, target in (("a.json", "there/b.json"), ("c.json", "a.json")):
         (tmp_path / name).symlink_to(target)
@@ -180,6 +180,10 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
     assert names(tmp_path) == ["a.json", "c.json", "there"]
     assert names(tmp_path / "there") == ["b.json"]
     assert all((tmp_path / name).is_symlink() for name in ("a.json", "c.json"))
+    (tmp_path / "m").symlink_to("there/model")
+    with keep_unfinished(tmp_path / "m") as folder:
+        assert folder == (tmp_path / "there").resolve() / "model.unfinished"
+    assert names(tmp_path / "there") == ["b.json"]
 
 
 def test_a_link_is_replaced_where_it_must_not_lead_away(tmp_path: Path) -> None:
@@ -200,14 +204,6 @@ def test_a_link_that_leads_nowhere(tmp_path: Path) -> None:
         with pytest.raises(ExportError, match=words), atomic_file(tmp_path / name):
             raise AssertionError
     assert names(tmp_path) == ["away", "loop"]
-
-
-def test_unfinished_work_lies_beside_what_a_link_points_to(tmp_path: Path) -> None:
-    (tmp_path / "there").mkdir()
-    (tmp_path / "m").symlink_to("there/model")
-    with keep_unfinished(tmp_path / "m") as folder:
-        assert folder == (tmp_path / "there").resolve() / "model.unfinished"
-    assert names(tmp_path / "there") == []
 
 
 def test_two_outputs_that_are_one(tmp_path: Path) -> None:

@@ -71,16 +71,12 @@ def test_videos_are_what_browsers_play_and_their_names_say_nothing(here):
         assert video.seconds == pytest.approx(0.4, abs=0.05)
 
 
-def test_every_page_of_a_ranking_has_the_anchor(here):
+def test_every_page_of_a_ranking_has_the_anchor_and_a_study_is_the_same_when_designed_again(here):
     conditions = ["recording", f"ours={here / 'ours'}"]
     study = design_study(here / "study", RANKING, conditions, [here / "said"], PLAIN)
     assert {len(trial.videos) for trial in study.trials} == {3}
     without = design_study(here / "other", RANKING, conditions, [here / "said"], replace(PLAIN, anchors=0))
     assert {len(trial.videos) for trial in without.trials} == {2}
-
-
-def test_a_study_is_the_same_when_it_is_designed_again(here):
-    conditions = ["recording", f"ours={here / 'ours'}"]
     first, second = (design_study(here / name, PAIRED, conditions, [here / "said"], PLAIN) for name in ("a", "b"))
     assert first == second
     other = design_study(here / "c", PAIRED, conditions, [here / "said"], replace(PLAIN, seed=5))
@@ -242,7 +238,8 @@ def test_a_check_of_attention_tells_the_answer_that_it_expects(kind):
         assert check.expected in check.note
 
 
-def test_each_rater_has_an_order_that_stays(tmp_path):
+def test_each_rater_has_an_order_that_stays_and_orders_are_balanced(tmp_path):
+    """A trial comes as often in the first half as chance has it: of 400 raters, 200 ± 4 standard deviations of 10."""
     study = small_study(tmp_path / "study")
     orders = [manifest.order_trials(study, rater) for rater in range(1, 30)]
     assert orders == [manifest.order_trials(study, rater) for rater in range(1, 30)]
@@ -250,11 +247,6 @@ def test_each_rater_has_an_order_that_stays(tmp_path):
     for order in orders:
         assert order[0].practice
         assert Counter(order) == Counter(study.trials)
-
-
-def test_orders_are_balanced_over_raters(tmp_path):
-    """A trial comes as often in the first half as chance has it: of 400 raters, 200 ± 4 standard deviations of 10."""
-    study = small_study(tmp_path / "study")
     counted = [trial for trial in study.trials if not trial.practice]
     early = Counter(
         trial for rater in range(400) for trial in manifest.order_trials(study, rater)[1 : 1 + len(counted) // 2]
@@ -262,14 +254,11 @@ def test_orders_are_balanced_over_raters(tmp_path):
     assert all(160 <= early[trial] <= 240 for trial in counted)
 
 
-def test_every_order_of_three_is_equally_likely():
+def test_a_ranking_shuffles_the_videos_of_a_page_and_every_order_of_three_is_equally_likely(tmp_path):
     """Of 6000, 1000 each: chi-squared of five degrees of freedom is under 20.5 in 99.9 % of draws."""
     counts = Counter("".join(manifest.shuffle("abc", "seed", n)) for n in range(6000))
     assert len(counts) == 6
     assert sum((count - 1000) ** 2 / 1000 for count in counts.values()) < 20.5
-
-
-def test_a_ranking_shuffles_the_videos_of_a_page(tmp_path):
     study = small_study(tmp_path / "study", answers.RANKING)
     pages = {manifest.order_trials(study, rater)[0].videos for rater in range(40)}
     assert len(pages) > 10

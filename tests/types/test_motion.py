@@ -127,7 +127,7 @@ def generation(frames: int = 101) -> Generation:
     return Generation(Motion(line, 100.0, (Channel("opening"),)), line**2, units, trace)
 
 
-def test_all_parts_come_at_the_new_rate() -> None:
+def test_all_parts_come_at_the_new_rate_and_the_state_is_that_of_the_nearest_frame() -> None:
     result = generation().resampled(25.0)
     assert result.motion.rate_hz == 25.0
     assert result.motion["opening"] == pytest.approx(np.arange(0, 101, 4))
@@ -135,9 +135,6 @@ def test_all_parts_come_at_the_new_rate() -> None:
     assert result.units == generation().units
     assert result.trace.states == generation().trace.states
     assert result.trace.frames.tolist() == [min(frame // 10, 9) for frame in range(0, 101, 4)]
-
-
-def test_the_state_is_that_of_the_nearest_frame() -> None:
     for rate_hz in (24.0, 29.97, 60.0, 100.0, 441.0):
         before, after = generation(), generation().resampled(rate_hz)
         assert len(after.trace.frames) == len(after.variance) == len(after.motion.values)
@@ -183,11 +180,7 @@ def timeline(*edges_s: tuple[float, float]) -> Timeline[str]:
     return Timeline(tuple(Span(start_s, end_s, f"at {start_s}") for start_s, end_s in edges_s))
 
 
-def test_rounding_is_not_an_overlap() -> None:
-    assert len(timeline((0, 0.1 + 0.2), (0.3, 1))) == 2
-
-
-def test_it_says_which_span_is_wrong() -> None:
+def test_it_says_which_span_is_wrong_and_rounding_is_no_overlap() -> None:
     for edges_s, message in (
         ([(1, 0.5)], r"'at 1' ends at 0.5 s, before its start at 1 s"),
         ([(0, 1), (0.9, 2)], r"'at 0.9' starts at 0.9 s, before the previous span ends \(1 s\)"),
@@ -197,6 +190,7 @@ def test_it_says_which_span_is_wrong() -> None:
     ):
         with pytest.raises(InputError, match=message):
             timeline(*edges_s)
+    assert len(timeline((0, 0.1 + 0.2), (0.3, 1))) == 2
 
 
 @settings(max_examples=50)
@@ -330,14 +324,11 @@ def test_a_value_that_is_not_allowed() -> None:
         assert words in str(error.value)
 
 
-def test_options_come_back() -> None:
+def test_options_come_back_and_texts_are_parsed_as_their_types() -> None:
     one = Example.parsed({"how_many": 7, "weight": 2, "steps": 0})
     assert (one.count, one.weight) == (7, 2)
     assert Example.parsed(one.as_mapping()) == one
     assert Example.parsed({}) == Example()
-
-
-def test_texts_are_parsed_as_their_types() -> None:
     for given_texts, values in (
         (["count=4", "weight=2", "kind=hard"], {"count": 4, "weight": 2.0, "kind": "hard"}),
         (["on=no"], {"on": False}), (["on=TRUE"], {"on": True}), (["free=a=b"], {"free": "a=b"}),
@@ -395,13 +386,10 @@ CURVE = np.array([0.0, 0.1, 0.2, 0.1])
 CERTAIN, UNCERTAIN = np.zeros(4), np.full(4, 2e-3)
 
 
-def test_a_known_voice_is_as_sure_as_its_variance() -> None:
+def test_a_known_voice_is_as_sure_as_its_variance_and_movements_of_a_stranger_less_than_his_mean() -> None:
     known = SpeechKnowledge(voice=1.0, phones=0.0)
     np.testing.assert_allclose(known.confidence(CURVE, CERTAIN), 1)
     np.testing.assert_allclose(known.confidence(CURVE, UNCERTAIN), 1 / (1 + 8 * 2e-3 / CURVE.var()))
-
-
-def test_movements_of_a_stranger_are_less_sure_than_his_mean() -> None:
     confidence = SpeechKnowledge(voice=0.0, phones=1.0).confidence(CURVE, CERTAIN)
     assert confidence[0] == pytest.approx(confidence[2])
     assert confidence[0] < confidence[1]
@@ -413,12 +401,9 @@ def test_knowing_more_makes_sure(better: dict[str, float]) -> None:
     assert (SpeechKnowledge(**better).confidence(CURVE, UNCERTAIN) > worse).all()
 
 
-def test_motion_of_other_words_is_not_sure_whoever_speaks() -> None:
+def test_motion_of_other_words_is_not_sure_whoever_speaks_and_one_that_stands_still_is() -> None:
     for voice in (0.0, 1.0):
         other = SpeechKnowledge(voice, 1.0, fit=0.0).confidence(CURVE, CERTAIN)
         assert 1 / other - 1 / SpeechKnowledge(voice, 1.0).confidence(CURVE, CERTAIN) == pytest.approx(0.5)
-
-
-def test_motion_that_stands_still_has_a_confidence() -> None:
     still = SpeechKnowledge(voice=0.0, phones=1.0).confidence(np.full(5, 0.1, np.float32), np.full(5, -1e-12))
     assert (still > 0.5).all()

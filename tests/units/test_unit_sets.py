@@ -33,27 +33,17 @@ def test_the_counts_are_those_of_the_paper() -> None:
 
 
 @named
-def test_every_phone_stands_in_one_group(name: str) -> None:
+def test_every_phone_stands_in_one_group_silence_alone_and_lips_that_meet_in_no_open_unit(name: str) -> None:
     phones = [phone for group in GROUPS[name] for phone in group.phones.split()]
     assert sorted(phones) == list(PHONES)
     assert len({group.unit for group in GROUPS[name]}) == len(GROUPS[name])
     assert all(group.reason for group in GROUPS[name])
     found = load_unit_set(name)
     assert {found.unit(phone) for phone in PHONES} == set(found.units)
-
-
-@named
-def test_silence_is_alone_unless_it_is_a_closed_mouth(name: str) -> None:
-    found = load_unit_set(name)
     beside = {phone for unit in found.silence for phone in found.phones(unit)}
     assert beside - {"sil", "sp"} == (set(LIP_CLOSING) if name == "2vis" else set())
     assert [found.silent(unit) for unit in found.silence] == [name != "2vis"] * len(found.silence)
     assert not any(found.silent(found.unit(phone)) for phone in SPOKEN)
-
-
-@named
-def test_lips_that_meet_are_no_part_of_an_open_unit(name: str) -> None:
-    found = load_unit_set(name)
     closing = {found.unit(phone) for phone in LIP_CLOSING}
     assert all(phone in LIP_CLOSING or is_silent(phone) for unit in closing for phone in found.phones(unit))
 
@@ -69,13 +59,10 @@ def kinds(name: str) -> dict[str, int]:
     return count
 
 
-def test_the_parts_of_the_sets_are_those_of_the_paper() -> None:
+def test_the_parts_of_the_sets_are_those_of_the_paper_and_break_one_another_down() -> None:
     assert kinds("eVis") == {"diphthong": 5, "vowel": 4, "other": 10}
     assert kinds("sVis") == {"diphthong": 0, "vowel": 3, "other": 3 + 1}
     assert load_unit_set("phone").unit_of_phone == {phone: phone for phone in PHONES}
-
-
-def test_the_extended_set_breaks_the_simple_one_down() -> None:
     for fine, coarse in (("phone", "eVis"), ("eVis", "sVis"), ("sVis", "2vis")):
         for unit in load_unit_set(fine).units:
             speech = [phone for phone in load_unit_set(fine).phones(unit) if not is_silent(phone)]

@@ -127,7 +127,7 @@ def moved(face: Face, by: float) -> Face:
     return (face[0], face[1] + by, *face[2:])
 
 
-def test_a_moving_face_is_one_scene(show: Show) -> None:
+def test_a_moving_face_is_one_scene_and_the_one_shown_longest_is_the_person(show: Show) -> None:
     follower, followed = show([([moved(ANNA, n)], 0) for n in range(30)])
     assert followed == [150.0 + n for n in range(30)]
     assert follower.mark_person().all()
@@ -135,23 +135,17 @@ def test_a_moving_face_is_one_scene(show: Show) -> None:
     assert (
         len(show([([ANNA], 0)] * 110)[0].list_thumbnails()) == face_follower.MAX_THUMBNAILS
     )  # later looks are kept when they are new
-
-
-def test_the_one_shown_longest_is_the_person(show: Show) -> None:
     follower, _ = show([([BELLA], 1)] * 8 + [([ANNA], 0)] * 20 + [([BELLA], 1)] * 5)
     assert follower.mark_person().tolist() == [False] * 8 + [True] * 20 + [False] * 5
     assert follower.list_cuts() == [8, 28]
 
 
-def test_she_is_known_again_elsewhere(show: Show) -> None:
+def test_she_is_known_again_elsewhere_and_a_face_that_jumps_is_looked_at_again(show: Show) -> None:
+    """Without a cut in the picture, the mesh goes over to somebody else."""
     near = ("a", 120.0, 110.0, 96.0)
     follower, _ = show([([ANNA], 0)] * 10 + [([near], 2)] * 6 + [([BELLA], 1)] * 5 + [([ANNA], 0)] * 4)
     assert follower.mark_person().tolist() == [True] * 16 + [False] * 5 + [True] * 4
     assert follower.list_cuts() == [10, 16, 21]
-
-
-def test_a_face_that_jumps_is_looked_at_again(show: Show) -> None:
-    """Without a cut in the picture, the mesh goes over to somebody else."""
     there = moved(BELLA, 1.5 * face_follower.JUMP * 64)
     follower, _ = show([([ANNA], 0)] * 12 + [([there], 0)] * 4 + [([ANNA], 0)] * 4)
     assert follower.mark_person().tolist() == [True] * 12 + [False] * 4 + [True] * 4

@@ -96,22 +96,7 @@ def test_frames_come_in_their_constant_order(write_video, scripted, dropped):
     assert distance.max() == {(): 0, (6, 13): 1, (7, 8, 9): 2}[dropped]
 
 
-def test_a_part_is_the_same_as_in_the_whole(write_video, scripted):
-    ticks = [n for n in range(20) if n not in (5, 12, 13)]
-    scripted([FACES[n] for n in ticks])
-    footage = track_footage(write_video(ticks=ticks))
-    whole = levels(decode_footage(footage))
-    for start, stop in ((0, 20), (0, 1), (7, 7), (12, 17), (19, None), (3, None)):
-        assert levels(decode_footage(footage, start, stop)) == whole[start:stop]
-    scripted(FACES[5:15])
-    footage = track_footage(write_video(ticks=range(20)), VideoSpan(0.2, 0.6))
-    assert levels(decode_footage(footage, 4, 8)) == list(range(9, 13))
-    for start, stop in ((-1, 5), (6, 5), (0, 11), (11, None)):
-        with pytest.raises(InputError, match=rf"frames {start} to {stop or 10} of .*, required within 0 to 10"):
-            decode_footage(footage, start, stop)
-
-
-def test_frames_in_any_order(write_video, scripted):
+def test_a_part_and_frames_in_any_order_are_the_same_as_in_the_whole(write_video, scripted):
     ticks = [n for n in range(20) if n not in (5, 12, 13)]
     scripted([FACES[n] for n in ticks])
     footage = track_footage(write_video(ticks=ticks))
@@ -121,19 +106,24 @@ def test_frames_in_any_order(write_video, scripted):
         groups = open_footage(footage, most_bytes)
         assert levels(groups.decode(n) for n in order) == [shown[n] for n in order]
         assert groups.nbytes <= max(most_bytes, 2 * 48 * 64 * 3)
+    for start, stop in ((0, 20), (0, 1), (7, 7), (12, 17), (19, None), (3, None)):
+        assert levels(decode_footage(footage, start, stop)) == shown[start:stop]
+    scripted(FACES[5:15])
+    footage = track_footage(write_video(ticks=range(20)), VideoSpan(0.2, 0.6))
+    assert levels(decode_footage(footage, 4, 8)) == list(range(9, 13))
+    for start, stop in ((-1, 5), (6, 5), (0, 11), (11, None)):
+        with pytest.raises(InputError, match=rf"frames {start} to {stop or 10} of .*, required within 0 to 10"):
+            decode_footage(footage, start, stop)
 
 
-def test_a_video_that_was_exchanged_is_noticed(write_video, scripted):
+def test_a_video_that_was_exchanged_is_noticed_and_one_that_became_shorter_shows_its_last_picture(
+    write_video, scripted
+):
     scripted(FACES)
     footage = track_footage(write_video(ticks=range(20)))
     other = write_video("other.mp4", ticks=range(20), size=(32, 32))
     with pytest.raises(InputError, match="a picture is not 64 × 48 as when it was tracked"):
         list(decode_footage(replace(footage, path=other)))
-
-
-def test_a_video_that_became_shorter_shows_its_last_picture(write_video, scripted):
-    scripted(FACES)
-    footage = track_footage(write_video(ticks=range(20)))
     shorter = replace(footage, path=write_video("shorter.mp4", ticks=range(15)))
     assert levels(decode_footage(shorter)) == [*range(15), *([14] * 5)]
     with pytest.raises(InputError, match=r"no picture from 0\.72 s on"):
@@ -246,13 +236,10 @@ def test_dropped_frames_are_put_in_their_place(write_video, scripted):
     assert np.flatnonzero(~result.seen).tolist() == [6, 13]
 
 
-def test_too_few_faces_are_refused_with_counts(write_video, scripted):
+def test_too_few_faces_and_broken_time_stamps_are_refused(write_video, scripted):
     scripted([face(0.1) if n < 15 else None for n in range(20)])
     with pytest.raises(InputError, match=r"no face in 5 of 20 frames; required: a face in at least 80%"):
         track(write_video(ticks=range(20)), crops=False)
-
-
-def test_broken_time_stamps_are_refused(write_video, scripted):
     scripted([face(0.1)] * 20)
     with pytest.raises(InputError, match=r"20 frames span 40\.\d s.*constant frame rate"):
         track(write_video("clip.mkv", ticks=[*range(19), 1000]), crops=False)

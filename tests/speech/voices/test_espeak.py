@@ -156,13 +156,10 @@ def test_a_stop_begins_with_its_closure() -> None:
     assert starts([("a", 0.1), ("p", 0.5)], Audio(np.zeros(RATE_HZ, np.float32), RATE_HZ)) == [0.1, 0.5]
 
 
-def test_an_l_that_is_late_gets_its_share_of_the_vowel() -> None:
+def test_an_l_that_is_late_gets_its_share_of_the_vowel_and_the_last_lasts_to_the_end() -> None:
     assert starts([("OI", 0.1), ("l", 0.29), ("d", 0.3)], sound()) == [0.1, 0.21, 0.3]
     assert starts([("OI", 0.1), ("l", 0.2), ("d", 0.3)], sound()) == [0.1, 0.2, 0.3]
     assert starts([("t", 0.1), ("l", 0.29), ("d", 0.3)], sound()) == [0.1, 0.29, 0.3]
-
-
-def test_the_last_lasts_to_the_end() -> None:
     phones = espeak.correct_times([("a", 0.1), ("s", 0.5)], sound())
     assert [(span.label, span.end_s) for span in phones] == [("a", 0.5), ("s", 1.0)]
 
@@ -255,14 +252,11 @@ def test_pauses_are_named_by_place_and_length() -> None:
     assert units[-1].end_s == pytest.approx(1.1)
 
 
-def test_what_is_not_covered_is_silent_and_what_is_too_late_is_cut() -> None:
+def test_what_is_not_covered_is_silent_what_is_too_late_is_cut_and_parts_of_a_label_join() -> None:
     said = timeline(("ih", 0.1, 0.2), ("t", 0.3, 0.6), ("t", 0.7, 0.8))
     units = convert_phones(said, ARPABET_PHONES, ["it"], LEXICON, 0.5)
     found = [(span.label.phone, span.start_s, span.end_s) for span in units]
     assert found == [("sil", 0.0, 0.1), ("ih", 0.1, 0.2), ("sp", 0.2, 0.3), ("t", 0.3, 0.5)]
-
-
-def test_several_phones_share_a_label_and_parts_join() -> None:
     said = timeline(("A@", 0.0, 0.2), (";", 0.2, 0.3), ("t", 0.3, 0.3), ("z", 0.3, 0.4))
     units = convert_phones(said, ESPEAK_PHONES, ["is"], LEXICON, 0.4)
     found = [(span.label.phone, span.start_s, span.end_s) for span in units]

@@ -125,19 +125,17 @@ HOME, AWAY = (
 """Games of the American League, East, 1987; a row for each team at home. Source: Agresti 2002, Table 10.10, p. 438."""
 
 
-def test_baseball_with_the_advantage_of_the_place_as_published():
-    """Source: Agresti 2002, Table 10.11 and p. 438: shares of strength to three decimals, and the advantage at home."""
+def test_baseball_with_the_advantage_of_the_place_as_published_and_its_deviations_sum_to_nothing():
+    """Source: Agresti 2002, Table 10.11 and p. 438: shares of strength to three decimals, and the advantage at home.
+
+    Errors are of statsmodels 0.15.0, GLM with family Binomial, on the same games; without Baltimore, and at home.
+    """
     model = fit_strengths(HOME, AWAY)
     shares = np.exp(model.strengths) / np.exp(model.strengths).sum()
     assert sorted(np.round(shares, 3)) == [0.044, 0.088, 0.137, 0.157, 0.164, 0.190, 0.220]
     assert TEAMS[int(shares.argmax())] == "Milwaukee"
     assert round(model.order, 3) == 0.302
     assert not model.is_shrunk
-
-
-def test_errors_are_those_of_a_statistics_package():
-    """Source: statsmodels 0.15.0, GLM with family Binomial, on the same games; without Baltimore, and at home."""
-    model = fit_strengths(HOME, AWAY)
     contrast = np.eye(7, 8)
     contrast[:6, 6], contrast[6] = -1, np.eye(8)[7]
     found = contrast @ np.append(model.strengths, model.order)
@@ -146,10 +144,6 @@ def test_errors_are_those_of_a_statistics_package():
     errors = np.sqrt(np.diag(contrast @ model.covariance @ contrast.T))
     expected = [0.347366, 0.344552, 0.340322, 0.340404, 0.337842, 0.335002, 0.130944]
     assert errors == pytest.approx(np.array(expected), abs=2e-6)
-
-
-def test_deviations_of_the_answers_sum_to_nothing():
-    model = fit_strengths(HOME, AWAY)
     games = [((i, j), True) for i, j in np.ndindex(7, 7) for _ in range(int(HOME[i, j]))]
     games += [((i, j), False) for i, j in np.ndindex(7, 7) for _ in range(int(AWAY[i, j]))]
     pairs, is_first = np.array([pair for pair, _ in games]), np.array([won for _, won in games])
@@ -184,13 +178,10 @@ def test_infinite_strengths_are_shrunk(first, second, is_shrunk):
     assert model.strengths.sum() == pytest.approx(0, abs=1e-9)
 
 
-def test_one_order_alone_has_no_effect():
+def test_one_order_alone_has_no_effect_and_groups_are_linked_by_comparisons():
     model = fit_strengths(np.array([[0, 3, 2], [0, 0, 3], [0, 0, 0.0]]), np.array([[0, 1, 2], [0, 0, 2], [0, 0, 0.0]]))
     assert model.order == 0
     assert not model.is_shrunk
-
-
-def test_groups_that_nothing_links():
     comparisons = np.zeros((5, 5))
     comparisons[0, 3] = comparisons[4, 3] = comparisons[1, 2] = 1
     assert link_groups(comparisons) == [[0, 3, 4], [1, 2]]
