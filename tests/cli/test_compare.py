@@ -14,7 +14,7 @@ def table(factor: float) -> str:
 WAVE = table(1.0)
 
 
-def test_the_figures_are_those_of_the_function(run, here):
+def test_the_figures_are_those_of_the_function_and_programs_read_lines_of_json(run, here):
     (here / "a.csv").write_text(WAVE)
     (here / "b.csv").write_text(table(0.5))
     done = run("compare", "a.csv", "b.csv", "a.csv", "-o", "figures.json")
@@ -26,10 +26,6 @@ def test_the_figures_are_those_of_the_function(run, here):
         "  mean ACC 1.000",
         "  closures: score 1.000 of 5, precision 1.000 of 5, F1 1.000, timing +0 ms",
     ]
-
-
-def test_programs_read_lines_of_json(run, here):
-    (here / "a.csv").write_text(WAVE)
     done = run("compare", "a.csv", "a.csv", "--machine-readable")
     assert (done.code, done.err) == (0, [])
     assert json.loads(done.out[-1])["figures"]["reference"] == "a.csv"

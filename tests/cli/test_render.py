@@ -25,7 +25,7 @@ def pictures(path: Path) -> list[np.ndarray]:
         return [frame.to_ndarray(format="rgb24").astype(int) for frame in video.decode(video=0)]
 
 
-def test_edited_values_are_drawn(run, motion_file, toy_speech, here):
+def test_edited_values_are_drawn_and_the_last_pose_stays_where_motion_is_shorter(run, motion_file, toy_speech, here):
     document = json.loads(motion_file.read_text())
     column = [channel["name"] for channel in document["channels"]].index("opening")
     for row in document["values"]:
@@ -40,6 +40,13 @@ def test_edited_values_are_drawn(run, motion_file, toy_speech, here):
     assert read_motion(here / "shut.csv")[0]["opening"].max() == pytest.approx(0)
     with av.open(str(here / "said.mp4")) as video:
         assert video.streams.audio
+    document["values"] = document["values"][:60]
+    (here / "cut.json").write_text(json.dumps(document))
+    done = run("render", "cut.json", "--sound", toy_speech, "-o", "cut.csv")
+    assert done.code == 0
+    assert "the motion lasts 0.59 s, the sound" in done.err[0]
+    assert "the last pose stays" in done.err[0]
+    assert len(read_motion(here / "cut.csv")[0].values) == pytest.approx(len(read_motion(motion_file)[0].values), abs=2)
 
 
 def test_blendshapes_without_phones_or_sound(run, here):
@@ -65,17 +72,6 @@ def test_a_glb_plays_with_its_sound_wherever_its_folder_goes(run, toy_speech, to
         assert max(float(np.abs(frame.to_ndarray()).max()) for frame in video.decode(audio=0)) > 0.01
     (here / "new" / "take #1 50%.wav").unlink()
     assert "is not there; give a sound" in run("render", "new/a.glb", "-o", "b.json").err[0]
-
-
-def test_sound_and_motion_of_other_lengths(run, motion_file, toy_speech, here):
-    document = json.loads(motion_file.read_text())
-    document["values"] = document["values"][:60]
-    (here / "cut.json").write_text(json.dumps(document))
-    done = run("render", "cut.json", "--sound", toy_speech, "-o", "cut.csv")
-    assert done.code == 0
-    assert "the motion lasts 0.59 s, the sound" in done.err[0]
-    assert "the last pose stays" in done.err[0]
-    assert len(read_motion(here / "cut.csv")[0].values) == pytest.approx(len(read_motion(motion_file)[0].values), abs=2)
 
 
 def test_motion_of_more_than_a_day_is_refused(run, here):

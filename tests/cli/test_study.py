@@ -61,17 +61,13 @@ def write_study(path: Path) -> None:
     write_answers(path, answers + paired_answers(comparisons(draw, np.array([-0.5, 0.5]), (8, 6), Effects())))
 
 
-def test_the_figures_are_those_of_the_function(run, here):
+def test_the_figures_are_those_of_the_function_and_programs_read_lines_of_json(run, here):
     write_study(here / "answers.csv")
     done = run("study", "analyse", "answers.csv", "-o", "result.json", "--baseline", "c1", "--sentences", "12")
     assert (done.code, done.err) == (0, [])
     figures = analyse_study(here / "answers.csv", baseline="c1", sentences=12)
     assert any("c1" in line for line in done.out)
     assert json.loads((here / "result.json").read_text()).keys() == figures.keys()
-
-
-def test_programs_read_lines_of_json(run, here):
-    write_study(here / "answers.csv")
     done = run("study", "analyse", "answers.csv", "--machine-readable")
     assert done.code == 0
     assert [part["kind"] for part in json.loads(done.out[-1])["figures"]["all"]] == ["mos", "paired"]

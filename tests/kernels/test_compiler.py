@@ -11,9 +11,9 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from children import environment, run_child
 from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
-from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward, normals
+from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward
 from lipmotion.kernels.compiler import limit_threads, list_blas_kernels
-from lipmotion_faces.kernels import affine, painting, raster, shading
+from lipmotion_faces.kernels import affine, normals, painting, raster, shading
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
 TESTS = Path(__file__).parents[1]
@@ -26,13 +26,11 @@ def unused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("unused")
-def test_long_recordings_are_compiled_and_short_ones_are_not() -> None:
+def test_long_recordings_are_compiled_and_short_ones_only_where_numba_is_loaded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert not compiler.pays(compiler.LONG_FRAMES // 2)
     assert compiler.pays(compiler.LONG_FRAMES * 2)
-
-
-@pytest.mark.usefixtures("unused")
-def test_all_is_compiled_where_numba_is_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "numba", cast("Any", None))
     assert compiler.pays()
 
@@ -129,20 +127,16 @@ def halves(x: float) -> float:
     return x / 2
 
 
-def test_compiled_code_is_kept_on_disk():
+def test_compiled_code_is_kept_on_disk_where_it_can_be():
     pytest.importorskip("numba")
     function = cast("Any", compiler.compiled(halves))
     assert function(3.0) == 1.5
     assert function.kernel.stats.cache_path is not None
-
-
-def test_what_cannot_be_kept_is_compiled_all_the_same():
     places: dict = {}
     exec(compile("def double(x):\n    return 2 * x\n", "nowhere", "exec"), places)  # noqa: S102  (no file, no cache)
-    pytest.importorskip("numba")
-    function = compiler.compiled(places["double"])
-    assert function(3.0) == 6.0
-    assert function.kernel.stats.cache_path is None
+    unkept = compiler.compiled(places["double"])
+    assert unkept(3.0) == 6.0
+    assert unkept.kernel.stats.cache_path is None
 
 
 def _sum(a: float, b: float) -> float:

@@ -86,14 +86,11 @@ def test_files_stay_in_order_and_folders_are_listed(tmp_path):
         list_recordings([tmp_path / "empty"])
 
 
-def test_folders_and_templates(tmp_path):
+def test_folders_and_templates_and_outputs_that_would_be_written_twice(tmp_path):
     planned = plan_outputs([Path("in/a.wav"), Path("b.c.flac")], ["out/", "x/{name}-take.mp4"], ["json", "csv"])
     assert planned == [["out/a.json", "out/a.csv", "x/a-take.mp4"], ["out/b.c.json", "out/b.c.csv", "x/b.c-take.mp4"]]
     assert is_for_several(str(tmp_path))
     assert not is_for_several("a.json")
-
-
-def test_outputs_that_would_be_written_twice():
     with pytest.raises(ExportError, match=r"o/a\.json: would be written for x/a\.wav and for y/a\.wav"):
         plan_outputs([Path("x/a.wav"), Path("y/a.wav")], ["o/"], ["json"])
     with pytest.raises(ExportError, match=r"a\.json: is one file, and there are 2 recordings"):

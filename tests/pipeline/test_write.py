@@ -46,15 +46,12 @@ def test_several_files_at_once(result, toy_model, toy_speech, tmp_path):
         assert len(units) == (0 if path.suffix == ".csv" else len(result.units))
 
 
-def test_files_say_where_they_come_from(result, toy_model, toy_speech, tmp_path):
+def test_files_say_where_they_come_from_and_a_recording_may_have_any_name(result, toy_model, toy_speech, tmp_path):
     about = {"corpus": ["a", "b"], "licence": ["CC BY 4.0"], "attribution": ["Anna", "Ünal"], "minutes": 3}
     write(result, [tmp_path / "a.json"], speech=toy_speech, model=replace(toy_model, about=about))
     document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert document["source"] == {"file": toy_speech.name}
     assert document["model"] == {"corpus": "a; b", "licence": "CC BY 4.0", "attribution": "Anna; Ünal"}
-
-
-def test_a_recording_may_have_any_name(result, toy_model, tmp_path):
     write(result, [tmp_path / "a.json", tmp_path / "a.npz"], speech="Ünal 音 caf\udce9.wav", model=toy_model)
     document = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert document["source"] == {"file": "Ünal 音 caf\\udce9.wav"}
@@ -364,7 +361,7 @@ def request_with_laughter() -> Request:
     return Request(audio, units=said(audio.duration_s, (0.5, 1.5)))
 
 
-def test_a_face_laughs_where_laughter_is_detected(toy_model, request_with_laughter):
+def test_a_face_laughs_where_laughter_is_detected_and_asked_for(toy_model, request_with_laughter):
     laughing = animate(request_with_laughter, model=toy_model)
     (event,) = laughing.events
     assert event.kind == "laughter"
@@ -375,11 +372,7 @@ def test_a_face_laughs_where_laughter_is_detected(toy_model, request_with_laught
     assert happy[round(loudest_s * 100)] > 0.7
     assert not happy[:150].any()
     assert "mood_happy" not in deliver(laughing, Delivery(mood="neutral")).motion.names
-
-
-def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(toy_model, request_with_laughter):
     plain = animate(replace(request_with_laughter, manner="asked"), model=toy_model)
-    laughing = animate(request_with_laughter, model=toy_model)
     assert not plain.events
     assert plain.motion["opening"][200:].max() < 0.05
     assert np.array_equal(plain.motion.values[50:150], laughing.motion.values[50:150])

@@ -127,7 +127,7 @@ def test_the_gaussian_is_the_most_responsible_one(name, row):
                 assert value.deviation == pytest.approx(np.sqrt(variance[column]) * visual.deviation[column])
 
 
-def test_shares_of_regressions_are_posteriors_of_the_visual_chain():
+def test_shares_of_regressions_are_posteriors_of_the_visual_chain_and_in_silence_the_rest_pose():
     model, inference = fitted("ph-vi-CHMM")
     posterior = inference.posteriors.chains[1]
     mean = model.regression[1][0].means(model.regression_inputs(inference), posterior)
@@ -138,10 +138,6 @@ def test_shares_of_regressions_are_posteriors_of_the_visual_chain():
             assert share.probability == pytest.approx(posterior[row, names.index(share.name)], abs=0.02)
         opening = mean[row, 0] * model.visual[0].deviation[0] + model.visual[0].mean[0]
         assert found.channels["opening"].value == pytest.approx(opening)
-
-
-def test_in_silence_away_from_speech_the_mean_is_the_rest_pose():
-    model, inference = fitted("ph-vi-CHMM")
     assert model.is_away_from_speech(inference.posteriors.chains[0])[5]
     (found,) = explanation("ph-vi-CHMM", 5).regressions
     assert found.shares == (types.NamedProbability("rest", 1.0),)

@@ -400,7 +400,7 @@ def table_model(folder: Path) -> tuple[engines.Engine, dict]:
     return engine, engine.to_arrays(model)
 
 
-def test_a_model_needs_its_table_no_more(tmp_path):
+def test_a_model_needs_its_table_no_more_and_a_damaged_one_is_refused(tmp_path):
     engine, arrays = table_model(tmp_path)
     model = engine.from_arrays(arrays)
     assert model.units.unit_of_phone == {phone: f"u{99 - number}{phone}" for number, phone in enumerate(PHONES)}
@@ -411,6 +411,9 @@ def test_a_model_needs_its_table_no_more(tmp_path):
         engines.engine_named("trajectory", {"units": ["eVis"]})
     with pytest.raises(errors.InputError, match="there are: 2vis"):
         engines.engine_named("trajectory", {"units": "evis"}).fit(examples(1), types.silent_monitor)
+    for damage in DAMAGES.values():
+        with pytest.raises(errors.ModelFormatError):
+            engine.from_arrays(arrays | {"units": damage(arrays["units"])})
 
 
 def changed(pairs: np.ndarray, row: int, column: int, text: str) -> np.ndarray:
@@ -431,10 +434,3 @@ DAMAGES = {
     "no table": lambda pairs: pairs[:0],
     "numbers": lambda pairs: np.zeros(pairs.shape),
 }
-
-
-def test_a_damaged_table_is_refused(tmp_path):
-    engine, arrays = table_model(tmp_path)
-    for damage in DAMAGES.values():
-        with pytest.raises(errors.ModelFormatError):
-            engine.from_arrays(arrays | {"units": damage(arrays["units"])})

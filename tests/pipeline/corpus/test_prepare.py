@@ -96,8 +96,12 @@ def test_what_is_up_to_date_is_kept(studio, tmp_path, tracked):
 
 
 @pytest.mark.usefixtures("tracked")
-def test_changed_recordings_transcripts_and_lists_are_prepared_again(studio, tmp_path):
+def test_what_is_damaged_or_has_changed_is_prepared_again_and_other_settings_prepare_all(studio, tmp_path):
     prepare(studio, tmp_path / "corpus", workers=1)
+    before = content(tmp_path / "corpus")
+    (tmp_path / "corpus" / "utterances" / "b" / "entry.json").write_text("{")
+    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("b",)
+    assert content(tmp_path / "corpus") == before
     write_noise(studio / "b.mp4", seed=77)
     assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("b",)
     (studio / "a.txt").write_text("Goodbye.")
@@ -107,22 +111,8 @@ def test_changed_recordings_transcripts_and_lists_are_prepared_again(studio, tmp
     corpus = Corpus.open(tmp_path / "corpus")
     assert corpus.utterance("a").words == ("goodbye",)
     assert corpus.names("val") == ("c",)
-
-
-@pytest.mark.usefixtures("tracked")
-def test_other_settings_prepare_again(studio, tmp_path):
-    prepare(studio, tmp_path / "corpus", workers=1)
     assert len(prepare(studio, tmp_path / "corpus", workers=1, crops=False).prepared) == 3
     assert Corpus.open(tmp_path / "corpus").utterance("a").track.crops is None
-
-
-@pytest.mark.usefixtures("tracked")
-def test_a_damaged_utterance_is_prepared_again(studio, tmp_path):
-    prepare(studio, tmp_path / "corpus", workers=1)
-    before = content(tmp_path / "corpus")
-    (tmp_path / "corpus" / "utterances" / "b" / "entry.json").write_text("{")
-    assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("b",)
-    assert content(tmp_path / "corpus") == before
 
 
 @pytest.mark.usefixtures("tracked")

@@ -203,12 +203,15 @@ def test_closed_is_closed_by_the_training_list(toy_model, toy_corpus, figures):
     assert (everything["split"], everything["clips"], everything["closed_under"]) == ("all", 12, expected)
 
 
-def test_without_transcripts_there_is_audio_only(toy_model, toy_corpus, tmp_path):
+def test_without_transcripts_there_is_audio_only_and_one_that_does_not_fit_is_named(toy_model, toy_corpus, tmp_path):
     first, second = held_out(toy_corpus)
     untold = corpus_of([replace(first, words=None), second], tmp_path)
     figures = evaluate(toy_model, untold)
     assert list(figures["conditions"]) == ["audio only"]
     assert figures["without_words"] == 1
+    wrong = corpus_of([first, replace(second, words=("five",) * 100)], tmp_path / "wrong")
+    with pytest.raises(AlignmentError, match=rf"{second.name}: .*too short.*correct its transcript, or leave it out"):
+        evaluate(toy_model, wrong)
 
 
 def test_a_model_on_its_own_training_list_is_named(toy_model, toy_corpus, figures):
@@ -221,13 +224,6 @@ def test_a_model_on_its_own_training_list_is_named(toy_model, toy_corpus, figure
     assert not _was_trained_on(replace(toy_model, about={**about, "speakers": ["ben"]}), training, "toy")
     first = Selection(names=toy_corpus.names("train")[:1])
     assert evaluate(toy_model, toy_corpus, selection=first)["seen_in_training"] is True
-
-
-def test_a_transcript_that_does_not_fit_is_named(toy_model, toy_corpus, tmp_path):
-    first, second = held_out(toy_corpus)
-    wrong = corpus_of([first, replace(second, words=("five",) * 100)], tmp_path)
-    with pytest.raises(AlignmentError, match=rf"{second.name}: .*too short.*correct its transcript, or leave it out"):
-        evaluate(toy_model, wrong)
 
 
 def renamed(motion: Motion) -> Motion:

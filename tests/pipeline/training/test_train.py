@@ -244,10 +244,14 @@ def test_words_that_are_left_out(right_transcripts, caplog):
     ]
 
 
-def test_labelled_phones_are_believed(right_transcripts, caplog):
+def test_labelled_phones_are_believed_and_of_two_alignments_the_better_one_counts(right_transcripts, caplog):
+    """Of phones in half of their places, and of others in all of them: these cover more of the speech and fit worse."""
     (utterance, units), (_, others) = right_transcripts[:2]
     warn_of_doubtful_transcripts([(replace(utterance, phones=units), others)])
     assert not caplog.records
+    for one, other in ((half_of(units), others), (half_of(units), half_of(units)), (half_of(units), units)):
+        warn_of_doubtful_transcripts([(utterance, one)], lambda _, other=other: other)
+    assert ["leave out words" in text for text in messages(caplog)] == [True, True]
 
 
 def test_without_general_models_nothing_is_measured(right_transcripts, caplog, monkeypatch):
@@ -268,14 +272,6 @@ def test_only_some_are_named(right_transcripts, caplog):
     assert "take09 and 4 more)" in text
     warn_of_missing_transcripts(many)  # that none has words is said elsewhere
     assert len(caplog.records) == 1
-
-
-def test_of_two_alignments_the_better_one_counts(right_transcripts, caplog):
-    """Of phones in half of their places, and of others in all of them: these cover more of the speech and fit worse."""
-    (utterance, units), (_, others) = right_transcripts[:2]
-    for one, other in ((half_of(units), others), (half_of(units), half_of(units)), (half_of(units), units)):
-        warn_of_doubtful_transcripts([(utterance, one)], lambda _, other=other: other)
-    assert ["leave out words" in text for text in messages(caplog)] == [True, True]
 
 
 @pytest.fixture(scope="module")
