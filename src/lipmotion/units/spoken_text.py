@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from enum import Enum
+from itertools import pairwise
 
 from lipmotion.errors import InputError
 from lipmotion.types import TimedWord
@@ -35,6 +36,10 @@ STAMP = re.compile(
     r"[(\[]?((?:\d{1,2}:)?\d{1,2}:\d\d)(?:[.,]\d{1,3})?[)\]]?(?:[ \t]*$|[ \t]*[-–—|]?[ \t]+(?=\S))"
 )
 """The time of a line of a transcript of the web, before it or above it: ``0:12 Hello``, ``Anna  0:12``."""
+NUMBER = re.compile(
+    r"(?m)^[ \t]*[(#]?(?:(\d{1,4})(?:[.):]+(?=\s|[^\W\d_])|[ \t]+[-–—](?=\s)|\t)|([a-z])\)(?=\s))[ \t]*(?=\S)"
+)
+"""The number of a line of a list, which is not said: ``1. Hello``, ``2) Hello``, ``a) Hello``."""
 CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]{1,20}\))?)[ \t]*\n(?=[^\n]*[a-z])")
 """A name in capitals above what that person says, as in screenplays."""
 DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
@@ -103,7 +108,8 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
 
     Names are those in capitals and with a remark (``ANNA:``, ``Anna (V.O.):``, ``[Anna]:``), ``Speaker 1:``, those in
     ``names``, two lines or more in capitals above what is said, as in screenplays, and what stands before the quotes of
-    a game's script, if all lines are such; also times before lines, if they rise from the first minute on.
+    a game's script, if all lines are such; also times before lines, if they rise from the first minute on, and numbers
+    before lines, if they count on.
     """
     left_out: list[str] = []
 
@@ -121,6 +127,9 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
     times_s = [parse_clock(stamp[1]) for stamp in STAMP.finditer(text)]
     if times_s[:1] == [0] or (len(times_s) > 1 and times_s[0] < 60 and times_s == sorted({*times_s})):
         text = STAMP.sub(leave_out, text)
+    numbers = [int(line[1] or ord(line[2])) for line in NUMBER.finditer(text)]
+    if len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers)):
+        text = NUMBER.sub(leave_out, text)
     cues = list(CUE.finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
         text = DIRECTION.sub(leave_out, CUE.sub(leave_out, text))

@@ -46,6 +46,7 @@ class DecodedAudio:
     damaged     : how many of them could not be decoded
     silence_s   : duration of the silence that fills holes
     stated_s    : duration that the container states, 0 if none
+    centre      : number of the channel that is the centre of three and more, None where there is none
     missing_s   : what a WAVE file's header states beyond its end
     """
 
@@ -57,6 +58,7 @@ class DecodedAudio:
     damaged: int
     silence_s: float
     stated_s: float
+    centre: int | None
     missing_s: float = 0.0
 
 
@@ -111,6 +113,8 @@ class _TrackDecoder:
         while self._pieces:  # each is freed when it is copied
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
+        names = [channel.name for channel in self._stream.layout.channels]
+        third = 2 if len(names) in (6, 8) and "NONE" in names else None  # names that a WAVE file may lack
         is_stated = self._stream.duration or not self._container.streams.video
         return DecodedAudio(
             samples=samples[self._cut :],
@@ -121,6 +125,7 @@ class _TrackDecoder:
             damaged=self._damaged,
             silence_s=self._silence_s,
             stated_s=read_duration(self._container, self._stream) if is_stated else 0.0,
+            centre=names.index("FC") if "FC" in names[1:] else third,
         )
 
     def _frames(self) -> Iterator[Any]:
@@ -217,8 +222,8 @@ LOG = logging.getLogger("lipmotion")
 SPEECH_RATE_HZ = 16_000
 SHORTEST_S = 0.1
 """Shorter recordings hold no sentence; the features need 25 ms around every frame."""
-CANCELLED_SHARE = 0.05
-"""The mean of the channels must have this share of the loudest channel's energy; else they cancel one another."""
+CANCELLED_SHARE = 0.2
+"""The mean of channels must have this share of the energy of unlike ones; else they cancel one another."""
 USABLE_SHARE = 0.5
 """A damaged recording is refused when less than this share of its sound can be decoded."""
 LEAST_HOLES_S = 0.005
@@ -245,18 +250,23 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     time stamps or a length that it cannot have, or samples not finite.
     """
     check_source(path, "recording")
-    sound = _decoded(path, rate_hz, None)
-    if sound.mean_energy < CANCELLED_SHARE * max(sound.energies, default=0.0):
+    sound, level = _decoded(path, rate_hz, None), logging.WARNING if warn else logging.DEBUG
+    count = len(sound.energies)
+    if sound.mean_energy < CANCELLED_SHARE * sum(sound.energies) / max(count, 1) ** 2:
         loudest = int(np.argmax(sound.energies))
-        LOG.log(
-            logging.WARNING if warn else logging.DEBUG,
-            "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used",
-            path,
-            len(sound.energies),
-            loudest + 1,
-        )
+        what = "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used"
+        LOG.log(level, what, path, count, loudest + 1)
         sound = _decoded(path, rate_hz, loudest)
-    level = logging.WARNING if warn else logging.DEBUG
+    elif sound.centre is not None:
+        from lipmotion.speech.sound.acoustic_conditions import speaks_alone
+
+        def decode(number: int) -> NDArray[np.float32]:
+            return _decoded(path, SPEECH_RATE_HZ, number).samples
+
+        if speaks_alone(sound.centre, sound.energies, decode):
+            what = "%s: of its %d channels, channel %d alone holds speech and is used; mix them down if others speak"
+            LOG.log(level, what, path, count, sound.centre + 1)
+            sound = _decoded(path, rate_hz, sound.centre)
     held_s = len(sound.samples) / sound.rate_hz - sound.silence_s
     found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
