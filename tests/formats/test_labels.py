@@ -182,6 +182,8 @@ def test_real_ones(recordings: Path):
 
 OTHER = {
     "master labels": ('#!MLF!#\n"*/a.lab"\n0 1000000 sil\n.\n"*/b.lab"\nhi\n.\n', "is a master label file"),
+    "SCC": ("Scenarist_SCC V1.0\n\n00:00:00:01\t94ae 9420\n", "closed captions"),
+    "Spruce's STL": ("00:00:00:01 , 00:00:01:22 , hello\n", "two times as in subtitles"),
     "one time a line": ("0.2 hi\n0.5 you\n", "one time a line, 0.2 in the first, which may be its start or its end"),
     "RTF": ("{\\rtf1\\ansi hello}", "begins with '{|rich-text"),
     "HTML": ("\n<html><body>hello</body></html>", "begins with '<html>|web page"),

@@ -164,6 +164,19 @@ def test_forms(name: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> N
     np.testing.assert_allclose(found, TONE, atol=1e-3)
 
 
+def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name, codec, share, said in (
+        ("a.flac", "flac", 0.93, "; the last"),
+        ("a.opus", "libopus", 0.93, "its last page is not marked as the last"),
+    ):
+        path = write_sound(tmp_path / name, babble(16_000, 12), 16_000, codec)
+        for part in (1, share):
+            caplog.clear()
+            path.write_bytes(path.read_bytes()[: round(part * path.stat().st_size)])
+            read_audio(path)
+            assert ("cut short" in caplog.text, said in caplog.text) == (part < 1, part < 1)
+
+
 def test_what_is_missing_of_a_wave_file_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Not of a stream, whose size is the largest that its program takes; not a few samples, which nobody misses."""
     for bits, container, content in ((16, 16, S16), (24, 32, S24_IN_32)):

@@ -29,7 +29,7 @@ from lipmotion.formats.label_tiers import (
     split_speakers,
     with_words,
 )
-from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subrip, write_webvtt
+from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subtitles
 from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_textgrid
 from lipmotion.formats.timed_lines import parse_line_tiers
 from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, read_xml_tiers
@@ -66,7 +66,7 @@ TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
 NAMED_TIERS = 12
 """Most names in a message."""
-_WRITERS = {".TextGrid": write_textgrid, ".vtt": write_webvtt, ".srt": write_subrip}
+_WRITERS = {".TextGrid": write_textgrid, ".vtt": write_subtitles, ".srt": write_subtitles}
 LABEL_SUFFIXES = tuple(_WRITERS)
 """Suffixes of label files that are written, as programs write them; capitals do not matter."""
 
@@ -372,6 +372,7 @@ def _check_no_labels(text: str, where: str) -> None:
     timed = "its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels"
     forms = {
         "holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text": "\0" in text,
+        "is closed captions in Scenarist's code (SCC); save them as .srt": start.startswith("Scenarist_SCC"),
         "is a master label file, required the words alone": start.startswith("#!MLF!#"),
         f"begins with {shorten(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
         "is a file of subtitles, required the words alone; write them into a text file": is_subtitles(text),

@@ -1,5 +1,5 @@
-"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``, SubViewer,
-MicroDVD, MPL2 and TMPlayer (``.sub``, ``.txt``), lyrics (``.lrc``), and what Whisper's programs print."""
+"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``, lyrics
+(``.lrc``), SubViewer, MicroDVD, MPL2 and TMPlayer (``.sub``, ``.txt``), and what Whisper's programs print."""
 
 from __future__ import annotations
 
@@ -27,8 +27,13 @@ CUE = re.compile(
 )
 """The times of a subtitle."""
 FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
-NO_ARROW = re.compile(rf"^\s{{0,20}}{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$", re.MULTILINE)
-"""A line of two times without an arrow that is known; times of day, as 5:30, do not count."""
+NO_ARROW = re.compile(
+    rf"^\s{{0,20}}(?:{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$|FRAMES[^\w\n]{{1,12}}FRAMES)".replace(
+        "FRAMES", r"\d\d(?:[:;]\d\d){3}"
+    ),
+    re.MULTILINE,
+)
+"""A line of two times without an arrow that is known, or that begins with two timecodes; times of day do not count."""
 TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
 SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2}:\d\d[.,]\d{1,6})"), re.MULTILINE)
 """The times of YouTube's own format and of SubViewer, ``0:00:01.000,0:00:02.500``."""
@@ -246,20 +251,16 @@ def clock(seconds: float, mark: str) -> str:
     return f"{minutes // 60:02d}:{minutes % 60:02d}:{rest // 1000:02d}{mark}{rest % 1000:03d}"
 
 
-def write_subrip(path: Path, units: Timeline[Unit]) -> None:
-    """Write the words in time, or the phones where the name ends with ``.phones.srt``, one a cue; silence has none.
+def write_subtitles(path: Path, units: Timeline[Unit]) -> None:
+    """Write the words in time as SubRip or WebVTT, or the phones where the name ends with ``.phones.srt``, one a cue.
 
-    After a failure there is no partial file. Raises ExportError: the file cannot be written.
+    Silence has no cue. After a failure there is no partial file. Raises ExportError: the file cannot be written.
     """
-    cues = enumerate(list_shown_labels(path, units), 1)
-    lines = [f"{number}\n{clock(a, ',')} --> {clock(b, ',')}\n{text}\n\n" for number, (a, b, text) in cues]
+    cues = list_shown_labels(path, units)
+    if path.suffix.lower() == ".srt":
+        lines = [f"{n}\n{clock(a, ',')} --> {clock(b, ',')}\n{text}\n\n" for n, (a, b, text) in enumerate(cues, 1)]
+    else:
+        shown = (f"\n{clock(a, '.')} --> {clock(b, '.')}\n{text.translate(_ESCAPES)}\n" for a, b, text in cues)
+        lines = ["WEBVTT\n", *shown]
     with atomic_file(path) as temporary:
         temporary.write_text("".join(lines), encoding="utf-8", newline="\n")
-
-
-def write_webvtt(path: Path, units: Timeline[Unit]) -> None:
-    """Write the same as WebVTT; phones where the name ends with ``.phones.vtt``."""
-    cues = list_shown_labels(path, units)
-    lines = [f"{clock(a, '.')} --> {clock(b, '.')}\n{text.translate(_ESCAPES)}\n" for a, b, text in cues]
-    with atomic_file(path) as temporary:
-        temporary.write_text("\n".join(["WEBVTT\n", *lines]), encoding="utf-8", newline="\n")

@@ -41,7 +41,7 @@ POINTS = re.compile(r"(\d+|\d*\.\d+)\s+(?:-?\d{1,3}\s+)?([^\d\s;]\S*)\s*(?:;.*)?
 ESPS = re.compile(r"\A(?:[^\n]*\n){0,20}?#[ \t]*\n(?=\s*[\d.]+\s)")
 """The header of ESPS and Festival, whose lines say where labels end."""
 SECONDS = re.compile(r"([-+]?\d*\.\d+)\s+([-+]?\d*\.\d+)(?:\s+(.*))?|([-+]?\d+,\d+)\t([-+]?\d+,\d+)(?:\t(.*))?")
-CTM = re.compile(rf"(\S+)\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?")
+CTM = re.compile(rf"(\S+)\s+(?!\d*\.\d)(\S+)\s+({NUMBER})\s+({NUMBER})\s+(\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?")
 """Recording, channel, start and duration in seconds, word, confidence."""
 STM = re.compile(rf"(\S+)\s+\S+\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(?:<[^<>]*>\s*)?(.*)")
 """Recording, channel, speaker, start and end in seconds, kind, words."""
@@ -51,21 +51,26 @@ LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")
 """The first line of a text of LRS: what is said."""
 LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
 COLUMNS = {
-    "start": {"begin", "start", "starttime", "starts", "tmin", "onset", "startframe", "framestart"},
+    "start": {"begin", "begintime", "start", "starttime", "starts", "tmin", "onset", "startframe", "framestart"},
     "end": {"end", "endtime", "ends", "stop", "tmax", "offset", "endframe", "frameend"},
     "duration": {"duration", "dur"},
-    "text": {"label", "text", "word", "phone", "transcript", "transcription", "utterance"},
+    "text": {"label", "text", "word", "phone", "transcript", "transcription", "utterance", "annotation"},
     "kind": {"type", "tier", "tiername"},
     "speaker": {"speaker", "speakerid", "participant"},
 }
 """Names of columns of tables: of the Montreal Forced Aligner, of Praat, of people."""
-UNIT_END = re.compile(r"(?:[\s_]+|[\s_]*[(\[])(?:m?s|m?secs?|(?:milli)?seconds?)[)\]]?$")
+UNIT_END = re.compile(
+    r"(?:[\s_]+(?:-\s)?|[\s_]*[(\[])(?:hh:mm:ss(?:[:.]\w+)?|(?:ss\.)?m?s(?:ecs?)?|(?:milli)?seconds?)[)\]]?$"
+)
 """A unit at the end of a name, which how long words last tells, too: ``start_ms``, ``Start (s)``."""
+ELAN_TIME = r"(?:\t[\d:]+[.,]\d+)"
 HEADLESS = (
+    (re.compile(rf"[^\t]+\t[^\t]*{ELAN_TIME}{{3}}\t[^\t]*"), "tier\tparticipant\tstart\tend\tduration\ttext"),
+    (re.compile(rf"[^\t]+\t[^\t]*{ELAN_TIME}{{6}}\t[^\t]*"), "tier\tparticipant\t\tstart\t\tend\t\tduration\ttext"),
     (re.compile(r"[^,]*,\d*\.\d+,\d*\.\d+,.*"), "name,start,end,text"),
     (re.compile(r"\d*\.\d+,\d*\.\d+,.*"), "start,end,text"),
 )
-"""The first line of tables without a header, and theirs: of aeneas, of people."""
+"""The first line of tables without a header, and theirs: of ELAN, of aeneas, of people."""
 TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
 LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
@@ -115,19 +120,17 @@ def _read_wholes(text: str, first: str, where: str) -> list[LabelTier] | None:
 
 def _read_starts(text: str, first: str, where: str) -> list[LabelTier] | None:
     """Return labels that each last to the next one, or from the one before, in ticks or seconds."""
-    point = POINTS.fullmatch(first)
-    lines = [line for _, line in islice(_lines(text), MAX_LABELS + 1)] if point else []
-    last = POINTS.fullmatch(lines[-1]) if len(lines) > 1 else None
-    in_ticks = point is not None and "." not in point[1]
-    if point is None or last is None or (in_ticks and float(last[1]) < SHORTEST_TICKS):
+    point, lines = POINTS.fullmatch(first), [line for _, line in islice(_lines(text), MAX_LABELS + 1)]
+    last = POINTS.fullmatch(lines[-1]) if point and len(lines) > 1 else None
+    if point is None or last is None:
         return None
-    if not in_ticks and not all(map(POINTS.fullmatch, lines)):
+    late, in_seconds = float(point[1]) > 0, "." in point[1]
+    if not (all(map(POINTS.fullmatch, lines)) if in_seconds else float(last[1]) >= SHORTEST_TICKS):
         return None
-    late = not in_ticks and float(point[1]) > 0
-    if late and classify_label(point[2]) is not SpokenAs.SILENCE:
+    if in_seconds and late and classify_label(point[2]) is not SpokenAs.SILENCE:
         found = f"has one time a line, {point[1]} in the first"
         raise InputError(f"{where}: {found}, which may be its start or its end; required: start end label in each")
-    return _read_points(text, where, ends=late)
+    return _read_points(text, where, ends=in_seconds and late)
 
 
 def _read_points(text: str, where: str, *, ends: bool) -> list[LabelTier]:

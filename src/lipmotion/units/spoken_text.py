@@ -15,6 +15,7 @@ from lipmotion.types.values import parse_clock
 from lipmotion.units.text_normalisation import tokenise
 from lipmotion.units.written_forms import list_readings
 
+LINE_BREAK = re.compile(r"<(?:br|p|div)\b[^<>]{0,40}>", re.IGNORECASE)
 TAG = re.compile(r"</?[a-zA-Z!|][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
 """Tags of SubRip (``<i>``), WebVTT (``<v Anna>``, ``<00:01.5>``), SubStation (``{\\an8}``), ``<unk>``, ``<|en|>``."""
 SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\((?!\d{3}\))[^()]{0,200}\)|（[^（）]{0,200}）")
@@ -99,7 +100,8 @@ def classify_label(label: str) -> SpokenAs:
 
 def extract_spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
     """Return what is spoken of a text; ``names``: of speakers, as ``find_speaker_names`` returns them."""
-    text = DEED.sub(" ", SOUND.sub(" ", TAG.sub("", html.unescape(TAG.sub("", text)))))
+    text = LINE_BREAK.sub("\n", html.unescape(TAG.sub("", LINE_BREAK.sub("\n", text))))
+    text = DEED.sub(" ", SOUND.sub(" ", TAG.sub("", text)))
     return remove_speakers(SYMBOLS.sub(" ", text), names)[0]
 
 

@@ -45,9 +45,8 @@ class DecodedAudio:
     packets     : how many packets the track has
     damaged     : how many of them could not be decoded
     silence_s   : duration of the silence that fills holes
-    stated_s    : duration that the container states, 0 if none
+    missing_s   : what the container states beyond the end
     centre      : number of the channel that is the centre of three and more, None where there is none
-    missing_s   : what a WAVE file's header states beyond its end
     """
 
     samples: NDArray[np.float32]
@@ -57,9 +56,8 @@ class DecodedAudio:
     packets: int
     damaged: int
     silence_s: float
-    stated_s: float
+    missing_s: float
     centre: int | None
-    missing_s: float = 0.0
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
@@ -116,6 +114,9 @@ class _TrackDecoder:
         names = [channel.name for channel in self._stream.layout.channels]
         third = 2 if len(names) in (6, 8) and "NONE" in names else None  # names that a WAVE file may lack
         is_stated = self._stream.duration or not self._container.streams.video
+        stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
+        missing_s = stated_s - len(samples) / self._rate_hz
+        rounded_s = ROUNDED_S if self._container.format.name in STATED else (1 - CUT_SHORT_SHARE) * stated_s
         return DecodedAudio(
             samples=samples[self._cut :],
             rate_hz=self._rate_hz,
@@ -124,7 +125,7 @@ class _TrackDecoder:
             packets=self._packets,
             damaged=self._damaged,
             silence_s=self._silence_s,
-            stated_s=read_duration(self._container, self._stream) if is_stated else 0.0,
+            missing_s=missing_s if missing_s > rounded_s else 0.0,
             centre=names.index("FC") if "FC" in names[1:] else third,
         )
 
@@ -228,8 +229,9 @@ USABLE_SHARE = 0.5
 """A damaged recording is refused when less than this share of its sound can be decoded."""
 LEAST_HOLES_S = 0.005
 """Holes that last less together are not mentioned: they would be rounded to 0."""
-CUT_SHORT_SHARE = 0.9
-"""A recording is called cut short when it holds less than this share of the duration that it states."""
+CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
+"""A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
+less in a format that states it exactly."""
 PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
 """Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
 UNKNOWN_SIZES = range(0x7FFF0000, 0x1_0000_0000)
@@ -267,16 +269,16 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
             what = "%s: of its %d channels, channel %d alone holds speech and is used; mix them down if others speak"
             LOG.log(level, what, path, count, sound.centre + 1)
             sound = _decoded(path, rate_hz, sound.centre)
-    held_s = len(sound.samples) / sound.rate_hz - sound.silence_s
+    held_s = len(sound.samples) / sound.rate_hz
     found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
         raise InputError(f"{path}: damaged: {found}; required: at least half of them; export the recording again")
     if sound.damaged or sound.silence_s >= SHORTEST_S:
         holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= LEAST_HOLES_S else ""
         LOG.log(level, "%s: damaged: %s%s", path, found, holes)
-    stated_s = sound.stated_s if held_s < CUT_SHORT_SHARE * sound.stated_s else held_s + sound.missing_s
-    if (missing_s := stated_s - held_s) >= SHORTEST_S:
-        found = f"it states {stated_s:.1f} s of sound and holds {held_s:.1f} s; the last {missing_s:.1f} s are missing"
+    if sound.missing_s >= SHORTEST_S:
+        stated = f"it states {held_s + sound.missing_s:.1f} s of sound and holds {held_s:.1f} s"
+        found = f"{stated}; the last {sound.missing_s:.1f} s are missing"
         LOG.log(level, "%s: cut short: %s", path, found)
     audio = Audio(sound.samples, rate_hz)
     if audio.duration_s < SHORTEST_S:
@@ -300,7 +302,10 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
             check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
             if len(container.streams.audio) > 1:
                 LOG.warning("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
-            return replace(_TrackDecoder(container, rate_hz, channel).decoded(), missing_s=missing_s)
+            if container.format.name == "ogg" and path.read_bytes().rpartition(b"OggS")[2][1:2] < b"\4":  # RFC 3533
+                LOG.warning("%s: its last page is not marked as the last: it may be cut short", path)
+            sound = _TrackDecoder(container, rate_hz, channel).decoded()
+            return replace(sound, missing_s=max(missing_s, sound.missing_s))
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
