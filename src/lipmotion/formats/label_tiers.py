@@ -15,16 +15,7 @@ from lipmotion.errors import InputError, shorten
 from lipmotion.printable import is_line
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, sort_lines
 from lipmotion.types.values import parse_clock, parse_number
-from lipmotion.units import (
-    PAUSE,
-    PHONES,
-    RECOGNISED,
-    SILENCE,
-    UNKNOWN_PHONES,
-    find_phone,
-    is_silent,
-    reduce_vowels,
-)
+from lipmotion.units import PAUSE, PHONES, RECOGNISED, SILENCE, UNKNOWN_PHONES, find_phone, is_silent, reduce_vowels
 from lipmotion.units.ipa_phones import read_ipa, read_tokens, xsampa_to_ipa
 from lipmotion.units.phones import CLOSURES, REDUCED_VOWELS, SHORT_PAUSE_S
 from lipmotion.units.spoken_text import (

@@ -67,13 +67,7 @@ def baum_welch(
     Returns the re-estimated models, and the mean log likelihood per frame before every step.
     An utterance too short for its units is left out.
     """
-    return run_em(
-        hmm,
-        lambda model: accumulate_statistics(model, data, sequences, work),
-        maximise,
-        steps,
-        after_step,
-    )
+    return run_em(hmm, lambda model: accumulate_statistics(model, data, sequences, work), maximise, steps, after_step)
 
 
 def reestimate_mixtures(hmm: UnitHmm, statistics: UnitStatistics) -> Mixtures:

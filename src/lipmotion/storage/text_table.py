@@ -59,13 +59,18 @@ class TextTable:
 def open_table(path: Path) -> Iterator[TextTable]:
     """Open a table to read its rows one by one; rows without any field are left out.
 
-    Raises OSError: it cannot be opened. Raises ValueError, also from the rows: it is no table of text.
+    Raises OSError: it cannot be opened. Raises InputError, also for a ValueError inside: it is no table of numbers.
     """
     with path.open("rb") as file:
         start = file.read(2)
     encoding = "utf-16" if start in {b"\xff\xfe", b"\xfe\xff"} else "utf-16-le" if start[1:] == b"\0" else "utf-8-sig"
     with path.open(encoding=encoding, newline="") as text:
-        yield read_table(iter(partial(text.readline, LONGEST_LINE), ""))
+        try:
+            yield read_table(iter(partial(text.readline, LONGEST_LINE), ""))
+        except (ValueError, OverflowError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
 
 
 def read_table(lines: Iterable[str]) -> TextTable:

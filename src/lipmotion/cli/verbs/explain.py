@@ -27,13 +27,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.explain`` and print the explanations; without a time, ``lipmotion.state_runs`` and the runs."""
     from lipmotion.pipeline.analysis.read_request import read_request
-    from lipmotion.pipeline.generate.explain import (
-        explain,
-        run_lines,
-        state_runs,
-        write_document,
-        write_explanation,
-    )
+    from lipmotion.pipeline.generate.explain import explain, run_lines, state_runs, write_document, write_explanation
     from lipmotion.pipeline.model import load_model
 
     requested = pick_part(options, Request())

@@ -17,9 +17,7 @@ from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import move_points
-from lipmotion.meshes.fitting.lip_placement import (
-    LipPlacement,
-)
+from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.fitting.shape_weights import solve_shape_weights, weigh_expressions, with_gap
 from lipmotion.meshes.model.binding import ControlBinding
 from lipmotion.meshes.model.face_shapes import FaceShapes, group_by_name, measure_lip_parting

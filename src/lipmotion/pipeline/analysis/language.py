@@ -16,11 +16,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.network.posteriors import (
-    WORD_BOUNDARY,
-    find_installed,
-    find_stretches,
-)
+from lipmotion.speech.recognition.network.posteriors import WORD_BOUNDARY, find_installed, find_stretches
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, open_recogniser
 from lipmotion.storage.files import atomic_file, check_distinct, check_target

@@ -36,12 +36,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     place_units,
     select_reliable,
 )
-from lipmotion.speech.recognition.recogniser import (
-    RECOGNISER_KINDS,
-    Recogniser,
-    find_network,
-    open_recogniser,
-)
+from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser, find_network, open_recogniser
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (

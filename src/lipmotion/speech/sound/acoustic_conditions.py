@@ -20,10 +20,9 @@ from lipmotion.types import Audio, ConditionSpectrum
 NOISE_KINDS = ("white", "babble")
 FEWEST_TALKERS = 2
 """One other talker is an interruption, not a babble."""
-HEARD, FAINT = 1.01, 1e-4
-"""Energies beside that of a voice: of all channels, above which it is not alone, and of the faintest that may speak."""
-SPEECH_LIKE_DB = 0.6
-"""Swings of the level in decibels, times the share of frames whose pitch moves: speech has 1 to 5, music up to 0.5."""
+HEARD, FAINT, SPEECH_LIKE_DB = 1.01, 1e-4, 0.6
+"""Energies beside that of a voice: of all channels, above which it is not alone, and of the faintest that may speak.
+Swings of the level in decibels, times the share of frames whose pitch moves: speech has 1 to 5, music up to 0.5."""
 SILENT_RMS = 1e-6
 """Speech of a lower root mean square, full scale 1, is silence."""
 HUM, LEAST_HUM, MAX_HUM_BLOCKS, HUM_RATIO, HUM_WIDTH = 16_000, 32_000, 200, 8.0, 61

@@ -262,10 +262,7 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     elif sound.centre is not None:
         from lipmotion.speech.sound.acoustic_conditions import speaks_alone
 
-        def decode(number: int) -> NDArray[np.float32]:
-            return _decoded(path, SPEECH_RATE_HZ, number).samples
-
-        if speaks_alone(sound.centre, sound.energies, decode):
+        if speaks_alone(sound.centre, sound.energies, lambda number: _decoded(path, SPEECH_RATE_HZ, number).samples):
             what = "%s: of its %d channels, channel %d alone holds speech and is used; mix them down if others speak"
             LOG.log(level, what, path, count, sound.centre + 1)
             sound = _decoded(path, rate_hz, sound.centre)

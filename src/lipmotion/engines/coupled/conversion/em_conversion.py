@@ -7,12 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import (
-    AudioVisualObservations,
-    Single,
-    StreamGroup,
-    infer_components,
-)
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single, StreamGroup, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Chains, Inference
 from lipmotion.stats.em import run_em
