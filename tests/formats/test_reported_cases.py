@@ -316,8 +316,6 @@ LINES = {
     "YouTube": '<transcript><text start="0.4" dur="1.2">hello big moon</text></transcript>',
     "YouTube's JSON": {"events": [{"tStartMs": 400, "dDurationMs": 1200, "segs": [{"utf8": "hello big"}, {"utf8":
         " moon"}]}]},
-    "whisper.cpp": {"transcription": [{"offsets": {"from": 400, "to": 1600}, "text": "hello big moon", "tokens": [{
-        "text": "h"}]}]},
     "Azure in batch": {"recognizedPhrases": [{"offset": "PT0.4S", "offsetInTicks": 4e6, "durationInTicks": 1.2e7,
         "nBest": [{"display": "hello big moon"}]}]},
 }  # fmt: skip

@@ -394,7 +394,7 @@ WORDS = {
     "Cartesia": (timings.CARTESIA, [("hi", 0, 0.4), ("you", 0.5, 0.9)]),
     "Google": (timings.GOOGLE, [("hello", 0.25, 0.75), ("you", 0.75, None)]),
     "Kokoro": (timings.KOKORO, [("hi", 0.25, 0.55), ("you", 0.6, 0.9)]),
-    "servers of Kokoro": (timings.SERVERS, [("hi", 0.1, 0.4)]),
+    "servers of Kokoro": (timings.SAMPLES["servers"], [("hi", 0.1, 0.4)]),
     "Gentle": (timings.GENTLE, [("hi", 0.1, 0.4), ("you", 0.5, 0.8)]),
     "MFA": (timings.MFA, [("my", 0.1, 0.5), ("spot", 0.5, 1.0)]),
     "MFA's table": (timings.MFA_CSV, [("my", 0.1, 0.5)]),

@@ -165,16 +165,13 @@ def test_forms(name: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> N
 
 
 def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    for name, codec, share, said in (
-        ("a.flac", "flac", 0.93, "; the last"),
-        ("a.opus", "libopus", 0.93, "its last page is not marked as the last"),
-    ):
+    for name, codec, said in (("a.flac", "flac", "; the last"), ("a.opus", "libopus", "its last page is not marked")):
         path = write_sound(tmp_path / name, babble(16_000, 12), 16_000, codec)
-        for part in (1, share):
+        for share in (1, 0.93):
             caplog.clear()
-            path.write_bytes(path.read_bytes()[: round(part * path.stat().st_size)])
+            path.write_bytes(path.read_bytes()[: round(share * path.stat().st_size)])
             read_audio(path)
-            assert ("cut short" in caplog.text, said in caplog.text) == (part < 1, part < 1)
+            assert ("cut short" in caplog.text, said in caplog.text) == (share < 1, share < 1)
 
 
 def test_what_is_missing_of_a_wave_file_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -283,9 +280,7 @@ def test_the_first_of_several_tracks(tmp_path: Path, original: Samples) -> None:
     assert late_by(read_audio(tmp_path / "a.mka").samples, original)[1] > 0.999
 
 
-def test_channels_that_cancel_give_way_to_the_loudest_and_others_are_averaged(
-    tmp_path: Path, original: Samples, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_channels_that_cancel(tmp_path: Path, original: Samples, caplog: pytest.LogCaptureFixture) -> None:
     for weights, loudest in (((0.8, -1), 1), ((0, 0, 0, 0, 1, 0), None), ((1, 0), None), ((1, -0.3), None)):
         caplog.clear()
         sound = np.array(weights, np.float32)[:, None] * original
@@ -296,9 +291,7 @@ def test_channels_that_cancel_give_way_to_the_loudest_and_others_are_averaged(
         assert (said in caplog.text) == (loudest is not None)
 
 
-def test_the_centre_is_taken_where_it_alone_speaks_beside_music(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_the_centre_is_taken_where_it_alone_speaks(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     time_s = np.arange(64_000) / 16_000
     voice = 0.3 * vowels(pulses(4, 140 + 20 * np.sin(2 * np.pi * time_s)))
     music = 0.1 * (np.sin(2 * np.pi * 220 * time_s) + np.sin(2 * np.pi * 330 * time_s))

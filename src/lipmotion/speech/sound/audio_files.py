@@ -38,15 +38,12 @@ PIECE_BYTES = 1 << 20
 class DecodedAudio:
     """A decoded sound track.
 
-    samples     : float32 array [shape=(N,)]
-    rate_hz     : sampling rate
-    energies    : energy of every channel
-    mean_energy : energy of the channels' mean
-    packets     : how many packets the track has
-    damaged     : how many of them could not be decoded
-    silence_s   : duration of the silence that fills holes
-    missing_s   : what the container states beyond the end
-    centre      : number of the channel that is the centre of three and more, None where there is none
+    samples, rate_hz : float32 array [shape=(N,)], and its sampling rate
+    energies, centre : of every channel; the number of the centre of three and more, None where there is none
+    mean_energy      : energy of the channels' mean
+    packets, damaged : how many packets the track has, and how many of them could not be decoded
+    silence_s        : duration of the silence that fills holes
+    missing_s        : what the container states beyond the end
     """
 
     samples: NDArray[np.float32]
