@@ -88,9 +88,7 @@ def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after_and_sile
     assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
 
 
-def test_unknown_sentences_are_recognised_and_digital_silence_is_silence(
-    hmm: Any, sentences: list[ToySentence]
-) -> None:
+def test_unknown_sentences_and_digital_silence(hmm: Any, sentences: list[ToySentence]) -> None:
     for sentence in sentences[-3:]:
         found = recognise(hmm, sentence.audio)
         assert covers(found, sentence.audio.duration_s)
