@@ -297,30 +297,9 @@ def frame(number: int = 3) -> LiveFrame:
 
 
 def read_osc(packet: bytes) -> list[tuple[str, list[str | float]]]:
-    """Return the messages of a bundle, by the rules of Open Sound Control 1.0."""
-    assert packet[:8] == b"#bundle\0"
-    place, messages = 16, []
-
-    def text(content: bytes) -> tuple[str, bytes]:
-        end = content.index(b"\0")
-        return content[:end].decode(), content[end // 4 * 4 + 4 :]
-
-    while place < len(packet):
-        (size,) = struct.unpack(">i", packet[place : place + 4])
-        address, rest = text(packet[place + 4 : place + 4 + size])
-        kinds, rest = text(rest)
-        arguments: list[str | float] = []
-        for kind in kinds[1:]:
-            if kind == "s":
-                argument, rest = text(rest)
-                arguments.append(argument)
-            else:
-                arguments.append(struct.unpack(">f", rest[:4])[0])
-                rest = rest[4:]
-        assert not rest
-        messages.append((address, arguments))
-        place += 4 + size
-    return messages
+    """Return the messages of a bundle, as python-osc reads them."""
+    osc = pytest.importorskip("pythonosc.osc_bundle", reason="no python-osc")
+    return [(message.address, message.params) for message in osc.OscBundle(packet)]
 
 
 def test_vmc_receivers_get_vowels_and_perfect_sync() -> None:
@@ -349,6 +328,12 @@ def test_live_link_packets_are_read_as_by_the_app() -> None:
     values = dict(zip(ARKIT_52, struct.unpack(">61f", packet[62 + size :]), strict=False))
     assert values["jawOpen"] == pytest.approx(frame()["jawOpen"])
     assert values["eyeBlinkLeft"] == 0
+    face = pytest.importorskip("pylivelinkface", reason="no PyLiveLinkFace: pip install pylivelinkface")
+    found, read = face.PyLiveLinkFace.decode(packet)
+    assert (found, read.name, read.fps) == (True, "lipmotion", 50)
+    shown = {each.name.lower(): read.get_blendshape(each) for each in face.FaceBlendShape}
+    assert shown["jawopen"] == pytest.approx(frame()["jawOpen"])
+    assert shown["headyaw"] == 0
 
 
 def test_frames_reach_a_receiver() -> None:

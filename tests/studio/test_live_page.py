@@ -1,6 +1,7 @@
 """Live frames in a real browser: the page of the window, and TalkingHead's own module."""
 
 import csv
+from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from io import TextIOWrapper
@@ -14,6 +15,9 @@ import programs
 from children import LIPMOTION, PIPE, child, wait_until
 from lipmotion import Stream
 from lipmotion.live.consumers import LiveSound, open_consumer
+from lipmotion.live.face import LiveCharacter
+from lipmotion_faces.characters.gltf_document import read_gltf_document, write_container
+from meshes.heads import renamed, write_glb
 from pipeline.made import read_welcome
 from study.browser import check_screens
 from study.firefox import BOTH
@@ -45,6 +49,17 @@ return steps.map((step_s) => {
   return mesh.morphTargetInfluences[mesh.morphTargetDictionary.jawOpen];
 });"""
 """Return which weight the jaw has at times of the stream, seconds."""
+
+EXPRESSIONS = {
+    "jawOpen": "aa",
+    "mouthStretchLeft": "ih",
+    "mouthPucker": "ou",
+    "mouthSmileLeft": "ee",
+    "mouthFunnel": "oh",
+}
+"""Shapes of the head, and the expressions of VRM that they stand for."""
+LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
+BONES = ("hips", "spine", "head", *(f"{side}{limb}" for side in ("left", "right") for limb in LIMBS))
 
 
 def address_in(text):
@@ -100,33 +115,38 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
     assert problems == []
 
 
-class Modules(SimpleHTTPRequestHandler):
-    """Serves packages of npm, and the page that uses them."""
-
-    def translate_path(self, path):
-        page = path.partition("?")[0] == "/talking_head.html"
-        return str(programs.FOLDER / "talking_head.html") if page else super().translate_path(path)
-
-    def log_message(self, *_):
-        pass
+@contextmanager
+def open_page(opens, folder, name, package, place):
+    """Give a window with a page of ``programs`` that a server's place is told; packages and files lie beside it."""
+    modules = programs.node_package(package)
+    if modules is None:
+        pytest.skip(f"no {package}: npm install {package} three, LIPMOTION_NODE_MODULES")
+    beside = (Path(modules).resolve().parents[1] / each for each in (package.partition("/")[0], "three"))
+    for each in (programs.FOLDER / name, *beside):
+        (folder / each.name).symlink_to(each)
+    with (
+        ThreadingHTTPServer(("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=str(folder))) as server,
+        opens(folder, *WEBGL) as window,
+    ):
+        Thread(target=server.serve_forever, daemon=True).start()
+        window.open(f"http://127.0.0.1:{server.server_port}/{name}?{place.removeprefix('ws://').rstrip('/')}")
+        yield window
+        problems = [each for each in window.problems() if "SEVERE" in each and "favicon" not in each]
+        server.shutdown()
+    assert problems == []
 
 
 @pytest.mark.parametrize("opens", BOTH[:1])
 def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
-    package = programs.node_package("@met4citizen/talkinghead")
-    if package is None:
-        pytest.skip("no TalkingHead: npm install @met4citizen/talkinghead, LIPMOTION_NODE_MODULES")
     audio = read_welcome()
     stream, about = Stream(audio.rate_hz), LiveSound(audio.rate_hz)
     with (
-        ThreadingHTTPServer(("127.0.0.1", 0), partial(Modules, directory=str(Path(package).parents[1]))) as server,
         open_consumer("talkinghead:0", print, about) as head,
-        opens(tmp_path, *WEBGL) as window,
+        open_page(
+            opens, tmp_path, "talking_head.html", "@met4citizen/talkinghead", address_in(capsys.readouterr().err)
+        ) as window,
     ):
-        Thread(target=server.serve_forever, daemon=True).start()
         assert isinstance(head, TalkingHead)
-        place = address_in(capsys.readouterr().err).removeprefix("ws://")
-        window.open(f"http://127.0.0.1:{server.server_address[1]}/talking_head.html?{place}")
         wait_until(lambda: window.run("return globalThis.called?.includes('streamStart')"), LIMIT_S)
         frames = []
         for first in range(0, 3 * audio.rate_hz, 320):
@@ -139,10 +159,48 @@ def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
         wait_until(lambda: window.run("return called.at(-1) === 'streamInterrupt'"), LIMIT_S)
         queued = window.run("return queued")
         assert window.run("return head.isSpeaking") is False
-        problems = [each for each in window.problems() if "SEVERE" in each and "favicon" not in each]
-        server.shutdown()
     first = len(frames) - len(queued)
     assert len(queued) > 100
     assert [time for time, _ in queued] == pytest.approx([20.0 * number for number in range(len(queued))], abs=0.2)
     assert [jaw for _, jaw in queued] == pytest.approx([frame["jawOpen"] for frame in frames[first:]], abs=1e-3)
-    assert problems == []
+
+
+def write_vrm(path):
+    """Write the head as a character of VRM 1.0, whose shapes are known by its expressions alone."""
+    write_glb(path, renamed({shape: f"of {name}" for shape, name in EXPRESSIONS.items()}))
+    document = read_gltf_document(path)
+    json, body = document.json, bytes(document.buffers[0])
+    place = next(place for place, node in enumerate(json["nodes"]) if "mesh" in node)
+    shapes = json["meshes"][json["nodes"][place]["mesh"]]["extras"]["targetNames"]
+    bones = {bone: {"node": len(json["nodes"]) + number} for number, bone in enumerate(BONES)}
+    json["nodes"] += [{"name": bone} for bone in BONES]
+    json["scenes"][0]["nodes"] += [bone["node"] for bone in bones.values()]
+    binds = {name: {"node": place, "index": shapes.index(f"of {name}"), "weight": 1} for name in EXPRESSIONS.values()}
+    json["extensionsUsed"] = ["VRMC_vrm"]
+    json["extensions"] = {"VRMC_vrm": {
+        "specVersion": "1.0", "humanoid": {"humanBones": bones},
+        "meta": {"name": "head", "authors": ["lipmotion"], "licenseUrl": "https://vrm.dev/licenses/1.0/"},
+        "expressions": {"preset": {name: {"morphTargetBinds": [bind]} for name, bind in binds.items()}},
+    }}  # fmt: skip
+    write_container(path, json, body)
+
+
+@pytest.mark.parametrize("opens", BOTH[:1])
+def test_three_vrm_takes_the_curves_of_a_character(opens, tmp_path, capsys):
+    """Its expressions move its shapes as the frames say."""
+    write_vrm(tmp_path / "head.vrm")
+    audio, character = read_welcome(), LiveCharacter(tmp_path / "head.vrm")
+    frames = [character(frame) for frame in Stream(audio.rate_hz).push(audio.samples[: 2 * audio.rate_hz])]
+    with (
+        open_consumer("websocket:0", print) as take,
+        open_page(opens, tmp_path, "three_vrm.html", "@pixiv/three-vrm", address_in(capsys.readouterr().err)) as window,
+    ):
+        wait_until(lambda: (take(frames[0]), window.run("return globalThis.shown?.['0.00']"))[1], LIMIT_S)
+        for frame in frames:
+            take(frame)
+        wait_until(lambda: window.run("return shown[arguments[0]]", f"{frames[-1].time_s:.2f}"), LIMIT_S)
+        shown = [window.run("return shown[arguments[0]]", f"{frame.time_s:.2f}") for frame in frames]
+    for name in EXPRESSIONS.values():
+        told = [frame.weights[name] for frame in frames]
+        assert max(told) > 0.02, name
+        assert [weights[f"of {name}"] for weights in shown] == pytest.approx(told, abs=1e-3)
