@@ -1,4 +1,4 @@
-"""Live frames in a real browser: the page of the window, and TalkingHead's own module."""
+"""Live frames in a real browser: the page of the window, TalkingHead's own module, and three-vrm."""
 
 import csv
 from contextlib import contextmanager
@@ -49,17 +49,10 @@ return steps.map((step_s) => {
   return mesh.morphTargetInfluences[mesh.morphTargetDictionary.jawOpen];
 });"""
 """Return which weight the jaw has at times of the stream, seconds."""
-
 EXPRESSIONS = {
-    "jawOpen": "aa",
-    "mouthStretchLeft": "ih",
-    "mouthPucker": "ou",
-    "mouthSmileLeft": "ee",
-    "mouthFunnel": "oh",
-}
+    "jawOpen": "aa", "mouthStretchLeft": "ih", "mouthPucker": "ou", "mouthSmileLeft": "ee", "mouthFunnel": "oh"
+}  # fmt: skip
 """Shapes of the head, and the expressions of VRM that they stand for."""
-LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
-BONES = ("hips", "spine", "head", *(f"{side}{limb}" for side in ("left", "right") for limb in LIMBS))
 
 
 def address_in(text):
@@ -116,20 +109,19 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
 
 
 @contextmanager
-def open_page(opens, folder, name, package, place):
-    """Give a window with a page of ``programs`` that a server's place is told; packages and files lie beside it."""
-    modules = programs.node_package(package)
+def open_page(opens, folder, package, capsys):
+    """Give a window with a package's page, which is told the server that was opened; a folder's files lie beside it."""
+    place = address_in(capsys.readouterr().err).removeprefix("ws://").rstrip("/")
+    modules, name = programs.node_package(package), package.rpartition("/")[2] + ".html"
     if modules is None:
         pytest.skip(f"no {package}: npm install {package} three, LIPMOTION_NODE_MODULES")
-    beside = (Path(modules).resolve().parents[1] / each for each in (package.partition("/")[0], "three"))
+    beside = [Path(modules).resolve().parents[1] / each for each in (package.partition("/")[0], "three")]
     for each in (programs.FOLDER / name, *beside):
         (folder / each.name).symlink_to(each)
-    with (
-        ThreadingHTTPServer(("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=str(folder))) as server,
-        opens(folder, *WEBGL) as window,
-    ):
+    served = partial(SimpleHTTPRequestHandler, directory=str(folder))
+    with ThreadingHTTPServer(("127.0.0.1", 0), served) as server, opens(folder, *WEBGL) as window:
         Thread(target=server.serve_forever, daemon=True).start()
-        window.open(f"http://127.0.0.1:{server.server_port}/{name}?{place.removeprefix('ws://').rstrip('/')}")
+        window.open(f"http://127.0.0.1:{server.server_port}/{name}?{place}")
         yield window
         problems = [each for each in window.problems() if "SEVERE" in each and "favicon" not in each]
         server.shutdown()
@@ -139,16 +131,13 @@ def open_page(opens, folder, name, package, place):
 @pytest.mark.parametrize("opens", BOTH[:1])
 def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
     audio = read_welcome()
-    stream, about = Stream(audio.rate_hz), LiveSound(audio.rate_hz)
+    stream, about, frames = Stream(audio.rate_hz), LiveSound(audio.rate_hz), []
     with (
         open_consumer("talkinghead:0", print, about) as head,
-        open_page(
-            opens, tmp_path, "talking_head.html", "@met4citizen/talkinghead", address_in(capsys.readouterr().err)
-        ) as window,
+        open_page(opens, tmp_path, "@met4citizen/talkinghead", capsys) as window,
     ):
         assert isinstance(head, TalkingHead)
         wait_until(lambda: window.run("return globalThis.called?.includes('streamStart')"), LIMIT_S)
-        frames = []
         for first in range(0, 3 * audio.rate_hz, 320):
             head.hear(audio.samples[first : first + 320])
             for frame in stream.push(audio.samples[first : first + 320]):
@@ -169,38 +158,31 @@ def write_vrm(path):
     """Write the head as a character of VRM 1.0, whose shapes are known by its expressions alone."""
     write_glb(path, renamed({shape: f"of {name}" for shape, name in EXPRESSIONS.items()}))
     document = read_gltf_document(path)
-    json, body = document.json, bytes(document.buffers[0])
-    place = next(place for place, node in enumerate(json["nodes"]) if "mesh" in node)
-    shapes = json["meshes"][json["nodes"][place]["mesh"]]["extras"]["targetNames"]
-    bones = {bone: {"node": len(json["nodes"]) + number} for number, bone in enumerate(BONES)}
-    json["nodes"] += [{"name": bone} for bone in BONES]
-    json["scenes"][0]["nodes"] += [bone["node"] for bone in bones.values()]
-    binds = {name: {"node": place, "index": shapes.index(f"of {name}"), "weight": 1} for name in EXPRESSIONS.values()}
-    json["extensionsUsed"] = ["VRMC_vrm"]
-    json["extensions"] = {"VRMC_vrm": {
-        "specVersion": "1.0", "humanoid": {"humanBones": bones},
-        "meta": {"name": "head", "authors": ["lipmotion"], "licenseUrl": "https://vrm.dev/licenses/1.0/"},
-        "expressions": {"preset": {name: {"morphTargetBinds": [bind]} for name, bind in binds.items()}},
-    }}  # fmt: skip
-    write_container(path, json, body)
+    place = next(place for place, node in enumerate(document.json["nodes"]) if "mesh" in node)
+    shapes = document.json["meshes"][document.json["nodes"][place]["mesh"]]["extras"]["targetNames"]
+    bind = {name: {"node": place, "index": shapes.index(f"of {name}"), "weight": 1} for name in EXPRESSIONS.values()}
+    expressions = {"preset": {name: {"morphTargetBinds": [bind[name]]} for name in bind}}
+    meta = {"name": "head", "authors": ["lipmotion"], "licenseUrl": "https://vrm.dev/licenses/1.0/"}
+    document.json["extensions"] = {"VRMC_vrm": {"specVersion": "1.0", "meta": meta, "expressions": expressions}}
+    document.json["extensionsUsed"] = ["VRMC_vrm"]
+    write_container(path, document.json, bytes(document.buffers[0]))
 
 
 @pytest.mark.parametrize("opens", BOTH[:1])
 def test_three_vrm_takes_the_curves_of_a_character(opens, tmp_path, capsys):
-    """Its expressions move its shapes as the frames say."""
     write_vrm(tmp_path / "head.vrm")
     audio, character = read_welcome(), LiveCharacter(tmp_path / "head.vrm")
-    frames = [character(frame) for frame in Stream(audio.rate_hz).push(audio.samples[: 2 * audio.rate_hz])]
+    first, *frames = map(character, Stream(audio.rate_hz).push(audio.samples[: 2 * audio.rate_hz]))
     with (
         open_consumer("websocket:0", print) as take,
-        open_page(opens, tmp_path, "three_vrm.html", "@pixiv/three-vrm", address_in(capsys.readouterr().err)) as window,
+        open_page(opens, tmp_path, "@pixiv/three-vrm", capsys) as window,
     ):
-        wait_until(lambda: (take(frames[0]), window.run("return globalThis.shown?.['0.00']"))[1], LIMIT_S)
+        wait_until(lambda: (take(first), window.run("return globalThis.shown?.['0.00']"))[1], LIMIT_S)
         for frame in frames:
             take(frame)
         wait_until(lambda: window.run("return shown[arguments[0]]", f"{frames[-1].time_s:.2f}"), LIMIT_S)
-        shown = [window.run("return shown[arguments[0]]", f"{frame.time_s:.2f}") for frame in frames]
+        shown = window.run("return shown")
     for name in EXPRESSIONS.values():
         told = [frame.weights[name] for frame in frames]
         assert max(told) > 0.02, name
-        assert [weights[f"of {name}"] for weights in shown] == pytest.approx(told, abs=1e-3)
+        assert [shown[f"{frame.time_s:.2f}"][f"of {name}"] for frame in frames] == pytest.approx(told, abs=1e-3)
