@@ -186,9 +186,8 @@ def test_what_cannot_be_heard_is_refused_and_the_stream_goes_on(sound: np.ndarra
     ):
         with pytest.raises(InputError, match=message):
             stream.push(wrong)
-    assert np.array_equal(
-        values_of(all_of(stream, sound[:8000], [80])), values_of(all_of(Stream(), sound[:8000], [80]))
-    )
+    heard, wanted = (values_of(all_of(each, sound[:8000], [80])) for each in (stream, Stream()))
+    assert np.array_equal(heard, wanted)
     for arguments, message in (((0,), "0 Hz"), ((16_000, 700), "700 ms"), ((16_000, -1), "-1 ms")):
         with pytest.raises(InputError, match=message):
             Stream(*arguments)
@@ -313,8 +312,7 @@ def test_vmc_receivers_get_vowels_and_perfect_sync() -> None:
 
 def test_osc_has_an_address_for_every_value() -> None:
     values = dict(read_osc(osc_packet(frame())))
-    assert values["/lipmotion/opening"] == [pytest.approx(0.125)]
-    assert len(values) == 2 + len(WEIGHT_NAMES)
+    assert (len(values), values["/lipmotion/opening"]) == (2 + len(WEIGHT_NAMES), [0.125])
 
 
 def test_live_link_packets_are_read_as_by_the_app() -> None:
@@ -329,11 +327,9 @@ def test_live_link_packets_are_read_as_by_the_app() -> None:
     assert values["jawOpen"] == pytest.approx(frame()["jawOpen"])
     assert values["eyeBlinkLeft"] == 0
     face = pytest.importorskip("pylivelinkface", reason="no PyLiveLinkFace: pip install pylivelinkface")
-    found, read = face.PyLiveLinkFace.decode(packet)
-    assert (found, read.name, read.fps) == (True, "lipmotion", 50)
-    shown = {each.name.lower(): read.get_blendshape(each) for each in face.FaceBlendShape}
-    assert shown["jawopen"] == pytest.approx(frame()["jawOpen"])
-    assert shown["headyaw"] == 0
+    _, read = face.PyLiveLinkFace.decode(packet)
+    assert (read.name, read.fps) == ("lipmotion", 50)
+    assert read.get_blendshape(face.FaceBlendShape.JawOpen) == pytest.approx(frame()["jawOpen"])
 
 
 def test_frames_reach_a_receiver() -> None:
@@ -354,16 +350,9 @@ def test_what_takes_no_frames_is_refused(to: str) -> None:
 def test_words_with_odd_times_do_no_harm() -> None:
     sound = np.zeros(16_000, "<i2").tobytes()
     odd: list[tuple[str, float, float | None]] = [
-        ("mama", np.nan, 0.2),
-        ("mama", -1.0, 0.3),
-        ("mama", 0.2, 0.1),
-        ("two words", 0.4, 0.5),
-        ("mama", 0.4, np.inf),
-        ("papa", 0.5, 0.9),
-        ("\u5988\u5988", 0.9, 0.95),
-        ("", 0.95, None),
-        ("mama", np.inf, None),
-    ]
+        ("mama", np.nan, 0.2), ("mama", -1.0, 0.3), ("mama", 0.2, 0.1), ("two words", 0.4, 0.5), ("mama", 0.4, np.inf),
+        ("papa", 0.5, 0.9), ("\u5988\u5988", 0.9, 0.95), ("", 0.95, None), ("mama", np.inf, None),
+    ]  # fmt: skip
 
     async def speak() -> list[float]:
         conversation = Conversation()

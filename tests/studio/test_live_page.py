@@ -32,23 +32,8 @@ WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-p
 LIMIT_S = 240.0
 SPOKEN_S = 3
 CONNECTED = "return Boolean(globalThis.live?.state.isConnected)"
-HOLD = """const { playback } = live, { schedule } = playback, held_s = playback.clock_s;
-document.querySelector("canvas").style.display = "none"; // nothing more is drawn: processors would take seconds for it
-Object.defineProperty(playback, "clock_s", { value: held_s, writable: true });
-window.heard = []; // the global object of Marionette is not the page's
-playback.schedule = (begin_s, samples) => {
-  heard.push((begin_s + playback.anchor_s - playback.shift_s) * playback.rate_hz);
-  schedule.call(playback, begin_s, samples);
-};"""
-"""From now on the test moves the clock, and it is noted when which sound is to be played, in samples."""
-SHOW = """const { playback, head } = live, [steps] = arguments;
-const mesh = head.meshes.find((each) => "jawOpen" in each.morphTargetDictionary);
-return steps.map((step_s) => {
-  playback.clock_s += step_s - playback.time_s;
-  live.draw();
-  return mesh.morphTargetInfluences[mesh.morphTargetDictionary.jawOpen];
-});"""
-"""Return which weight the jaw has at times of the stream, seconds."""
+CLOCK = (programs.FOLDER / "live_clock.js").read_text("utf-8")
+SHOWN = CLOCK + "return weightsAt(arguments[0]);"
 EXPRESSIONS = {
     "jawOpen": "aa", "mouthStretchLeft": "ih", "mouthPucker": "ou", "mouthSmileLeft": "ee", "mouthFunnel": "oh"
 }  # fmt: skip
@@ -84,7 +69,7 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
             check_screens(window, "live", SCREENS)
             window.click("#sound")
             wait_until(lambda: window.run("return live.playback.isHeard && live.playback.context.currentTime"), LIMIT_S)
-            window.run(HOLD)
+            window.run(CLOCK + "hold();")
             process.stdin.buffer.write(sound)
             process.stdin.buffer.flush()
             wait_until(lambda: window.run("return heard.length") == 50 * SPOKEN_S, LIMIT_S)
@@ -95,8 +80,8 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
         times, sent = (np.array([float(row[name]) for row in rows]) for name in ("time_s", "jawOpen"))
         # at frames, and between them; the last ones, sent as the stream ends, a slow browser may miss
         steps = np.arange(0, times[-1] - 0.3, 0.0125)
-        shown, heard = window.run(SHOW, steps.tolist()), window.run("return heard")
-        rested = window.run(SHOW, [times[-1] + 1])
+        shown, heard = window.run(SHOWN, steps.tolist()), window.run("return heard")
+        rested = window.run(SHOWN, [times[-1] + 1])
         assert window.run("return live.drawing") is False
         gone = ("WebSocket", "ERR_CONNECTION_REFUSED")  # the server has ended: a browser may ask for the icon late
         problems = [each for each in window.problems() if "SEVERE" in each and not any(word in each for word in gone)]
