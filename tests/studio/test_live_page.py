@@ -158,10 +158,7 @@ def test_three_vrm_takes_the_curves_of_a_character(opens, tmp_path, capsys):
     write_vrm(tmp_path / "head.vrm")
     audio, character = read_welcome(), LiveCharacter(tmp_path / "head.vrm")
     first, *frames = map(character, Stream(audio.rate_hz).push(audio.samples[: 2 * audio.rate_hz]))
-    with (
-        open_consumer("websocket:0", print) as take,
-        open_page(opens, tmp_path, "@pixiv/three-vrm", capsys) as window,
-    ):
+    with open_consumer("websocket:0", print) as take, open_page(opens, tmp_path, "@pixiv/three-vrm", capsys) as window:
         wait_until(lambda: (take(first), window.run("return globalThis.shown?.['0.00']"))[1], LIMIT_S)
         for frame in frames:
             take(frame)
