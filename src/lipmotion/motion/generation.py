@@ -21,13 +21,7 @@ from lipmotion.motion.articulation import (
     fit_articulation_prior,
     widen_range,
 )
-from lipmotion.motion.closure import (
-    Closure,
-    choose_closed_frames,
-    find_closable_ranges,
-    fit_closure,
-    is_never_negative,
-)
+from lipmotion.motion.closure import Closure, choose_closed_frames, find_closable_ranges, fit_closure, is_never_negative
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionLimits, MotionSpace, fit_reduced_motion, measure_limits
 from lipmotion.types import (

@@ -97,10 +97,7 @@ class Mixtures:
         return self.responsibilities(density, x, weights).T @ with_squares(x)
 
     def set_from_statistics(
-        self,
-        densities: NDArray[np.intp],
-        sums: NDArray[np.floating[Any]],
-        floor: NDArray[np.floating[Any]],
+        self, densities: NDArray[np.intp], sums: NDArray[np.floating[Any]], floor: NDArray[np.floating[Any]]
     ) -> None:
         """Set weights, means and variances of densities, in place, to the maximum-likelihood estimates of statistics.
 

@@ -18,17 +18,7 @@ from lipmotion.motion.general_motion import hear_articulators
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import (
-    Configuration,
-    Constraints,
-    Example,
-    Generation,
-    Monitor,
-    Speech,
-    StateTrace,
-    Timeline,
-    Unit,
-)
+from lipmotion.types import Configuration, Constraints, Example, Generation, Monitor, Speech, StateTrace, Timeline, Unit
 
 
 @final

@@ -224,11 +224,7 @@ def _make_set(
 
 
 def show_edited_curves(
-    generation: Generation,
-    staging: Staging | None = None,
-    prosody: Prosody | None = None,
-    *,
-    mouth: bool = True,
+    generation: Generation, staging: Staging | None = None, prosody: Prosody | None = None, *, mouth: bool = True
 ) -> Generation:
     """Return a generation whose motion shows its edits of curves, for faces that have no such curves.
 

@@ -228,11 +228,7 @@ def train(  # noqa: PLR0913
 
 
 def fit_phones(
-    utterances: Sequence[Utterance],
-    recogniser: HmmConfig,
-    lexicon: Lexicon,
-    monitor: Monitor,
-    checkpoint: Checkpoint,
+    utterances: Sequence[Utterance], recogniser: HmmConfig, lexicon: Lexicon, monitor: Monitor, checkpoint: Checkpoint
 ) -> tuple[UnitHmm, list[Example], dict[str, str]]:
     """Return phone models, the examples for an engine, and the reason for every utterance that is not used.
 
@@ -293,11 +289,7 @@ def label_phones(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> 
 
 
 def _train_phone_models(
-    utterances: Sequence[Utterance],
-    lexicon: Lexicon,
-    config: HmmConfig,
-    monitor: Monitor,
-    checkpoint: Checkpoint,
+    utterances: Sequence[Utterance], lexicon: Lexicon, config: HmmConfig, monitor: Monitor, checkpoint: Checkpoint
 ) -> UnitHmm:
     """Return phone models of all transcribed or labelled utterances, or those of the shipped model."""
     transcribed: list[tuple[Audio, tuple[str, ...]]] = []

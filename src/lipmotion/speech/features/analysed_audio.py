@@ -13,15 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import average_power, find_sound_runs, find_spoken_frames, smooth_level
 from lipmotion.speech.features.encoding import WindowedEncoding
-from lipmotion.speech.features.mfcc import (
-    HOP,
-    WINDOW,
-    check_samples,
-    frame_count,
-    log_energy,
-    mfcc_of_warps,
-    spectrum,
-)
+from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, frame_count, log_energy, mfcc_of_warps, spectrum
 from lipmotion.speech.recognition.general import CEPSTRA, general_features
 from lipmotion.speech.sound.voice_activity import (
     SEPARATE_FRAMES,

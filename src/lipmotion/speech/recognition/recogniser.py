@@ -192,12 +192,7 @@ class Recogniser:
         return [LabelledFrames(frame, span.label.phone) for frame, span in zip(frames, aligned, strict=True)]
 
     def align(
-        self,
-        audio: Audio,
-        features: Features,
-        words: Sequence[str],
-        lexicon: Lexicon,
-        anchors: Anchors | None = None,
+        self, audio: Audio, features: Features, words: Sequence[str], lexicon: Lexicon, anchors: Anchors | None = None
     ) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
 
