@@ -99,7 +99,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
             "oy": GestureTarget(0, 0.6, 1.0, 0.035),
         }
         | _steady({"ih y": 0.7, "s z": 0.6, "ix": 0.55, "ae eh": 0.45}, 1.0, 0.035)
-        | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 2.0, 0.04)
+        | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 1.5, 0.04)
         | _steady({"sil sp": 0.0}, 0.7, 0.03),
     ),
     "lip_press": (
@@ -114,7 +114,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     ),
     "teeth": (
         GestureTarget(0.5, 0.5, 0.5, 0.03),
-        _steady({"s z sh zh ch jh": 0.98}, 12.0, 0.027)
+        _steady({"s z sh zh ch jh": 0.98}, 12.0, 0.026)
         | _steady({"t d n en k g ng": 0.88}, 9.0, 0.025)
         | _steady({"iy": 0.79, "ih ix ey y": 0.7, "sil sp": 0.0}, 1.5, 0.03)
         | _steady({"f v th dh ah l el": 0.5, "ae eh": 0.58, "r er axr": 0.4}, 2.0, 0.025)
