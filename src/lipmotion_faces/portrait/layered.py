@@ -249,11 +249,10 @@ class _LayeredPicture:
     def draw(self, pose: FacePose, mouth: str) -> NDArray[np.uint8]:
         """Return one frame [shape=(H, W, 3 or 4)]."""
         unit = EYE_DISTANCE * self._size
-        eyes = "closed" if pose.lids > 0.5 else "open"
         mood = pose.mood
         brows = pose.brows + MOOD_RISE * (mood.inner + mood.outer) / 2 - MOOD_FALL * mood.lowered
         look = (round(pose.gaze_x * unit), round(pose.gaze_y * unit), round(brows * unit))
-        head = self._heads(mouth, eyes, *look)
+        head = self._heads(mouth, "closed" if pose.lids > 0.5 else "open", *look)
         moved = np.empty(head.shape, np.uint8)
         place = pose.head
         columns, rows = np.arange(0, self._width + 16, 16.0), np.arange(0, self._size + 16, 16.0)
@@ -261,8 +260,7 @@ class _LayeredPicture:
         y = np.broadcast_to((rows - 0.4 * self._size - PIVOT_Y * unit)[:, None], x.shape)
         right, down = (place.x + 0.5 * place.yaw) * unit, (place.y + 0.5 * place.pitch) * unit
         warp_bytes(head, place.roll * y - right, -place.roll * x - down, 16, moved)
-        layer = moved.astype(np.float32) * np.array([1, 1, 1, 1 / 255], np.float32)
-        picture = lay_over(self._front, lay_over(layer, self._behind))
+        picture = lay_over(self._front, lay_over(moved * np.array([1, 1, 1, 1 / 255], np.float32), self._behind))
         if self._opaque:
             return np.asarray(picture[..., :3] + 0.5, np.uint8)
         alpha = picture[..., 3:]
