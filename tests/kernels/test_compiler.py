@@ -11,9 +11,9 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from children import environment, run_child
 from kernels.conftest import load_numba
 from kernels.networks import network_posteriors, phone_loop
-from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward, normals
+from lipmotion.kernels import banded, compiler, factorial, factorial_loops, forward_backward
 from lipmotion.kernels.compiler import limit_threads, list_blas_kernels
-from lipmotion_faces.kernels import affine, painting, raster, shading
+from lipmotion_faces.kernels import affine, normals, painting, raster, shading
 from lipmotion_faces.kernels.textured import CLEAR, SOLID, TexturedTriangles, draw_textured
 
 TESTS = Path(__file__).parents[1]
