@@ -260,7 +260,8 @@ class _LayeredPicture:
         y = np.broadcast_to((rows - 0.4 * self._size - PIVOT_Y * unit)[:, None], x.shape)
         right, down = (place.x + 0.5 * place.yaw) * unit, (place.y + 0.5 * place.pitch) * unit
         warp_bytes(head, place.roll * y - right, -place.roll * x - down, 16, moved)
-        picture = lay_over(self._front, lay_over(moved * np.array([1, 1, 1, 1 / 255], np.float32), self._behind))
+        layer = moved.astype(np.float32) * np.array([1, 1, 1, 1 / 255], np.float32)
+        picture = lay_over(self._front, lay_over(layer, self._behind))
         if self._opaque:
             return np.asarray(picture[..., :3] + 0.5, np.uint8)
         alpha = picture[..., 3:]
