@@ -70,6 +70,7 @@ def test_integers_and_channels_are_the_same_sound(sound: np.ndarray) -> None:
     assert np.array_equal(alone, as_bytes)
 
 
+@pytest.mark.long
 def test_without_a_limit_it_is_what_animate_makes(sound: np.ndarray) -> None:
     stream = Stream(look_ahead_ms=None)
     assert stream.push(sound[:48_000]) == []
@@ -80,7 +81,7 @@ def test_without_a_limit_it_is_what_animate_makes(sound: np.ndarray) -> None:
     assert {frame.known_s for frame in frames} == {3.0}
 
 
-@pytest.mark.parametrize("look_ahead_ms", [0, 80, 320])
+@pytest.mark.parametrize("look_ahead_ms", [80, *(pytest.param(each, marks=pytest.mark.long) for each in (0, 320))])
 def test_it_follows_the_whole_recording(sound: np.ndarray, look_ahead_ms: float) -> None:
     whole = animate(Request(Audio(sound, 16_000))).motion
     frames = all_of(Stream(look_ahead_ms=look_ahead_ms), sound, [640])

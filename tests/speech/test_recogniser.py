@@ -356,6 +356,7 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
         assert count_phone_edits(first, then) <= 2
 
 
+@pytest.mark.long
 def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voice: list[types.Audio]) -> None:
     """By features of a short recording that move apart from their deltas and these from theirs."""
     one, other = (through_a_telephone(audio) for audio in voice[:2])
