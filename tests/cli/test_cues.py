@@ -108,6 +108,7 @@ def test_status_lines(run, basics, toy_speech):
         assert event["log"] == {"level": "Trace", "message": f"Progress: {event['value']:.0%}"}
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("here")
 def test_warnings_are_status_lines_too(run, basics):
     handlers = list(logging.getLogger().handlers)

@@ -31,6 +31,7 @@ def test_without_a_time_all_states_are_listed(run, toy_model_file, toy_speech):
     assert few.out[3] == f"and {len(documents) - 2} more (--count N prints N, --json all)"
 
 
+@pytest.mark.long
 def test_without_a_model_it_is_the_shipped_one(run, toy_model_file, toy_speech):
     shipped = run("explain", toy_speech, "--at", "0.5")
     named = run("explain", toy_speech, "--model", toy_model_file, "--at", "0.5")
@@ -52,6 +53,7 @@ def test_words_are_written_and_given_back(run, here):
     assert list(dict.fromkeys(unit["word"] for unit in units if unit.get("word"))) == SAID.split()
 
 
+@pytest.mark.long
 def test_for_people_and_programs(run):
     assert run("words", WELCOME) == (0, [SAID], [])
     done = run("words", WELCOME, "--machine-readable")

@@ -304,6 +304,7 @@ def test_a_character_of_several(run, takes, toy_model_file, here):
     assert read_motion(here / "out" / "b.json")[0].names[0] == "jawOpen"
 
 
+@pytest.mark.long
 def test_standard_input_and_output(toy_model_file, toy_speech, here):
     words = ["animate", "-", "--model", toy_model_file, "-o", "-", "a.csv", "a.json", "--format", "csv"]
     with (

@@ -60,6 +60,7 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.long
 def test_an_output_that_is_an_input(run, laid):
     before = content(laid)
     for what, line in REFUSED:

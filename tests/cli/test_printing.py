@@ -130,6 +130,7 @@ NOT_SHOWN = {
 """Commands that print the name in another form, or not at all."""
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="names that Windows does not allow")
 @pytest.mark.usefixtures("poisoned")
 def test_what_is_obeyed_is_shown(capsys):

@@ -197,7 +197,7 @@ def test_a_mouth_that_is_missing_is_replaced_and_closures_are_never_skipped():
 
 def test_mouths_do_not_flicker():
     rng = np.random.default_rng(0)
-    poses = [geometry.MouthPose(float(gap)) for gap in 0.24 + 0.02 * rng.standard_normal(100)]
+    poses = [geometry.MouthPose(float(gap)) for gap in 0.12 + 0.02 * rng.standard_normal(100)]
     shown = layered.choose_mouths(poses, list(layered.MOUTHS), 25.0)
     alone = [layered.choose_mouths([pose], list(layered.MOUTHS), 25.0)[0] for pose in poses]
 

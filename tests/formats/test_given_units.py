@@ -102,9 +102,7 @@ def followed(audio: Audio, units: Timeline[Unit]) -> tuple[SpeechAnalysis, float
     return understood, predict_outlook(request, understood).confidence
 
 
-def test_right_phones_are_followed_without_a_word(
-    audio: Any, right: Timeline[Unit], caplog: pytest.LogCaptureFixture
-) -> None:
+def test_right_phones_are_followed(audio: Any, right: Timeline[Unit], caplog: pytest.LogCaptureFixture) -> None:
     understood, confidence = followed(audio, right)
     assert understood.speech.units == right
     assert confidence == pytest.approx(1)

@@ -35,6 +35,10 @@ STATES = [(t, phone, state) for t, (phone, state) in enumerate((p, s) for p in "
     [
         ("0 1300000 sil\n1300000 2050000 hh -31.5\n2050000 3000000 IY1 -20 he\n", SAID),
         ("0 sil\n1300000 hh\n2050000 iy\n", [*SAID[:2], (0.205, math.inf, "iy")]),
+        ("0.13 sil\n0.205 hh\n0.3 iy\n", SAID),
+        ("signal b\nnfields 1\n#\n 0.1300 26 sil\n 0.205 26 hh ; x\n 0.3 26 iy\n", SAID),
+        ("0.0 sil\n0.13 hh\n0.205 iy\n", [*SAID[:2], (0.205, math.inf, "iy")]),
+        ('#!MLF!#\r\n"*/a.rec"\r\n0 1300000 sil -3.1\r\n1300000 2050000 hh\r\n2050000 3000000 iy\r\n.\r\n', SAID),
         (  # phones between their neighbours
             "0 1000000 sil-hh+iy\n1000000 2000000 x^hh-iy+t=ae@1_2/A:0-1-2@1-1&1+4\n2000000 3000000 iy-t+sil\n",
             [(0, 0.1, "hh"), (0.1, 0.2, "iy"), (0.2, 0.3, "t")],
@@ -177,12 +181,13 @@ def test_real_ones(recordings: Path):
 
 
 OTHER = {
-    "master labels": ('#!MLF!#\n"*/a.lab"\n0 1000000 sil\n.\n', "is a master label file"),
+    "master labels": ('#!MLF!#\n"*/a.lab"\n0 1000000 sil\n.\n"*/b.lab"\nhi\n.\n', "is a master label file"),
+    "SCC": ("Scenarist_SCC V1.0\n\n00:00:00:01\t94ae 9420\n", "closed captions"),
+    "Spruce's STL": ("00:00:00:01 , 00:00:01:22 , hello\n", "two times as in subtitles"),
+    "one time a line": ("0.2 hi\n0.5 you\n", "one time a line, 0.2 in the first, which may be its start or its end"),
     "RTF": ("{\\rtf1\\ansi hello}", "begins with '{|rich-text"),
     "HTML": ("\n<html><body>hello</body></html>", "begins with '<html>|web page"),
-    "ESPS with a header": ("signal b\nnfields 1\n#\n 0.0500 26 sil\n 0.1 26 p\n 0.2 26 aa\n", "its lines hold times"),
     "NUL": ("hello you\0 there", "holds NUL characters"),
-    "ESPS": ("signal a\nnfields 1\n#\n 0.0500 26 sil\n 0.1 26 p\n 0.2 26 aa\n", "its lines hold times"),
     "mixed seconds": ("0 0.5 p\n0.5 1 aa\n", "its lines hold times"),
     "a start of NaN": ("nan 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "its lines hold times"),
     "a last start of 0": ("0 sil\n1000000 p\n0 aa\n", "its lines hold times"),

@@ -280,6 +280,11 @@ OTHERS: dict[str, Any] = {
     "a table of clocks": "start,end,text\n" + "".join(f"0:0{a:.3f},00:00:0{b:.3f},{w}\n" for w, a, b in W),
     "a table in seconds": "start\tend\ttext\n" + "".join(f"{a}\t{b}\t{w}\n" for w, a, b in W),
     "numbers between commas": "".join(f"{a:.0f},{b:.0f},{w}\n" for w, a, b in MS),
+    "letters as objects": {"characters": [
+        {"text": letter, "start": a + k * (b - a) / len(w), "end": a + (k + 1) * (b - a) / len(w)}
+        for w, a, b in W for k, letter in enumerate(w + " ")]},
+    "ELAN's table": "Begin Time - ss.msec\tEnd Time - ss.msec\tAnnotation\n"
+    + "".join(f"{a}\t{b}\t{w}\n" for w, a, b in W),
     "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
 }  # fmt: skip
 
@@ -300,6 +305,10 @@ LINES = {
     "whisper.cpp prints": "Detecting language\n[00:00:00.400 --> 00:00:01.600]   hello big moon\n",
     "faster-whisper prints": "[0.40s -> 1.60s] hello big moon\n",
     "subtitles of an old Mac": "1\r00:00:00,400 --> 00:00:01,600\rhello big\rmoon\r",
+    "ELAN's text": "default\t\t00:00:00.400\t0.4\t00:00:01.600\t1.6\t00:00:01.200\t1.2\thello big moon\n",
+    "HTML's breaks": "1\n00:00:00,400 --> 00:00:01,600\nhello<br/>big&lt;br&gt;moon\n",
+    "SubViewer": "[INFORMATION]\n[TITLE]no\n[SUBTITLE]\n00:00:00.40,00:00:01.60\nhello big[br]moon\n",
+    "MPL2": "[4][16]hello big|/moon\n[16][17]\n",
     "SBV": "0:00:00.400,0:00:01.600\nhello big\nmoon\n",
     "TTML": TTML.format("", BODY.format("00:00:00.4", "end", "1600ms")),
     "TTML in ticks": TTML.format(RATES, BODY.format("4000000t", "dur", "12000000t")),
@@ -307,8 +316,6 @@ LINES = {
     "YouTube": '<transcript><text start="0.4" dur="1.2">hello big moon</text></transcript>',
     "YouTube's JSON": {"events": [{"tStartMs": 400, "dDurationMs": 1200, "segs": [{"utf8": "hello big"}, {"utf8":
         " moon"}]}]},
-    "whisper.cpp": {"transcription": [{"offsets": {"from": 400, "to": 1600}, "text": "hello big moon", "tokens": [{
-        "text": "h"}]}]},
     "Azure in batch": {"recognizedPhrases": [{"offset": "PT0.4S", "offsetInTicks": 4e6, "durationInTicks": 1.2e7,
         "nBest": [{"display": "hello big moon"}]}]},
 }  # fmt: skip
@@ -318,7 +325,7 @@ LINES = {
 def test_lines_in_time(write: Any, name: str) -> None:
     found = read_transcript(write(LINES[name]))
     assert isinstance(found, TimedTranscript)
-    (line,) = found.lines
+    line = found.lines[0]
     assert " ".join(word.word for word in line.words) == "hello big moon"
     assert (line.start_s, line.end_s) == pytest.approx((0.4, 1.6))
 

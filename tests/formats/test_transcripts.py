@@ -94,6 +94,7 @@ OF_LINES = {
     "WebVTT with names of cues": "WEBVTT\n\nfirst part\n00:01.000 --> 00:02.500\nHello there\n\nsecond part\n"
     "00:02.750 --> 00:04.000\nHow are you\n",
     "lyrics": "[ar:Anna]\n[offset:+50]\n[00:02.80] How are\nyou\n[00:01.05] Hello there\n[00:02.55]\n[00:04.05]\n",
+    "MicroDVD": "{1}{1}20.000\n{20}{50}Hello|there!\n{55}{80}{y:i}How are you?\n",
     "lines that begin with times": "[0:01] Hello there\n[00:00:02.50]\n[0:00:02.75]How are you\n[0:04]",
     "Whisper's table": "start\tend\ttext\n1000\t2500\tHello there!\n2750\t4000\tHow are you?\n",
     "Whisper": json.dumps({"text": " Hello there! How are you?", "language": "en", "segments": [
@@ -346,13 +347,14 @@ def test_what_is_written_is_read(folder: Path, rows: list[tuple[float, float, li
 def test_times_are_never_spoken(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     for content, message in (
-        (SRT.replace("-->", ","), "two times as in subtitles; required: times as in 00:00:01,000 --> 00:00:02,500, or"),
+        (SRT.replace("-->", "/"), "two times as in subtitles; required: times as in 00:00:01,000 --> 00:00:02,500, or"),
         (SRT.replace("-->", "", 1), "line 2 is '00:00:01,000  00:00:02,500'; required times as in"),
         (SRT.replace("-->", "->").replace("02,500", "2x"), "line 2 is '00:00:01,000 -> 00:00:2x'; required times as"),
         (ASS.replace("0:00:04.00", "later"), "line 12 is 'Dialogue: 0,0:00:02.75,later"),
         (ASS.replace("0:00:04.00", "0:00:00.10"), "line 12 ends at 0.1 s, before its start at 2.75 s; correct it"),
         (ASS.replace(",0,0,0,,How", ""), "line 12 is 'Dialogue: 0,0:00:02.75"),
         (ASS[: ASS.index("Dialogue")], "the transcript holds no word"),
+        ("{25}{63}Hello there\n", "is MicroDVD, whose times are in frames, and says no rate"),
     ):
         path.write_text(content)
         with pytest.raises(InputError) as refused:
@@ -392,7 +394,7 @@ WORDS = {
     "Cartesia": (timings.CARTESIA, [("hi", 0, 0.4), ("you", 0.5, 0.9)]),
     "Google": (timings.GOOGLE, [("hello", 0.25, 0.75), ("you", 0.75, None)]),
     "Kokoro": (timings.KOKORO, [("hi", 0.25, 0.55), ("you", 0.6, 0.9)]),
-    "servers of Kokoro": (timings.SERVERS, [("hi", 0.1, 0.4)]),
+    "servers of Kokoro": (timings.SAMPLES["servers"], [("hi", 0.1, 0.4)]),
     "Gentle": (timings.GENTLE, [("hi", 0.1, 0.4), ("you", 0.5, 0.8)]),
     "MFA": (timings.MFA, [("my", 0.1, 0.5), ("spot", 0.5, 1.0)]),
     "MFA's table": (timings.MFA_CSV, [("my", 0.1, 0.5)]),

@@ -119,6 +119,7 @@ def laid_out(name: str, folder: Path) -> Path:
     return next(folder.glob("head.[go]*"))
 
 
+@pytest.mark.long
 def test_expensive_characters_are_refused_with_what_is_too_much(tmp_path: Path) -> None:
     for number, (name, message) in enumerate(REFUSED.items()):
         with pytest.raises(errors.InputError, match=message):

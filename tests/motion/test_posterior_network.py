@@ -84,6 +84,7 @@ def test_motion_follows_the_posteriors_and_the_spectrum_only_of_a_known_voice(ne
     assert width < 0.5
 
 
+@pytest.mark.long
 def test_the_recurrent_network_counts_for_a_known_voice(network: PosteriorNetwork) -> None:
     plain = replace(network, recurrent=None)
     known, unknown = speech(99), speech(99, voice=0.0)

@@ -163,6 +163,7 @@ def trained() -> AcousticNetwork:
     return result
 
 
+@pytest.mark.long
 def test_it_predicts_motion_of_held_out_speech(trained: AcousticNetwork) -> None:
     one, values = example_in_conditions(99)
     motion, distortion = trained.predict(one.speech)

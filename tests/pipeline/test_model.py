@@ -130,6 +130,7 @@ def adapted_file(adapted: Model, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return path
 
 
+@pytest.mark.long
 def test_only_the_adaptation_changes(toy_model, adapted):
     assert toy_model.adaptation is None
     assert adapted.adaptation is not None

@@ -148,6 +148,7 @@ def test_files_of_motion_hold_moods(generation, tmp_path, suffix):
     assert find_mouth(found, generation.units).frown.max() > 0.2
 
 
+@pytest.mark.long
 def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(generation, tmp_path):
     plain, fewer = (written(tmp_path, generation, f"{n}.tres", delivery=Delivery(key_tolerance=n)) for n in (0, 0.03))
     assert sum(map(len, fewer)) < 0.5 * sum(map(len, plain))

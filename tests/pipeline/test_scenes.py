@@ -67,7 +67,7 @@ def test_the_rate_is_that_of_the_keys(generation):
 
 
 @pytest.mark.parametrize("own", [False, True], ids=["head", "character"])
-@pytest.mark.parametrize("mood", ["", "angry:0.8, surprised at 1.0"])
+@pytest.mark.parametrize("mood", [pytest.param("", marks=pytest.mark.long), "angry:0.8, surprised at 1.0"])
 def test_some_frames_are_those_of_the_whole(generation, mood, own, tmp_path):
     """What they need of the whole motion, as its pose at rest and its phrases, they have."""
     values, spans, each_s = np.tile(generation.motion.values, (3, 1)), list(generation.units), 2.01

@@ -15,6 +15,7 @@ from children import run_child
 from lipmotion import errors, types
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_files import _TrackDecoder, read_audio
+from speech.made_voices import pulses, vowels
 from speech.opened import opened_in
 from speech.sounds import (
     LEVEL,
@@ -163,6 +164,16 @@ def test_forms(name: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> N
     np.testing.assert_allclose(found, TONE, atol=1e-3)
 
 
+def test_what_is_missing_of_other_files_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name, codec, said in (("a.flac", "flac", "; the last"), ("a.opus", "libopus", "its last page is not marked")):
+        path = write_sound(tmp_path / name, babble(16_000, 12), 16_000, codec)
+        for share in (1, 0.93):
+            caplog.clear()
+            path.write_bytes(path.read_bytes()[: round(share * path.stat().st_size)])
+            read_audio(path)
+            assert ("cut short" in caplog.text, said in caplog.text) == (share < 1, share < 1)
+
+
 def test_what_is_missing_of_a_wave_file_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Not of a stream, whose size is the largest that its program takes; not a few samples, which nobody misses."""
     for bits, container, content in ((16, 16, S16), (24, 32, S24_IN_32)):
@@ -269,10 +280,8 @@ def test_the_first_of_several_tracks(tmp_path: Path, original: Samples) -> None:
     assert late_by(read_audio(tmp_path / "a.mka").samples, original)[1] > 0.999
 
 
-def test_channels_that_cancel_give_way_to_the_loudest_and_others_are_averaged(
-    tmp_path: Path, original: Samples, caplog: pytest.LogCaptureFixture
-) -> None:
-    for weights, loudest in (((0.8, -1), 1), ((0, 0, 0, 0, 1, 0), 4), ((1, 0), None), ((1, -0.3), None)):
+def test_channels_that_cancel(tmp_path: Path, original: Samples, caplog: pytest.LogCaptureFixture) -> None:
+    for weights, loudest in (((0.8, -1), 1), ((0, 0, 0, 0, 1, 0), None), ((1, 0), None), ((1, -0.3), None)):
         caplog.clear()
         sound = np.array(weights, np.float32)[:, None] * original
         audio = read_audio(write_sound(tmp_path / "a.wav", sound, 16_000, "pcm_f32le"))
@@ -280,6 +289,18 @@ def test_channels_that_cancel_give_way_to_the_loudest_and_others_are_averaged(
         assert np.allclose(audio.samples, wanted, atol=1e-6)
         said = f"a.wav: its {len(weights)} channels cancel one another in their mean; channel {(loudest or 0) + 1}"
         assert (said in caplog.text) == (loudest is not None)
+
+
+def test_the_centre_is_taken_where_it_alone_speaks(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    time_s = np.arange(64_000) / 16_000
+    voice = 0.3 * vowels(pulses(4, 140 + 20 * np.sin(2 * np.pi * time_s)))
+    music = 0.1 * (np.sin(2 * np.pi * 220 * time_s) + np.sin(2 * np.pi * 330 * time_s))
+    for left, centre, is_taken in ((music, voice, True), (voice, music, False), (voice, voice, False)):
+        caplog.clear()
+        channels = np.array([left, left, centre, 0 * left, 0.3 * left, 0.3 * left], np.float32)
+        audio = read_audio(write_sound(tmp_path / "a.wav", channels, 16_000, "pcm_f32le"))
+        assert np.allclose(audio.samples, centre if is_taken else channels.mean(axis=0), atol=1e-6)
+        assert ("of its 6 channels, channel 3 alone holds speech" in caplog.text) == is_taken
 
 
 NAMES = ["-o.wav", "a b.wav", 'it\'s "it".wav', "new\nline.wav", "😀 音 é.wav", "12:30.wav", "http:x.wav", "%03d?*.wav"]

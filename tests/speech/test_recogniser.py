@@ -88,9 +88,7 @@ def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after_and_sile
     assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
 
 
-def test_unknown_sentences_are_recognised_and_digital_silence_is_silence(
-    hmm: Any, sentences: list[ToySentence]
-) -> None:
+def test_unknown_sentences_and_digital_silence(hmm: Any, sentences: list[ToySentence]) -> None:
     for sentence in sentences[-3:]:
         found = recognise(hmm, sentence.audio)
         assert covers(found, sentence.audio.duration_s)
@@ -358,6 +356,7 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
         assert count_phone_edits(first, then) <= 2
 
 
+@pytest.mark.long
 def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voice: list[types.Audio]) -> None:
     """By features of a short recording that move apart from their deltas and these from theirs."""
     one, other = (through_a_telephone(audio) for audio in voice[:2])

@@ -212,9 +212,7 @@ def sentences() -> list[ToySentence]:
     return toy_sentences(5)
 
 
-def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_is_said(
-    sentences: list[ToySentence],
-) -> None:
+def test_it_is_the_mean_over_phones_of_the_best_state_of_what_is_said(sentences: list[ToySentence]) -> None:
     """Frame by frame, by name."""
     sentence = sentences[0]
     density = general.load_general().log_density(general.general_features(sentence.audio))

@@ -56,6 +56,7 @@ def texts(found: recognised_speech.Recognition) -> list[str]:
     return [span.label.text for span in found.words]
 
 
+@pytest.mark.long
 def test_words_decide_the_phones_of_english(welcome: Audio) -> None:
     aligned = recogniser_of(load_model(), "auto").align(welcome, read_sound(welcome).mfcc(), SAID, Lexicon())
     for found in (of_welcome("auto"), of_welcome("words")):

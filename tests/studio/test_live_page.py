@@ -1,6 +1,7 @@
-"""Live frames in a real browser: the page of the window, and TalkingHead's own module."""
+"""Live frames in a real browser: the page of the window, TalkingHead's own module, and three-vrm."""
 
 import csv
+from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from io import TextIOWrapper
@@ -14,6 +15,9 @@ import programs
 from children import LIPMOTION, PIPE, child, wait_until
 from lipmotion import Stream
 from lipmotion.live.consumers import LiveSound, open_consumer
+from lipmotion.live.face import LiveCharacter
+from lipmotion_faces.characters.gltf_document import read_gltf_document, write_container
+from meshes.heads import renamed, write_glb
 from pipeline.made import read_welcome
 from study.browser import check_screens
 from study.firefox import BOTH
@@ -28,23 +32,12 @@ WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-p
 LIMIT_S = 240.0
 SPOKEN_S = 3
 CONNECTED = "return Boolean(globalThis.live?.state.isConnected)"
-HOLD = """const { playback } = live, { schedule } = playback, held_s = playback.clock_s;
-document.querySelector("canvas").style.display = "none"; // nothing more is drawn: processors would take seconds for it
-Object.defineProperty(playback, "clock_s", { value: held_s, writable: true });
-window.heard = []; // the global object of Marionette is not the page's
-playback.schedule = (begin_s, samples) => {
-  heard.push((begin_s + playback.anchor_s - playback.shift_s) * playback.rate_hz);
-  schedule.call(playback, begin_s, samples);
-};"""
-"""From now on the test moves the clock, and it is noted when which sound is to be played, in samples."""
-SHOW = """const { playback, head } = live, [steps] = arguments;
-const mesh = head.meshes.find((each) => "jawOpen" in each.morphTargetDictionary);
-return steps.map((step_s) => {
-  playback.clock_s += step_s - playback.time_s;
-  live.draw();
-  return mesh.morphTargetInfluences[mesh.morphTargetDictionary.jawOpen];
-});"""
-"""Return which weight the jaw has at times of the stream, seconds."""
+CLOCK = (programs.FOLDER / "live_clock.js").read_text("utf-8")
+SHOWN = CLOCK + "return weightsAt(arguments[0]);"
+EXPRESSIONS = {
+    "jawOpen": "aa", "mouthStretchLeft": "ih", "mouthPucker": "ou", "mouthSmileLeft": "ee", "mouthFunnel": "oh"
+}  # fmt: skip
+"""Shapes of the head, and the expressions of VRM that they stand for."""
 
 
 def address_in(text):
@@ -76,7 +69,7 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
             check_screens(window, "live", SCREENS)
             window.click("#sound")
             wait_until(lambda: window.run("return live.playback.isHeard && live.playback.context.currentTime"), LIMIT_S)
-            window.run(HOLD)
+            window.run(CLOCK + "hold();")
             process.stdin.buffer.write(sound)
             process.stdin.buffer.flush()
             wait_until(lambda: window.run("return heard.length") == 50 * SPOKEN_S, LIMIT_S)
@@ -87,8 +80,8 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
         times, sent = (np.array([float(row[name]) for row in rows]) for name in ("time_s", "jawOpen"))
         # at frames, and between them; the last ones, sent as the stream ends, a slow browser may miss
         steps = np.arange(0, times[-1] - 0.3, 0.0125)
-        shown, heard = window.run(SHOW, steps.tolist()), window.run("return heard")
-        rested = window.run(SHOW, [times[-1] + 1])
+        shown, heard = window.run(SHOWN, steps.tolist()), window.run("return heard")
+        rested = window.run(SHOWN, [times[-1] + 1])
         assert window.run("return live.drawing") is False
         gone = ("WebSocket", "ERR_CONNECTION_REFUSED")  # the server has ended: a browser may ask for the icon late
         problems = [each for each in window.problems() if "SEVERE" in each and not any(word in each for word in gone)]
@@ -100,35 +93,36 @@ def test_the_head_speaks_in_step_with_its_sound(opens, tmp_path):
     assert problems == []
 
 
-class Modules(SimpleHTTPRequestHandler):
-    """Serves packages of npm, and the page that uses them."""
-
-    def translate_path(self, path):
-        page = path.partition("?")[0] == "/talking_head.html"
-        return str(programs.FOLDER / "talking_head.html") if page else super().translate_path(path)
-
-    def log_message(self, *_):
-        pass
+@contextmanager
+def open_page(opens, folder, package, capsys):
+    """Give a window with a package's page, which is told the server that was opened; a folder's files lie beside it."""
+    place = address_in(capsys.readouterr().err).removeprefix("ws://").rstrip("/")
+    modules, name = programs.node_package(package), package.rpartition("/")[2] + ".html"
+    if modules is None:
+        pytest.skip(f"no {package}: npm install {package} three, LIPMOTION_NODE_MODULES")
+    beside = [Path(modules).resolve().parents[1] / each for each in (package.partition("/")[0], "three")]
+    for each in (programs.FOLDER / name, *beside):
+        (folder / each.name).symlink_to(each)
+    served = partial(SimpleHTTPRequestHandler, directory=str(folder))
+    with ThreadingHTTPServer(("127.0.0.1", 0), served) as server, opens(folder, *WEBGL) as window:
+        Thread(target=server.serve_forever, daemon=True).start()
+        window.open(f"http://127.0.0.1:{server.server_port}/{name}?{place}")
+        yield window
+        problems = [each for each in window.problems() if "SEVERE" in each and "favicon" not in each]
+        server.shutdown()
+    assert problems == []
 
 
 @pytest.mark.parametrize("opens", BOTH[:1])
 def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
-    package = programs.node_package("@met4citizen/talkinghead")
-    if package is None:
-        pytest.skip("no TalkingHead: npm install @met4citizen/talkinghead, LIPMOTION_NODE_MODULES")
     audio = read_welcome()
-    stream, about = Stream(audio.rate_hz), LiveSound(audio.rate_hz)
+    stream, about, frames = Stream(audio.rate_hz), LiveSound(audio.rate_hz), []
     with (
-        ThreadingHTTPServer(("127.0.0.1", 0), partial(Modules, directory=str(Path(package).parents[1]))) as server,
         open_consumer("talkinghead:0", print, about) as head,
-        opens(tmp_path, *WEBGL) as window,
+        open_page(opens, tmp_path, "@met4citizen/talkinghead", capsys) as window,
     ):
-        Thread(target=server.serve_forever, daemon=True).start()
         assert isinstance(head, TalkingHead)
-        place = address_in(capsys.readouterr().err).removeprefix("ws://")
-        window.open(f"http://127.0.0.1:{server.server_address[1]}/talking_head.html?{place}")
         wait_until(lambda: window.run("return globalThis.called?.includes('streamStart')"), LIMIT_S)
-        frames = []
         for first in range(0, 3 * audio.rate_hz, 320):
             head.hear(audio.samples[first : first + 320])
             for frame in stream.push(audio.samples[first : first + 320]):
@@ -139,10 +133,38 @@ def test_talking_head_takes_sound_and_blendshapes(opens, tmp_path, capsys):
         wait_until(lambda: window.run("return called.at(-1) === 'streamInterrupt'"), LIMIT_S)
         queued = window.run("return queued")
         assert window.run("return head.isSpeaking") is False
-        problems = [each for each in window.problems() if "SEVERE" in each and "favicon" not in each]
-        server.shutdown()
     first = len(frames) - len(queued)
     assert len(queued) > 100
     assert [time for time, _ in queued] == pytest.approx([20.0 * number for number in range(len(queued))], abs=0.2)
     assert [jaw for _, jaw in queued] == pytest.approx([frame["jawOpen"] for frame in frames[first:]], abs=1e-3)
-    assert problems == []
+
+
+def write_vrm(path):
+    """Write the head as a character of VRM 1.0, whose shapes are known by its expressions alone."""
+    write_glb(path, renamed({shape: f"of {name}" for shape, name in EXPRESSIONS.items()}))
+    document = read_gltf_document(path)
+    place = next(place for place, node in enumerate(document.json["nodes"]) if "mesh" in node)
+    shapes = document.json["meshes"][document.json["nodes"][place]["mesh"]]["extras"]["targetNames"]
+    bind = {name: {"node": place, "index": shapes.index(f"of {name}"), "weight": 1} for name in EXPRESSIONS.values()}
+    expressions = {"preset": {name: {"morphTargetBinds": [bind[name]]} for name in bind}}
+    meta = {"name": "head", "authors": ["lipmotion"], "licenseUrl": "https://vrm.dev/licenses/1.0/"}
+    document.json["extensions"] = {"VRMC_vrm": {"specVersion": "1.0", "meta": meta, "expressions": expressions}}
+    document.json["extensionsUsed"] = ["VRMC_vrm"]
+    write_container(path, document.json, bytes(document.buffers[0]))
+
+
+@pytest.mark.parametrize("opens", BOTH[:1])
+def test_three_vrm_takes_the_curves_of_a_character(opens, tmp_path, capsys):
+    write_vrm(tmp_path / "head.vrm")
+    audio, character = read_welcome(), LiveCharacter(tmp_path / "head.vrm")
+    first, *frames = map(character, Stream(audio.rate_hz).push(audio.samples[: 2 * audio.rate_hz]))
+    with open_consumer("websocket:0", print) as take, open_page(opens, tmp_path, "@pixiv/three-vrm", capsys) as window:
+        wait_until(lambda: (take(first), window.run("return globalThis.shown?.['0.00']"))[1], LIMIT_S)
+        for frame in frames:
+            take(frame)
+        wait_until(lambda: window.run("return shown[arguments[0]]", f"{frames[-1].time_s:.2f}"), LIMIT_S)
+        shown = window.run("return shown")
+    for name in EXPRESSIONS.values():
+        told = [frame.weights[name] for frame in frames]
+        assert max(told) > 0.02, name
+        assert [shown[f"{frame.time_s:.2f}"][f"of {name}"] for frame in frames] == pytest.approx(told, abs=1e-3)

@@ -26,6 +26,7 @@ def studio(toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_pa
         yield opened
 
 
+@pytest.mark.long
 def test_what_is_dropped_under_the_name_of_a_line_that_was_removed_is_a_new_line(studio):
     sound = (studio.folder.path.parent / "line.wav").read_bytes()
     first = studio.ask("/api/lines?name=take.wav", sound, x_lipmotion_transcript="mama").content

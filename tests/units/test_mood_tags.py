@@ -50,6 +50,8 @@ def test_unknown_tags_are_named_and_not_spoken(caplog):
         ("HELP\nme now", "help me now", ""),
         ("0:00\nhi\nAnna Lee  1:07\nyou", "hi you", "0:00, Anna Lee  1:07"),
         ("(00:04) hi\n00:00:09 - you", "hi you", "(00:04), 00:00:09 -"),
+        ("1. One hi\n2.You\n3) 20\na) the\nb) end", "one hi you twenty the end", "1., 2., 3), a), b)"),
+        ("2. you\n4. me", "two you four me", ""),
         ("5:30 is early\n7:15 is late", "five thirty is early seven fifteen is late", ""),
         ('e "Hello"', "hello", "e"),
         ('e happy "Hello"\n"A voice."\nm "Hi \\"you\\""', "hello a voice hi you", "e happy, m"),

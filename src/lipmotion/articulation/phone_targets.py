@@ -69,7 +69,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     "tongue": (
         GestureTarget(0, 0, 0.5, 0.025),
         _steady({"th dh": TIP_OUT}, 5.0, 0.02)
-        | _steady({"l el": TIP_UP, "t d n en": 0.5, "ch jh": 0.3}, 2.5, 0.022)
+        | _steady({"l el": TIP_UP, "t d n en": 0.45, "ch jh": 0.3, "k g ng": 0.2}, 4.0, 0.025)
         | _steady({"s z": 0.3, "sh zh": 0.25, "r er axr": 0.2}, 0.8, 0.03),
     ),
     "lip_tuck": (
@@ -85,10 +85,10 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
             "oy": GestureTarget(0.6, 0.0, 1.6, 0.04),
             "aw": GestureTarget(0.0, 0.6, 1.4, 0.04),
         }
-        | _steady({"sh zh ch jh r": 0.6, "er axr": 0.45}, 4.0, 0.035)
+        | _steady({"sh zh ch jh r": 0.6, "er axr": 0.45}, 6.0, 0.035)
         | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 3.0, 0.035)
-        | _steady({"th dh": 0.0}, 1.6, 0.03)
-        | _steady({"f v": 0.0, "s z": 0.0, "sil sp": 0.0}, 0.7, 0.03),
+        | _steady({"th dh s z k g ng": 0.0}, 2.2, 0.03)
+        | _steady({"f v t d n en l el sil sp": 0.0}, 1.0, 0.03),
     ),
     "spread": (
         GestureTarget(0, 0, 0.25, 0.03),
@@ -110,16 +110,16 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
         GestureTarget(0, 0, 0.4, 0.03),
         _steady({"aa": 1.0, "ah": 0.7, "ao": 0.8}, 2.0, 0.04)
         | {"ay": GestureTarget(0.8, 0.0, 1.4, 0.035), "aw": GestureTarget(1.0, 0.3, 1.4, 0.035)}
-        | _steady({"ae eh": 0.2}, 1.0, 0.035),
+        | _steady({"ae eh": 0.2, "t d n en l el k g ng s z sh zh ch jh r": 0.0}, 1.3, 0.03),
     ),
     "teeth": (
         GestureTarget(0.5, 0.5, 0.5, 0.03),
-        _steady({"s z sh zh ch jh": 0.98}, 7.0, 0.025)
-        | _steady({"t d n en": 0.8, "iy k g ng": 0.79, "ih ix ey y": 0.75}, 1.5, 0.03)
-        | _steady({"f v th dh ah": 0.5, "ae eh": 0.58}, 2.0, 0.025)
+        _steady({"s z sh zh ch jh": 0.98}, 12.0, 0.026)
+        | _steady({"t d n en k g ng": 0.88}, 9.0, 0.025)
+        | _steady({"iy": 0.79, "ih ix ey y": 0.7, "sil sp": 0.0}, 1.5, 0.03)
+        | _steady({"f v th dh ah l el": 0.5, "ae eh": 0.58, "r er axr": 0.4}, 2.0, 0.025)
         | _steady({"uw w": 0.0, "uh ao": 0.15, "aa": 0.4}, 2.0, 0.04)
-        | {"ow": GestureTarget(0.3, 0.0, 1.6, 0.04)}
-        | _steady({"sil sp": 0.0}, 2.5, 0.03),
+        | {"ow": GestureTarget(0.3, 0.0, 1.6, 0.04)},
     ),
 }
 

@@ -29,7 +29,7 @@ from lipmotion.formats.label_tiers import (
     split_speakers,
     with_words,
 )
-from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subrip, write_webvtt
+from lipmotion.formats.subtitles import NO_ARROW, is_subtitles, parse_subtitles, write_subtitles
 from lipmotion.formats.textgrid import is_textgrid, parse_interval_tiers, write_textgrid
 from lipmotion.formats.timed_lines import parse_line_tiers
 from lipmotion.formats.xml_labels import READ_ROOTS, ROOT, read_xml_tiers
@@ -53,8 +53,8 @@ LARGEST_LABELS = 1 << 24
 """Most bytes of a label file: labels of a day."""
 MOTION = re.compile(r'"lipmotion\.motion"|time_s,')
 """How our own motion files begin: a quick answer for large ones."""
-MASTER = "#!MLF!#"
-"""The start of HTK's master label files, which hold the labels of many recordings."""
+MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
+"""The line before each recording's labels in HTK's master label files, and that with its name."""
 MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
 """The start of RTF, HTML, XML and JSON."""
 CHAPTER = ".trans.txt"
@@ -66,7 +66,7 @@ TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
 NAMED_TIERS = 12
 """Most names in a message."""
-_WRITERS = {".TextGrid": write_textgrid, ".vtt": write_webvtt, ".srt": write_subrip}
+_WRITERS = {".TextGrid": write_textgrid, ".vtt": write_subtitles, ".srt": write_subtitles}
 LABEL_SUFFIXES = tuple(_WRITERS)
 """Suffixes of label files that are written, as programs write them; capitals do not matter."""
 
@@ -372,7 +372,8 @@ def _check_no_labels(text: str, where: str) -> None:
     timed = "its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels"
     forms = {
         "holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text": "\0" in text,
-        "is a master label file of many recordings; write a .lab beside each": start.startswith(MASTER),
+        "is closed captions in Scenarist's code (SCC); save them as .srt": start.startswith("Scenarist_SCC"),
+        "is a master label file, required the words alone": start.startswith("#!MLF!#"),
         f"begins with {shorten(start[:20])!r}, required the words alone; save it as text": MARKUP.match(start),
         "is a file of subtitles, required the words alone; write them into a text file": is_subtitles(text),
         f"has the line {line!r}, two times as in subtitles; required: times as in {clock}, or the words alone": match,
@@ -395,7 +396,14 @@ def _check_plain(text: str, path: Path) -> None:
 
 def _read_text(path: Path, kind: str = "label") -> str:
     text = read_text_file(path, kind, LARGEST_LABELS, western=True)
-    return text if "\n" in text else text.replace("\r", "\n")
+    text = text if "\n" in text else text.replace("\r", "\n")
+    if not text.startswith("#!MLF!#"):
+        return text
+    names = MASTER.findall(text)
+    if len(names) != 1:
+        held = f"is a master label file of {len(names)} recordings: {', '.join(map(shorten, names[:NAMED_TIERS]))}"
+        raise InputError(f"{path}: {held}; required the labels of one; write a .lab beside each recording")
+    return re.sub(r"^\.[ \t\r]*$", "", MASTER.sub("\n", text), flags=re.MULTILINE)
 
 
 def write_labels(path: Path, units: Timeline[Unit]) -> None:

@@ -522,6 +522,11 @@ def _read_columns(objects: Objects, where: str) -> list[LabelTier] | None:
     columns: dict[str, list[TimedLabel]] = defaultdict(list)
     pieces = 0
     for place, item in objects:
+        names_of_letters = () if "words" in item else ("characters", "charsegments")
+        letters = next((item[name] for name in names_of_letters if name in item), None)
+        if isinstance(letters, list) and letters and all(isinstance(each, dict) for each in letters):
+            lists = ([each.get(name, each.get("char")) for each in letters] for name in ("text", "start", "end"))
+            item = dict(zip(COLUMNS[0][1], lists, strict=True))  # noqa: PLW2901
         for name in ("result", "timestampinfo"):
             item = item[name] if isinstance(item.get(name), dict) else item  # noqa: PLW2901
         owners = {name: item[name] for name in COLUMN_OWNERS if isinstance(item.get(name), dict)}

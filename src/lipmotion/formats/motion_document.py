@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
-from lipmotion.formats.base import MotionFormat, read_members, write_json
+from lipmotion.formats.base import MotionFormat, find_next_at, read_members, write_json
 from lipmotion.formats.steady_rate import TIME_COLUMN, clean_column, convert_times, resample_rows, tabulate_frames
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
 from lipmotion.printable import is_line
@@ -298,13 +298,11 @@ def read_frames(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 def _decode_documents(text: str) -> Iterator[Any]:
     """Yield the documents of a text: one, or several one after the other."""
-    at = 0
+    at = find_next_at(text, 0)
     while at < len(text):
-        if text[at].isspace() or text[at] == ",":
-            at += 1
-        else:
-            value, at = _DECODER.raw_decode(text, at)
-            yield value
+        value, at = _DECODER.raw_decode(text, at)
+        yield value
+        at = find_next_at(text, at)
 
 
 def _find_objects(value: Any, deepest: int) -> Iterator[dict[str, Any]]:

@@ -99,6 +99,10 @@ def resample_evenly(time_s: Array, rows: Array) -> tuple[Array, float]:
             f"{len(time_s)} rows in {passed_s[-1]:.1f} s at {hertz:g} rows a second: most of the time there are none; "
             "cut the take where it has gaps"
         )
+    missing = np.maximum(np.rint(steps * hertz) - 1, 0)
+    if missing.any():
+        spans = _name_spans([(passed_s[start], passed_s[stop]) for start, stop in find_runs(missing > 0)])
+        LOG.warning("%d rows are missing, of %g a second, at %s: straight lines between", missing.sum(), hertz, spans)
     grid_s = np.arange(frames) / hertz
     return np.stack([np.interp(grid_s, passed_s, column) for column in rows.T], axis=1), round(hertz, 6)
 
@@ -155,14 +159,10 @@ def resample_rows(
     if not seen.all():
         if not seen.any():
             raise InputError("0 rows with values of all curves, required two or more")
-        spans = [
-            f"{time_s[start] - time_s[0]:.2f}–{time_s[stop - 1] - time_s[0]:.2f} s" for start, stop in find_runs(~seen)
-        ]
-        more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
-        LOG.warning(
-            "%d of %d rows have no face or lack numbers, at %s%s: straight lines between, at rest before and after",
-            *(int((~seen).sum()), len(seen), ", ".join(spans[:4]), more),
-        )
+        passed_s = time_s - time_s[0]
+        spans = _name_spans([(passed_s[start], passed_s[stop - 1]) for start, stop in find_runs(~seen)])
+        what = "rows have no face or lack numbers, at %s: straight lines between, at rest before and after"
+        LOG.warning(f"%d of %d {what}", int((~seen).sum()), len(seen), spans)
         for column in range(values.shape[1]):
             values[:, column] = np.interp(time_s, time_s[seen], values[seen, column])
         first, last = np.flatnonzero(seen)[[0, -1]]
@@ -170,6 +170,11 @@ def resample_rows(
         values[np.ix_((np.arange(len(seen)) < first) | (np.arange(len(seen)) > last), weights)] = 0.0
     rows, rate_hz = resample_evenly(time_s, np.concatenate([values, seen[:, None]], axis=1))
     return Motion(rows[:, :-1], rate_hz, tuple(channels)), rows[:, -1] > 0.5
+
+
+def _name_spans(spans: Sequence[tuple[float, float]]) -> str:
+    more = f" and {len(spans) - 4} more" if len(spans) > 4 else ""
+    return ", ".join(f"{start_s:.2f}–{end_s:.2f} s" for start_s, end_s in spans[:4]) + more
 
 
 def _channel(name: str, unit: str) -> Channel:

@@ -1,5 +1,5 @@
 """Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``, lyrics
-(``.lrc``), and what Whisper's programs print."""
+(``.lrc``), SubViewer, MicroDVD, MPL2 and TMPlayer (``.sub``, ``.txt``), and what Whisper's programs print."""
 
 from __future__ import annotations
 
@@ -27,11 +27,22 @@ CUE = re.compile(
 )
 """The times of a subtitle."""
 FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
-NO_ARROW = re.compile(rf"^\s{{0,20}}{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$", re.MULTILINE)
-"""A line of two times without an arrow that is known; times of day, as 5:30, do not count."""
+NO_ARROW = re.compile(
+    rf"^\s{{0,20}}(?:{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$|FRAMES[^\w\n]{{1,12}}FRAMES)".replace(
+        "FRAMES", r"\d\d(?:[:;]\d\d){3}"
+    ),
+    re.MULTILINE,
+)
+"""A line of two times without an arrow that is known, or that begins with two timecodes; times of day do not count."""
 TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
-SBV = re.compile(rf"\A{TIME}\s?,\s?{TIME}\s*?$", re.MULTILINE)
-"""The times of YouTube's own format, ``0:00:01.000,0:00:02.500``."""
+SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2}:\d\d[.,]\d{1,6})"), re.MULTILINE)
+"""The times of YouTube's own format and of SubViewer, ``0:00:01.000,0:00:02.500``."""
+COUNTED = re.compile(
+    r"^([{\[])(\d{1,7})[}\]][{\[](\d{0,7})[}\]][ \t/]*(.*)$|^(\d{1,2}:\d\d:\d\d)[:=](?!\d)", re.MULTILINE
+)
+"""The start of lines of MicroDVD (``{25}{63}Hello``, frames), MPL2 (``[10][25]``, tenths), TMPlayer (``00:00:01:``)."""
+RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.MULTILINE)
+"""The first line of MicroDVD's, its frames a second: ``{1}{1}23.976``."""
 WORD_TIME = re.compile(rf"<{TIME}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
 NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")
@@ -63,7 +74,8 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 def is_subtitles(text: str) -> bool:
     """Return whether a text is a file of subtitles or lyrics."""
-    return text.startswith("WEBVTT") or any(form.search(text) for form in (SUBSTATION, CUE, SBV, LYRICS))
+    forms = (SUBSTATION, CUE, SBV, LYRICS)
+    return text.startswith("WEBVTT") or COUNTED.match(text) is not None or any(form.search(text) for form in forms)
 
 
 def parse_subtitles(text: str, where: str) -> LabelTier:
@@ -71,12 +83,29 @@ def parse_subtitles(text: str, where: str) -> LabelTier:
 
     Left out are notes and styles, the repetitions of captions that scroll, and what stands before the first cue.
     Numbers of cues may be missing, and blank lines too.
-    Raises InputError: times that are damaged or end before they start, with their line; too many cues or words.
+    Raises InputError: times that are damaged or end before they start, with their line; too many cues or words; frames
+    of an unknown rate.
     """
+    text = _convert_counts(text, where) if COUNTED.match(text) else text
     read = _read_lyrics if LYRICS.search(text) else _read_cues
     cues = list((_read_dialogue if read is _read_cues and SUBSTATION.search(text) else read)(text, where))
     labels = (replace(cue, parts=_split_words(cue)) for cue in _drop_repetitions(cues))
     return LabelTier("subtitles", tuple(labels), LINES)
+
+
+def _convert_counts(text: str, where: str) -> str:
+    """Return lines that begin with counts of frames or tenths of a second with times instead, as those of lyrics."""
+    stated = RATE.match(text)
+    if text[0] == "{" and not stated:
+        found = "is MicroDVD, whose times are in frames, and says no rate"
+        raise InputError(f"{where}: {found}; required: frames a second in the first line, as {{1}}{{1}}25.000")
+
+    def time_line(line: re.Match[str]) -> str:
+        per_s = float(stated[1].replace(",", ".")) if stated and line[1] == "{" else 10.0
+        edges = [line[5]] if line[5] else [clock(int(edge) / per_s, ".") for edge in line.group(2, 3) if edge]
+        return f"[{' -> '.join(edges)}]" + (line[4] or "").replace("|", " ")
+
+    return COUNTED.sub(time_line, RATE.sub("", text, count=1) if stated else text)
 
 
 def strip_markup(text: str) -> str:
@@ -222,20 +251,16 @@ def clock(seconds: float, mark: str) -> str:
     return f"{minutes // 60:02d}:{minutes % 60:02d}:{rest // 1000:02d}{mark}{rest % 1000:03d}"
 
 
-def write_subrip(path: Path, units: Timeline[Unit]) -> None:
-    """Write the words in time, or the phones where the name ends with ``.phones.srt``, one a cue; silence has none.
+def write_subtitles(path: Path, units: Timeline[Unit]) -> None:
+    """Write the words in time as SubRip or WebVTT, or the phones where the name ends with ``.phones.srt``, one a cue.
 
-    After a failure there is no partial file. Raises ExportError: the file cannot be written.
+    Silence has no cue. After a failure there is no partial file. Raises ExportError: the file cannot be written.
     """
-    cues = enumerate(list_shown_labels(path, units), 1)
-    lines = [f"{number}\n{clock(a, ',')} --> {clock(b, ',')}\n{text}\n\n" for number, (a, b, text) in cues]
+    cues = list_shown_labels(path, units)
+    if path.suffix.lower() == ".srt":
+        lines = [f"{n}\n{clock(a, ',')} --> {clock(b, ',')}\n{text}\n\n" for n, (a, b, text) in enumerate(cues, 1)]
+    else:
+        shown = (f"\n{clock(a, '.')} --> {clock(b, '.')}\n{text.translate(_ESCAPES)}\n" for a, b, text in cues)
+        lines = ["WEBVTT\n", *shown]
     with atomic_file(path) as temporary:
         temporary.write_text("".join(lines), encoding="utf-8", newline="\n")
-
-
-def write_webvtt(path: Path, units: Timeline[Unit]) -> None:
-    """Write the same as WebVTT; phones where the name ends with ``.phones.vtt``."""
-    cues = list_shown_labels(path, units)
-    lines = [f"{clock(a, '.')} --> {clock(b, '.')}\n{text.translate(_ESCAPES)}\n" for a, b, text in cues]
-    with atomic_file(path) as temporary:
-        temporary.write_text("\n".join(["WEBVTT\n", *lines]), encoding="utf-8", newline="\n")

@@ -82,7 +82,7 @@ _TIMECODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.,])(\d{1,9}(
 def check_table(motion: Motion) -> None:
     """Raise ExportError if a channel's name would break the header."""
     for name in motion.names:
-        if set(name) & set(',;"') or not name.isprintable():
+        if set(name) & set(',;"') or not name.isprintable() or name != name.strip():
             raise ExportError(f"the channel name {shorten(name)!r} does not fit in a table; write .json or .npz")
     if len(",".join([TIME, *motion.names])) >= LONGEST_LINE:
         raise ExportError(f"the channel names do not fit in a line of {LONGEST_LINE} letters; write .json or .npz")
@@ -105,21 +105,16 @@ def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     ``read_curve_table`` says.
     Raises InputError: not a table of numbers with a header, or times that are not even.
     """
-    try:
-        with open_table(path) as table:
-            if table.names[0] != TIME or len(table.names) < 2:
-                return read_curve_motion(path)
-            columns, numbers = len(table.names), array("d")
-            for line, fields in table.rows:
-                if len(fields) != columns:
-                    raise ValueError(f"line {line} has {len(fields)} fields, required {columns} numbers in each")
-                numbers.extend(parse_numbers(fields, line))
-            values = np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
-            channels = tuple(Channel(name, WEIGHT if to_arkit(name) else EYE_DISTANCE) for name in table.names[1:])
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
+    with open_table(path) as table:
+        if table.names[0] != TIME or len(table.names) < 2:
+            return read_curve_motion(path)
+        columns, numbers = len(table.names), array("d")
+        for line, fields in table.rows:
+            if len(fields) != columns:
+                raise ValueError(f"line {line} has {len(fields)} fields, required {columns} numbers in each")
+            numbers.extend(parse_numbers(fields, line))
+        values = np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
+        channels = tuple(Channel(name, WEIGHT if to_arkit(name) else EYE_DISTANCE) for name in table.names[1:])
     time_s = values[:, 0]
     if len(time_s) < 2:
         raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
@@ -168,7 +163,7 @@ def is_live_link_file(path: Path) -> bool:
     """Return whether a file is such a table; a file that cannot be read is none."""
     try:
         with open_table(path) as table:
-            return is_live_link(table.plain_names)
+            return is_live_link(table.names)
     except (OSError, ValueError):
         return False
 
@@ -194,30 +189,23 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     times that are not even, ``resample_rows`` says.
     Raises InputError: not such a table, a field that is no number, times that go back, or gaps without end.
     """
-    try:
-        with open_table(path) as table:
-            names = table.plain_names
-            keys = list(map(clean_column, names))
-            timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
-            used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
-            if timed is None or not 0 < len(used) <= MAX_CURVES:
-                raise ValueError(
-                    f"the first line is {shorten(','.join(names))!r}, required 'time_s,opening,...', or curves "
-                    "beside a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
-                )
-            times, names, values = _read_rows(
-                table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None
+    with open_table(path) as table:
+        names = table.names
+        keys = list(map(clean_column, names))
+        timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
+        used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
+        if timed is None or not 0 < len(used) <= MAX_CURVES:
+            raise ValueError(
+                f"the first line is {shorten(','.join(names))!r}, required 'time_s,opening,...', or curves "
+                "beside a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
             )
-            coded = bool(re.search("[:;]", times[0][1]))
-            if coded:
-                time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
-            else:
-                time_s = convert_times(np.array([parse_numbers([text], line)[0] for line, text in times]), keys[timed])
-            return resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
-    except (ValueError, OverflowError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
+        times, names, values = _read_rows(table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None)
+        coded = bool(re.search("[:;]", times[0][1]))
+        if coded:
+            time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
+        else:
+            time_s = convert_times(np.array([parse_numbers([text], line)[0] for line, text in times]), keys[timed])
+        return resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
 
 
 def _read_rows(
@@ -229,8 +217,6 @@ def _read_rows(
     numbers = array("d")
     columns = len(names)
     for line, fields in rows:
-        while len(fields) > columns and not fields[-1].strip():
-            fields.pop()
         times.append((line, fields[timed].strip() if timed < len(fields) else ""))
         curves = [fields[column] for column in used if column < len(fields)]
         if not any(map(str.strip, curves)) or (

@@ -1,4 +1,4 @@
-"""Labels in time, one a line: of HTK, Audacity and TIMIT, NIST's CTM and STM, tables with a header, texts of LRS."""
+"""Labels in time, one a line: of HTK, Audacity, TIMIT, ESPS, NIST's CTM and STM, tables with a header, texts of LRS."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from lipmotion.formats.label_tiers import (
     require_time,
     to_phone,
 )
+from lipmotion.units.spoken_text import SpokenAs, classify_label
 
 SHORTEST_TICKS = 10_000
 """Whole numbers below a millisecond are not taken as ticks at sight: "20 30 people" is a sentence."""
@@ -35,9 +36,12 @@ LONG_SPAN = 45
 """Whole numbers in order that are further apart than this are no seconds."""
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
 WHOLE = re.compile(r"(\d+)[\s,;]\s*(\d+)[\s,;]\s*(\S+)(?:\s.*)?")
-STARTS = re.compile(r"(\d+)\s+([^\d\s]\S*)")
+POINTS = re.compile(r"(\d+|\d*\.\d+)\s+(?:-?\d{1,3}\s+)?([^\d\s;]\S*)\s*(?:;.*)?")
+"""A start or an end alone, perhaps a colour, a label: of HTK in ticks; of ESPS, Festival and people in seconds."""
+ESPS = re.compile(r"\A(?:[^\n]*\n){0,20}?#[ \t]*\n(?=\s*[\d.]+\s)")
+"""The header of ESPS and Festival, whose lines say where labels end."""
 SECONDS = re.compile(r"([-+]?\d*\.\d+)\s+([-+]?\d*\.\d+)(?:\s+(.*))?|([-+]?\d+,\d+)\t([-+]?\d+,\d+)(?:\t(.*))?")
-CTM = re.compile(rf"(\S+)\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?")
+CTM = re.compile(rf"(\S+)\s+(?!\d*\.\d)(\S+)\s+({NUMBER})\s+({NUMBER})\s+(\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?")
 """Recording, channel, start and duration in seconds, word, confidence."""
 STM = re.compile(rf"(\S+)\s+\S+\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(?:<[^<>]*>\s*)?(.*)")
 """Recording, channel, speaker, start and end in seconds, kind, words."""
@@ -47,21 +51,26 @@ LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")
 """The first line of a text of LRS: what is said."""
 LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
 COLUMNS = {
-    "start": {"begin", "start", "starttime", "starts", "tmin", "onset", "startframe", "framestart"},
+    "start": {"begin", "begintime", "start", "starttime", "starts", "tmin", "onset", "startframe", "framestart"},
     "end": {"end", "endtime", "ends", "stop", "tmax", "offset", "endframe", "frameend"},
     "duration": {"duration", "dur"},
-    "text": {"label", "text", "word", "phone", "transcript", "transcription", "utterance"},
+    "text": {"label", "text", "word", "phone", "transcript", "transcription", "utterance", "annotation"},
     "kind": {"type", "tier", "tiername"},
     "speaker": {"speaker", "speakerid", "participant"},
 }
 """Names of columns of tables: of the Montreal Forced Aligner, of Praat, of people."""
-UNIT_END = re.compile(r"(?:[\s_]+|[\s_]*[(\[])(?:m?s|m?secs?|(?:milli)?seconds?)[)\]]?$")
+UNIT_END = re.compile(
+    r"(?:[\s_]+(?:-\s)?|[\s_]*[(\[])(?:hh:mm:ss(?:[:.]\w+)?|(?:ss\.)?m?s(?:ecs?)?|(?:milli)?seconds?)[)\]]?$"
+)
 """A unit at the end of a name, which how long words last tells, too: ``start_ms``, ``Start (s)``."""
+ELAN_TIME = r"(?:\t[\d:]+[.,]\d+)"
 HEADLESS = (
+    (re.compile(rf"[^\t]+\t[^\t]*{ELAN_TIME}{{3}}\t[^\t]*"), "tier\tparticipant\tstart\tend\tduration\ttext"),
+    (re.compile(rf"[^\t]+\t[^\t]*{ELAN_TIME}{{6}}\t[^\t]*"), "tier\tparticipant\t\tstart\t\tend\t\tduration\ttext"),
     (re.compile(r"[^,]*,\d*\.\d+,\d*\.\d+,.*"), "name,start,end,text"),
     (re.compile(r"\d*\.\d+,\d*\.\d+,.*"), "start,end,text"),
 )
-"""The first line of tables without a header, and theirs: of aeneas, of people."""
+"""The first line of tables without a header, and theirs: of ELAN, of aeneas, of people."""
 TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
 LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
 """Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
@@ -72,8 +81,12 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
 
     HTK's lines are ``start end label`` in 100 ns (further columns are ignored), or ``start label``, where each label
     ends where the next one starts; Audacity's are ``start end label`` in seconds; TIMIT's in samples at 16 kHz.
-    Raises InputError: a later line is of another form, or has a time that is none, with its number.
+    One time a line is that of the end under the header of ESPS, or where the first label is silence and ends after 0.
+    Raises InputError: a later line is of another form, or has a time that is none, with its number; or one time a line
+    of which it is not clear whether labels start or end there.
     """
+    if header := ESPS.match(text):
+        return _read_points("\n" * header[0].count("\n") + text[header.end() :], where, ends=True)
     first = next((line for _, line in _lines(text)), "")
     if RTTM.match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
@@ -106,13 +119,26 @@ def _read_wholes(text: str, first: str, where: str) -> list[LabelTier] | None:
 
 
 def _read_starts(text: str, first: str, where: str) -> list[LabelTier] | None:
-    """Return labels that each last to the next one, in ticks."""
-    lines = [line for _, line in islice(_lines(text), MAX_LABELS + 1)] if STARTS.fullmatch(first) else []
-    last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None
-    if last is None or float(last[1]) < SHORTEST_TICKS:
+    """Return labels that each last to the next one, or from the one before, in ticks or seconds."""
+    point, lines = POINTS.fullmatch(first), [line for _, line in islice(_lines(text), MAX_LABELS + 1)]
+    last = POINTS.fullmatch(lines[-1]) if point and len(lines) > 1 else None
+    if point is None or last is None:
         return None
-    rows = list(_match_lines(text, STARTS, "start label", where))
-    edges_s = [require_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows] + [math.inf]
+    late, in_seconds = float(point[1]) > 0, "." in point[1]
+    if not (all(map(POINTS.fullmatch, lines)) if in_seconds else float(last[1]) >= SHORTEST_TICKS):
+        return None
+    if in_seconds and late and classify_label(point[2]) is not SpokenAs.SILENCE:
+        found = f"has one time a line, {point[1]} in the first"
+        raise InputError(f"{where}: {found}, which may be its start or its end; required: start end label in each")
+    return _read_points(text, where, ends=in_seconds and late)
+
+
+def _read_points(text: str, where: str, *, ends: bool) -> list[LabelTier]:
+    """Return the labels of lines with one time: their ends, else their starts."""
+    rows = list(_match_lines(text, POINTS, "end label" if ends else "start label", where))
+    per_s = 1 if any("." in time for _, (time, _) in rows) else TICKS_PER_S
+    times_s = [require_time(time, f"line {number}", where) / per_s for number, (time, _) in rows]
+    edges_s = [0.0, *times_s] if ends else [*times_s, math.inf]
     pairs = zip(edges_s, edges_s[1:], rows, strict=False)
     return [LabelTier("labels", tuple(TimedLabel(a, b, row[1], f"line {number}") for a, b, (number, row) in pairs))]
 

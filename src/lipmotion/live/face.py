@@ -34,6 +34,8 @@ PARTING = np.array([name.startswith(("mouthLowerDown", "mouthUpperUp")) for name
 """Which weights of the mouth part the lips: where these are closed, they are 0."""
 PRESSING = np.array([name.startswith("mouthPress") for name in ARKIT_MOUTH])
 """Those of lips that are pressed together, as far as they close in speech."""
+CLOSING_GAIN = 1.2
+"""Openings under the table's pose lie so much further from it: what a network expects hardly ever closes."""
 WEIGHT_NAMES = (*ARKIT_MOUTH, *VISEME_CHANNELS)
 
 
@@ -89,8 +91,7 @@ class ModelFace:
         poses = np.concatenate([np.zeros((1, self._space.dimensions)), np.eye(self._space.dimensions)])
         rows, _ = self._space.restore(poses, np.zeros_like(poses))
         self._base, self._basis = rows[0], rows[1:] - rows[0]
-        row = ARTICULATORS.index(OPENING)
-        column = self._closure.column
+        row, column = ARTICULATORS.index(OPENING), self._closure.column
         self._closed = (self._closure.closed - self._prior.centre[column]) / self._prior.matrix[row, column]
         self._opening, self.opening = row, self.names.index(OPENING)
 
@@ -103,13 +104,12 @@ class ModelFace:
 
     def pose(self, articulators: Array, said: Array, closing: float) -> tuple[Array, Array]:
         """Return the values of all channels, and the weights, with the lips closed so far, 0 to 1."""
-        moved = articulators.copy()
+        moved, column = articulators.copy(), self._closure.column
+        moved[self._opening] *= CLOSING_GAIN if moved[self._opening] < 0 else 1
         moved[self._opening] += closing * min(self._closed - moved[self._opening], 0.0)
         reduced = self._prior.centre + articulators @ self._prior.matrix
-        opening = self._prior.centre[self._closure.column] + (
-            moved[self._opening] * self._prior.matrix[self._opening, self._closure.column]
-        )
-        reduced += (opening - reduced[self._closure.column]) * self._closure.follow
+        opening = self._prior.centre[column] + moved[self._opening] * self._prior.matrix[self._opening, column]
+        reduced += (opening - reduced[column]) * self._closure.follow
         values = self._base + reduced @ self._basis
         values[self._bounded] = np.maximum(values[self._bounded], 0)
         arkit = np.clip(np.concatenate([[1.0], moved, said]) @ live_network().curves, 0, 1)

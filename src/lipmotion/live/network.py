@@ -28,8 +28,6 @@ from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS
 
 TAPS, BLOCK = 16, 160
 """Zero crossings of the resampling filter on either side; and samples that are resampled at a time, 10 ms."""
-
-
 LARGEST_SAMPLE = 1e6
 """Samples beyond this are no sound, also where full scale is not 1."""
 

@@ -46,31 +46,31 @@ def from_field(field: str) -> str:
 
 @dataclass(frozen=True)
 class TextTable:
-    """The names of the columns, and the rows below: each with the number of its last line, and its fields."""
+    """The names of the columns, and the rows below: each with the number of its last line, and its fields.
+
+    Names have no blanks around them; empty names and fields at the end, as of lines that end in a comma, are left out.
+    """
 
     names: list[str]
     rows: Iterator[tuple[int, list[str]]]
-
-    @property
-    def plain_names(self) -> list[str]:
-        """The names without blanks around them, and without empty ones at the end."""
-        names = [name.strip() for name in self.names]
-        while len(names) > 1 and not names[-1]:
-            names.pop()
-        return names
 
 
 @contextmanager
 def open_table(path: Path) -> Iterator[TextTable]:
     """Open a table to read its rows one by one; rows without any field are left out.
 
-    Raises OSError: it cannot be opened. Raises ValueError, also from the rows: it is no table of text.
+    Raises OSError: it cannot be opened. Raises InputError, also for a ValueError inside: it is no table of numbers.
     """
     with path.open("rb") as file:
         start = file.read(2)
     encoding = "utf-16" if start in {b"\xff\xfe", b"\xfe\xff"} else "utf-16-le" if start[1:] == b"\0" else "utf-8-sig"
     with path.open(encoding=encoding, newline="") as text:
-        yield read_table(iter(partial(text.readline, LONGEST_LINE), ""))
+        try:
+            yield read_table(iter(partial(text.readline, LONGEST_LINE), ""))
+        except (ValueError, OverflowError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
 
 
 def read_table(lines: Iterable[str]) -> TextTable:
@@ -84,13 +84,16 @@ def read_table(lines: Iterable[str]) -> TextTable:
             break
         above += 1
     bare = re.sub(r'"[^"]*"', "", head)
-    rows = _rows(csv.reader(chain([head], lines), delimiter=separator or max(SEPARATORS, key=bare.count)), above)
-    return TextTable(next(rows, (0, [""]))[1], rows)
+    reader = csv.reader(chain([head], lines), delimiter=separator or max(SEPARATORS, key=bare.count))
+    names = [name.strip() for name in next(_rows(reader, above, 1), (0, [""]))[1]]
+    return TextTable(names, _rows(reader, above, len(names)))
 
 
-def _rows(reader: Iterator[list[str]], above: int) -> Iterator[tuple[int, list[str]]]:
+def _rows(reader: Iterator[list[str]], above: int, columns: int) -> Iterator[tuple[int, list[str]]]:
     try:
         for row in reader:
+            while len(row) > columns and not row[-1].strip():
+                row.pop()
             if any(map(str.strip, row)):
                 yield above + reader.line_num, row  # type: ignore[attr-defined]
     except csv.Error as error:
@@ -123,6 +126,6 @@ def read_whole_table(path: Path, kind: str, largest: int, required: Sequence[str
     text = read_text_file(path, kind, largest)
     try:
         table = read_table(io.StringIO(text, newline=""))
-        return table.plain_names, list(table.rows)
+        return table.names, list(table.rows)
     except ValueError as error:
         raise InputError(f"{path}: no readable table ({shorten(str(error))}); required {','.join(required)}") from error

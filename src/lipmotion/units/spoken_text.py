@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from enum import Enum
+from itertools import pairwise
 
 from lipmotion.errors import InputError
 from lipmotion.types import TimedWord
@@ -14,6 +15,7 @@ from lipmotion.types.values import parse_clock
 from lipmotion.units.text_normalisation import tokenise
 from lipmotion.units.written_forms import list_readings
 
+LINE_BREAK = re.compile(r"<(?:br|p|div)\b[^<>]{0,40}>", re.IGNORECASE)
 TAG = re.compile(r"</?[a-zA-Z!|][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
 """Tags of SubRip (``<i>``), WebVTT (``<v Anna>``, ``<00:01.5>``), SubStation (``{\\an8}``), ``<unk>``, ``<|en|>``."""
 SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\((?!\d{3}\))[^()]{0,200}\)|（[^（）]{0,200}）")
@@ -35,6 +37,10 @@ STAMP = re.compile(
     r"[(\[]?((?:\d{1,2}:)?\d{1,2}:\d\d)(?:[.,]\d{1,3})?[)\]]?(?:[ \t]*$|[ \t]*[-–—|]?[ \t]+(?=\S))"
 )
 """The time of a line of a transcript of the web, before it or above it: ``0:12 Hello``, ``Anna  0:12``."""
+NUMBER = re.compile(
+    r"(?m)^[ \t]*[(#]?(?:(\d{1,4})(?:[.):]+(?=\s|[^\W\d_])|[ \t]+[-–—](?=\s)|\t)|([a-z])\)(?=\s))[ \t]*(?=\S)"
+)
+"""The number of a line of a list, which is not said: ``1. Hello``, ``2) Hello``, ``a) Hello``."""
 CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]{1,20}\))?)[ \t]*\n(?=[^\n]*[a-z])")
 """A name in capitals above what that person says, as in screenplays."""
 DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
@@ -94,7 +100,8 @@ def classify_label(label: str) -> SpokenAs:
 
 def extract_spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
     """Return what is spoken of a text; ``names``: of speakers, as ``find_speaker_names`` returns them."""
-    text = DEED.sub(" ", SOUND.sub(" ", TAG.sub("", html.unescape(TAG.sub("", text)))))
+    text = LINE_BREAK.sub("\n", html.unescape(TAG.sub("", LINE_BREAK.sub("\n", text))))
+    text = DEED.sub(" ", SOUND.sub(" ", TAG.sub("", text)))
     return remove_speakers(SYMBOLS.sub(" ", text), names)[0]
 
 
@@ -103,7 +110,8 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
 
     Names are those in capitals and with a remark (``ANNA:``, ``Anna (V.O.):``, ``[Anna]:``), ``Speaker 1:``, those in
     ``names``, two lines or more in capitals above what is said, as in screenplays, and what stands before the quotes of
-    a game's script, if all lines are such; also times before lines, if they rise from the first minute on.
+    a game's script, if all lines are such; also times before lines, if they rise from the first minute on, and numbers
+    before lines, if they count on.
     """
     left_out: list[str] = []
 
@@ -121,6 +129,9 @@ def remove_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str
     times_s = [parse_clock(stamp[1]) for stamp in STAMP.finditer(text)]
     if times_s[:1] == [0] or (len(times_s) > 1 and times_s[0] < 60 and times_s == sorted({*times_s})):
         text = STAMP.sub(leave_out, text)
+    numbers = [int(line[1] or ord(line[2])) for line in NUMBER.finditer(text)]
+    if len(numbers) > 1 and all(b in (a + 1, 1, ord("a")) for a, b in pairwise(numbers)):
+        text = NUMBER.sub(leave_out, text)
     cues = list(CUE.finditer(text))
     if len(cues) > 1 or any("(" in cue[1] for cue in cues):
         text = DIRECTION.sub(leave_out, CUE.sub(leave_out, text))

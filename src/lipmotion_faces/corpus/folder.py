@@ -15,7 +15,7 @@ from lipmotion.errors import CorpusError, InputError, shorten
 from lipmotion.extensions import Registry
 from lipmotion.formats.label_files import find_labels, read_labels
 from lipmotion.formats.tables import is_live_link_file
-from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, check_listable, read_text_file
+from lipmotion.storage.sources import AUDIO_SUFFIXES, VIDEO_SUFFIXES, check_listable
 from lipmotion.units import split_words
 from lipmotion_faces.corpus.source_recordings import (
     LISTS,
@@ -239,8 +239,6 @@ CREMA_SENTENCES = {
     "WSI": "we'll stop in a couple of minutes",
 }
 """What is said in CREMA-D, by the code in a file's name. Source: Cao et al. 2014, Table 1."""
-SCRIPT_LINE = re.compile(r"\d+\s+\d+\s+(\S+)")
-"""A line of the word times of TCD-TIMIT: start, end, word."""
 
 
 @dataclass(frozen=True)
@@ -309,15 +307,7 @@ def _read_grid_words(directory: Path, video: Path, groups: Mapping[str, str]) ->
 def _read_tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words | None:
     """Return the words of the script beside a video, ``SA1.txt`` of ``sa1.mp4``: lines of start, end, word; or text."""
     scripts = (video.with_name(f"{stem}.txt") for stem in (video.stem, video.stem.upper()))
-    script = next((path for path in scripts if path.is_file()), None)
-    if script is None:
-        return None
-    lines = read_text_file(script, "script", LARGEST_ALIGNMENT_BYTES).splitlines()
-    rows = [SCRIPT_LINE.fullmatch(line.strip()) for line in lines if line.strip()]
-    if not rows or not all(rows):
-        return read_labels(script).words
-    spoken = [row[1] for row in rows if row and row[1].lower() not in SILENCES]
-    return split_words(" ".join(spoken))
+    return next((read_labels(path).words for path in scripts if path.is_file()), None)
 
 
 def _research(attribution: str) -> dict[str, str]:

@@ -186,7 +186,7 @@ def read_offsets(path: Path) -> dict[str, float]:
     """
     try:
         table = read_table(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES), newline=""))
-        if table.plain_names != COLUMNS:
+        if table.names != COLUMNS:
             raise InputError(f"{path}: the columns are {shorten(','.join(table.names))!r}, required name,offset_ms")
         offsets: dict[str, float] = {}
         for number, row in table.rows:

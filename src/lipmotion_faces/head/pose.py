@@ -17,7 +17,7 @@ SPREAD_RISE = 0.52
 """Part of the gap by which the upper lip rises where lips are spread: the upper teeth show more than the lower ones."""
 BITTEN_GAP = (0.12, 0.2)
 """Teeth stay together up to the first gap, and part until the second one."""
-BITTEN = (0.8, 0.95)
+BITTEN = (0.72, 0.94)
 """Teeth are apart up to the first value of ``teeth``, and together from the second on."""
 OO_ROUNDNESS = 0.8
 """How round the lips of oo are; those of w are a ring."""

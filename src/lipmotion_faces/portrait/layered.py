@@ -116,7 +116,7 @@ def _reduce(mask: NDArray[np.bool_]) -> Pixels:
 
 OWN_SIZE = 640
 MOUTH = "mouth-"
-CHANGE_COST = 0.01
+CHANGE_COST = 0.007
 """A change of mouths costs as much as this squared distance at 2 frames a second, so that none is shown too shortly."""
 EYE_DISTANCE = 0.285
 """Height of the picture that stands for an eye distance, in which heads and eyes are moved."""
@@ -141,16 +141,18 @@ MOUTHS = {
     "mbp": _Key(0.0),
     "fv": _Key(0.05, tuck=1.0),
     "th": _Key(0.1, tongue=1.0),
-    "l": _Key(0.12, tongue=0.6, teeth=0.55),
-    "s": _Key(0.1, 1.02, tongue=0.3, protrusion=0.15, teeth=1.0),
-    "ee": _Key(0.11, 1.08, tongue=0.2, teeth=0.79),
-    "eh": _Key(0.14, 1.03, teeth=0.57),
-    "aa": _Key(0.22, 0.97, teeth=0.4, oval=0.9),
-    "oh": _Key(0.12, 0.91, tongue=0.05, protrusion=0.55, teeth=0.25),
-    "oo": _Key(0.05, 0.83, protrusion=1.0, teeth=0.0),
+    "l": _Key(0.14, 0.98, tongue=0.6),
+    "s": _Key(0.11, 1.02, tongue=0.2, teeth=0.88),
+    "sh": _Key(0.11, 0.94, tongue=0.25, protrusion=0.5, teeth=0.9),
+    "ee": _Key(0.12, 1.08, teeth=0.72),
+    "eh": _Key(0.2, 1.05, teeth=0.57, oval=0.2),
+    "aa": _Key(0.2, 0.97, teeth=0.45, oval=0.85),
+    "r": _Key(0.1, 0.91, tongue=0.2, protrusion=0.5, teeth=0.4),
+    "oh": _Key(0.16, 0.89, protrusion=0.75, teeth=0.15),
+    "oo": _Key(0.07, 0.86, protrusion=1.0, teeth=0.0),
 }
 """The mouths that a drawing may have, as layers ``mouth-NAME``; ``rest`` is required, what is missing is replaced."""
-_WEIGHTS = np.array([5.0, 1.5, 1.0, 0.9, 1.0, 1.2, 0.6])
+_WEIGHTS = np.array([5.0, 1.5, 1.0, 0.9, 1.0, 1.8, 1.0])
 
 
 @final
@@ -247,11 +249,10 @@ class _LayeredPicture:
     def draw(self, pose: FacePose, mouth: str) -> NDArray[np.uint8]:
         """Return one frame [shape=(H, W, 3 or 4)]."""
         unit = EYE_DISTANCE * self._size
-        eyes = "closed" if pose.lids > 0.5 else "open"
         mood = pose.mood
         brows = pose.brows + MOOD_RISE * (mood.inner + mood.outer) / 2 - MOOD_FALL * mood.lowered
         look = (round(pose.gaze_x * unit), round(pose.gaze_y * unit), round(brows * unit))
-        head = self._heads(mouth, eyes, *look)
+        head = self._heads(mouth, "closed" if pose.lids > 0.5 else "open", *look)
         moved = np.empty(head.shape, np.uint8)
         place = pose.head
         columns, rows = np.arange(0, self._width + 16, 16.0), np.arange(0, self._size + 16, 16.0)

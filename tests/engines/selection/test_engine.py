@@ -17,6 +17,7 @@ from lipmotion.types import Generation, Span, Timeline, Unit, silent_monitor
 SPOKEN = speech(timeline(("b", "aa", "t", "iy", "m", "uw")))
 
 
+@pytest.mark.long
 def test_every_unit_says_which_recording_it_comes_from(model, engine) -> None:
     names = {each.name for each in examples()}
     result = engine.generate(model, SPOKEN)

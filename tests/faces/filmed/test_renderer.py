@@ -113,6 +113,7 @@ def test_outside_nothing_changes_and_a_frame_without_a_face_stays_as_it_is(
         assert outside.mean() > 0.5
 
 
+@pytest.mark.long
 def test_a_silent_mouth_onto_a_talking_one(
     appearance: Appearance, backgrounds: list[Background], spoken: Motion
 ) -> None:
@@ -131,6 +132,7 @@ def test_a_silent_mouth_onto_a_talking_one(
     assert dark[0].sum(axis=(1, 2)).max() < 60
 
 
+@pytest.mark.long
 def test_a_talking_mouth_onto_a_silent_one(appearance: Appearance, spoken: Motion) -> None:
     backgrounds = footage_of(closed(spoken))
     made = stitched(appearance, appearance.predict_codes(spoken), backgrounds)

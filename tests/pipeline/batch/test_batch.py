@@ -93,6 +93,7 @@ def test_what_was_done_is_kept(sounds, settings, tmp_path):
     assert batch(sounds, out, replace(settings, outputs=Outputs(kinds=("csv",))), jobs=1).done == 3
 
 
+@pytest.mark.long
 def test_marks_hold_in_every_run(sounds, settings, tmp_path, caplog):
     out, marks = tmp_path / "out", tmp_path / "marked.csv"
     batch(sounds, out, settings, jobs=1)

@@ -402,6 +402,7 @@ def test_each_collection_has_its_own(corpus):
     assert "ms), by 4 clips together, which corpus sync removes; 4 tell alone: median +1" in found.list_lines()[1]
 
 
+@pytest.mark.long
 def test_sync_moves_what_is_late_once(corpus):
     before = {name: corpus.utterance(name).audio.samples.copy() for name in corpus.names()}
     late_s = measure_offsets(corpus).collections["there"].late_s

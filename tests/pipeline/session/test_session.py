@@ -172,6 +172,7 @@ def test_a_thousand_edits_of_phones_are_no_deeper_than_one(session):
     assert phones(session.units(edits))[1:4] == ["p", "b", "m"]
 
 
+@pytest.mark.long
 def test_pins_hold_for_channels_and_curves(session, tmp_path):
     edits = edited(
         "pin opening 0.1 at 0.8", "pin jawOpen 0.7 at 1.2", "gain 1.5 from 0.5 to 1.0", "pin viseme_PP 0.4 at 1.5"

@@ -77,6 +77,7 @@ def test_temporary_files_go_even_if_not_all_is_read(faked: Path) -> None:
     assert list(faked.iterdir()) == []
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("faked")
 def test_voices_by_name() -> None:
     for name, full_name in (

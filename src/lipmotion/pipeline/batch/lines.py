@@ -182,7 +182,7 @@ def _read_table(source: Path, text: str) -> list[dict[str, str]] | None:
     """Return the rows of a table with a header by the names of its columns; None: it has no header."""
     try:
         table = read_table(io.StringIO(text, newline=""))
-        header = [name.lower() for name in table.plain_names]
+        header = [name.lower() for name in table.names]
         file = next((name for name in header if name in FILE_COLUMNS), None)
         if file is None:
             return None

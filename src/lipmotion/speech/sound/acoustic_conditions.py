@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.loudness import find_loud_frames
+from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP, WINDOW, check_samples, log_energy, spectrum
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.voice_activity import find_passages
@@ -19,6 +20,9 @@ from lipmotion.types import Audio, ConditionSpectrum
 NOISE_KINDS = ("white", "babble")
 MIN_TALKERS = 2
 """One other talker is an interruption, not a babble."""
+HEARD, FAINT, SPEECH_LIKE_DB = 1.01, 1e-4, 0.6
+"""Energies beside that of a voice: of all channels, above which it is not alone, and of the faintest that may speak.
+Swings of the level in decibels, times the share of frames whose pitch moves: speech has 1 to 5, music up to 0.5."""
 SILENT_RMS = 1e-6
 """Speech of a lower root mean square, full scale 1, is silence."""
 HUM, MIN_HUM, MAX_HUM_BLOCKS, HUM_RATIO, HUM_WIDTH = 16_000, 32_000, 200, 8.0, 61
@@ -52,6 +56,29 @@ def remove_hum(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     within, before = (sound[HUM // 2 : -HUM // 2] for sound in (clean, samples))  # hum may be left at the ends
     voiced = np.square(within).sum() > HUM_REST * np.square(before).sum() and find_passages(log_energy(within))
     return clean if voiced else samples
+
+
+def speaks_alone(channel: int, energies: Sequence[float], decode: Callable[[int], NDArray[np.float32]]) -> bool:
+    """Return whether one of several channels is speech, and the others, which are heard beside it, are music or noise.
+
+    decode : returns the sound of a channel at 16 kHz [shape=(N,)]
+    """
+    if sum(energies) < HEARD * energies[channel]:
+        return False
+    others = [n for n, energy in enumerate(energies) if n != channel and energy > FAINT * energies[channel]]
+    return _is_like_speech(decode(channel)) and not any(_is_like_speech(decode(number)) for number in others)
+
+
+def _is_like_speech(samples: NDArray[np.float32]) -> bool:
+    """Speech swings with its syllables (after Scheirer & Slaney 1997), and its pitch moves. Whispers do not count."""
+    from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+    level_db = 10 / np.log(10) * log_energy(samples).astype(float)
+    level_db = np.maximum(level_db, level_db.max() - 40)
+    heard = maximum_filter1d(level_db, 101) > level_db.max() - 25  # pauses of a voice that says little do not count
+    swing_db = np.sqrt(np.square(uniform_filter1d(level_db, 5) - uniform_filter1d(level_db, 50))[heard].mean())
+    steps = np.abs(np.diff(log_f0(Audio(samples, SPEECH_RATE_HZ))))[: len(heard) - 1]
+    return bool(swing_db * ((steps > 0.004) & (steps < 0.1))[heard[: len(steps)]].mean() > SPEECH_LIKE_DB)
 
 
 def mix_noise(audio: Audio, kind: str, snr_db: float, talkers: Sequence[Audio] = (), seed: int = 0) -> Audio:

@@ -38,15 +38,12 @@ PIECE_BYTES = 1 << 20
 class DecodedAudio:
     """A decoded sound track.
 
-    samples     : float32 array [shape=(N,)]
-    rate_hz     : sampling rate
-    energies    : energy of every channel
-    mean_energy : energy of the channels' mean
-    packets     : how many packets the track has
-    damaged     : how many of them could not be decoded
-    silence_s   : duration of the silence that fills holes
-    stated_s    : duration that the container states, 0 if none
-    missing_s   : what a WAVE file's header states beyond its end
+    samples, rate_hz : float32 array [shape=(N,)], and its sampling rate
+    energies, centre : of every channel; the number of the centre of three and more, None where there is none
+    mean_energy      : energy of the channels' mean
+    packets, damaged : how many packets the track has, and how many of them could not be decoded
+    silence_s        : duration of the silence that fills holes
+    missing_s        : what the container states beyond the end
     """
 
     samples: NDArray[np.float32]
@@ -56,8 +53,8 @@ class DecodedAudio:
     packets: int
     damaged: int
     silence_s: float
-    stated_s: float
-    missing_s: float = 0.0
+    missing_s: float
+    centre: int | None
 
 
 def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
@@ -111,7 +108,12 @@ class _TrackDecoder:
         while self._pieces:  # each is freed when it is copied
             first, piece = self._pieces.pop()
             samples[first : first + len(piece) // 4] = np.frombuffer(piece, np.float32)
+        names = [channel.name for channel in self._stream.layout.channels]
+        third = 2 if len(names) in (6, 8) and "NONE" in names else None  # names that a WAVE file may lack
         is_stated = self._stream.duration or not self._container.streams.video
+        stated_s = read_duration(self._container, self._stream) if is_stated else 0.0
+        missing_s = stated_s - len(samples) / self._rate_hz
+        rounded_s = ROUNDED_S if self._container.format.name in STATED else (1 - CUT_SHORT_SHARE) * stated_s
         return DecodedAudio(
             samples=samples[self._cut :],
             rate_hz=self._rate_hz,
@@ -120,7 +122,8 @@ class _TrackDecoder:
             packets=self._packets,
             damaged=self._damaged,
             silence_s=self._silence_s,
-            stated_s=read_duration(self._container, self._stream) if is_stated else 0.0,
+            missing_s=missing_s if missing_s > rounded_s else 0.0,
+            centre=names.index("FC") if "FC" in names[1:] else third,
         )
 
     def _frames(self) -> Iterator[Any]:
@@ -217,14 +220,15 @@ LOG = logging.getLogger("lipmotion")
 SPEECH_RATE_HZ = 16_000
 SHORTEST_S = 0.1
 """Shorter recordings hold no sentence; the features need 25 ms around every frame."""
-CANCELLED_SHARE = 0.05
-"""The mean of the channels must have this share of the loudest channel's energy; else they cancel one another."""
+CANCELLED_SHARE = 0.2
+"""The mean of channels must have this share of the energy of unlike ones; else they cancel one another."""
 USABLE_SHARE = 0.5
 """A damaged recording is refused when less than this share of its sound can be decoded."""
 MIN_HOLES_S = 0.005
 """Holes that last less together are not mentioned: they would be rounded to 0."""
-CUT_SHORT_SHARE = 0.9
-"""A recording is called cut short when it holds less than this share of the duration that it states."""
+CUT_SHORT_SHARE, ROUNDED_S, STATED = 0.9, 0.5, ("flac", "aiff", "mov,mp4,m4a,3gp,3g2,mj2")
+"""A recording is called cut short when it holds less than this share of the duration that it states, or so many seconds
+less in a format that states it exactly."""
 PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
 """Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
 UNKNOWN_SIZES = range(0x7FFF0000, 0x1_0000_0000)
@@ -245,28 +249,30 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     time stamps or a length that it cannot have, or samples not finite.
     """
     check_source(path, "recording")
-    sound = _decoded(path, rate_hz, None)
-    if sound.mean_energy < CANCELLED_SHARE * max(sound.energies, default=0.0):
+    sound, level = _decoded(path, rate_hz, None), logging.WARNING if warn else logging.DEBUG
+    count = len(sound.energies)
+    if sound.mean_energy < CANCELLED_SHARE * sum(sound.energies) / max(count, 1) ** 2:
         loudest = int(np.argmax(sound.energies))
-        LOG.log(
-            logging.WARNING if warn else logging.DEBUG,
-            "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used",
-            path,
-            len(sound.energies),
-            loudest + 1,
-        )
+        what = "%s: its %d channels cancel one another in their mean; channel %d, the loudest, is used"
+        LOG.log(level, what, path, count, loudest + 1)
         sound = _decoded(path, rate_hz, loudest)
-    level = logging.WARNING if warn else logging.DEBUG
-    held_s = len(sound.samples) / sound.rate_hz - sound.silence_s
+    elif sound.centre is not None:
+        from lipmotion.speech.sound.acoustic_conditions import speaks_alone
+
+        if speaks_alone(sound.centre, sound.energies, lambda number: _decoded(path, SPEECH_RATE_HZ, number).samples):
+            what = "%s: of its %d channels, channel %d alone holds speech and is used; mix them down if others speak"
+            LOG.log(level, what, path, count, sound.centre + 1)
+            sound = _decoded(path, rate_hz, sound.centre)
+    held_s = len(sound.samples) / sound.rate_hz
     found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
         raise InputError(f"{path}: damaged: {found}; required: at least half of them; export the recording again")
     if sound.damaged or sound.silence_s >= SHORTEST_S:
         holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= MIN_HOLES_S else ""
         LOG.log(level, "%s: damaged: %s%s", path, found, holes)
-    stated_s = sound.stated_s if held_s < CUT_SHORT_SHARE * sound.stated_s else held_s + sound.missing_s
-    if (missing_s := stated_s - held_s) >= SHORTEST_S:
-        found = f"it states {stated_s:.1f} s of sound and holds {held_s:.1f} s; the last {missing_s:.1f} s are missing"
+    if sound.missing_s >= SHORTEST_S:
+        stated = f"it states {held_s + sound.missing_s:.1f} s of sound and holds {held_s:.1f} s"
+        found = f"{stated}; the last {sound.missing_s:.1f} s are missing"
         LOG.log(level, "%s: cut short: %s", path, found)
     audio = Audio(sound.samples, rate_hz)
     if audio.duration_s < SHORTEST_S:
@@ -290,7 +296,10 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
             check_sound_format(str(path), stream.rate or 0, stream.channels or 0)
             if len(container.streams.audio) > 1:
                 LOG.warning("%s: the first of %d sound tracks is used", path, len(container.streams.audio))
-            return replace(_TrackDecoder(container, rate_hz, channel).decoded(), missing_s=missing_s)
+            if container.format.name == "ogg" and path.read_bytes().rpartition(b"OggS")[2][1:2] < b"\4":  # RFC 3533
+                LOG.warning("%s: its last page is not marked as the last: it may be cut short", path)
+            sound = _TrackDecoder(container, rate_hz, channel).decoded()
+            return replace(sound, missing_s=max(missing_s, sound.missing_s))
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
