@@ -163,6 +163,8 @@ OPPOSED = (
 """Shapes of which each on one side undoes those on the other: a face has one side at a time."""
 OPPOSITION = 1.5
 """Cost of the product of two such weights, where that of the square of either is 1: both at once are never best."""
+NEARNESS = 0.1
+"""Weight of the distance from the weights that are separated."""
 PAIR_WEIGHT = 0.15
 """Weight of the difference between the left and the right of a pair."""
 VISEME_WEIGHT = 0.2
@@ -257,11 +259,12 @@ def fit_bounded_curves(
     square = matrix @ matrix.T + costs.ridge * np.eye(len(matrix))
     if ties is not None:
         square = square + ties.T @ ties
-    scale = np.sqrt(np.diag(square))
+    own = np.sqrt(np.diag(square))
+    if opposed is not None:
+        square = np.where(opposed, OPPOSITION * np.outer(own, own), square)
+    scale = np.sqrt(own**2 + 6 * costs.smooth)  # with that of the second differences: shapes that move little converge
     wanted = targets @ matrix.T / scale
     square = square / np.outer(scale, scale)
-    if opposed is not None:
-        square = np.where(opposed, OPPOSITION, square)
     smooth, low, high = costs.smooth / scale**2, limits[0] * scale, limits[1] * scale
     step = 1 / (np.linalg.norm(square, 2) + LARGEST_EIGENVALUE * float(smooth.max(initial=0.0)))
     decay, pull, stiffness = np.eye(len(square)) - step * square, step * wanted, step * smooth
@@ -342,6 +345,7 @@ def separate_opposed(
     sides = [[np.isin(known, names) for names in pair] for pair in OPPOSED]
     opposed = np.any([np.outer(one, other) | np.outer(other, one) for one, other in sides], axis=0)
     costs = replace(costs, ridge=costs.ridge / 10)  # they are as small as they should be
+    matrix = np.concatenate([matrix, NEARNESS * np.eye(len(matrix))], axis=1)
     return fit_bounded_curves(matrix, weights @ matrix, costs, ties, limits, weights, opposed)
 
 
