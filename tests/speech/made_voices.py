@@ -25,7 +25,7 @@ def vowels(source: Samples, tilt: float = 0.0) -> Samples:
     return source / np.abs(source).max() * (0.15 + np.sin(np.pi * time_s / 0.25) ** 2)
 
 
-def pulses(duration_s: float, hertz: float) -> Samples:
+def pulses(duration_s: float, hertz: float | Samples) -> Samples:
     phase = np.arange(round(duration_s * RATE_HZ)) * hertz / RATE_HZ
     return np.diff(np.floor(phase), prepend=0.0)
 

@@ -508,9 +508,7 @@ def _read_columns(objects: Objects, where: str) -> list[LabelTier] | None:
     columns: dict[str, list[TimedLabel]] = defaultdict(list)
     pieces = 0
     for place, item in objects:
-        letters = next(
-            (item[name] for name in ("characters", "charsegments") if "words" not in item and name in item), []
-        )
+        letters = None if "words" in item else item.get("characters", item.get("charsegments"))
         if isinstance(letters, list) and letters and all(isinstance(each, dict) for each in letters):
             lists = ([each.get(name, each.get("char")) for each in letters] for name in ("text", "start", "end"))
             item = dict(zip(COLUMNS[0][1], lists, strict=True))  # noqa: PLW2901
