@@ -280,9 +280,7 @@ def test_motion_of_cues_that_are_written(form: str, motion_sheet: CueSheet, tmp_
 @pytest.mark.parametrize(
     ("times", "scale"), [("0 1000 2000", 1000.0), ("0 80 160", 1000.0), ("0 2 4", 1.0), ("0 99.5 199", 1.0)]
 )
-def test_milliseconds_are_read_as_such(
-    times: str, scale: float, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_milliseconds_are_read(times: str, scale: float, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     starts = times.split()
     (tmp_path / "a.tsv").write_text("".join(map("{}\t{}\n".format, starts, "XDX")))
     found = read_cues(tmp_path / "a.tsv").cues

@@ -62,9 +62,7 @@ def test_godot_parser_reads_the_same_tracks(tmp_path: Path) -> None:
         ("a.anim", "headYaw", "no blendshapes, or no two frames"),
     ],
 )
-def test_names_that_no_path_has_and_motion_without_weights_are_refused(
-    tmp_path: Path, name: str, channel: str, message: str
-) -> None:
+def test_names_and_motion_without_weights_are_refused(tmp_path: Path, name: str, channel: str, message: str) -> None:
     with pytest.raises(ExportError, match=message):
         written(tmp_path / name, generation(channel))
 

@@ -522,8 +522,7 @@ def _read_columns(objects: Objects, where: str) -> list[LabelTier] | None:
     columns: dict[str, list[TimedLabel]] = defaultdict(list)
     pieces = 0
     for place, item in objects:
-        names_of_letters = () if "words" in item else ("characters", "charsegments")
-        letters = next((item[name] for name in names_of_letters if name in item), None)
+        letters = None if "words" in item else item.get("characters", item.get("charsegments"))
         if isinstance(letters, list) and letters and all(isinstance(each, dict) for each in letters):
             lists = ([each.get(name, each.get("char")) for each in letters] for name in ("text", "start", "end"))
             item = dict(zip(COLUMNS[0][1], lists, strict=True))  # noqa: PLW2901

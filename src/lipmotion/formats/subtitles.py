@@ -27,12 +27,8 @@ CUE = re.compile(
 )
 """The times of a subtitle."""
 FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
-NO_ARROW = re.compile(
-    rf"^\s{{0,20}}(?:{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$|FRAMES[^\w\n]{{1,12}}FRAMES)".replace(
-        "FRAMES", r"\d\d(?:[:;]\d\d){3}"
-    ),
-    re.MULTILINE,
-)
+FRAMES, GAP = r"\d\d(?:[:;]\d\d){3}", r"[^\w\n]{1,12}"
+NO_ARROW = re.compile(rf"^\s{{0,20}}(?:{FULL_CLOCK}{GAP}{FULL_CLOCK}\s{{0,20}}$|{FRAMES}{GAP}{FRAMES})", re.MULTILINE)
 """A line of two times without an arrow that is known, or that begins with two timecodes; times of day do not count."""
 TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
 SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2}:\d\d[.,]\d{1,6})"), re.MULTILINE)
@@ -41,8 +37,7 @@ COUNTED = re.compile(
     r"^([{\[])(\d{1,7})[}\]][{\[](\d{0,7})[}\]][ \t/]*(.*)$|^(\d{1,2}:\d\d:\d\d)[:=](?!\d)", re.MULTILINE
 )
 """The start of lines of MicroDVD (``{25}{63}Hello``, frames), MPL2 (``[10][25]``, tenths), TMPlayer (``00:00:01:``)."""
-RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.MULTILINE)
-"""The first line of MicroDVD's, its frames a second: ``{1}{1}23.976``."""
+RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.MULTILINE)  # MicroDVD's: {1}{1}23.976
 WORD_TIME = re.compile(rf"<{TIME}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
 NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")

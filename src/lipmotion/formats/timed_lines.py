@@ -82,8 +82,7 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     HTK's lines are ``start end label`` in 100 ns (further columns are ignored), or ``start label``, where each label
     ends where the next one starts; Audacity's are ``start end label`` in seconds; TIMIT's in samples at 16 kHz.
     One time a line is that of the end under the header of ESPS, or where the first label is silence and ends after 0.
-    Raises InputError: a later line is of another form, or has a time that is none, with its number; or one time a line
-    of which it is not clear whether labels start or end there.
+    Raises InputError: a later line is of another form, or has a time that is none; or starts that may be ends.
     """
     if header := ESPS.match(text):
         return _read_points("\n" * header[0].count("\n") + text[header.end() :], where, ends=True)
