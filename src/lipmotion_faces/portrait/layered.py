@@ -206,8 +206,7 @@ def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float)
     values = np.array([[p.gap, p.width, p.tongue, p.tuck, p.protrusion, p.teeth, p.oval] for p in poses])
     distance = np.square((values[:, None] - keys) * _WEIGHTS).sum(axis=2)
     shut = np.array([name in ("rest", "mbp") for name in mouths])
-    closed = (values[:, 0] < 1e-6) & (values[:, 3] < 0.3)
-    distance[np.ix_(closed, ~shut)] += 100.0
+    distance[np.ix_((values[:, 0] < 1e-6) & (values[:, 3] < 0.3), ~shut)] += 100.0  # closed lips show a closed mouth
     change = CHANGE_COST * fps / 2
     cost, back = distance[0].copy(), np.zeros(distance.shape, int)
     for n in range(1, len(distance)):
@@ -260,7 +259,8 @@ class _LayeredPicture:
         y = np.broadcast_to((rows - 0.4 * self._size - PIVOT_Y * unit)[:, None], x.shape)
         right, down = (place.x + 0.5 * place.yaw) * unit, (place.y + 0.5 * place.pitch) * unit
         warp_bytes(head, place.roll * y - right, -place.roll * x - down, 16, moved)
-        picture = lay_over(self._front, lay_over(moved * np.array([1, 1, 1, 1 / 255], np.float32), self._behind))
+        layer = moved.astype(np.float32) * np.array([1, 1, 1, 1 / 255], np.float32)
+        picture = lay_over(self._front, lay_over(layer, self._behind))
         if self._opaque:
             return np.asarray(picture[..., :3] + 0.5, np.uint8)
         alpha = picture[..., 3:]
