@@ -206,8 +206,7 @@ def choose_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float)
     values = np.array([[p.gap, p.width, p.tongue, p.tuck, p.protrusion, p.teeth, p.oval] for p in poses])
     distance = np.square((values[:, None] - keys) * _WEIGHTS).sum(axis=2)
     shut = np.array([name in ("rest", "mbp") for name in mouths])
-    closed = (values[:, 0] < 1e-6) & (values[:, 3] < 0.3)
-    distance[np.ix_(closed, ~shut)] += 100.0
+    distance[np.ix_((values[:, 0] < 1e-6) & (values[:, 3] < 0.3), ~shut)] += 100.0  # closed lips show a closed mouth
     change = CHANGE_COST * fps / 2
     cost, back = distance[0].copy(), np.zeros(distance.shape, int)
     for n in range(1, len(distance)):
