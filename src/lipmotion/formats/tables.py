@@ -82,7 +82,7 @@ _TIMECODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.,])(\d{1,9}(
 def check_table(motion: Motion) -> None:
     """Raise ExportError if a channel's name would break the header."""
     for name in motion.names:
-        if set(name) & set(',;"') or not name.isprintable() or name != name.strip():
+        if not name or set(name) & set(',;"') or not name.isprintable() or name != name.strip():
             raise ExportError(f"the channel name {shorten(name)!r} does not fit in a table; write .json or .npz")
     if len(",".join([TIME, *motion.names])) >= LONGEST_LINE:
         raise ExportError(f"the channel names do not fit in a line of {LONGEST_LINE} letters; write .json or .npz")
