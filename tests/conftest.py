@@ -173,8 +173,8 @@ def heard_once() -> Iterator[None]:
         return answer
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Hama, "log_posteriors", remember(Hama.log_posteriors))
-        patched.setattr(encoding, "encode_window", remember(encoding.encode_window))
+        for owner, name in ((Hama, "log_posteriors"), (encoding, "encode_window")):
+            patched.setattr(owner, name, remember(getattr(owner, name)))
         yield
 
 

@@ -30,7 +30,7 @@ from lipmotion_faces.characters import binding, character_files, gltf_scene, lip
 from lipmotion_faces.characters.character_files import JAW_OPEN, load_character, with_jaw
 from lipmotion_faces.characters.gltf_document import find_bone_kind
 from lipmotion_faces.characters.gltf_scene import merge_bones
-from lipmotion_faces.head.pose import list_head_poses
+from lipmotion_faces.head import list_head_poses
 from meshes.gltf import POSITIONS, document, glb, with_skin
 from meshes.heads import SEAM, VISEMES, head, lip_points, renamed, shaped, write_glb, write_obj
 from meshes.speech import motion, units

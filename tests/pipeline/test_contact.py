@@ -23,7 +23,7 @@ from lipmotion.pipeline.outputs.motion_files import fit_to_format, resample_curv
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion.types.delivery import MOODS
 from lipmotion.units import mark_closing_phones
-from lipmotion_faces.head.pose import list_head_poses
+from lipmotion_faces.head import list_head_poses
 from lipmotion_faces.head.stage import build_head_mesh, make_figure, measure_lip_gap
 from lipmotion_faces.outputs.scenes import build_character_scene, build_head_scene
 from lipmotion_faces.portrait.layered import MOUTHS, choose_mouths

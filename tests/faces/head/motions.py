@@ -3,8 +3,8 @@
 import numpy as np
 
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion_faces.head import CharacterPose
 from lipmotion_faces.head.figure import Figure
-from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import RINGS, VISIBLE_RINGS
 from lipmotion_faces.head.stage import Stage
 

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from faces.head.motions import mouth_rows
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion_faces.base import rotate_head
+from lipmotion_faces.head import CharacterPose
 from lipmotion_faces.head.inside import LOWER_EDGE, make_lower_teeth, make_upper_teeth, measure_drop
 from lipmotion_faces.head.part import MOUTH_Y, to_head
-from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import (
     ARCH,
     COLUMNS,

@@ -8,7 +8,7 @@ from lipmotion import Staging, errors, types
 from lipmotion.articulation.mouth import ROUND_GAPS
 from lipmotion.units import LIP_CLOSING
 from lipmotion_faces import head, make_face, testing
-from lipmotion_faces.head.pose import CharacterPose, list_head_poses
+from lipmotion_faces.head import CharacterPose, list_head_poses
 from lipmotion_faces.head.stage import Stage, make_camera
 from lipmotion_faces.rendering.drawn_surface import Camera
 
