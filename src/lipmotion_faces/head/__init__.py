@@ -17,7 +17,7 @@ from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, Face, Picture, Staging
 from lipmotion_faces.head.pose import CharacterPose, list_head_poses
 
-__all__ = ["Head"]
+__all__ = ["CharacterPose", "Head", "list_head_poses"]
 
 SIZE = (1280, 720)
 """Width and height of pictures whose size is not given."""
