@@ -158,16 +158,15 @@ def released(request: pytest.FixtureRequest) -> Iterator[None]:
 def heard_once() -> Iterator[None]:
     """The networks hear the same toy sentences in a hundred trainings: what they said is known by the sound."""
 
-    def remember(hear: Callable[[Any, Any], NDArray[np.float32]]) -> Callable[[Any, Any], NDArray[np.float32]]:
+    def remember(hear: Callable[..., NDArray[np.float32]]) -> Callable[..., NDArray[np.float32]]:
         said: dict[bytes, NDArray[np.float32]] = {}
 
-        def answer(one: Any, other: Any) -> NDArray[np.float32]:
-            sound = one if isinstance(one, np.ndarray) else other
-            key = sha256(sound.tobytes()).digest()
+        def answer(*given: Any) -> NDArray[np.float32]:
+            key = next(sha256(each.tobytes()).digest() for each in given if isinstance(each, np.ndarray))
             if key not in said:
-                said[key] = hear(one, other)
-                if len(said) > MAX_HEARD:
-                    del said[next(iter(said))]
+                said[key] = hear(*given)
+            for oldest in list(said)[:-MAX_HEARD]:
+                del said[oldest]
             return said[key].copy()
 
         return answer
@@ -204,13 +203,12 @@ def made_once(name: str, engine: str = "trajectory", visual: str = "geometry", *
     """Return fixtures: the file of a model that one worker trains for all, and the model in it."""
 
     def file(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Path:
-        folder = tmp_path_factory.getbasetemp()
-        folder = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / name
-        path = folder / "toy.lipmotion"
+        base = tmp_path_factory.getbasetemp()
+        path = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / name / "toy.lipmotion"
         with ExitStack() as held:
             while not path.exists():
                 with suppress(ExportError):  # another worker makes it
-                    held.enter_context(lock_folder(folder))
+                    held.enter_context(lock_folder(path.parent))
                     break
                 time.sleep(0.1)
             if not path.exists():
@@ -220,8 +218,8 @@ def made_once(name: str, engine: str = "trajectory", visual: str = "geometry", *
     def content(request: pytest.FixtureRequest) -> Model:
         return load_model(request.getfixturevalue(f"{name}_file"))
 
-    fixture = partial(pytest.fixture, scope="session")
-    return fixture(name=f"{name}_file")(file), fixture(name=name)(content)
+    session = partial(pytest.fixture, scope="session")
+    return session(name=f"{name}_file")(file), session(name=name)(content)
 
 
 toy_model_file, toy_model = made_once("toy_model", articulation=False)
