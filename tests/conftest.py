@@ -40,8 +40,7 @@ from testing.toy_face import toy_face
 if sys.platform == "linux":  # arrays of a megabyte go back to the system when they are freed: a worker runs 2,000 tests
     ctypes.CDLL(None).mallopt(-3, 1 << 20)  # M_MMAP_THRESHOLD
 SENTENCES = 12
-MAX_HEARD = 40
-"""Sounds whose posteriors are kept: those of the toy, and some before."""
+MAX_HEARD = 40  # sounds of which is kept what networks said: those of the toy, and some before
 FIXED, EXPLORE = "fixed", "explore"
 """Profiles of Hypothesis: the same examples every time; and ``--hypothesis-profile=explore``: others, and more."""
 MORE_SENTENCES = 10
