@@ -3,7 +3,8 @@
     python scripts/processor_time.py [--limit LOOPS] COMMAND ...
 
 The unit is a Python loop of ten million additions on this machine, the mean of one before and one after the command.
-Processor seconds are user and system time of the command and of all children that it waited for. The exit code is the
+Processor seconds are user and system time of the command and of all children that it waited for; of these, the largest
+process is printed, too (MB on Linux). The exit code is the
 command's; more than the limit is said, and is no failure: how fast two cores are beside each other varies by the hour.
 """
 
@@ -45,7 +46,7 @@ def main() -> int:
     limit = "" if options.limit is None else f", {'within' if loops <= options.limit else 'OVER'} {options.limit:,}"
     print(
         f"{' '.join(options.command)}: {used_s:,.0f} processor seconds, {loops:,.0f} loops of {unit_s:.2f} s{limit}; "
-        f"{wall_s:,.0f} s by the clock",
+        f"{wall_s:,.0f} s by the clock; largest process {used.ru_maxrss / 1024:,.0f} MB",
         flush=True,
     )
     return process.returncode if process.returncode >= 0 else 128 - process.returncode
