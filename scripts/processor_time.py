@@ -4,8 +4,8 @@
 
 The unit is a Python loop of ten million additions on this machine, the mean of one before and one after the command.
 Processor seconds are user and system time of the command and of all children that it waited for; of these, the largest
-process is printed, too (MB on Linux). The exit code is the
-command's; more than the limit is said, and is no failure: how fast two cores are beside each other varies by the hour.
+process is printed, too (MB on Linux). The exit code is the command's; more than the limit is said, and is no failure:
+how fast two cores are beside each other varies by the hour.
 """
 
 from __future__ import annotations
