@@ -43,7 +43,8 @@ FACES = {
 """Faces, how closely what is measured follows opening, width and outer, and the largest ratio of the openings."""
 
 
-@pytest.mark.parametrize("name", ["woman", pytest.param("head", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("name", FACES)
 def test_the_drawn_motion_is_tracked_as_large_as_given_and_closed_where_closed(name):
     face, correlations, largest = FACES[name]
     motion, units = syllables()

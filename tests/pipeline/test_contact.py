@@ -192,14 +192,13 @@ def _check(generation: Generation, fps: float, readers: dict[str, Reader]) -> No
         assert not len(wrong), f"{name} at {fps:g} Hz: other contact in frames {wrong.tolist()}"
 
 
-AT_RATES = list(zip(KINDS, RATES * 2, strict=False))
-BRIEF = ("generated", "imported at 25 Hz")
-"""The first kind goes through all that is ours, the second through what others give; the rest takes longer."""
+AT_RATES = [  # the first of the quick ones goes through all that is ours, the second through what others give
+    pytest.param(kind, fps, marks=[] if kind in ("generated", "imported at 25 Hz") else pytest.mark.long)
+    for kind, fps in zip(KINDS, RATES * 2, strict=False)
+]
 
 
-@pytest.mark.parametrize(
-    ("kind", "fps"), [pytest.param(*each, marks=[] if each[0] in BRIEF else pytest.mark.long) for each in AT_RATES]
-)
+@pytest.mark.parametrize(("kind", "fps"), AT_RATES)
 def test_lips_touch_in_the_same_frames_everywhere(kind, fps, characters):
     readers = _readers(characters)
     if kind != "edited by hand":

@@ -107,6 +107,7 @@ def test_the_eyes_of_the_turned_head_become_level():
     np.testing.assert_allclose(along[:2], [np.cos(angle), np.sin(angle)], atol=0.03)
 
 
+@pytest.mark.long
 def test_a_large_face_is_averaged_not_skipped_and_outside_of_the_image_its_edge_repeats():
     image = np.random.default_rng(0).integers(0, 256, (2000, 2000, 3)).astype(np.uint8)
     crop = head_pose.crop_mouth(

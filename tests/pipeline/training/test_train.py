@@ -409,6 +409,7 @@ def test_originals_are_the_projected_pictures(models, toy_corpus):
         assert np.array_equal(clip.original[:, 3:], model.eigenlips.project(images))
 
 
+@pytest.mark.long
 def test_motion_files_hold_the_coefficients_and_videos_need_an_opening(models, toy_speech, tmp_path):
     result = animate(toy_speech, model=models["eigenlips"])
     write(result, [tmp_path / "a.npz", tmp_path / "a.json"])
