@@ -207,9 +207,9 @@ def draw(frames: Callable[[list[Any]], list[Any]], *, checked: bool = True) -> F
     return Changed()
 
 
-def test_faces_that_keep_the_contract():
-    check_face(Bars())
-    check_face(make_face("portrait"))
+@pytest.mark.parametrize("face", [Bars(), pytest.param(make_face("portrait"), marks=pytest.mark.long)])
+def test_faces_that_keep_the_contract(face):
+    check_face(face)
 
 
 def test_faces_that_break_it():
