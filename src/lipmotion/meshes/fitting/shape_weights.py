@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +119,6 @@ def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[st
 
 
 Limits = tuple[Array | float, Array | float]
-
 LARGEST_EIGENVALUE = 16.0
 """The largest eigenvalue of the squared second difference."""
 MAX_STEPS, TOLERANCE = 2000, 1e-5
@@ -266,7 +266,7 @@ def fit_bounded_curves(
     wanted = targets @ matrix.T / scale
     square = square / np.outer(scale, scale)
     smooth, low, high = costs.smooth / scale**2, limits[0] * scale, limits[1] * scale
-    step = 1 / (np.linalg.norm(square, 2) + LARGEST_EIGENVALUE * float(smooth.max(initial=0.0)))
+    step = 1 / (np.linalg.norm(square, 2) + LARGEST_EIGENVALUE * smooth.max(initial=0.0))
     decay, pull, stiffness = np.eye(len(square)) - step * square, step * wanted, step * smooth
     current = ahead = np.clip(wanted if initial is None else scale * initial, low, high)
     momentum, seconds = 1.0, np.zeros((len(targets) + 2, len(matrix)))  # its first and last two rows stay 0
@@ -304,8 +304,7 @@ def _weigh_rows(displacements: Array, gap: Array) -> Array:
     weights[template.corner, 0] *= CORNER_WEIGHT
     inner = [template.row(point) for pair in FACING[:3] for point in pair]
     weights[inner, 1] *= 0.5  # the gap says it
-    flat = (displacements * weights).reshape(len(displacements), -1)
-    return np.concatenate([flat, GAP_WEIGHT * gap[:, None]], axis=1)
+    return np.concatenate([(displacements * weights).reshape(len(gap), -1), GAP_WEIGHT * gap[:, None]], axis=1)
 
 
 def _solve_free_weights(
@@ -328,8 +327,7 @@ def _solve_free_weights(
     ties, weights = PAIR_WEIGHT * shapes.pairs(), fixed.copy()
     weights[:, free] += fit_bounded_curves(matrix[free], targets - fixed @ matrix, costs, ties[:, free])
     weights = round_lips(np.clip(weights, 0.0, 1.0), shapes, mouth.protrusion)
-    limits = (fixed, np.where(free, 1.0, fixed))
-    weights = separate_opposed(weights, matrix, shapes.known, costs, limits, ties)
+    weights = separate_opposed(weights, matrix, shapes.known, costs, (fixed, np.where(free, 1.0, fixed)), ties)
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
     return np.clip(weights, 0.0, 1.0)
@@ -342,11 +340,16 @@ def separate_opposed(
 
     weights : 0 to 1 [shape=(T, S)]; known : names of the shapes as ARKit's; others : as of ``fit_bounded_curves``
     """
-    sides = [[np.isin(known, names) for names in pair] for pair in OPPOSED]
-    opposed = np.any([np.outer(one, other) | np.outer(other, one) for one, other in sides], axis=0)
+    pairs = (np.outer(one, other) for one, other in _find_opposed(tuple(known)))
+    opposed = np.any([pair | pair.T for pair in pairs], axis=0)
     costs = replace(costs, ridge=costs.ridge / 10)  # they are as small as they should be
     matrix = np.concatenate([matrix, NEARNESS * np.eye(len(matrix))], axis=1)
     return fit_bounded_curves(matrix, weights @ matrix, costs, ties, limits, weights, opposed)
+
+
+@lru_cache
+def _find_opposed(known: tuple[str, ...]) -> list[list[NDArray[np.bool_]]]:
+    return [[np.isin(known, names) for names in pair] for pair in OPPOSED]
 
 
 def cancel_opposed(weights: Array, known: Sequence[str]) -> Array:
@@ -354,8 +357,8 @@ def cancel_opposed(weights: Array, known: Sequence[str]) -> Array:
     [shape=(S,)]. ``separate_opposed`` keeps the look better, but needs many frames and some time.
     """
     left = weights.copy()
-    for one, other in (tuple(np.isin(known, names) for names in pair) for pair in OPPOSED):
-        strong, weak = weights[one].max(initial=0.0), weights[other].max(initial=0.0)
+    for one, other in _find_opposed(tuple(known)):
+        strong, weak = (weights[each].max(initial=0.0) for each in (one, other))
         left[one] *= max(strong - weak, 0.0) / max(strong, 1e-9)
         left[other] *= max(weak - strong, 0.0) / max(weak, 1e-9)
     return left
@@ -366,9 +369,8 @@ def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
     result, template = weights.copy(), build_mouth()
     right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
     present = {row: full for name, full in ROUNDING.items() if (row := shapes.row(name)) is not None}
-    narrower = sum(
-        full * float(shapes.moved[row, right, 0] - shapes.moved[row, left, 0]) for row, full in present.items()
-    )
+    across = shapes.moved[:, right, 0] - shapes.moved[:, left, 0]
+    narrower = sum(full * float(across[row]) for row, full in present.items())
     share = float(np.clip(NARROWING / narrower, *SHARES)) if narrower > 0 else 1.0
     for row, full in present.items():
         result[:, row] = np.maximum(result[:, row], share * full * protrusion)
@@ -384,8 +386,7 @@ def weigh_moods(mouth: SpokenMouth, shapes: FaceShapes) -> Array | None:
     """
     weights = np.zeros((len(mouth.gap), len(shapes.names)))
     for name, (curve, full) in MOOD_SHAPES.items():
-        row = shapes.row(name)
-        if row is not None:
+        if (row := shapes.row(name)) is not None:
             weights[:, row] = full * getattr(mouth, curve)
     return weights if weights.any() else None
 
@@ -438,8 +439,7 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array, kept: Collection[st
     if jaw is not None and close is not None:  # until the end: the jaw with the lips, and behind closed lips
         weights[:, jaw] -= weights[:, close]
         apart[close] += apart[jaw]
-    still = (np.abs(apart) < MIN_PARTING) | np.isin(shapes.known, list(kept))
-    way = np.where(still, 0.0, apart)
+    way = np.where((np.abs(apart) < MIN_PARTING) | np.isin(shapes.known, list(kept)), 0.0, apart)
     low, high = np.full(len(weights), -1 / MIN_PARTING), np.full(len(weights), 1 / MIN_PARTING)
     for _ in range(60):
         middle = (low + high) / 2
