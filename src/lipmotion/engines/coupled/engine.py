@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import Any, ClassVar, final
@@ -15,13 +15,13 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_from_arrays, coupled_to_arrays
 from lipmotion.engines.coupled.chains.densities import Single, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
-from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream
+from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
 from lipmotion.engines.coupled.conversion.em_conversion import convert, group_index, path_to_means
 from lipmotion.engines.coupled.conversion.mean_regression import weigh_regressions
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
-from lipmotion.engines.coupled.training.alignment import mark_allowed_units
+from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.articulation import Statistics, count_unseen, slice_dynamics
@@ -44,7 +44,6 @@ from lipmotion.types import (
     Speech,
     StateTrace,
     Timeline,
-    Unit,
 )
 from lipmotion.units import VISEME_OF
 
@@ -59,37 +58,29 @@ LINE = 110
 
 def describe(model: CoupledModel) -> str:
     """Return a text with the chains, the streams and the regressions of a model, one a line."""
-    return "\n".join(map(printable, [*_chains(model), *_streams(model), *_regressions(model)]))
-
-
-def _chains(model: CoupledModel) -> Iterator[str]:
-    structure, product = model.chains.structure, model.chains.transitions.product
-    yield f"{structure.kind}: {KINDS[structure.kind]}"
+    chains, structure, product = model.chains, model.chains.structure, model.chains.transitions.product
+    lines = [f"{structure.kind}: {KINDS[structure.kind]}"]
     if len(structure.chains) > 1:
         apart = "any number of states" if structure.limit is None else f"up to {structure.limit} state(s)"
         together = "" if structure.cross_units or structure.limit is None else ", units left together"
-        yield f"  asynchrony: {apart} apart{together}"
-    count = len(product.joint_states) if isinstance(product, Product) else product.chain_states.shape[1]
-    yield f"  joint states: {count}"
+        lines.append(f"  asynchrony: {apart} apart{together}")
+    lines.append(f"  joint states: {product.chain_states.shape[1]}")
     for number, (chain, units) in enumerate(zip(structure.chains, structure.units, strict=True), start=1):
-        yield f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states"
-        yield from (f"  {line}" for line in wrap(" ".join(units), LINE))
-
-
-def _streams(model: CoupledModel) -> Iterator[str]:
-    chains = model.chains
-    for number, name in enumerate(chains.streams):
-        mixtures = chains.groups[group_index(chains, number)].stream_mixtures(number)
-        densities, components, size = mixtures.means.shape
-        chain = chains.structure.chain_of(number) + 1
-        yield f"stream {name}: {size} dimensions on chain {chain}, {densities} densities of {components} Gaussian(s)"
-
-
-def _regressions(model: CoupledModel) -> Iterator[str]:
+        lines.append(f"chain {number}: {chain.name}, {len(units)} units of {structure.states} states")
+        lines += [f"  {line}" for line in wrap(" ".join(units), LINE)]
+    for stream, name in enumerate(chains.streams):
+        densities, components, size = chains.groups[group_index(chains, stream)].stream_mixtures(stream).size
+        lines.append(
+            f"stream {name}: {size} dimensions on chain {structure.chain_of(stream) + 1}, "
+            f"{densities} densities of {components} Gaussian(s)"
+        )
     regressions = model.regression[1] if model.regression is not None else ()
-    for stream, regression in zip(model.visual, regressions, strict=False):
+    for visual, regression in zip(model.visual, regressions, strict=False):
         count, inputs, _ = regression.coefficients.shape
-        yield f"means of {stream.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
+        lines.append(
+            f"means of {visual.name}: {count} regressions on {inputs} inputs, from features and posteriors around"
+        )
+    return "\n".join(map(printable, lines))
 
 
 Array = NDArray[np.float64]
@@ -164,27 +155,21 @@ def sum_lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[S
     return result
 
 
-def infer_units(chains: Chains, posteriors: LatticePosteriors, kept: slice) -> list[ChainPosteriors]:
+def infer_units(chains: Chains, posteriors: LatticePosteriors, frames: slice) -> list[ChainPosteriors]:
     """Return the posteriors of the units of each chain in some frames."""
     structure = chains.structure
     return [
         ChainPosteriors(
             unit_set.name,
             units,
-            posteriors.chains[number][kept].reshape(-1, len(units), structure.states).sum(axis=2),
+            posteriors.chains[number][frames].reshape(-1, len(units), structure.states).sum(axis=2),
             list_leads(chains, number),
-            lead[kept],
+            lead[frames],
         )
         for number, (unit_set, units, lead) in enumerate(
             zip(structure.chains, structure.units, sum_lead_posteriors(chains, posteriors), strict=True)
         )
     ]
-
-
-def join_posteriors(parts: Sequence[ChainPosteriors]) -> ChainPosteriors:
-    """Return the posteriors of one chain in successive parts of an utterance as one."""
-    probability, lead = (np.concatenate([getattr(part, name) for part in parts]) for name in ("probability", "lead"))
-    return replace(parts[0], probability=probability, lead=lead)
 
 
 def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]) -> tuple[NamedProbability, ...]:
@@ -196,7 +181,7 @@ def _rank_by_probability(names: Sequence[str], probability: NDArray[np.floating]
 def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int, stream: int) -> DominantGaussian:
     chains = model.chains
     number = group_index(chains, stream)
-    group, responsibilities = chains.groups[number], inference.emissions.responsibilities[number]
+    group, responsibilities = chains.groups[number], inference.responsibilities[number]
     posterior = inference.posteriors.densities[number][row : row + 1]
     weight = infer_components(posterior, None if responsibilities is None else responsibilities[row : row + 1])[0]
     component, position = np.unravel_index(weight.argmax(), weight.shape)
@@ -329,32 +314,35 @@ class CoupledEngine(Engine[CoupledModel]):
             reliability=np.maximum(speech.confidence, 1 - speech.voice),  # the chains know their own voice better
         )
         states, positions = np.unique(path, return_inverse=True)
+        sets = model.chains.structure.chains
+        names = ("/".join(each.unit(span.label.phone) for each in sets) for span in speech.units)
+        labelled = zip(speech.units, names, strict=True)
+        units = Timeline(tuple(replace(span, label=replace(span.label, unit=name)) for span, name in labelled))
         return Generation(
             motion,
             variance,
-            _with_units(model, speech.units),
+            units,
             StateTrace(tuple(model.chains.transitions.product.name(int(state)) for state in states), positions),
         )
 
     def lattice(self, model: CoupledModel, speech: Speech, wanted: slice) -> Lattice:
         """Return the lattice of some frames: joint states near the phones of a transcript, or all without one."""
-        chains = model.chains
         if not speech.units_decide:
-            return chains.full_lattice
-        frames = len(speech.features.values)
-        allowed = mark_allowed_units(chains.structure, speech.units, frames)[wanted]
-        return chains.lattice(allowed)
+            return model.chains.full_lattice
+        allowed = mark_allowed_units(model.chains.structure, speech.units, len(speech.features.values))
+        return model.chains.lattice(allowed[wanted])
 
     def _statistics(self, model: CoupledModel, speech: Speech, frames: slice) -> tuple[Statistics, NDArray[np.intp]]:
         """Return means and precisions [each shape=(T, 3, Q)], and the most probable joint state of every frame."""
         chains = model.chains
         if self.config.conversion == PATH:
-            observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
-            path, _ = chains.best_path(chains.emission_log_densities(observations, lattice), lattice)
+            observations = speech_observations(speech, model.visual, frames)
+            path, _ = chains.best_path(observations, self.lattice(model, speech, frames))
             return model.frame_statistics([path_to_means(chains, path, s + 1) for s in range(len(model.visual))]), path
         inference = self.infer(model, speech, frames)
         if self.config.conversion != TRAJECTORY:
-            streams = convert(chains, inference.observations, inference.lattice, self.config.em, inference).streams[1:]
+            how = self.config.start, self.config.update, self.config.steps
+            streams, _ = convert(chains, inference.observations, inference.lattice, *how, inference)
             return model.frame_statistics(streams), inference.posteriors.most_probable
         means, precisions = model.motion_statistics(inference)
         share = ENCODING_SHARE * min(2 * count_unseen(speech.voice), 1.0)
@@ -368,11 +356,13 @@ class CoupledEngine(Engine[CoupledModel]):
 
         With ``trajectory`` conversion, each of its steps infers again, with the generated motion as observed motion.
         """
-        observations, lattice = model.speech_observations(speech, frames), self.lattice(model, speech, frames)
+        observations = speech_observations(speech, model.visual, frames)
+        lattice = self.lattice(model, speech, frames)
         inference = model.chains.infer(observations, lattice)
         for _ in range(self.config.steps if self.config.conversion == TRAJECTORY else 0):
             values = solve_mlpg(*model.motion_statistics(inference))[0]
-            inference = model.chains.infer(model.with_motion(observations, values), lattice)
+            seen = observations.with_visual_streams([stream.standardised(values) for stream in model.visual])
+            inference = model.chains.infer(seen, lattice)
         return inference
 
     def explain(self, model: CoupledModel, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:  # noqa: D102
@@ -390,9 +380,16 @@ class CoupledEngine(Engine[CoupledModel]):
         blocks = []
         for inner, outer in split_into_blocks(len(speech.features.values)):
             inference = self.infer(model, speech, outer)
-            kept = slice(inner.start - outer.start, inner.stop - outer.start)
-            blocks.append(infer_units(model.chains, inference.posteriors, kept))
-        return tuple(join_posteriors(parts) for parts in zip(*blocks, strict=True))
+            frames = slice(inner.start - outer.start, inner.stop - outer.start)
+            blocks.append(infer_units(model.chains, inference.posteriors, frames))
+        return tuple(
+            replace(
+                parts[0],
+                probability=np.concatenate([part.probability for part in parts]),
+                lead=np.concatenate([part.lead for part in parts]),
+            )
+            for parts in zip(*blocks, strict=True)
+        )
 
     def describe(self, model: CoupledModel) -> str:  # noqa: D102
         return describe(model)
@@ -402,10 +399,3 @@ class CoupledEngine(Engine[CoupledModel]):
 
     def from_arrays(self, arrays: Arrays) -> CoupledModel:  # noqa: D102
         return coupled_from_arrays(arrays, self.config)
-
-
-def _with_units(model: CoupledModel, units: Timeline[Unit]) -> Timeline[Unit]:
-    chains = model.chains.structure.chains
-    return Timeline(
-        tuple(replace(s, label=replace(s.label, unit="/".join(c.unit(s.label.phone) for c in chains))) for s in units)
-    )

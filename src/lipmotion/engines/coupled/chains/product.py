@@ -63,11 +63,8 @@ class Product:
     @cached_property
     def chain_states(self) -> Index:
         """The state of every chain in each joint state [shape=(C, S)]."""
-        chains = range(len(self.structure.chains))
-        return np.array(
-            [[self.structure.state(joint.units[c], joint.states[c]) for joint in self.joint_states] for c in chains],
-            np.intp,
-        )
+        units, states, _ = (np.array(part, np.intp).T for part in zip(*self.joint_states, strict=True))
+        return units * self.structure.states + states
 
     @cached_property
     def lead(self) -> Index:

@@ -128,10 +128,6 @@ class Structure:
         unit, position = divmod(state, self.states)
         return f"{self.units[chain][unit]}.{position + 1}"
 
-    def state(self, unit: int, state: int) -> int:
-        """Return the number of a state within its chain, from its unit and its number within the unit."""
-        return unit * self.states + state
-
 
 def list_unit_sets(names: str) -> tuple[UnitSet, ...]:
     """Return the unit sets named, or read from files, in a text. Raises InputError: none, or no such set."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single, StreamGroup, infer_components
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Chains, Inference
 from lipmotion.stats.em import run_em
@@ -21,65 +19,51 @@ CONVERGENCE_GAIN = 1e-4
 """EM ends when the log likelihood per frame gains less."""
 
 
-@dataclass(frozen=True)
-class ConversionSettings:
-    """Options of the EM conversion.
-
-    start      : ``soft``: expected means over all paths, given speech alone; ``viterbi``: means along the best path, as
-                 in the paper
-    update     : ``exact``: the maximiser of each M-step; ``printed``: Eq. 9 as it stands
-    most_steps : greatest number of EM steps after the start
-    """
-
-    start: str = SOFT
-    update: str = EXACT
-    most_steps: int = 10
-
-
-@dataclass(frozen=True, eq=False)
-class ConversionResult:
-    """The streams of a conversion, speech first [each shape=(T, D_s)], and the log likelihood per frame by step."""
-
-    streams: tuple[Array, ...]
-    log_likelihood: tuple[float, ...]
-
-
 def convert(
     chains: Chains,
     observations: AudioVisualObservations,
     lattice: Lattice,
-    settings: ConversionSettings,
-    given_speech: Inference | None = None,
-) -> ConversionResult:
+    start: str = SOFT,
+    update: str = EXACT,
+    max_steps: int = 10,
+    speech_inference: Inference | None = None,
+) -> tuple[tuple[Array, ...], tuple[float, ...]]:
     """Return the visual streams that maximise the joint likelihood with speech, near the start.
 
     observations : the first stream is speech; the values of the others are ignored
     lattice      : the joint states that the utterance may be in
-    given_speech : posteriors given speech alone, where they are known; a soft start needs them
-    With ``exact`` updates the joint likelihood never falls; with ``printed`` ones it may.
+    start        : ``soft``: expected means over all paths, given speech alone; ``viterbi``: means along the best path,
+                   as in the paper
+    update       : ``exact``: the maximiser of each M-step; ``printed``: Eq. 9 as it stands
+    max_steps    : greatest number of EM steps after the start
+    speech_inference : posteriors given speech alone, where they are known; a soft start needs them
+    Returns the streams [each shape=(T, D_s)], and the log likelihood per frame by step. With ``exact`` updates the
+    joint likelihood never falls; with ``printed`` ones it may.
     Source: Xie & Liu 2007, Eqs. 3–11, Fig. 6.
     """
-    speech = without_visual_streams(observations)
-    streams = _start(chains, speech, lattice, settings, given_speech)
-    log_likelihoods: tuple[float, ...] = ()
-    if settings.most_steps:
-        result = run_em(
-            streams,
-            lambda streams: chains.infer(_with_visual_streams(speech, streams), lattice),
-            lambda _, inference: _update_streams(chains, inference, settings.update),
-            settings.most_steps,
-            min_gain=CONVERGENCE_GAIN,
-            maximise_converged=False,
-        )
-        streams, log_likelihoods = result.model, result.log_likelihoods
-    return ConversionResult((observations.streams[0].astype(float), *streams), log_likelihoods)
+    speech, visual = observations.without_visual_streams(), range(1, len(chains.streams))
 
+    def update_streams(inference: Inference, update: str) -> tuple[Array, ...]:
+        """The M-step: return the visual streams that the posteriors make most likely."""
+        statistics = (sum_precisions(chains, inference, stream, update) for stream in visual)
+        return tuple(weighted / np.maximum(precision, 1e-300) for precision, weighted in statistics)
 
-def without_visual_streams(observations: AudioVisualObservations) -> AudioVisualObservations:
-    """Return the observations with all streams but speech marked as not observed."""
-    for stream in range(1, len(observations.streams)):
-        observations = observations.without_stream(stream)
-    return observations
+    if start == VITERBI:
+        path, _ = chains.best_path(speech, lattice)
+        streams = tuple(path_to_means(chains, path, stream) for stream in visual)
+    else:
+        streams = update_streams(speech_inference or chains.infer(speech, lattice), EXACT)
+    if not max_steps:
+        return streams, ()
+    result = run_em(
+        streams,
+        lambda streams: chains.infer(speech.with_visual_streams([x.astype(np.float32) for x in streams]), lattice),
+        lambda _, inference: update_streams(inference, update),
+        max_steps,
+        min_gain=CONVERGENCE_GAIN,
+        maximise_converged=False,
+    )
+    return result.model, result.log_likelihoods
 
 
 def group_index(chains: Chains, stream: int) -> int:
@@ -87,62 +71,19 @@ def group_index(chains: Chains, stream: int) -> int:
     return next(number for number, group in enumerate(chains.groups) if stream in group.streams)
 
 
-def sum_precisions(chains: Chains, inference: Inference, stream: int) -> tuple[Array, Array]:
+def sum_precisions(chains: Chains, inference: Inference, stream: int, update: str = EXACT) -> tuple[Array, Array]:
     """Return expected precisions and precision-weighted means of a stream [each shape=(T, D)].
 
-    These are Σ γ(q, k) Σ⁻¹ and Σ γ(q, k) Σ⁻¹ μ over the states q and components k of the stream.
+    These are Σ γ(q, k) Σ⁻¹ and Σ γ(q, k) Σ⁻¹ μ over the states q and components k of the stream; with the ``printed``
+    update as Eq. 9 sums them, over joint states and with the weights of components once more.
     """
     number = group_index(chains, stream)
-    weight = infer_components(inference.posteriors.densities[number], inference.emissions.responsibilities[number])
-    return _weigh_precisions(chains.groups[number], stream, inference.lattice.densities[number], weight)
-
-
-def path_to_means(chains: Chains, path: NDArray[np.intp], stream: int) -> Array:
-    """Return the mean of a stream's mixture in every state along a path of joint states [shape=(T, D)]."""
-    group = chains.groups[group_index(chains, stream)]
-    mixtures = group.stream_mixtures(stream)
-    means = (np.exp(mixtures.log_weights)[:, :, None] * mixtures.means).sum(axis=1)
-    return means[group.tie[path]].astype(float)
-
-
-def _start(
-    chains: Chains,
-    speech: AudioVisualObservations,
-    lattice: Lattice,
-    settings: ConversionSettings,
-    given_speech: Inference | None,
-) -> tuple[Array, ...]:
-    """Return the visual streams before the first step of EM [each shape=(T, D_s)]."""
-    if settings.start == VITERBI:
-        path, _ = chains.best_path(chains.emission_log_densities(speech, lattice), lattice)
-        return tuple(path_to_means(chains, path, stream) for stream in range(1, len(chains.streams)))
-    return _update_streams(chains, given_speech or chains.infer(speech, lattice), EXACT)
-
-
-def _update_streams(chains: Chains, inference: Inference, update: str) -> tuple[Array, ...]:
-    """Return the visual streams that the posteriors make most likely (M-step) [each shape=(T, D_s)]."""
-    statistics = sum_precisions if update == EXACT else _sum_smoothed
-    streams = []
-    for stream in range(1, len(chains.streams)):
-        precision, weighted = statistics(chains, inference, stream)
-        streams.append(weighted / np.maximum(precision, 1e-300))
-    return tuple(streams)
-
-
-def _sum_smoothed(chains: Chains, inference: Inference, stream: int) -> tuple[Array, Array]:
-    """Return precisions and precision-weighted means of a stream as Eq. 9 sums them [each shape=(T, D)]."""
-    number = group_index(chains, stream)
     group, densities = chains.groups[number], inference.lattice.densities[number]
-    joint_states = np.bincount(inference.lattice.ties[number], minlength=len(densities))
-    factors = (np.exp(group.mixtures.log_weights[densities]).T * joint_states).astype(np.float32)
-    posteriors = infer_components(inference.posteriors.densities[number], inference.emissions.responsibilities[number])
-    return _weigh_precisions(group, stream, densities, posteriors * factors)
-
-
-def _weigh_precisions(
-    group: StreamGroup, stream: int, densities: NDArray[np.intp], weight: Single
-) -> tuple[Array, Array]:
-    """Return the sums of weighted precisions, and of these times means, of a stream [each shape=(T, D)]."""
+    weight = infer_components(inference.posteriors.densities[number], inference.responsibilities[number])
+    if update == PRINTED:
+        joint_states = np.bincount(inference.lattice.ties[number], minlength=len(densities))
+        factors = (np.exp(group.mixtures.log_weights[densities]).T * joint_states).astype(np.float32)
+        weight = weight * factors
     mixtures = group.stream_mixtures(stream).select(densities)
     precision = (1 / mixtures.variances).transpose(1, 0, 2)
     weighted = precision * mixtures.means.transpose(1, 0, 2)
@@ -151,7 +92,9 @@ def _weigh_precisions(
     return precisions, weighted_means
 
 
-def _with_visual_streams(observations: AudioVisualObservations, streams: tuple[Array, ...]) -> AudioVisualObservations:
-    for number, values in enumerate(streams, start=1):
-        observations = observations.with_stream(number, values.astype(np.float32))
-    return observations
+def path_to_means(chains: Chains, path: NDArray[np.intp], stream: int) -> Array:
+    """Return the mean of a stream's mixture in every state along a path of joint states [shape=(T, D)]."""
+    group = chains.groups[group_index(chains, stream)]
+    mixtures = group.stream_mixtures(stream)
+    means = (np.exp(mixtures.log_weights)[:, :, None] * mixtures.means).sum(axis=1)
+    return means[group.tie[path]].astype(float)

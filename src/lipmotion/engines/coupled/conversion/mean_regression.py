@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import CorpusError
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
 from lipmotion.stats.pca import find_principal_axes, measure_covariance
 from lipmotion.stats.trees import create_statistics, ridge
@@ -122,14 +121,9 @@ class RegressionUtterance:
 
 
 def fit_axes(posteriors: Iterable[Single]) -> Single:
-    """Return the principal axes of posteriors as columns [shape=(N, R)]. Raises CorpusError: no posteriors."""
-    total: Array | None = None
-    for posterior in posteriors:
-        products = (posterior.T @ posterior).astype(float)
-        total = products if total is None else total + products
-    if total is None:
-        raise CorpusError("no recording to learn from")
-    return _find_principal_axes(total, POSTERIOR_AXES)
+    """Return the principal axes of posteriors as columns [shape=(N, R)]."""
+    total = sum((posterior.T @ posterior).astype(float) for posterior in posteriors)
+    return _find_principal_axes(np.asarray(total), POSTERIOR_AXES)
 
 
 def fit_regression_inputs(posterior_basis: Single, utterances: Sequence[RegressionUtterance]) -> RegressionInputs:
