@@ -1,5 +1,6 @@
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -86,13 +87,9 @@ def test_in_noise_the_sound_alone_chooses(model, engine) -> None:
     unsure = replace(SPOKEN, units_known=False, confidence=0.0)
     assert not build_target(model, costs, unsure).by_sound
     guide = model.guide
-    distorted = (guide.predict(unsure)[0], np.ones(len(unsure.features.values)))
-
-    class Noisy(type(guide)):
-        def predict(self, _):
-            return distorted
-
-    model = replace(model, guide=Noisy(**vars(guide)))
+    distorted = (guide.predictor.predict(unsure)[0], np.ones(len(unsure.features.values)))
+    noisy = SimpleNamespace(can_predict=lambda _: True, predict=lambda _: distorted)
+    model = replace(model, guide=replace(guide, predictor=noisy))
     target = build_target(model, costs, unsure)
     assert target.by_sound
     assert target.windows.durations_s == pytest.approx(SEGMENT_S, rel=0.1)

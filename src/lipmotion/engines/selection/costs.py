@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.inventory import (
-    RecordedUnits,
-    UnitIndex,
-    UnitNumbers,
-    find_substitutes,
-    index_units,
-    substitute_symbols,
-)
+from lipmotion.engines.selection.inventory import RecordedUnits, UnitIndex, UnitNumbers, find_substitutes, index_units
 from lipmotion.engines.selection.windows import (
     INVISIBLE,
     INVISIBLE_SYMBOL,
     OVERLAPS,
+    PHONE_NUMBER,
     PROTECTED_PHONES,
     SILENT,
     VISEME_NUMBER,
@@ -207,7 +201,8 @@ class Costs:
         self, windows: PhoneWindows, guided: Array | None, predicted: Array | None, *, by_sound: bool = False
     ) -> Target:
         """Return phones to compare with units, and motion predicted at ``POINTS`` [each shape=(U, POINTS, Q)]."""
-        known = substitute_symbols(windows, self.stand_ins)
+        table = np.array([PHONE_NUMBER[self.stand_ins.get(phone, phone)] for phone in PHONES], np.int16)
+        known = replace(windows, phones=table[windows.phones])
         contexts = known.contexts(self.config.invisible_phones, self.config.window // 2)
         if guided is None or predicted is None:
             return Target(known, contexts, None, None)
@@ -221,24 +216,22 @@ class Costs:
     def target_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return the cost of each of some units for one phone [shape=(N,)]."""
         config, windows = self.config, self.inventory.windows
-        costs = np.zeros(len(units)) if target.by_sound else self._context_costs(target, number, units)
+        costs = np.zeros(len(units))
+        if not target.by_sound:
+            symbols, others = target.contexts[number], self.index.contexts[units]
+            other_visemes = VISEME_NUMBER[others] != VISEME_NUMBER[symbols]
+            costs = ((others != symbols).astype(float) + other_visemes) @ (self._context_weights / 2)
+            costs = costs + self._phonological_costs(target, number, units)
         duration_s = max(float(target.windows.durations_s[number]), MIN_S)
         costs += config.duration * np.abs(np.log(np.maximum(windows.durations_s[units], MIN_S) / duration_s))
-        is_shown = target.by_sound or target.symbol(number) != INVISIBLE_SYMBOL
-        if is_shown and target.guided is not None and target.predicted is not None and self._recorded is not None:
+        is_visible = target.by_sound or target.symbol(number) != INVISIBLE_SYMBOL
+        if is_visible and target.guided is not None and target.predicted is not None and self._recorded is not None:
             distance = np.square(self._recorded[units] - target.guided[number]).mean(axis=1).sum(axis=1)
             if self._predicted is not None and config.trust:
                 unlike = np.square(self._predicted[units] - target.predicted[number]).mean(axis=1).sum(axis=1)
                 distance *= np.minimum(unlike / config.trust**2, 1)
             costs += config.guide * PER_S * duration_s * distance
         return costs
-
-    def _context_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
-        """Return what the phones around, words and stress of each of some units cost for one phone [shape=(N,)]."""
-        differs = self.index.contexts[units] != target.contexts[number]
-        other_viseme = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
-        costs = (differs.astype(float) + other_viseme) @ (self._context_weights / 2)
-        return costs + self._phonological_costs(target, number, units)
 
     def _phonological_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return what other edges of a word and other stress of each of some units cost for one phone [shape=(N,)]."""
@@ -393,13 +386,13 @@ def select(
     target: Target,
     excluded: NDArray[np.bool_] | None = None,
     *,
-    given: Mapping[int, int] | None = None,
+    required: Mapping[int, int] | None = None,
     prune: bool = True,
 ) -> SelectedUnits:
     """Return the candidates of least total cost.
 
     excluded : units that must not be used [shape=(all units,)]
-    given    : units that must be used, by the number of their phone in the target
+    required : units that must be used, by the number of their phone in the target
     prune    : leave out candidates that cannot be part of the best sequence, and those beyond the beam
     A candidate whose target cost exceeds the least one of its phone by more than two joins can cost is never the best:
     the one of least target cost in its place would be better. So this does not change the cost of the result. Of the
@@ -407,8 +400,8 @@ def select(
     (docs/results/selection.md).
     Source: Minnis & Breen 2000, §3.
     """
-    given = given or {}
-    found = [_candidates(costs, target, number, excluded, given.get(number), prune) for number in range(len(target))]
+    required = required or {}
+    found = [_candidates(costs, target, n, excluded, required.get(n), prune) for n in range(len(target))]
     total, backward, joins = found[0][1].copy(), [], []
     for number in range(1, len(found)):
         (left, _), (right, right_costs) = found[number - 1], found[number]
@@ -432,11 +425,11 @@ def select(
 
 
 def _candidates(
-    costs: Costs, target: Target, number: int, excluded: NDArray[np.bool_] | None, given: int | None, prune: bool
+    costs: Costs, target: Target, number: int, excluded: NDArray[np.bool_] | None, required: int | None, prune: bool
 ) -> tuple[UnitNumbers, Array]:
     """Return the candidates for one phone, and their target costs. Where all units are excluded, they are allowed."""
-    if given is not None:
-        units = np.array([given], np.intp)
+    if required is not None:
+        units = np.array([required], np.intp)
         return units, costs.target_costs(target, number, units)
     if target.by_sound:
         usable = costs.inventory.usable

@@ -6,17 +6,15 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
+from lipmotion.engines.selection.windows import SYMBOLS, PhoneWindows
 from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, find_similar_lips
 
-LINE = 110
 SOURCE = re.compile(r" \d+\.\d+-\d+\.\d+ s \S+$")
 """The end of what ``find_source`` returns."""
 
@@ -26,34 +24,6 @@ def find_source(inventory: RecordedUnits, unit: int) -> str:
     windows = inventory.windows
     start_s, end_s = windows.times_s[unit].tolist()
     return f"{inventory.names[windows.recording[unit]]} {start_s:.3f}-{end_s:.3f} s {PHONES[windows.phones[unit]]}"
-
-
-def count_by_source(inventory: RecordedUnits, sources: Iterable[str]) -> dict[str, int]:
-    """Return the units that some texts of ``find_source`` name; other texts are left out."""
-    wanted = set(sources)
-    recordings = {source.split(" ")[0] for source in wanted}
-    numbers = [number for number, name in enumerate(inventory.names) if name.split(" ")[0] in recordings]
-    units = np.flatnonzero(np.isin(inventory.windows.recording, numbers) & inventory.usable).tolist()
-    named = {find_source(inventory, unit): unit for unit in units}
-    return {source: named[source] for source in wanted if source in named}
-
-
-def list_inventory(inventory: RecordedUnits) -> str:
-    """Return how many units each phone has, and what stands in for phones without units."""
-    windows, usable = inventory.windows, inventory.usable
-    counts = {phone: int((usable & (windows.phones == n)).sum()) for n, phone in enumerate(PHONES)}
-    stand_ins = find_substitutes(windows, usable)
-    lines = [f"{int(usable.sum())} units of {len(inventory.names)} recordings"]
-    lines += _wrap_text("units of each phone", [f"{phone} {count}" for phone, count in counts.items() if count])
-    if stand_ins:
-        lines += _wrap_text(
-            "phones without units, and what stands in for them", [f"{p} ({q})" for p, q in stand_ins.items()]
-        )
-    return "\n".join(lines)
-
-
-def _wrap_text(name: str, items: list[str]) -> list[str]:
-    return [f"{name}:", *(f"  {line}" for line in wrap(", ".join(items), LINE))]
 
 
 Array = NDArray[np.float64]
@@ -197,12 +167,6 @@ def find_substitutes(windows: PhoneWindows, usable: NDArray[np.bool_]) -> dict[s
     """Return for every phone that no usable unit has the phone that stands in for it."""
     known = {PHONES[number] for number in np.unique(windows.phones[usable])}
     return {phone: find_similar_lips(phone, known) for phone in PHONES if phone not in known} if known else {}
-
-
-def substitute_symbols(windows: PhoneWindows, stand_ins: dict[str, str]) -> PhoneWindows:
-    """Return windows in which each missing phone is the one that stands in for it."""
-    table = np.array([PHONE_NUMBER[stand_ins.get(phone, phone)] for phone in PHONES], np.int16)
-    return replace(windows, phones=table[windows.phones])
 
 
 def _keys(columns: NDArray[np.intp]) -> NDArray[np.int64]:

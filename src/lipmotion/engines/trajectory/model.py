@@ -189,12 +189,11 @@ class Emission:
 
     def _leaf(self, name: str, context: Context) -> int:
         """Return the leaf of a context in a tree; it is looked for once."""
-        found = self._leaves.get((name, context))
-        if found is None:
+        if (name, context) not in self._leaves:
             if len(self._leaves) > MAX_CONTEXTS:
                 self._leaves.clear()
-            found = self._leaves[name, context] = self.forest[name].path(context)[-1]
-        return found
+            self._leaves[name, context] = self.forest[name].path(context)[-1]
+        return self._leaves[name, context]
 
     @cached_property
     def _leaves(self) -> dict[tuple[str, Context], int]:
@@ -234,22 +233,6 @@ def add_acoustic_regression(
         means[frames] += (z[frames] @ regression.coefficients[row]).reshape(len(frames), *means.shape[1:])
 
 
-def emission_to_arrays(emission: Emission) -> dict[str, NDArray[Any]]:
-    """Serialise the densities; means and coefficients are stored at half precision."""
-    arrays = trees_to_arrays(emission.forest) | {
-        "means": emission.means.astype(np.float16),
-        "variances": emission.variances,
-    }
-    if emission.regression is not None:
-        context = emission.regression.context
-        arrays |= {
-            **acoustic_context_to_arrays(context),
-            "coefficients": emission.regression.coefficients.astype(np.float16),
-            "coefficient_rows": emission.regression.rows,
-        }
-    return arrays
-
-
 def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -> Emission:
     """Deserialise the densities.
 
@@ -265,7 +248,13 @@ def emission_from_arrays(arrays: Arrays, layout: StateLayout, dimensions: int) -
     leaves = sum(len(tree.leaves) for tree in forest.values()) + 1
     densities = check_arrays(arrays, DENSITIES, L=leaves, Q=dimensions)
     check_spread(densities["means"][:, 0], densities["variances"][:, 0])
-    regression = _regression_from_arrays(arrays, leaves, dimensions) if REGRESSION.keys() & arrays.keys() else None
+    regression = None
+    if REGRESSION.keys() & arrays.keys():
+        stored = check_arrays(arrays, REGRESSION, L=leaves, V=3 * dimensions)
+        rows = stored["coefficient_rows"]
+        if rows.max() >= stored.sizes["C"]:
+            raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
+        regression = AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)
     return Emission(forest, densities["means"], densities["variances"], regression)
 
 
@@ -276,15 +265,7 @@ REGRESSION = {
     "coefficient_rows": ArraySpec(np.int32, "L", -1, 1e6),
 }
 EMISSION = (*TREES, *DENSITIES, *REGRESSION)
-"""Names of the arrays of ``emission_to_arrays``: L densities, C regressions on A components."""
-
-
-def _regression_from_arrays(arrays: Arrays, leaves: int, dimensions: int) -> AcousticRegression:
-    stored = check_arrays(arrays, REGRESSION, L=leaves, V=3 * dimensions)
-    rows = stored["coefficient_rows"]
-    if rows.max() >= stored.sizes["C"]:
-        raise ValueError(f"a density that uses regression {rows.max()} of {stored.sizes['C']}")
-    return AcousticRegression(acoustic_context_from_arrays(stored), stored["coefficients"], rows)
+"""Names of the arrays of an emission: L densities, C regressions on A components."""
 
 
 NETWORK_SHARE = 0.6
@@ -292,7 +273,7 @@ NETWORK_SHARE = 0.6
 RESTING_SHARE = 0.5
 """Share of its weight that the predictor has where the states rest, with voices that training knows: their mouths open
 before they speak."""
-STRANGER_LOSS = 0.8
+UNSEEN_VOICE_LOSS = 0.8
 """Share of their weight that states lose with voices that training does not know at all."""
 
 
@@ -344,11 +325,11 @@ class Experts:
         if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
-        own = self.network is not None and self.network.uses_prior  # states of a person, not of a distant speaker
-        strange = count_unseen(self.speech.voice)
-        known = 1.0 if own else 1 - STRANGER_LOSS * strange
+        personal = self.network is not None and self.network.uses_prior  # states of a person, not a distant speaker
+        unseen = count_unseen(self.speech.voice)
+        known = 1.0 if personal else 1 - UNSEEN_VOICE_LOSS * unseen
         states = (1 - self.network_share) * self.reliability * familiarity * known
-        at_rest = np.maximum(1 - self.reliability, 0.0 if own else RESTING_SHARE * (1 - strange))
+        at_rest = np.maximum(1 - self.reliability, 0.0 if personal else RESTING_SHARE * (1 - unseen))
         if self.silent is not None:
             at_rest[self.silent] = 0
         network = self.network_share * np.where(resting, at_rest, 1.0)
@@ -395,8 +376,8 @@ class TrajectoryModel:
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
         prior = self.prior
         if prior is not None and self.network is not None:
-            beside = replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR, known_voice_share=KNOWN_VOICE_SHARE)
-            prior = None if self.network.uses_articulation else beside
+            weaker = replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR, known_voice_share=KNOWN_VOICE_SHARE)
+            prior = None if self.network.uses_articulation else weaker
         return LearnedMotion(self.space, self.closure, self.limits, scaling, prior, self.modulation)
 
     @property
@@ -406,13 +387,19 @@ class TrajectoryModel:
 
 
 def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
-    """Serialise a model."""
+    """Serialise a model; means and coefficients are stored at half precision."""
+    emission, regression = model.emission, model.emission.regression
     arrays = motion_to_arrays(model.units, model.space, model.closure, model.prior) | {"gain": model.variance_factors}
-    recogniser = recogniser_to_arrays(model.phone_recogniser) if model.phone_recogniser is not None else {}
-    network = predictor_to_arrays(model.network)
+    arrays |= trees_to_arrays(emission.forest)
+    arrays |= {"means": emission.means.astype(np.float16), "variances": emission.variances}
+    if regression is not None:
+        arrays |= acoustic_context_to_arrays(regression.context)
+        arrays |= {"coefficients": regression.coefficients.astype(np.float16), "coefficient_rows": regression.rows}
     if model.network is not None:
-        network |= {"network_share": np.array([model.network_share])}
-    return arrays | emission_to_arrays(model.emission) | network | recogniser | filter_to_arrays(model.modulation)
+        arrays |= predictor_to_arrays(model.network) | {"network_share": np.array([model.network_share])}
+    if model.phone_recogniser is not None:
+        arrays |= recogniser_to_arrays(model.phone_recogniser)
+    return arrays | filter_to_arrays(model.modulation)
 
 
 def model_from_arrays(
