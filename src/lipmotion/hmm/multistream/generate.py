@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +9,9 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import MOTION
-from lipmotion.hmm.multistream.model import JointHmm, StreamModel
+from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.recognise import StatePath
-from lipmotion.kernels.banded import build_equations, pin, solve
+from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.stats.curves import with_dynamics
 
 Array = NDArray[np.float64]
@@ -44,41 +43,31 @@ class FrameDensities:
         return self.log_weights + 0.5 * (scale - self.precisions * off * off).sum(axis=(2, 3))
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """A trajectory and its variance [shape=(T, Q)], in units of the motion, and its log likelihoods."""
-
-    values: Array
-    variance: Array
-    log_likelihoods: tuple[float, ...]
-
-
 def select_densities(hmm: JointHmm, path: StatePath) -> FrameDensities:
     """Return the densities of motion along a path of states. Raises InputError: no motion, or its weight is 0."""
-    model, means, precisions = _collect_gaussians(hmm)
+    weight = hmm.config.synthesis.motion
+    if MOTION not in hmm.models or not weight:
+        raise InputError("the model has no motion, or it is switched off in synthesis; train on recordings with a face")
+    model = hmm.models[MOTION]
+    mixtures, deviation = model.tied.mixtures, model.scale.deviation
+    G, M, D = mixtures.size
+    means = (mixtures.means * deviation + model.scale.mean).reshape(G, M, 3, D // 3)
+    precisions = (weight / (mixtures.variances * deviation**2)).reshape(G, M, 3, D // 3)
     chosen = model.forest.leaves(path.states.triphones)[path.frames]
     precisions = precisions[chosen]
     precisions[[0, -1], :, 1:] = 0  # Δ and Δ² of the first and last frame count for nothing
-    return FrameDensities(model.tied.mixtures.log_weights[chosen].astype(float), means[chosen], precisions)
+    return FrameDensities(mixtures.log_weights[chosen].astype(float), means[chosen], precisions)
 
 
-def solve_trajectory(
-    densities: FrameDensities, pins: Mapping[tuple[int, int], float] | None = None, iterations: int = ITERATIONS
-) -> Trajectory:
-    """Return the trajectory that is most probable together with its dynamics.
+def solve_trajectory(densities: FrameDensities, iterations: int = ITERATIONS) -> tuple[Array, tuple[float, ...]]:
+    """Return the trajectory that is most probable together with its dynamics, and its log likelihood by step.
 
-    pins       : (frame, dimension) -> the value that the trajectory must take
     iterations : most steps of EM over the Gaussians of mixtures; for single ones there is a closed form
     Source: Hofer 2008, Eqs. 6–11, with Δ²x_t = x_{t−1} − 2x_t + x_{t+1} (the print lost the minus sign); for mixtures,
     EM over the components as in Tokuda et al. 2000, case 3 with one state path.
     Cost: O(T·M·Q) a step.
-    Raises InputError: a pin outside the frames or dimensions.
     """
-    frames, _, _, dimensions = densities.means.shape
-    for frame, dimension in pins or {}:
-        if not (0 <= frame < frames and 0 <= dimension < dimensions):
-            raise InputError(f"a pin at {(frame, dimension)}, required within {frames} frames, {dimensions} dimensions")
-    values, variance = _solve(densities, np.exp(densities.log_weights), pins or {})
+    values, _ = solve_mlpg(*_merge(densities, np.exp(densities.log_weights)))
     log_likelihoods: list[float] = []
     for _ in range(iterations):
         components = densities.log_components(values)
@@ -86,17 +75,17 @@ def solve_trajectory(
         share = np.exp(components - best)
         log_likelihoods.append(float((best[:, 0] + np.log(share.sum(axis=1))).sum()))
         gain = np.diff(log_likelihoods[-2:])
-        if share.shape[1] == 1 or len(log_likelihoods) == iterations or (gain < MIN_GAIN * frames).any():
+        if share.shape[1] == 1 or len(log_likelihoods) == iterations or (gain < MIN_GAIN * len(values)).any():
             break
-        values, variance = _solve(densities, share / share.sum(axis=1, keepdims=True), pins or {})
-    return Trajectory(values, variance, tuple(log_likelihoods))
+        values, _ = solve_mlpg(*_merge(densities, share / share.sum(axis=1, keepdims=True)))
+    return values, tuple(log_likelihoods)
 
 
 def merge_gaussians(densities: FrameDensities) -> tuple[Array, Array]:
     """Return one Gaussian for every frame: mean and precision [each shape=(T, 3, Q)]."""
     if densities.log_weights.shape[1] == 1:
         return densities.means[:, 0], densities.precisions[:, 0]
-    components = densities.log_components(solve_trajectory(densities).values)
+    components = densities.log_components(solve_trajectory(densities)[0])
     share = np.exp(components - components.max(axis=1, keepdims=True))
     return _merge(densities, share / share.sum(axis=1, keepdims=True))
 
@@ -106,27 +95,3 @@ def _merge(densities: FrameDensities, share: Array) -> tuple[Array, Array]:
     shared = densities.precisions * share[:, :, None, None]
     precision = shared.sum(axis=1)
     return (shared * densities.means).sum(axis=1) / np.maximum(precision, np.finfo(float).tiny), precision
-
-
-def _solve(densities: FrameDensities, share: Array, pins: Mapping[tuple[int, int], float]) -> tuple[Array, Array]:
-    """Return the trajectory and its variance [each shape=(T, Q)], given posteriors of the Gaussians [shape=(T, M)]."""
-    bands = build_equations(*_merge(densities, share))
-    for (frame, dimension), value in pins.items():
-        pin(bands, frame, dimension, value)
-    values, variance = solve(bands)
-    for frame, dimension in pins:
-        variance[frame, dimension] = 0
-    return values, variance
-
-
-def _collect_gaussians(hmm: JointHmm) -> tuple[StreamModel, Array, Array]:
-    """Return the motion model, its leaves' means and weighted precisions [shape=(G, M, 3, Q)]. Raises InputError."""
-    weight = hmm.config.synthesis.motion
-    if MOTION not in hmm.models or not weight:
-        raise InputError("the model has no motion, or it is switched off in synthesis; train on recordings with a face")
-    model = hmm.models[MOTION]
-    mixtures, deviation = model.tied.mixtures, model.scale.deviation
-    G, M, D = mixtures.size
-    means = mixtures.means * deviation + model.scale.mean
-    precisions = weight / (mixtures.variances * deviation**2)
-    return model, means.reshape(G, M, 3, D // 3), precisions.reshape(G, M, 3, D // 3)

@@ -14,7 +14,7 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.multistream.densities import ACOUSTIC_STREAMS, MOTION, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.unit_states import RecognisedUnit, TriphoneStates, expand_triphones
-from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, UnitLoop, build_chain, decode_units
+from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, UnitLoop, build_chain, decode_path
 
 MIN_VARIANCE = 1.0
 """Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
@@ -241,11 +241,6 @@ class JointRecogniser:
         if MOTION in self._weights.active:
             raise InputError("recognition uses no motion: give the stream motion the weight 0")
 
-    def recognise(self, observed: StreamObservations, beam: float | None = None) -> list[RecognisedUnit]:
-        """Return the likeliest units. Raises InputError: no active stream. Raises AlignmentError: too few frames."""
-        units, starts = decode_units(self._loop.network, self._log_likelihoods(observed), beam)
-        return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
-
     @property
     def _weights(self) -> StreamWeights:
         return self.weights or self.hmm.config.recognition
@@ -254,15 +249,17 @@ class JointRecogniser:
     def _loop(self) -> ContextLoop:
         return build_context_loop(self.hmm)
 
-    def _log_likelihoods(self, observed: StreamObservations) -> LogLikelihoods:
+    def recognise(self, observed: StreamObservations) -> list[RecognisedUnit]:
+        """Return the likeliest units. Raises InputError: no active stream. Raises AlignmentError: too few frames."""
         streams = self.hmm.standardise(observed, self._weights)
 
-        def log_density(first: int, end: int, chosen: NDArray[np.intp] | None) -> NDArray[np.float32]:
+        def log_density(first: int, end: int, _: NDArray[np.intp] | None) -> NDArray[np.float32]:
             rows = {name: stream[first:end] for name, stream in streams.items()}
-            values = self.hmm.log_density(rows, self._loop.leaves, self._weights).astype(np.float32)
-            return values if chosen is None else values[:, chosen]
+            return self.hmm.log_density(rows, self._loop.leaves, self._weights).astype(np.float32)
 
-        return LogLikelihoods(observed.frames, log_density)
+        loop = self._loop.network
+        units, starts = decode_path(loop, loop.network.best_path(LogLikelihoods(observed.frames, log_density)))
+        return [RecognisedUnit(unit, int(first)) for unit, first in zip(units, starts[:-1], strict=True)]
 
 
 @lru_cache(maxsize=4)
