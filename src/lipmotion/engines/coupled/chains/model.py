@@ -47,7 +47,7 @@ class NetworkLattice(Lattice):
         )
         order = network.layout.order
         ordered_ties = [tie[order] for tie in self.ties]
-        expected = network.product_posteriors(logs, ordered_ties, np.array([len(logs[0])]))
+        expected = network.posteriors(logs, ordered_ties, np.array([len(logs[0])]))
         structure = transitions.product.structure
         return LatticePosteriors(
             tuple(
