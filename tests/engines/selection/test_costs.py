@@ -18,12 +18,11 @@ from engines.selection.drawn_units import (
     with_stress,
 )
 from lipmotion.engines import create_engine, engine_named
-from lipmotion.engines.selection import concatenation, windows
+from lipmotion.engines.selection import concatenation
 from lipmotion.engines.selection import costs as search
 from lipmotion.engines.selection.concatenation import join_pieces, to_pieces
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE, select
-from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.windows import list_windows
+from lipmotion.engines.selection.inventory import RecordedUnits, list_windows
 from lipmotion.types import Span, Timeline, Unit
 
 NAMED = {"protected": "p", "invisible": "t", "normal": "s"}
@@ -49,9 +48,7 @@ def test_each_edge_of_a_word_that_differs_costs_once() -> None:
     costs, every = costs_of(units, word=0.07), np.arange(1, 12, 3)
     assert costs.target_costs(target_of(costs, "iy | aa | iy"), 1, every) == pytest.approx([0, 0.07, 0.07, 0.14])
     assert costs.target_costs(target_of(costs, "iy aa iy"), 1, every) == pytest.approx([0.14, 0.07, 0.07, 0])
-    wordless = costs.target(
-        windows.list_windows([Timeline(tuple(Span(n, n + 1.0, Unit("iy")) for n in range(3)))]), None, None
-    )
+    wordless = costs.target(list_windows([Timeline(tuple(Span(n, n + 1.0, Unit("iy")) for n in range(3)))]), None, None)
     assert costs.target_costs(wordless, 1, every) == pytest.approx(0)
 
 
@@ -71,7 +68,7 @@ def test_motion_unlike_the_guide_costs_unless_the_sounds_are_alike() -> None:
     predicted = np.stack([np.full((len(FRACTIONS), 1), each) for each in (0.5, 0.55, 0.9)]).astype(np.float16)
     costs = costs_of(replace(units, predicted=predicted), guide=2.0, trust=0.1)
     wanted = np.full((1, len(FRACTIONS), 1), 0.5)
-    target = costs.target(windows.list_windows([timeline("aa")]), wanted, wanted)
+    target = costs.target(list_windows([timeline("aa")]), wanted, wanted)
     distance = 0.3**2 * 2 * PHONE_S * 10
     assert costs.target_costs(target, 0, array(0, 1, 2)) == pytest.approx([0, distance / 4, distance], rel=1e-2)
 
@@ -155,7 +152,7 @@ def test_abutting_pieces_are_bent_in_the_last_and_the_first_twentieth() -> None:
     """§4: "smoothed for the last 5% of the first unit, and the first 5% of the second unit"."""
     units = inventory("s iy", "uw n", levels=(0, 1), duration_s=1.0)
     costs = costs_of(units)
-    target = costs.target(windows.list_windows([timeline("s iy uw n", 1.0)]), None, None)
+    target = costs.target(list_windows([timeline("s iy uw n", 1.0)]), None, None)
     motion = concatenation.join_pieces(units, target, concatenation.to_pieces(costs, target, np.arange(4)), 401)[:, 0]
     bent = np.flatnonzero((motion > 1e-9) & (motion < 1 - 1e-9))
     assert (bent[0], bent[-1]) == pytest.approx((200 - 0.05 * 200, 200 + 0.05 * 200), abs=1)

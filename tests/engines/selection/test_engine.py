@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from lipmotion import engines, errors, types
 from lipmotion.engines.selection.concatenation import TimeMap, join_pieces, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, select
+from lipmotion.engines.selection.inventory import OVERLAPS, TABLE_1, find_lip_class, parse_invisible
 from lipmotion.engines.selection.selection_training import SEGMENT_S, build_target
-from lipmotion.engines.selection.windows import OVERLAPS, TABLE_1, find_lip_class, parse_invisible
 from lipmotion.testing import PHONES, example, examples, speech, timeline
 from lipmotion.types import Generation, Span, Timeline, Unit, silent_monitor
 

@@ -10,16 +10,18 @@ from engines.selection.drawn_units import costs_of, inventory, recorded, timelin
 from lipmotion import engines, types
 from lipmotion.engines.selection.concatenation import join_pieces, to_pieces
 from lipmotion.engines.selection.costs import select
-from lipmotion.engines.selection.inventory import RecordedUnits, find_substitutes, index_units
-from lipmotion.engines.selection.selection_training import build_target
-from lipmotion.engines.selection.windows import (
+from lipmotion.engines.selection.inventory import (
     INVISIBLE_SYMBOL,
     PHONE_NUMBER,
     SILENT,
     TABLE_1,
+    RecordedUnits,
     cover_recording,
+    find_substitutes,
+    index_units,
     list_windows,
 )
+from lipmotion.engines.selection.selection_training import build_target
 from lipmotion.errors import InputError
 from lipmotion.testing import PHONES as SPOKEN
 from lipmotion.testing import examples, speech

@@ -13,7 +13,7 @@ from lipmotion.engines.coupled.chains.lattice import FactorialProduct, Factorial
 from lipmotion.engines.coupled.chains.model import Chains, VisualStream
 from lipmotion.engines.coupled.chains.product import Grammar, Transitions, find_reachable
 from lipmotion.engines.coupled.chains.structures import Structure
-from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
+from lipmotion.engines.coupled.conversion import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_from_arrays, motion_to_arrays

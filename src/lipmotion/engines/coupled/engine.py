@@ -18,8 +18,7 @@ from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
-from lipmotion.engines.coupled.conversion.em_conversion import convert, group_index, path_to_means
-from lipmotion.engines.coupled.conversion.mean_regression import weigh_regressions
+from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means, weigh_regressions
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
 from lipmotion.engines.coupled.training.coupled_training import THREADS, fit_coupled

@@ -13,8 +13,15 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream
 from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
-from lipmotion.engines.coupled.conversion.em_conversion import EXACT, SOFT, STARTS, UPDATES, sum_precisions
-from lipmotion.engines.coupled.conversion.mean_regression import RegressionInputs, VisualRegression
+from lipmotion.engines.coupled.conversion import (
+    EXACT,
+    SOFT,
+    STARTS,
+    UPDATES,
+    RegressionInputs,
+    VisualRegression,
+    sum_precisions,
+)
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling

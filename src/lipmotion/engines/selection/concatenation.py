@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_AFTER, JOIN_BEFORE, NO_JOIN, Costs, Target
-from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
+from lipmotion.engines.selection.inventory import PROTECTED_PHONES, RecordedUnits, UnitNumbers
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.windows import PROTECTED_PHONES
 from lipmotion.motion.articulation import Statistics
 from lipmotion.motion.frame_labels import find_digital_silence, find_runs, mark_distant
 from lipmotion.stats.curves import with_dynamics

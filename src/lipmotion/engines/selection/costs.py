@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.selection.inventory import RecordedUnits, UnitIndex, UnitNumbers, find_substitutes, index_units
-from lipmotion.engines.selection.windows import (
+from lipmotion.engines.selection.inventory import (
     INVISIBLE,
     INVISIBLE_SYMBOL,
     OVERLAPS,
@@ -20,7 +19,12 @@ from lipmotion.engines.selection.windows import (
     SILENT,
     VISEME_NUMBER,
     PhoneWindows,
+    RecordedUnits,
+    UnitIndex,
+    UnitNumbers,
     find_lip_class,
+    find_substitutes,
+    index_units,
     parse_invisible,
 )
 from lipmotion.errors import InputError

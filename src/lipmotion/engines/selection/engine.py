@@ -15,10 +15,16 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import Chosen, Piece, TimeMap, join_motion, list_shown_units, to_pieces
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, SelectionConfig, Target, select
-from lipmotion.engines.selection.inventory import SOURCE, RecordedUnits, find_source, find_substitutes
+from lipmotion.engines.selection.inventory import (
+    PHONE_NUMBER,
+    SOURCE,
+    RecordedUnits,
+    find_source,
+    find_substitutes,
+    list_windows,
+)
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.selection_training import build_target, fit_selection
-from lipmotion.engines.selection.windows import PHONE_NUMBER, list_windows
 from lipmotion.errors import InputError
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.costs import FRACTIONS, POINTS, Costs, SelectionConfig
-from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.windows import PhoneWindows
+from lipmotion.engines.selection.inventory import PhoneWindows, RecordedUnits
 from lipmotion.hmm.multistream.phone_recogniser import (
     JOINT_PREFIX,
     OwnPhoneRecogniser,

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.selection.concatenation import Chosen, join_motion, join_pieces, to_pieces
 from lipmotion.engines.selection.costs import Costs, SelectionConfig, Target, select
-from lipmotion.engines.selection.inventory import RecordedUnits
+from lipmotion.engines.selection.inventory import RecordedUnits, cover_recording, list_windows
 from lipmotion.engines.selection.model import Guide, SelectionModel, interpolate_at
-from lipmotion.engines.selection.windows import cover_recording, list_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING

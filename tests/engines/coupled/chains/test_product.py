@@ -22,7 +22,7 @@ from lipmotion.engines.coupled.chains import densities, model, structures
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.product import JointState, Transitions, create_transitions, find_reachable
 from lipmotion.engines.coupled.chains.structures import list_unit_sets
-from lipmotion.engines.coupled.conversion.em_conversion import convert, sum_precisions
+from lipmotion.engines.coupled.conversion import convert, sum_precisions
 from lipmotion.engines.coupled.training.chain_training import MIN_FRAMES, with_joint_state_densities
 from lipmotion.errors import InputError
 from oracles import coupled as oracle

@@ -5,8 +5,8 @@ import pytest
 
 from engines.coupled.tiny import KINDS, chains, observations, structure
 from lipmotion.engines import engine_named
-from lipmotion.engines.coupled.conversion import mean_regression
-from lipmotion.engines.coupled.conversion.em_conversion import EXACT, PRINTED, SOFT, VITERBI, convert, path_to_means
+from lipmotion.engines.coupled import conversion
+from lipmotion.engines.coupled.conversion import EXACT, PRINTED, SOFT, VITERBI, convert, path_to_means
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.types import silent_monitor
@@ -93,7 +93,7 @@ def test_the_printed_update_weighs_by_components_and_partners():
     np.testing.assert_allclose(printed, expected, rtol=1e-3, atol=1e-4)
 
 
-def utterances(count=3, frames=60, states=4, seed=0) -> list[mean_regression.RegressionUtterance]:
+def utterances(count=3, frames=60, states=4, seed=0) -> list[conversion.RegressionUtterance]:
     draw = np.random.default_rng(seed)
     result = []
     for _ in range(count):
@@ -103,40 +103,37 @@ def utterances(count=3, frames=60, states=4, seed=0) -> list[mean_regression.Reg
         observed = draw.random(frames) < 0.8
         target = (features[:, :2] + visual[:, :2] * 3).astype(np.float32)
         target = np.where(observed[:, None], target, 99).astype(np.float32)
-        result.append(mean_regression.RegressionUtterance(features, first, [visual], [target], observed))
+        result.append(conversion.RegressionUtterance(features, first, [visual], [target], observed))
     return result
 
 
 def test_the_regressions_are_ridges_one_towards_the_other():
     """By normal equations over explicitly weighted rows: all, then families, then regressions."""
     data = utterances()
-    inputs = mean_regression.fit_regression_inputs(np.eye(4, dtype=np.float32), data)
+    inputs = conversion.fit_regression_inputs(np.eye(4, dtype=np.float32), data)
     regression_of_state, family = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 0, 1])
-    found = mean_regression.fit_visual_regression(inputs, data, 0, regression_of_state, family)
+    found = conversion.fit_visual_regression(inputs, data, 0, regression_of_state, family)
     z = np.concatenate([inputs(one.features, one.reduced_posteriors)[one.observed] for one in data]).astype(float)
     target = np.concatenate([one.targets[0][one.observed] for one in data]).astype(float)
     weight = np.concatenate(
-        [
-            mean_regression.weigh_regressions(one.chain_posteriors[0], regression_of_state, 3)[one.observed]
-            for one in data
-        ]
+        [conversion.weigh_regressions(one.chain_posteriors[0], regression_of_state, 3)[one.observed] for one in data]
     ).astype(float)
 
     def solved(rows, prior, strength):
         system = z.T @ (rows[:, None] * z) + strength * np.eye(z.shape[1])
         return np.linalg.solve(system, z.T @ (rows[:, None] * target) + strength * prior)
 
-    shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), mean_regression.SHARED_RIDGE * len(z))
+    shared = solved(weight.sum(axis=1), 0 * np.zeros((z.shape[1], 2)), conversion.SHARED_RIDGE * len(z))
     for number in range(3):
-        above = solved(weight[:, family == family[number]].sum(axis=1), shared, mean_regression.OWN_RIDGE)
+        above = solved(weight[:, family == family[number]].sum(axis=1), shared, conversion.OWN_RIDGE)
         np.testing.assert_allclose(
-            found.coefficients[number], solved(weight[:, number], above, mean_regression.OWN_RIDGE), atol=2e-3
+            found.coefficients[number], solved(weight[:, number], above, conversion.OWN_RIDGE), atol=2e-3
         )
 
 
 def test_expected_means_and_precisions_are_sums_over_states():
     draw = np.random.default_rng(0)
-    regression = mean_regression.VisualRegression(
+    regression = conversion.VisualRegression(
         np.array([0, 1, 1]),
         draw.normal(0, 1, (2, 5, 3)).astype(np.float32),
         draw.uniform(0.5, 2, (3, 3)).astype(np.float32),
