@@ -164,7 +164,7 @@ def test_by_default_units_merge_in_a_vowel_rather_than_abut_behind_a_plosive() -
     units = inventory("s p", "uw n", "s p uw", "uw n")
     costs = costs_of(units, engine_named("selection", {}).config)
     target = target_of(costs, "s p uw n")
-    pieces = concatenation.to_pieces(costs, target, search.select(costs, target).units)
+    pieces = concatenation.to_pieces(costs, target, search.select(costs, target)[0])
     assert ABUTTING_JOIN not in [piece.join for piece in pieces[1:]]
     assert (pieces[0].unit, pieces[0].stop + (pieces[1].join == JOIN_AFTER)) == (4, 3)
 
@@ -190,7 +190,7 @@ def list_recordings(
     one, other = (costs.shown(list_windows([each])) for each in (wanted, wrong))
     differs = (getattr(one, by) != getattr(other, by)).reshape(len(one), -1).any(axis=1)
     assert one.phones.tolist() == other.phones.tolist()
-    found = select(costs, costs.target(one, None, None)).units
+    found = select(costs, costs.target(one, None, None))[0]
     recordings = costs.inventory.windows.recording[found]
     return set(recordings[differs if differs.any() else slice(None)].tolist())
 
@@ -230,7 +230,7 @@ def test_units_merge_beside_a_protected_phone_not_in_it(phone: str) -> None:
     config = replace(DEFAULT, context=0.0)
     costs = costs_of(units, config)
     target = target_of(costs, f"s iy {phone} aa n")
-    assert costs.inventory.windows.recording[select(costs, target).units[2]] == 2
+    assert costs.inventory.windows.recording[select(costs, target)[0][2]] == 2
     careless = costs_of(units, replace(config, protected=0.0))
     assert careless.inventory.windows.recording[select(careless, target).units[2]] < 2
 

@@ -153,7 +153,7 @@ def test_a_word_whose_edge_is_suppressed_keeps_it() -> None:
 def joined(units: RecordedUnits, text: str, config=PRINTED):
     costs = costs_of(units.without(config.suppressed_phones), config)
     target = costs.target(costs.shown(list_windows([timeline(text)])), None, None)
-    pieces = to_pieces(costs, target, select(costs, target).units)
+    pieces = to_pieces(costs, target, select(costs, target)[0])
     return target, join_pieces(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
 
 
@@ -184,7 +184,7 @@ def test_a_recorded_sentence_costs_nothing_without_its_suppressed_phones(model, 
     for one in examples(4):
         target = build_target(model, costs, one.speech)
         assert not {PHONES[phone] for phone in target.windows.phones} & {*INVISIBLE}
-        assert select(replace(costs, config=PRINTED), target).cost == pytest.approx(0)
+        assert select(replace(costs, config=PRINTED), target)[1] == pytest.approx(0)
     assert {PHONES[phone] for phone in costs.inventory.windows.phones} <= {"sil", "b", "aa", "iy", "m", "uw", "s", "p"}
 
 

@@ -285,22 +285,19 @@ def _find_principal_axes(covariance: Array, size: int) -> Single:
 
 
 def _context(acoustic: AcousticContext, features: Single, reduced_posteriors: Single) -> Single:
-    """Return the acoustic context and the posteriors at ``OFFSETS`` of all frames, side by side [shape=(T, F')]."""
+    """Return the acoustic context and the posteriors at ``OFFSETS`` of all frames, side by side [shape=(T, F')].
+
+    Posteriors are moving averages with a cosine window; frames beyond the edges repeat these.
+    """
     scale = ACOUSTIC_WEIGHT / float(np.linalg.norm(acoustic.basis[:, 0]))
     frames = np.arange(len(reduced_posteriors))
-    windows = [
-        _smoothed(reduced_posteriors, REACH + abs(offset) // 5)[np.clip(frames + offset, 0, len(frames) - 1)]
-        for offset in OFFSETS
-    ]
+    windows = []
+    for offset in OFFSETS:
+        reach = REACH + abs(offset) // 5
+        window = np.hanning(2 * reach + 3)[1:-1]
+        padded = np.pad(reduced_posteriors, ((reach, reach), (0, 0)), mode="edge")
+        smoothed = np.zeros_like(reduced_posteriors)
+        for shift, share in enumerate((window / window.sum()).astype(np.float32)):
+            smoothed += share * padded[shift : shift + len(frames)]
+        windows.append(smoothed[np.clip(frames + offset, 0, len(frames) - 1)])
     return np.concatenate([acoustic(features, slice(None)) * np.float32(scale), *windows], axis=1)
-
-
-def _smoothed(values: Single, reach: int) -> Single:
-    """Return a moving average with a cosine window of 2·reach + 1 frames; frames beyond the edges repeat them."""
-    window = np.hanning(2 * reach + 3)[1:-1]
-    window = (window / window.sum()).astype(np.float32)
-    padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    total = np.zeros_like(values)
-    for shift, share in enumerate(window):
-        total += share * padded[shift : shift + len(values)]
-    return total

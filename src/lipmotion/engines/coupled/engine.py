@@ -17,7 +17,7 @@ from lipmotion.engines.coupled.chains.densities import Single, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
 from lipmotion.engines.coupled.chains.product import Product
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, Structure
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means, weigh_regressions
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.chain_training import mark_allowed_units
@@ -148,8 +148,8 @@ def sum_lead_posteriors(chains: Chains, posteriors: LatticePosteriors) -> list[S
         ahead = np.array(list_leads(chains, chain), np.intp)
         lead = np.zeros((len(posteriors.most_probable), len(ahead)), np.float32)
         if isinstance(product, Product) and posteriors.joint is not None:
-            own = product.lead[chain][posteriors.joint.states]
-            lead = posteriors.joint.probability @ (own[:, None] == ahead).astype(np.float32)
+            leads = product.lead[chain][posteriors.joint.states]
+            lead = posteriors.joint.probability @ (leads[:, None] == ahead).astype(np.float32)
         result.append(lead)
     return result
 
@@ -192,27 +192,24 @@ def _find_dominant_gaussian(model: CoupledModel, inference: Inference, row: int,
         visual = model.visual[stream - 1]
         means, precisions = visual.unstandardised(mean[None], 1 / variance[None])
         channels = _list_channel_values(model, visual, means[0, 0], 1 / precisions[0, 0])
+    observed, distance = inference.observations.observed[stream], None
+    if observed is None or observed[row]:  # how far the observation is from the Gaussian, in standard deviations (RMS)
+        error = inference.observations.streams[stream][row] - mean
+        distance = float(np.sqrt(np.mean(error * error / variance)))
     states = chains.transitions.product.chain_states[:, group.tie == density]
     return DominantGaussian(
         chains.streams[stream],
         " | ".join(
-            chains.structure.state_name(chain, int(own[0])) for chain, own in enumerate(states) if (own == own[0]).all()
+            chains.structure.state_name(chain, int(each[0]))
+            for chain, each in enumerate(states)
+            if (each == each[0]).all()
         ),
         int(component) + 1,
         len(weight),
         float(weight[component, position]),
-        _distance(inference, stream, row, mean, variance),
+        distance,
         channels,
     )
-
-
-def _distance(inference: Inference, stream: int, row: int, mean: Array, variance: Array) -> float | None:
-    """Return how far an observation is from a Gaussian, in standard deviations (RMS); None: it was not observed."""
-    observed = inference.observations.observed[stream]
-    if observed is not None and not observed[row]:
-        return None
-    error = inference.observations.streams[stream][row] - mean
-    return float(np.sqrt(np.mean(error * error / variance)))
 
 
 def _list_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) -> list[tuple[RegressedMean, ...]]:
@@ -225,9 +222,9 @@ def _list_means(model: CoupledModel, inference: Inference, rows: Sequence[int]) 
     for row in rows:
         shares = rest if away[row] else _list_regression_shares(model, inference, row)
         regressed = []
-        for stream, own in zip(model.visual, shares, strict=False):
+        for stream, weights in zip(model.visual, shares, strict=False):
             mean, variance = means[row, 0, stream.columns], 1 / precisions[row, 0, stream.columns]
-            regressed.append(RegressedMean(stream.name, own, _list_channel_values(model, stream, mean, variance)))
+            regressed.append(RegressedMean(stream.name, weights, _list_channel_values(model, stream, mean, variance)))
         result.append(tuple(regressed))
     return result
 
@@ -239,17 +236,14 @@ def _list_regression_shares(model: CoupledModel, inference: Inference, row: int)
         chain, regression_of_state = structure.chain_of(number + 1), regression.regression_of_state
         posterior = inference.posteriors.chains[chain][row : row + 1]
         weights = weigh_regressions(posterior, regression_of_state, len(regression.coefficients))[0]
-        names = [_name_regression(structure, chain, regression_of_state, k) for k in range(len(weights))]
+        names = []  # the viseme of the states that share a regression, with their position if it is the same: ``bi.2``
+        for k in range(len(weights)):
+            units, positions = np.divmod(np.flatnonzero(regression_of_state == k), structure.states)
+            phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
+            viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
+            names.append(f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme)
         result.append(_rank_by_probability(names, weights))
     return result
-
-
-def _name_regression(structure: Structure, chain: int, regression_of_state: NDArray[np.intp], regression: int) -> str:
-    """Return the viseme of the states that share a regression, with their position if it is the same: ``bi.2``."""
-    units, positions = np.divmod(np.flatnonzero(regression_of_state == regression), structure.states)
-    phones = {structure.chains[chain].phones(structure.units[chain][unit])[0] for unit in units}
-    viseme = "/".join(sorted({VISEME_OF[phone] for phone in phones}))
-    return f"{viseme}.{positions[0] + 1}" if len(set(positions.tolist())) == 1 else viseme
 
 
 def _list_channel_values(

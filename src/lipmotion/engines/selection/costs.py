@@ -366,25 +366,6 @@ def _differ(one: NDArray[np.int8], other: NDArray[np.int8]) -> NDArray[np.bool_]
     return (one != other) & (one >= 0) & (other >= 0)
 
 
-@dataclass(frozen=True, eq=False)
-class SelectedUnits:
-    """The chosen units.
-
-    units        : one for each phone of the target [shape=(U,)]
-    target_costs : of each [shape=(U,)]
-    join_costs   : of each with the unit before it; the first is 0 [shape=(U,)]
-    """
-
-    units: UnitNumbers
-    target_costs: Array
-    join_costs: Array
-
-    @property
-    def cost(self) -> float:
-        """The total cost."""
-        return float(self.target_costs.sum() + self.join_costs.sum())
-
-
 def select(
     costs: Costs,
     target: Target,
@@ -392,8 +373,8 @@ def select(
     *,
     required: Mapping[int, int] | None = None,
     prune: bool = True,
-) -> SelectedUnits:
-    """Return the candidates of least total cost.
+) -> tuple[UnitNumbers, float]:
+    """Return the candidates of least total cost, one for each phone of the target, and this cost.
 
     excluded : units that must not be used [shape=(all units,)]
     required : units that must be used, by the number of their phone in the target
@@ -406,26 +387,19 @@ def select(
     """
     required = required or {}
     found = [_candidates(costs, target, n, excluded, required.get(n), prune) for n in range(len(target))]
-    total, backward, joins = found[0][1].copy(), [], []
+    total, backward = found[0][1], []
     for number in range(1, len(found)):
         (left, _), (right, right_costs) = found[number - 1], found[number]
         join = costs.join_costs(target, number, left, right)
         sums = total[:, None] + join
         best = sums.argmin(axis=0)
-        columns = np.arange(len(right))
         backward.append(best)
-        joins.append(join[best, columns])
-        total = sums[best, columns] + right_costs
-    place = int(total.argmin())
-    places = [place]
+        total = sums[best, np.arange(len(right))] + right_costs
+    places = [int(total.argmin())]
     for best in reversed(backward):
         places.append(int(best[places[-1]]))
-    places.reverse()
-    return SelectedUnits(
-        np.array([units[n] for (units, _), n in zip(found, places, strict=True)], np.intp),
-        np.array([each[n] for (_, each), n in zip(found, places, strict=True)]),
-        np.array([0.0, *(join[n] for join, n in zip(joins, places[1:], strict=True))]),
-    )
+    units = [candidates[place] for (candidates, _), place in zip(found, reversed(places), strict=True)]
+    return np.array(units, np.intp), float(total.min())
 
 
 def _candidates(

@@ -124,7 +124,7 @@ class SelectionEngine(Engine[SelectionModel]):
         costs = model.costs(self.config)
         target = build_target(model, costs, speech)
         frames = len(speech.features.values)
-        units = select(costs, target, required=_find_named_units(costs, target, speech.units)).units
+        units = select(costs, target, required=_find_named_units(costs, target, speech.units))[0]
         pieces = to_pieces(costs, target, units)
         chosen = Chosen(target, units, pieces)
         motion, variance = join_motion(model, costs, chosen, speech, constraints, close=self.config.closures)
@@ -161,7 +161,7 @@ class SelectionEngine(Engine[SelectionModel]):
         inventory = replace(inventory, kept=np.array([[0, len(sound)]]), motion=sound, predicted=None)
         costs = Costs(inventory, replace(self.config, **SOUND), 1 / np.maximum(sound.std(axis=0), 1e-9))
         target = costs.target(list_windows([units]), None, None)
-        chosen = select(costs, target).units
+        chosen = select(costs, target)[0]
         pieces = to_pieces(costs, target, chosen)
         sources = [find_source(inventory, unit) for unit in chosen.tolist()]
         pairs = zip(pieces, [*pieces[1:], None], strict=True)

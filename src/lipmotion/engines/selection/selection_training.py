@@ -112,7 +112,7 @@ def fit_selection(
         frames = mark_known_dynamics(examples[number].valid)
         if frames.any():
             target = build_target(model, costs, examples[number].speech)
-            units = select(costs, target, costs.inventory.windows.recording == number).units
+            units = select(costs, target, costs.inventory.windows.recording == number)[0]
             chosen = Chosen(target, units, to_pieces(costs, target, units))
             left_out.append((number, frames, chosen))
             joined = join_pieces(costs.inventory, target, chosen.pieces, len(values[number]))

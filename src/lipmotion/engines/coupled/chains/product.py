@@ -95,14 +95,13 @@ def find_reachable(structure: Structure, grammar: Grammar) -> Product:
         )
         for unit, probability in enumerate(grammar.initial[0])
     }
-    successors = _Successors(structure, grammar.bigrams[0])
     reached: dict[JointState, list[_Successor]] = {}
     waiting = deque(initial_states)
     while waiting:
         joint = waiting.popleft()
         if joint in reached:
             continue
-        reached[joint] = list(successors.of(joint))
+        reached[joint] = list(_list_successors(structure, grammar.bigrams[0], joint))
         waiting.extend(target for target, _, _ in reached[joint] if target not in reached)
     joint_states = tuple(sorted(reached, key=lambda j: (j.ahead, j.states, j.units[1:], j.units[0])))
     number = {joint: index for index, joint in enumerate(joint_states)}
@@ -131,65 +130,37 @@ _Successor = tuple[JointState, tuple[bool, ...], float]
 """A joint state that may follow, which chains move on, and the probability of the units entered."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Successors:
-    """The joint states that may follow a joint state, by the limit of asynchrony and the first chain's bigram."""
-
-    structure: Structure
-    bigram: NDArray[np.float64]
-
-    def of(self, joint: JointState) -> Iterator[_Successor]:
-        """Yield the joint states that may follow, which chains move on, and the probability of the units entered."""
-        for moved in product((False, True), repeat=len(joint.units)):
-            leaving = tuple(
-                move and state == self.structure.states - 1 for move, state in zip(moved, joint.states, strict=True)
-            )
-            if any(out and ahead for out, ahead in zip(leaving, joint.ahead, strict=True)):
-                continue  # the chain would be a second unit ahead
-            if any(leaving) and not (self.structure.cross_units or all(leaving)):
-                continue
-            states = tuple(
-                0 if out else state + move for out, state, move in zip(leaving, joint.states, moved, strict=True)
-            )
-            ahead = tuple(out or was for out, was in zip(leaving, joint.ahead, strict=True))
-            positions = [state + self.structure.states * out for state, out in zip(states, ahead, strict=True)]
-            if not (self.structure.limit is None or max(positions) - min(positions) <= self.structure.limit):
-                continue
-            relative_ahead = (False,) * len(ahead) if all(ahead) else ahead
-            for units, probability in self._entered(joint, leaving):
-                yield JointState(units, states, relative_ahead), moved, probability
-
-    def _entered(self, joint: JointState, leaving: tuple[bool, ...]) -> Iterator[tuple[tuple[int, ...], float]]:
-        """Yield the units of all chains after those in ``leaving`` entered the next unit, and their probability."""
-        corresponding_units = self.structure.corresponding_units
-        if not any(leaving):
-            yield joint.units, 1.0
-            return
-        if joint.ahead[0]:  # the first chain is in the next unit already
-            yield self._with(joint, leaving, joint.units[0]), 1.0
-            return
-        row = self.bigram[joint.units[0]]
-        candidates = [
-            unit
-            for unit in range(len(row))
-            if all(
-                corresponding_units[c][unit] == own
-                for c, (own, out) in enumerate(zip(joint.units, joint.ahead, strict=True))
-                if out
-            )
-        ]
-        total = sum(row[unit] for unit in candidates)
-        probabilities: dict[tuple[int, ...], float] = defaultdict(float)
-        for unit in candidates:
-            probabilities[self._with(joint, leaving, unit)] += float(row[unit] / total)
-        yield from probabilities.items()
-
-    def _with(self, joint: JointState, leaving: tuple[bool, ...], unit: int) -> tuple[int, ...]:
-        """Return the units of all chains; those in ``leaving`` get what corresponds to ``unit`` of the first chain."""
-        return tuple(
-            self.structure.corresponding_units[c][unit] if out else own
-            for c, (own, out) in enumerate(zip(joint.units, leaving, strict=True))
+def _list_successors(structure: Structure, bigram: NDArray[np.float64], joint: JointState) -> Iterator[_Successor]:
+    """Yield what may follow a joint state, by the limit of asynchrony and the first chain's bigram."""
+    corresponding = structure.corresponding_units
+    for moved in product((False, True), repeat=len(joint.units)):
+        leaving = tuple(move and state == structure.states - 1 for move, state in zip(moved, joint.states, strict=True))
+        if any(out and ahead for out, ahead in zip(leaving, joint.ahead, strict=True)):
+            continue  # the chain would be a second unit ahead
+        if any(leaving) and not (structure.cross_units or all(leaving)):
+            continue
+        states = tuple(
+            0 if out else state + move for out, state, move in zip(leaving, joint.states, moved, strict=True)
         )
+        ahead = tuple(out or was for out, was in zip(leaving, joint.ahead, strict=True))
+        positions = [state + structure.states * out for state, out in zip(states, ahead, strict=True)]
+        if not (structure.limit is None or max(positions) - min(positions) <= structure.limit):
+            continue
+        relative_ahead = (False,) * len(ahead) if all(ahead) else ahead
+        entered = {joint.units[0]: 1.0}  # of the first chain, if it enters one or is in it already
+        if any(leaving) and not joint.ahead[0]:
+            row, chains_ahead = bigram[joint.units[0]], [c for c, is_ahead in enumerate(joint.ahead) if is_ahead]
+            candidates = [
+                unit for unit in range(len(row)) if all(corresponding[c][unit] == joint.units[c] for c in chains_ahead)
+            ]
+            total = sum(row[unit] for unit in candidates)
+            entered = {unit: float(row[unit] / total) for unit in candidates}
+        probabilities: dict[tuple[int, ...], float] = defaultdict(float)
+        for unit, probability in entered.items():
+            units = (corresponding[c][unit] if out else joint.units[c] for c, out in enumerate(leaving))
+            probabilities[tuple(units)] += probability
+        for units_of_chains, probability in probabilities.items():
+            yield JointState(units_of_chains, states, relative_ahead), moved, probability
 
 
 Array = NDArray[np.float64]
@@ -253,7 +224,13 @@ class Transitions:
         Source: Darroch & Ratcliff 1972; the M-step of Xie & Liu 2007, Eq. A.16, is exact only without the mask.
         """
         if self.product.structure.moves_together:
-            return replace(self, advance=tuple(self._counted(chain, counts) for chain in range(len(self.rows))))
+            shares = []
+            for chain, old in enumerate(self.advance):
+                rows = self._arc_rows(chain)
+                moved = np.bincount(rows, counts * self.product.moves[chain], len(old))
+                share = (moved + old) / (np.bincount(rows, counts, len(old)) + 1)
+                shares.append(np.clip(share, MIN_ADVANCE, 1 - MIN_ADVANCE))
+            return replace(self, advance=tuple(shares))
         left: Array = np.bincount(self.product.arc_from, counts, len(self.product.joint_states)).astype(float)[
             self.product.arc_from
         ]
@@ -291,13 +268,6 @@ class Transitions:
         if blocks == 1:
             return rows
         return rows + len(self.advance[chain]) // blocks * ((1 << np.arange(chain)) @ self.product.moves[:chain])
-
-    def _counted(self, chain: int, counts: Array) -> Array:
-        """Return the shares of moving on in a chain's table, from counts of arcs [shape=(E,)]."""
-        rows, old = self._arc_rows(chain), self.advance[chain]
-        moved = np.bincount(rows, counts * self.product.moves[chain], len(old))
-        share = (moved + old) / (np.bincount(rows, counts, len(old)) + 1)
-        return np.clip(share, MIN_ADVANCE, 1 - MIN_ADVANCE)
 
     def _rescaled(self, chain: int, counts: Array, expected: Array) -> Transitions:
         """Return the transitions after a step of iterative scaling, of one chain's table, towards counts of arcs."""
