@@ -256,7 +256,7 @@ def test_a_cut_in_a_cluster_is_worth_a_worse_merge() -> None:
 
     def recording_of_s(settings: Any) -> int:
         costs = costs_of(units, settings)
-        return int(costs.inventory.windows.recording[select(costs, target_of(costs, "s l iy")).units[0]])
+        return int(costs.inventory.windows.recording[select(costs, target_of(costs, "s l iy"))[0][0]])
 
     assert recording_of_s(config) == 0
     assert recording_of_s(replace(config, cluster=0.0)) == 1
