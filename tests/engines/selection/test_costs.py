@@ -271,5 +271,5 @@ def test_units_merge_where_stress_agrees() -> None:
         for stress, chosen in ((DEFAULT.stress, 1), (0.0, 0)):
             config = replace(DEFAULT, context=0.0, stress=stress)
             costs = costs_of(units, config)
-            found = select(costs, target_of(costs, "b iy s", (-1, 1, -1))).units
+            found = select(costs, target_of(costs, "b iy s", (-1, 1, -1)))[0]
             assert units.windows.recording[found[phone]] == chosen, (phone, stress)
