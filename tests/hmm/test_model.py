@@ -151,7 +151,7 @@ def test_a_price_on_units_leaves_fewer():
 def test_chains_name_states_in_context_and_fall_back_where_unseen():
     hmm = random_hmm(1, contexts=8)
     chain = expand_states(hmm, ("sil", "a", "b", "sp", "a"))
-    names = [name for name, _ in chain.names]
+    names = list(chain.names)
     assert names[3:6] == ["a.0<sil", "a.1", "a.2>b"]
     assert names[6:9] == ["b.0<a", "b.1", "b.2>sil"]  # as a neighbour, a pause is silence
     assert names[10:] == ["a.0<sil", "a.1", "a.2>sil"]  # as beyond the end

@@ -438,7 +438,7 @@ def add_contexts(hmm: UnitHmm, data: Sequence[NDArray[np.float32]], sequences: S
     for x, sequence in zip(data, sequences, strict=True):
         if len(x) >= sum(hmm.table.count(unit) for unit in sequence):
             chain, path = align_states(hmm, compute_log_likelihoods(hmm, x), sequence)
-            frames.update(chain.names[position][0] for position in path)
+            frames.update(chain.names[position] for position in path)
     frequent = {name for name, count in frames.items() if count >= hmm.config.context_frames}
     table = hmm.table.extend(tuple(sorted(frequent - set(hmm.table.names))))
     new = hmm.mixtures.select(table.parents()[len(hmm.log_stay) :])

@@ -49,7 +49,7 @@ def test_states_are_named_with_their_probabilities(kind, sets, limit):
     product, of = found.transitions.product, found.structure
     for row in range(len(joint)):
         best = find_joint_state(found, posteriors, row)
-        assert best.name == product.name(int(joint[row].argmax()))
+        assert best.name == of.name(product.chain_states[:, joint[row].argmax()].tolist())
         assert best.probability == pytest.approx(joint[row].max(), abs=2e-5)
         for chain, explained in enumerate(list_chain_states(found, posteriors, row)):
             names = [of.state_name(chain, state) for state in range(of.state_counts[chain])]

@@ -131,7 +131,7 @@ def find_joint_state(chains: Chains, posteriors: LatticePosteriors, row: int) ->
     if posteriors.joint is None:
         return None
     best = int(posteriors.joint.probability[row].argmax())
-    name = chains.transitions.product.name(int(posteriors.joint.states[best]))
+    name = chains.structure.name(chains.transitions.product.chain_states[:, posteriors.joint.states[best]].tolist())
     return NamedProbability(name, float(posteriors.joint.probability[row, best]))
 
 
@@ -307,16 +307,12 @@ class CoupledEngine(Engine[CoupledModel]):
             reliability=np.maximum(speech.confidence, 1 - speech.voice),  # the chains know their own voice better
         )
         states, positions = np.unique(path, return_inverse=True)
-        sets = model.chains.structure.chains
-        names = ("/".join(each.unit(span.label.phone) for each in sets) for span in speech.units)
-        labelled = zip(speech.units, names, strict=True)
-        units = Timeline(tuple(replace(span, label=replace(span.label, unit=name)) for span, name in labelled))
-        return Generation(
-            motion,
-            variance,
-            units,
-            StateTrace(tuple(model.chains.transitions.product.name(int(state)) for state in states), positions),
-        )
+        structure, chain_states = model.chains.structure, model.chains.transitions.product.chain_states
+        names = tuple(structure.name(each) for each in chain_states[:, states].T.tolist())
+        of_chains = ("/".join(each.unit(span.label.phone) for each in structure.chains) for span in speech.units)
+        labelled = zip(speech.units, of_chains, strict=True)
+        units = Timeline(tuple(replace(span, label=replace(span.label, unit=unit)) for span, unit in labelled))
+        return Generation(motion, variance, units, StateTrace(names, positions))
 
     def lattice(self, model: CoupledModel, speech: Speech, wanted: slice) -> Lattice:
         """Return the lattice of some frames: joint states near the phones of a transcript, or all without one."""

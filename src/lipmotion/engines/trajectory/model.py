@@ -172,20 +172,16 @@ class Emission:
     regression: AcousticRegression | None
 
     @cached_property
-    def _first(self) -> dict[str, int]:
-        counts = np.cumsum([0, *(len(tree.leaves) for tree in self.forest.values())])
-        return dict(zip(self.forest, counts.tolist(), strict=False))
-
-    @cached_property
-    def _rank(self) -> dict[str, NDArray[np.intp]]:
-        return {name: np.cumsum(tree.asked < 0) - 1 for name, tree in self.forest.items()}
+    def _rows(self) -> dict[tuple[str, int], int]:
+        leaves = [(name, leaf) for name, tree in self.forest.items() for leaf in tree.leaves.tolist()]
+        return {leaf: row for row, leaf in enumerate(leaves)}
 
     def row(self, state: FullContextState, layout: StateLayout) -> int:
         """Return the number of the density of a full-context state: its row in ``means``."""
         if state == layout.rest:
             return len(self.means) - 1
         name = layout.name(state)
-        return self._first[name] + int(self._rank[name][self._leaf(name, state.context)])
+        return self._rows[name, self._leaf(name, state.context)]
 
     def _leaf(self, name: str, context: Context) -> int:
         """Return the leaf of a context in a tree; it is looked for once."""

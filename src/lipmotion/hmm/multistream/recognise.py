@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,8 +120,7 @@ class ContextLoop:
     monophones: NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
-class _StateNodes:
+class _StateNodes(NamedTuple):
     """The nodes of one state of a unit: one for each class of left and each of right neighbours that it tells apart.
 
     left, right : [shape=(N,)], the class of every neighbour
@@ -133,14 +133,6 @@ class _StateNodes:
     left: NDArray[np.intp]
     right: NDArray[np.intp]
     numbers: Grid
-
-    def after(self, neighbour: int) -> list[int]:
-        """Return the nodes that have this left neighbour."""
-        return [int(number) for number in self.numbers[self.left[neighbour], :]]
-
-    def before(self, neighbour: int) -> list[int]:
-        """Return the nodes that have this right neighbour."""
-        return [int(number) for number in self.numbers[:, self.right[neighbour]]]
 
 
 def build_context_loop(hmm: JointHmm) -> ContextLoop:
@@ -182,12 +174,12 @@ def _join_units(
         leave = float(hmm.log_move[hmm.inventory.monophones[unit, hmm.inventory.count(unit) - 1]])
         for following in units:
             entered, score = nodes[following][0], leave + _language_score(hmm, unit, following)
-            for source in last.before(place[following]):
-                for target in entered.after(place[unit]):
+            for source in last.numbers[:, last.right[place[following]]].tolist():
+                for target in entered.numbers[entered.left[place[unit]]].tolist():
                     builder.arc(source, target, score)
-        for node in first.after(place[silence]):
+        for node in first.numbers[first.left[place[silence]]].tolist():
             builder.initial(node, hmm.config.insertion if unit == silence else _language_score(hmm, silence, unit))
-        for node in last.before(place[silence]):
+        for node in last.numbers[:, last.right[place[silence]]].tolist():
             builder.final(node, leave + (0.0 if unit == silence else _language_score(hmm, unit, silence)))
 
 

@@ -113,10 +113,6 @@ class FactorialProduct:
         """The state of each chain in each joint state [shape=(2, S)]."""
         return np.indices(self.structure.state_counts).reshape(2, -1)
 
-    def name(self, state: int) -> str:
-        """Return the name of a joint state, as ``Structure.name``."""
-        return self.structure.name(self.chain_states[:, state].tolist())
-
 
 @dataclass(frozen=True, eq=False)
 class FactorialTransitions:

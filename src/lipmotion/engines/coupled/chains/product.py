@@ -77,10 +77,6 @@ class Product:
         positions = np.array(progress).T
         return positions - positions[0]
 
-    def name(self, state: int) -> str:
-        """Return the name of a joint state, as ``Structure.name``."""
-        return self.structure.name(self.chain_states[:, state].tolist())
-
 
 def find_reachable(structure: Structure, grammar: Grammar) -> Product:
     """Return the product of chains: the joint states that can be reached from the beginning of an utterance.

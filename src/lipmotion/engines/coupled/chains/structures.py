@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -116,11 +116,8 @@ class Structure:
         """Return the chain that emits a stream: the first emits speech, the others the visual streams in order."""
         return min(stream, len(self.chains) - 1)
 
-    def name(self, states: Sequence[int]) -> str:
-        """Return the name of a joint state, as ``b.1 | bi.2``: of each chain the unit, and its state, counted from 1.
-
-        states : the state of each chain
-        """
+    def name(self, states: Iterable[int]) -> str:
+        """Return the name of a joint state, given that of each chain: ``b.1 | bi.2``, with states counted from 1."""
         return " | ".join(self.state_name(chain, state) for chain, state in enumerate(states))
 
     def state_name(self, chain: int, state: int) -> str:
