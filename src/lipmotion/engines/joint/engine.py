@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.densities import MOTION, StreamObservations, StreamWeights, stream_observations
-from lipmotion.hmm.multistream.generate import merge_gaussians, select_densities
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, joint_from_arrays, joint_to_arrays
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, grow_joint, train_joint, with_durations
-from lipmotion.hmm.multistream.recognise import StatePath, align, build_recogniser
+from lipmotion.hmm.multistream.recognise import StatePath, align, build_recogniser, merge_gaussians, select_densities
 from lipmotion.hmm.multistream.unit_states import Inventory, RecognisedUnit, frames_to_units, units_to_frames
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.motion.arrays import (
