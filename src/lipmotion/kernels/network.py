@@ -87,17 +87,6 @@ class Chunks(NamedTuple):
     weight: Array
     arcs: Index
 
-    @classmethod
-    def of(cls, layout: ArcLayout, weights: ArcWeights) -> Chunks:
-        """Return the padded runs of a layout."""
-        runs = layout.runs.copy()
-        runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
-        runs[:, 3] = np.cumsum(runs[:, 2]) - runs[:, 2]
-        weight = np.zeros(runs[:, 2].sum())
-        arcs = np.arange(len(weights.runs)) + np.repeat(runs[:, 3] - layout.runs[:, 3], layout.runs[:, 2])
-        weight[arcs] = weights.runs
-        return cls(runs.astype(np.uintp), weight, arcs)
-
 
 class ForwardBackwardNetwork(NamedTuple):
     """A network prepared for forward–backward.
@@ -271,7 +260,13 @@ def _weigh(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array,
         matrix = np.zeros((targets, width))
         matrix[:, :sources] = blocks[first : first + sources, :targets].T
         transposed.append(matrix)
-    return best, weights, np.concatenate(transposed), Chunks.of(layout, weights)
+    runs = layout.runs.copy()
+    runs[:, 2] = -(-runs[:, 2] // CHUNK) * CHUNK
+    runs[:, 3] = np.cumsum(runs[:, 2]) - runs[:, 2]
+    weight = np.zeros(runs[:, 2].sum())
+    arcs = np.arange(len(weights.runs)) + np.repeat(runs[:, 3] - layout.runs[:, 3], layout.runs[:, 2])
+    weight[arcs] = weights.runs
+    return best, weights, np.concatenate(transposed), Chunks(runs.astype(np.uintp), weight, arcs)
 
 
 @compile_to_rounding

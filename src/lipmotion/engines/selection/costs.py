@@ -30,7 +30,7 @@ from lipmotion.engines.selection.inventory import (
 from lipmotion.errors import InputError
 from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor
-from lipmotion.types import Configuration, Rule, option
+from lipmotion.types import FRAME_RATE_HZ, Configuration, Rule, option
 from lipmotion.units import PHONES
 from lipmotion.units.phones import CLASSES
 
@@ -319,9 +319,9 @@ class Costs:
     def _states(self, fraction: float) -> Array:
         """Return position and velocity of all units at a fraction of their durations [shape=(U, 2Q)]."""
         if fraction not in self._known_states:
-            units, inventory = np.arange(len(self.inventory.windows)), self.inventory
-            velocities = inventory.velocities(units, fraction) * self.config.velocity
-            state = np.concatenate([inventory.poses(units, fraction), velocities], axis=1) * np.tile(self.scale, 2)
+            step_s, poses = 1 / FRAME_RATE_HZ, self.inventory.poses
+            velocities = (poses(fraction, step_s) - poses(fraction, -step_s)) / (2 * step_s) * self.config.velocity
+            state = np.concatenate([poses(fraction), velocities], axis=1) * np.tile(self.scale, 2)
             self._known_states[fraction] = state
         return self._known_states[fraction]
 
@@ -352,8 +352,7 @@ class Costs:
         """The motion at ``POINTS`` of every unit, times ``scale`` [shape=(U, POINTS, Q)]; None: there is no guide."""
         if self.inventory.predicted is None or not self.config.guide:
             return None
-        units = np.arange(len(self.inventory.windows))
-        return np.stack([self.inventory.poses(units, fraction) for fraction in FRACTIONS], axis=1) * self.scale
+        return np.stack([self.inventory.poses(fraction) for fraction in FRACTIONS], axis=1) * self.scale
 
     @cached_property
     def _predicted(self) -> Array | None:

@@ -265,17 +265,10 @@ class RecordedUnits:
         predicted = self.predicted[kept] if self.predicted is not None else None
         return replace(self, windows=windows, usable=self.usable[kept], predicted=predicted)
 
-    def poses(self, units: UnitNumbers, fraction: float) -> Array:
-        """Return the motion of some units at a fraction of their duration, 0 to 1 [shape=(N, Q)]."""
-        start_s, end_s = self.windows.times_s[units].T
-        return self.at(self.windows.recording[units], start_s + fraction * (end_s - start_s))
-
-    def velocities(self, units: UnitNumbers, fraction: float) -> Array:
-        """Return the change of the motion per second, at a fraction of the duration of some units [shape=(N, Q)]."""
-        start_s, end_s = self.windows.times_s[units].T
-        time_s, recording = start_s + fraction * (end_s - start_s), self.windows.recording[units]
-        step_s = 1 / FRAME_RATE_HZ
-        return (self.at(recording, time_s + step_s) - self.at(recording, time_s - step_s)) / (2 * step_s)
+    def poses(self, fraction: float, later_s: float = 0.0) -> Array:
+        """Return the motion of all units at a fraction of their duration, 0 to 1, or some time later [shape=(U, Q)]."""
+        start_s, end_s = self.windows.times_s.T
+        return self.at(self.windows.recording, start_s + fraction * (end_s - start_s) + later_s)
 
     def at(self, recording: NDArray[np.integer], time_s: Array) -> Array:
         """Return the motion of recordings at times, interpolated; held beyond their ends [shape=(N, Q)]."""
