@@ -183,6 +183,7 @@ class _Scaled:
         self.initial, self.final = log_ends(audio, visual)
         self.audio, self.visual = _moves(audio, kind), _moves(visual, kind)
         self.start, self.densities = 0, list[FrameDensity]()
+        self.pairs: tuple[Index, Index] = logs.pairs[:, 0], logs.pairs[:, 1]
         # In a frame, what was raised is 1 / whole² at most for each joint state, forward and backward, times the sum of
         # all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
         raised = 2 * len(logs.audio) * 9 * self.initial.size / self.whole**2
@@ -205,7 +206,7 @@ class _Scaled:
             moved = _move_to_last(before, *self.audio[:2], entering, count)
             total = _forward(
                 before, *self.audio[:2], entering, *self.visual[:2], moved @ self.visual[2],
-                density.audio, density.visual, density.pair, density.pair_audio, density.pair_visual,
+                density.audio, density.visual, density.pair, *self.pairs,
                 MIN_PRODUCT[self.kind], self.whole, after,
             )  # fmt: skip
             if not total > MIN_TOTAL[self.kind]:
@@ -232,7 +233,7 @@ class _Scaled:
         after, sums = np.empty_like(before), [np.empty(len(part)) for part in density[:3]]
         total = _backward(
             before, moved, *self.audio[:2], self.audio[2] @ moved[:units], density.audio, density.visual, density.pair,
-            density.pair_audio, density.pair_visual,
+            *self.pairs,
             MIN_PRODUCT[self.kind], self.whole, after, *sums,
         )  # fmt: skip
         met = float(sums[0].sum())

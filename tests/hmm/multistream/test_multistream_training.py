@@ -229,7 +229,7 @@ def test_an_even_count_has_no_middle():
 
 
 def test_silence_stands_for_pauses_beside_other_units():
-    contexts = KNOWN.contexts(("sil", "a", "sp", "b"))
+    contexts = list(dict.fromkeys(context for context, _ in expand_triphones(KNOWN, ("sil", "a", "sp", "b")).triphones))
     assert contexts == [("sil", "sil", "a"), ("sil", "a", "sil"), ("a", "sp", "b"), ("sil", "b", "sil")]
     states = expand_triphones(KNOWN, ("a", "sp"))
     assert states.positions.tolist() == [0, 0, 0, 1]

@@ -32,7 +32,7 @@ from lipmotion.hmm.multistream.model import (
     grow_forest,
     list_context_questions,
 )
-from lipmotion.hmm.multistream.recognise import check_bounds, measure_durations
+from lipmotion.hmm.multistream.recognise import align, check_bounds
 from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState, expand_triphones
 from lipmotion.hmm.unit_training import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES, group_by_length
 from lipmotion.kernels.forward_backward import LOG_ZERO, chain_posteriors
@@ -44,6 +44,8 @@ from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
 
 MIN_STAY_PROBABILITY = 0.05
 """Smallest probability of staying in a state."""
+MIN_DURATION_VARIANCE = 1.0
+"""Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
 MIN_MIXTURE_POSTERIOR = 1e-5
 """Smaller state posteriors are left out of the statistics of mixtures; nearly all posteriors are smaller."""
 Rows = NDArray[np.float32]
@@ -273,7 +275,7 @@ def train_joint(
 ) -> JointHmm:
     """Return models of all streams, trained together: the last of ``grow_joint``, which says what it takes."""
     *_, hmm = grow_joint(utterances, inventory, classes, config, monitor, work)
-    return with_durations(hmm, utterances)
+    return replace(hmm, durations=measure_durations(hmm, utterances))
 
 
 def grow_joint(
@@ -286,7 +288,7 @@ def grow_joint(
 ) -> Iterator[JointHmm]:
     """Yield models of all streams, trained together, of 1, 2, 4 … Gaussians for speech, then of more for motion.
 
-    Their durations are not measured (NaN): ``with_durations``.
+    Their durations are not measured (NaN): ``measure_durations``.
 
     classes : sets of units, by name, that the trees ask about, besides single units
     A stream of weight 0 in training does not affect the alignment, but its densities are learned.
@@ -370,9 +372,25 @@ def _make_equal_models(
     return JointHmm(config, inventory, models, log_stay, durations, spoken, bigram)
 
 
-def with_durations(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> JointHmm:
-    """Return models with the durations of states that are measured in the alignment of their training."""
-    return replace(hmm, durations=measure_durations(hmm, [(u.observed, u.units) for u in utterances]))
+def measure_durations(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> NDArray[np.float64]:
+    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)]."""
+    sums = np.zeros((len(hmm.log_stay), 3))
+    for utterance in utterances:
+        observed, units = utterance.observed, utterance.units
+        active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)
+        if not active or len(expand_triphones(hmm.inventory, units).monophones) > observed.frames:
+            continue
+        path = align(hmm, observed, units, weights=hmm.config.training)
+        frames = np.bincount(path.frames, minlength=len(path.states.monophones)).astype(float)
+        np.add.at(sums, path.states.monophones, np.stack([np.ones(len(frames)), frames, frames * frames], axis=1))
+    leave = np.exp(hmm.log_move)
+    geometric = np.stack([1 / leave, (1 - leave) / leave**2], axis=1)
+    count = np.maximum(sums[:, 0], 1)
+    mean = sums[:, 1] / count
+    measured = np.stack([mean, sums[:, 2] / count - mean * mean], axis=1)
+    durations = np.where(sums[:, :1] > 0, measured, geometric)
+    durations[:, 1] = np.maximum(durations[:, 1], MIN_DURATION_VARIANCE)
+    return durations
 
 
 def _split_monitor(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -18,9 +18,6 @@ from lipmotion.hmm.multistream.unit_states import RecognisedUnit, TriphoneStates
 from lipmotion.hmm.network import LogLikelihoods, NetworkBuilder, UnitLoop, build_chain, decode_path
 from lipmotion.kernels.banded import solve_mlpg
 from lipmotion.stats.curves import with_dynamics
-
-MIN_VARIANCE = 1.0
-"""Smallest variance of a duration, in frames²; durations that were all equal have variance 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,28 +79,6 @@ def check_bounds(bounds: NDArray[np.intp], units: int, frames: int) -> None:
     """Raise InputError unless bounds are the first frames of so many units, and the frame count at the end."""
     if bounds.shape != (units + 1,) or bounds[0] != 0 or bounds[-1] != frames or (np.diff(bounds) < 0).any():
         raise InputError(f"bounds {bounds.tolist()} of {units} units; required one more than units, from 0 to {frames}")
-
-
-def measure_durations(
-    hmm: JointHmm, utterances: Iterable[tuple[StreamObservations, Sequence[str]]]
-) -> NDArray[np.float64]:
-    """Return mean and variance of the duration of each state without context, in frames [shape=(R, 2)]."""
-    sums = np.zeros((len(hmm.log_stay), 3))
-    for observed, units in utterances:
-        active = set(hmm.config.training.active) & set(observed.streams) & set(hmm.models)
-        if not active or len(expand_triphones(hmm.inventory, units).monophones) > observed.frames:
-            continue
-        path = align(hmm, observed, units, weights=hmm.config.training)
-        frames = np.bincount(path.frames, minlength=len(path.states.monophones)).astype(float)
-        np.add.at(sums, path.states.monophones, np.stack([np.ones(len(frames)), frames, frames * frames], axis=1))
-    leave = np.exp(hmm.log_move)
-    geometric = np.stack([1 / leave, (1 - leave) / leave**2], axis=1)
-    count = np.maximum(sums[:, 0], 1)
-    mean = sums[:, 1] / count
-    measured = np.stack([mean, sums[:, 2] / count - mean * mean], axis=1)
-    durations = np.where(sums[:, :1] > 0, measured, geometric)
-    durations[:, 1] = np.maximum(durations[:, 1], MIN_VARIANCE)
-    return durations
 
 
 Grid = NDArray[np.intp]
