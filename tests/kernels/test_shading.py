@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from lipmotion_faces.kernels import shading
 from lipmotion_faces.kernels.normals import sum_normals
-from oracles import shading as oracle
+from oracles import drawing as oracle
 
 
 def unit(vectors):

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.stats.curves import measure_modulation_spectrum, varies, with_dynamics
-from oracles.trajectories import window_matrix
+from oracles.statistics import window_matrix
 
 
 @given(frames=st.integers(1, 12), seed=st.integers(0, 1000))

@@ -31,7 +31,7 @@ from lipmotion.hmm.multistream.recognise import (
 from lipmotion.stats.curves import with_dynamics
 from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
-from oracles import trajectories
+from oracles.statistics import generate_trajectory
 
 
 def test_densities_are_those_of_the_formulas():
@@ -225,7 +225,7 @@ def test_one_gaussian_has_the_closed_form(frames, seed):
     values, log_likelihoods = solve_trajectory(densities)
     for channel in range(2):
         mean, precision = densities.means[:, 0, :, channel], densities.precisions[:, 0, :, channel]
-        assert values[:, channel] == pytest.approx(trajectories.generate(mean, precision)[0], abs=1e-8)
+        assert values[:, channel] == pytest.approx(generate_trajectory(mean, precision)[0], abs=1e-8)
     assert len(log_likelihoods) == 1
 
 

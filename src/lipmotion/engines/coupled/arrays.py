@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import StreamGroup
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains, VisualStream
-from lipmotion.engines.coupled.chains.product import Grammar, Transitions, find_reachable
-from lipmotion.engines.coupled.chains.structures import Structure
+from lipmotion.engines.coupled.chains.product import Grammar, Structure, Transitions, find_reachable
 from lipmotion.engines.coupled.conversion import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledConfig, CoupledModel
 from lipmotion.errors import InputError, ModelFormatError

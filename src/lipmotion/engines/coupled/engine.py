@@ -16,8 +16,7 @@ from lipmotion.engines.coupled.arrays import coupled_from_arrays, coupled_to_arr
 from lipmotion.engines.coupled.chains.densities import Single, infer_components
 from lipmotion.engines.coupled.chains.lattice import Lattice, LatticePosteriors
 from lipmotion.engines.coupled.chains.model import Chains, Inference, VisualStream, speech_observations
-from lipmotion.engines.coupled.chains.product import Product
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
+from lipmotion.engines.coupled.chains.product import COUPLED, FACTORIAL, HMM, MULTISTREAM, Product
 from lipmotion.engines.coupled.conversion import convert, group_index, path_to_means, weigh_regressions
 from lipmotion.engines.coupled.model import PATH, TRAJECTORY, CoupledConfig, CoupledModel
 from lipmotion.engines.coupled.training.chain_training import mark_allowed_units

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.model import EIGENLIPS, Chains, Inference, VisualStream
-from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
+from lipmotion.engines.coupled.chains.product import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, list_unit_sets
 from lipmotion.engines.coupled.conversion import (
     EXACT,
     SOFT,

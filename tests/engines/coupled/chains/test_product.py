@@ -18,10 +18,16 @@ from engines.coupled.tiny import (
     structure,
 )
 from lipmotion.engines import create_engine
-from lipmotion.engines.coupled.chains import densities, model, structures
+from lipmotion.engines.coupled.chains import densities, model
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
-from lipmotion.engines.coupled.chains.product import JointState, Transitions, create_transitions, find_reachable
-from lipmotion.engines.coupled.chains.structures import list_unit_sets
+from lipmotion.engines.coupled.chains.product import (
+    UNSEEN_LOSS,
+    JointState,
+    Transitions,
+    create_transitions,
+    find_reachable,
+    list_unit_sets,
+)
 from lipmotion.engines.coupled.conversion import convert, sum_precisions
 from lipmotion.engines.coupled.training.chain_training import MIN_FRAMES, with_joint_state_densities
 from lipmotion.errors import InputError
@@ -365,7 +371,7 @@ def both(seed=0) -> tuple[model.Chains, model.Chains]:
 def penalised(listed: model.Chains, groups) -> model.Chains:
     """Listed chains with the same penalty for joint states without densities of their own."""
     speech = groups[0].mixtures.copy()
-    speech.log_weights[:-3] -= structures.UNSEEN_LOSS
+    speech.log_weights[:-3] -= UNSEEN_LOSS
     return replace(listed, groups=(replace(groups[0], mixtures=speech), *groups[1:]))
 
 
@@ -396,7 +402,7 @@ def test_conversion_is_the_same():
         np.testing.assert_allclose(results[0][0], results[1][0], rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.parametrize("loss", [0.0, structures.UNSEEN_LOSS])
+@pytest.mark.parametrize("loss", [0.0, UNSEEN_LOSS])
 def test_densities_integrate_to_1_without_a_loss(loss):
     """As printed, those of every joint state; with the option, rare ones lose that share, and frequent ones nothing."""
     of = replace(structure(FACTORIAL, (THREE, TWO), limit=None), unseen_loss=loss)

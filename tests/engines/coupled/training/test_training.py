@@ -26,7 +26,7 @@ from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.chains.densities import MIN_COMPONENT_FRAMES, AudioVisualObservations, reestimate_group
 from lipmotion.engines.coupled.chains.lattice import FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains, speech_observations
-from lipmotion.engines.coupled.chains.structures import list_unit_sets
+from lipmotion.engines.coupled.chains.product import list_unit_sets
 from lipmotion.engines.coupled.conversion import EXACT, VITERBI, convert
 from lipmotion.engines.coupled.training.chain_training import (
     CONVERGENCE_GAIN,

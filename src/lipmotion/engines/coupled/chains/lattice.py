@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import Single
-from lipmotion.engines.coupled.chains.product import MIN_ADVANCE, Grammar
-from lipmotion.engines.coupled.chains.structures import Structure
+from lipmotion.engines.coupled.chains.product import MIN_ADVANCE, Grammar, Structure
 from lipmotion.kernels.factorial import infer_factorial
 from lipmotion.kernels.factorial_loops import FactorialLogLikelihoods, Loop, find_factorial_path
 

@@ -19,8 +19,7 @@ from lipmotion.engines.coupled.chains.lattice import (
     build_factorial_lattice,
     tie_posteriors,
 )
-from lipmotion.engines.coupled.chains.product import Transitions
-from lipmotion.engines.coupled.chains.structures import Structure
+from lipmotion.engines.coupled.chains.product import Structure, Transitions
 from lipmotion.kernels.network import ForwardBackwardNetwork
 from lipmotion.kernels.paths import NetworkArrays, best_path
 from lipmotion.motion.space import MotionSpace

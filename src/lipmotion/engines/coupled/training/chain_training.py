@@ -24,14 +24,17 @@ from lipmotion.engines.coupled.chains.densities import (
 from lipmotion.engines.coupled.chains.lattice import FactorialProduct, FactorialTransitions, Lattice
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import (
+    COUPLED,
+    FACTORIAL,
+    HMM,
     Grammar,
     JointState,
     Product,
+    Structure,
     Transitions,
     create_transitions,
     find_reachable,
 )
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, Structure
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.unit_states import units_to_frames
 from lipmotion.stats.bigram import estimate_bigram

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.base import Fit
 from lipmotion.engines.coupled.chains.model import EIGENLIPS, GEOMETRY, Chains, fit_visual_streams, speech_observations
-from lipmotion.engines.coupled.chains.structures import HMM, list_unit_sets
+from lipmotion.engines.coupled.chains.product import HMM, list_unit_sets
 from lipmotion.engines.coupled.conversion import (
     RegressionInputs,
     RegressionUtterance,
