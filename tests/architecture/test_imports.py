@@ -36,7 +36,7 @@ FORBIDDEN = [
     (ENGINES, "lipmotion/engines/base.py", "from lipmotion.engines import registry"),
     (FACES, "lipmotion_faces/portrait/mouth_painting.py", "from lipmotion_faces import registry"),
     (FORMATS, "lipmotion/formats/tables.py", "from lipmotion.formats import motion_document"),
-    (FORMATS, "lipmotion/formats/rhubarb.py", "from lipmotion.formats import papagayo"),
+    (FORMATS, "lipmotion/formats/fap.py", "from lipmotion.formats import vmd"),
     (FORMATS, "lipmotion/formats/base.py", "import lipmotion.formats.c3d"),
     (
         "Engines know predictors by their interface alone",

@@ -16,8 +16,8 @@ from formats.examples import written as write
 from lipmotion import read_motion
 from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.bvh import CENTIMETRES
-from lipmotion.formats.live2d import TOLERANCE, measure_mouth_form, measure_mouth_open
+from lipmotion.formats.c3d import CENTIMETRES
+from lipmotion.formats.game_engines import TOLERANCE, measure_mouth_form, measure_mouth_open
 from lipmotion.formats.vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import move_points, with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import gaze_to_weights, weights_to_gaze

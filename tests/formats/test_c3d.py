@@ -10,8 +10,7 @@ from formats.examples import of_motion
 from formats.examples import written as write
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats import read_motion
-from lipmotion.formats.c3d import BLOCK, C3dFile, read_c3d, write_c3d
-from lipmotion.formats.markers import MILLIMETRES, to_head_frame
+from lipmotion.formats.c3d import BLOCK, MILLIMETRES, C3dFile, read_c3d, to_head_frame, write_c3d
 from lipmotion.types import WEIGHT, Channel, Generation, Motion
 
 RNG = np.random.default_rng(11)

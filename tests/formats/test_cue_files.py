@@ -15,8 +15,7 @@ from lipmotion import CueSheet, read_motion
 from lipmotion.articulation.cue_sheets import choose_cues
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import ExportError, InputError
-from lipmotion.formats.cues import CUE_FORMATS, convert_cues, format_of, read_cues, write_cue_file
-from lipmotion.formats.papagayo import UNKNOWN
+from lipmotion.formats.cues import CUE_FORMATS, UNKNOWN, convert_cues, format_of, read_cues, write_cue_file
 from lipmotion.pipeline.outputs.motion_files import read_generation
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units.phones import SHAPES

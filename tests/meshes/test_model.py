@@ -3,7 +3,7 @@ import pytest
 
 from lipmotion import errors, types
 from lipmotion.errors import InputError
-from lipmotion.formats.keys import EVERY_KEY, Thinning, place_keys
+from lipmotion.formats.base import EVERY_KEY, Thinning, place_keys
 from lipmotion.meshes.model import shape_names
 from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.meshes.model.rig_tables import apply_rig, read_rig_table

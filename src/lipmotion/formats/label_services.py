@@ -416,7 +416,10 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return lists of items in time: phones, and a tier of each speaker, of words if nearly all are, else of lines."""
     rows = [row for place, item in objects for row in _find_rows(item, place if len(objects) > 1 else "", where)]
     check_count(len(rows), where)
-    _warn_of_missed_words(objects, where)
+    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
+    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
+    if missed and where:
+        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
     timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
     if not timed and not (rows and all(item.keys() <= TEXT_ALONE for _, item in objects)):
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
@@ -427,28 +430,16 @@ def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:
     if any(len({part.speaker for part in row.parts}) > 1 for row in spoken):
         spoken = [part for row in spoken for part in row.parts or (row,)]
     tiers = [LabelTier(PHONE_LABELS, tuple(_scale_rows(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
-    return tiers + _group_by_speaker(spoken, where, may_be_phones=not phones)
-
-
-def _warn_of_missed_words(objects: Objects, where: str) -> None:
-    words = [word for _, item in objects if isinstance(item.get("words"), list) for word in item["words"]]
-    missed = sum(isinstance(word, dict) and word.get("case") == MISSED for word in words)
-    if missed and where:
-        LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
-
-
-def _group_by_speaker(rows: list[Row], where: str, *, may_be_phones: bool) -> list[LabelTier]:
-    """Return a tier of each speaker: of words if nearly all rows are single ones, else of lines, or of phones."""
-    counts = [len(find_words(extract_spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
-    check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
-    single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
-    role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
+    counts = [len(find_words(extract_spoken_text(each.text[:LONGEST_JUDGED]))) for each in spoken]
+    check_word_count(sum(counts) + sum(len(each.parts) for each in spoken), where)
+    single = sum(each.role == WORDS or count < 2 for each, count in zip(spoken, counts, strict=True))
+    role = WORDS if single >= SINGLE_SHARE * len(spoken) and not any(each.parts for each in spoken) else LINES
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
-    for row, label in zip(rows, _scale_rows(rows, role, where), strict=True):
-        by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
-    if may_be_phones and all(row.role != WORDS and not row.parts for row in rows):
+    for each, label in zip(spoken, _scale_rows(spoken, role, where), strict=True):
+        by_speaker[each.speaker or (each.parts[0].speaker if each.parts else "")].append(label)
+    if not phones and all(each.role != WORDS and not each.parts for each in spoken):
         role = PHONE_LABELS if all(holds_phones(LabelTier("", tuple(each))) for each in by_speaker.values()) else role
-    return [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
+    return tiers + [LabelTier(who or role, tuple(labels), role, who) for who, labels in by_speaker.items()]
 
 
 def _drop_first_pass(rows: list[Row]) -> list[Row]:

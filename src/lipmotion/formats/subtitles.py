@@ -228,17 +228,6 @@ def _read_dialogue(text: str, where: str) -> Iterator[TimedLabel]:
             yield TimedLabel(*times, BREAK.sub("\n", shown), f"line {number}")
 
 
-def list_shown_labels(path: Path, units: Timeline[Unit]) -> list[tuple[float, float, str]]:
-    """Return start, end and text of each word, or of each phone where the name of the file asks for them; no silence.
-
-    Words are those of ``units.group_words``.
-    """
-    if path.stem.lower().endswith(PHONES):
-        spoken = [span for span in units if not is_silent(span.label.phone)]
-        return [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in spoken]
-    return [(span.start_s, span.end_s, span.label) for span in group_words(units) if span.label]
-
-
 def clock(seconds: float, mark: str) -> str:
     """Return a time as ``HH:MM:SS.mmm``; ``mark``: what stands before the thousandths."""
     thousandths = round(seconds * 1000)
@@ -249,9 +238,13 @@ def clock(seconds: float, mark: str) -> str:
 def write_subtitles(path: Path, units: Timeline[Unit]) -> None:
     """Write the words in time as SubRip or WebVTT, or the phones where the name ends with ``.phones.srt``, one a cue.
 
-    Silence has no cue. After a failure there is no partial file. Raises ExportError: the file cannot be written.
+    Words are those of ``units.group_words``; silence has no cue. After a failure there is no partial file.
+    Raises ExportError: the file cannot be written.
     """
-    cues = list_shown_labels(path, units)
+    cues = [(span.start_s, span.end_s, span.label) for span in group_words(units) if span.label]
+    if path.stem.lower().endswith(PHONES):
+        spoken = [span for span in units if not is_silent(span.label.phone)]
+        cues = [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in spoken]
     if path.suffix.lower() == ".srt":
         lines = [f"{n}\n{clock(a, ',')} --> {clock(b, ',')}\n{text}\n\n" for n, (a, b, text) in enumerate(cues, 1)]
     else:

@@ -319,10 +319,8 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
         first = np.flatnonzero((np.diff(seconds) == 1) & (seconds[1:] % 60 == 0) & (seconds[1:] % 600 != 0)) + 1
         jumps = (frames[first - 1] >= rate - 1) & (np.floor(frames[first]) == rate // 15)
         if mark == ";" or (rate in {30, 60} and len(first) and jumps.all()):
-            time_s, day_s = (
-                _drop_frames(seconds, frames, rate),
-                float(_drop_frames(np.array(DAY_S), np.array(0.0), rate)),
-            )
+            time_s = _drop_frames(seconds, frames, rate)
+            day_s = float(_drop_frames(np.array(DAY_S), np.array(0.0), rate))
     over = np.concatenate([[0.0], np.cumsum(np.diff(time_s) < -DAY_S / 2)])
     return time_s + day_s * over
 

@@ -84,25 +84,21 @@ def parse_line_tiers(text: str, where: str) -> list[LabelTier] | None:
     One time a line is that of the end under the header of ESPS, or where the first label is silence and ends after 0.
     Raises InputError: a later line is of another form, or has a time that is none; or starts that may be ends.
     """
-    if header := ESPS.match(text):
-        return _read_points("\n" * header[0].count("\n") + text[header.end() :], where, ends=True)
+    if esps := ESPS.match(text):
+        return _read_points("\n" * esps[0].count("\n") + text[esps.end() :], where, ends=True)
     first = next((line for _, line in _lines(text)), "")
     if RTTM.match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
     if SECONDS.fullmatch(first):
         return [_read_spans(text, SECONDS, where)]
-    for read in (_read_columns, _read_lrs, _read_wholes, _read_starts, _read_nist):
+    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
+    if columns := _find_columns(header or first):
+        return _read_table(text, columns, where, header)
+    for read in (_read_lrs, _read_wholes, _read_starts, _read_nist):
         tiers = read(text, first, where)
         if tiers is not None:
             return tiers
     return None
-
-
-def _read_columns(text: str, first: str, where: str) -> list[LabelTier] | None:
-    """Return the tiers of a table whose columns are known by their names, or by the form of its first line."""
-    header = next((header for form, header in HEADLESS if form.fullmatch(first)), "")
-    columns = _find_columns(header or first)
-    return _read_table(text, columns, where, header) if columns else None
 
 
 def _read_wholes(text: str, first: str, where: str) -> list[LabelTier] | None:
