@@ -143,16 +143,15 @@ PROTOTYPES = {
 
 
 def test_every_mood_has_known_action_units_with_intensities_and_sources():
-    rows = expression.list_mood_rows()
-    assert {row.mood for row in rows} == {*MOODS}
-    assert len({(row.mood, row.unit) for row in rows}) == len(rows)
-    assert {row.source for row in rows} == SOURCES
-    for row in rows:
-        assert row.unit in ACTION_UNITS
-        assert 0 < row.intensity <= 1
+    rows = [(row["mood"], int(row["action_unit"]), row["source"]) for row in expression.list_mood_rows()]
+    assert {mood for mood, *_ in rows} == {*MOODS}
+    assert len({(mood, unit) for mood, unit, _ in rows}) == len(rows)
+    assert {source for *_, source in rows} == SOURCES
+    assert {unit for _, unit, _ in rows} <= {*ACTION_UNITS}
+    assert all(0 < size <= 1 for units in expression.read_mood_table().values() for size in units.values())
     for mood, asked in PROTOTYPES.items():
         assert asked <= {*expression.read_mood_table()[mood]}
-        assert asked <= {row.unit for row in rows if row.mood == mood and row.source == "EMFACS"}
+        assert asked <= {unit for name, unit, source in rows if name == mood and source == "EMFACS"}
 
 
 def test_a_mood_comes_and_goes_smoothly_around_its_time():

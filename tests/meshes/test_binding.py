@@ -9,7 +9,6 @@ from lipmotion import errors, types
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, build_mouth
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.meshes.fitting import blendshape_motion, shape_weights
-from lipmotion.meshes.fitting.driven import skin_vertices
 from lipmotion.meshes.fitting.shape_weights import OPPOSED, CurveCosts, cancel_opposed, fit_bounded_curves, round_lips
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion_faces.characters import binding as binding_files
@@ -71,9 +70,7 @@ def test_skinning_is_the_weighted_sum_of_the_transformed_vertices(binding, mesh)
     rng = np.random.default_rng(3)
     matrices = np.tile(np.eye(3, 4), (len(binding.placement.points), 1, 1)) + 0.1 * rng.normal(size=(52, 3, 4))
     rows = binding.rows[:40]
-    fast = skin_vertices(binding.matrix[:40], matrices, mesh.vertices[rows])
     slow = skinned_vertex_by_vertex(binding.matrix[:40].toarray(), matrices, mesh.vertices[rows])
-    np.testing.assert_allclose(fast, slow, atol=1e-9)
     np.testing.assert_allclose(binding.transformed(mesh, matrices)[rows], slow, atol=1e-9)
 
 

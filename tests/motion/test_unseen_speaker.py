@@ -10,7 +10,7 @@ from lipmotion.motion import articulation
 from lipmotion.motion import articulation as unseen_speaker
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.closure import REACH_S, find_closable_ranges
-from lipmotion.motion.general_motion import hear_articulators
+from lipmotion.motion.network_steps import hear_articulators
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.pipeline.analysis.speech_analysis import analyse
 from lipmotion.pipeline.model import with_prior

@@ -18,7 +18,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,29 +35,20 @@ CHANGE_S: Final = (0.25, 0.2)
 """A mood begins to change so long before its time, and has changed so long after it."""
 
 
-class MoodRow(NamedTuple):
-    """An action unit of a mood: its intensity, 0 to 1, and where it is from."""
-
-    mood: str
-    unit: int
-    intensity: float
-    source: str
-
-
 @cache
-def list_mood_rows() -> tuple[MoodRow, ...]:
-    """Return the rows of the table ``moods.csv``."""
+def list_mood_rows() -> list[dict[str, str]]:
+    """Return the rows of the table ``moods.csv``: mood, action unit, its intensity, and where it is from."""
     text = resources.files("lipmotion.articulation").joinpath("moods.csv").read_text(encoding="ascii")
-    return tuple(
-        MoodRow(row["mood"], int(row["action_unit"]), float(row["intensity"]), row["source"])
-        for row in csv.DictReader(text.splitlines())
-    )
+    return list(csv.DictReader(text.splitlines()))
 
 
 @cache
 def read_mood_table() -> Mapping[str, Mapping[int, float]]:
     """Return the intensity of the action units of each mood, 0 to 1."""
-    return {mood: {row.unit: row.intensity for row in list_mood_rows() if row.mood == mood} for mood in MOODS}
+    return {
+        mood: {int(r["action_unit"]): float(r["intensity"]) for r in list_mood_rows() if r["mood"] == mood}
+        for mood in MOODS
+    }
 
 
 def is_mood(channel: str) -> bool:

@@ -89,8 +89,21 @@ def motion_from_arrays(
     units : the name of the unit set; the set itself is in the arrays
     Raises KeyError, ValueError, IndexError, TypeError: an array is missing, or has a wrong shape, type or range.
     """
-    space = _restore_space(arrays)
-    closure = None
+    shapes = check_arrays(arrays, CHANNELS)
+    count, direct = shapes.sizes["P"], shapes["direct"]
+    channels = tuple(Channel(name, unit) for name, unit in shapes["channels"].tolist())
+    if len({channel.name for channel in channels}) < count:
+        raise ValueError("channels whose names repeat")
+    if len(set(direct.tolist()) & set(range(count))) < len(direct):
+        raise ValueError(f"direct channels {direct.tolist()}, required different ones under {count}")
+    points = closure = None
+    if len(direct) == count:
+        refuse_undeclared(arrays.keys() & POINTS.keys())
+    else:
+        stored = check_arrays(arrays, POINTS, R=count - len(direct))
+        check_orthonormal("points_basis", stored["points_basis"])
+        points = Pca(stored["points_mean"], stored["points_basis"])
+    space = MotionSpace(channels, direct, points)
     if OPENING in space.direct_names:
         stored = check_arrays(arrays, CLOSURE, Q=space.dimensions)
         column, closed = stored["closure"]
@@ -122,19 +135,3 @@ MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *ARTICULATION)
 """Names of the arrays of ``motion_to_arrays``: P channels, of which R are reduced to K dimensions."""
 LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTICULATION, *MODULATION)
 """Names of the arrays of ``learned_motion_to_arrays``."""
-
-
-def _restore_space(arrays: Arrays) -> MotionSpace:
-    stored = check_arrays(arrays, CHANNELS)
-    count, direct = stored.sizes["P"], stored["direct"]
-    channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
-    if len({channel.name for channel in channels}) < count:
-        raise ValueError("channels whose names repeat")
-    if len(set(direct.tolist()) & set(range(count))) < len(direct):
-        raise ValueError(f"direct channels {direct.tolist()}, required different ones under {count}")
-    if len(direct) == count:
-        refuse_undeclared(arrays.keys() & POINTS.keys())
-        return MotionSpace(channels, direct, None)
-    points = check_arrays(arrays, POINTS, R=count - len(direct))
-    check_orthonormal("points_basis", points["points_basis"])
-    return MotionSpace(channels, direct, Pca(points["points_mean"], points["points_basis"]))

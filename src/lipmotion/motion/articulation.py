@@ -366,7 +366,7 @@ class UnseenSpeaker:
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
         """Draw the motion in and near speech towards what the general network hears in the sound.
 
-        articulators : of ``motion.general_motion`` [shape=(T, 8)]
+        articulators : of ``network_steps.hear_articulators`` [shape=(T, 8)]
         """
         spoken = np.zeros((self.frames, 1))
         for span in self.units:
@@ -384,7 +384,7 @@ class UnseenSpeaker:
     def confirm_closures(self, ranges: Sequence[slice], articulators: Array) -> list[slice]:
         """Return the ranges of frames in which a p, b or m can be relied on, or the general network hears one.
 
-        articulators : of ``motion.general_motion`` [shape=(T, 8)]
+        articulators : of ``network_steps.hear_articulators`` [shape=(T, 8)]
         """
         reliability, opening = np.broadcast_to(self.reliability, self.frames), articulators[:, 0]
         return [r for r in ranges if reliability[r].mean() > 0.5 or opening[r].min() < CONFIRMED]

@@ -99,7 +99,10 @@ def fit_eigenlips(images: Images, components: int = COMPONENTS) -> Eigenlips:
         raise InputError(f"{len(images)} mouth pictures, all the same; required at least two that differ")
     basis = np.stack([space.basis[:count] for space in spaces]).astype(np.float32)
     mean = np.stack([space.mean for space in spaces]).astype(np.float32)
-    explained = np.array([_share(colour - m, b) for colour, m, b in zip(flat, mean, basis, strict=True)])
+    explained = np.zeros(len(COLOURS))
+    for c, (colour, axes) in enumerate(zip(flat, basis, strict=True)):
+        centred = colour - mean[c]
+        explained[c] = np.square(centred @ axes.T).sum(dtype=float) / np.square(centred).sum(dtype=float)
     height, width = images.shape[1:3]
     return Eigenlips(mean, basis, explained, (height, width))
 
@@ -141,11 +144,6 @@ SPACES = {
 def _sort_by_colour(images: Images) -> NDArray[np.uint8]:
     """Return pictures as rows of each colour [shape=(3, T, H·W)]."""
     return np.moveaxis(images, -1, 0).reshape(len(COLOURS), len(images), -1)
-
-
-def _share(centred: NDArray[np.float32], basis: NDArray[np.float32]) -> float:
-    """Return the share of the variance that a basis [shape=(K, D)] explains of centred pictures [shape=(N, D)]."""
-    return float(np.square(centred @ basis.T).sum(dtype=float) / np.square(centred).sum(dtype=float))
 
 
 def _check(images: Images, size: tuple[int, int] | None = None) -> None:

@@ -198,19 +198,14 @@ def label_full_context(units: Timeline[Unit], frames: int, layout: StateLayout) 
         count = layout.states(unit)
         named = [FullContextState(left_unit, unit, right_unit, number) for number in range(count)]
         rests = is_silent(span.label.phone) & away[first:stop]
-        state = _states(time_s, span.start_s, span.end_s, count, layout.edge_s)
+        step = min((span.end_s - span.start_s) / count, layout.edge_s)
+        half = count // 2
+        from_start, from_end = (time_s - span.start_s) / step, (span.end_s - time_s) / step
+        before = np.floor(from_start + 1e-9)
+        after = count - np.ceil(from_end - 1e-9)
+        numbers = np.where(from_start < half, before, np.where(from_end <= half + 1e-9, after, half))
+        state = np.minimum(np.maximum(numbers, 0), count - 1).astype(np.intp)
         for frame, number, at_rest in zip(range(first, stop), state.tolist(), rests.tolist(), strict=True):
             if not at_rest:
                 result[frame] = named[number]
     return result
-
-
-def _states(time_s: NDArray[np.float64], start_s: float, end_s: float, states: int, edge_s: float) -> NDArray[np.intp]:
-    """Return the number of the state of a unit at each of some times [shape=(T,)]; the unit has ``states`` states."""
-    step = min((end_s - start_s) / states, edge_s)
-    half = states // 2
-    from_start, from_end = (time_s - start_s) / step, (end_s - time_s) / step
-    before = np.floor(from_start + 1e-9)
-    after = states - np.ceil(from_end - 1e-9)
-    state = np.where(from_start < half, before, np.where(from_end <= half + 1e-9, after, half))
-    return np.minimum(np.maximum(state, 0), states - 1).astype(np.intp)

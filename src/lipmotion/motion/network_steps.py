@@ -1,22 +1,31 @@
-"""What networks share: time steps of 40 ms, the frames of 10 ms between them, training and storage."""
+"""What networks share: time steps of 40 ms, frames of 10 ms between them, training, storage; and the general network.
+
+The general network hears motion in the encoding of speech alone, for every voice; it learned from hundreds of readers.
+``scripts/live_network.py`` trains it on measured motion of one speaker, and on what ``animate`` makes of the others'
+recordings, in quiet and in noise: mistakes differ from reader to reader, and the network learns what they share
+(Xie, Luong, Hovy & Le 2020, self-training). It needs no phones.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from typing import Any, Generic, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.predictors import PredictorTraining
 from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, make_network
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.stats.network_training import LinearMap, SequenceNetwork, TrainingPlan, TrainingSequence, fit_network
 from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, make_recurrent_network
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays
-from lipmotion.types import Progress
+from lipmotion.types import Progress, Speech
 
 Array = NDArray[np.float64]
 FloatT = TypeVar("FloatT", bound=np.floating[Any])
@@ -241,3 +250,29 @@ def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
     if not (scale > 0).all():
         raise ValueError(f"{name} with a scale that is not more than 0")
     return scale
+
+
+WEIGHTS = "general-motion.npz"
+GENERAL_SHAPE = ConvolutionalShape("general", "general network", 64, 128, (1, 2, 4, 8))
+"""From the 64 values of ``Speech.encoding``, 0.6 s before and after a frame."""
+ENCODING_SCALE = np.float32(4)
+"""What the encoding is multiplied by, so that its values are about 1."""
+
+
+def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:
+    """Return articulators, in deviations from the pose of the table of articulation [shape=(T, 8)].
+
+    None: the speech has no encoding, or its phones are given for a voice that training knows.
+    """
+    if speech.encoding is None or (speech.voice >= 1 and speech.units_known):
+        return None
+    steps = np.asarray(speech.encoding)[::STEP].astype(np.float32) * ENCODING_SCALE
+    return interpolate_steps(load_shipped()(steps).astype(float), len(speech.features.values))
+
+
+@cache
+def load_shipped() -> ConvolutionalNetwork:
+    """Return the network of the package."""
+    path = resources.files("lipmotion") / "models" / WEIGHTS
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        return GENERAL_SHAPE.from_arrays(dict(stored), len(ARTICULATORS))

@@ -210,20 +210,17 @@ class PriorRegression(Predictor):
 
         Raises InputError: an unknown phone.
         """
-        regressors = (self._fill(_regressors(speech)) - self.mean) / self.scale
+        kinds = _regressors(speech)
+        row, starts = self.mean.astype(float), np.cumsum([0, *self.sizes])
+        result = np.tile(row, (len(kinds[0]), 1))  # what the training had and this speech has not has its mean
+        for kind, start, size in zip(kinds, starts, self.sizes, strict=False):
+            result[:, start : start + min(size, kind.shape[1])] = kind[:, :size]
+        regressors = (result - self.mean) / self.scale
         steps = (regressors @ self.coefficients).astype(float) + self.centre
         frames = len(speech.features.values)
         distortion = speech.prior.distortion if speech.prior is not None else np.zeros(len(steps))
         outputs = interpolate_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
         return outputs[:, :-1], np.clip(outputs[:, -1], 0, 1)
-
-    def _fill(self, kinds: Sequence[Array]) -> Array:
-        """Return the regressors [shape=(N, R)]; those that the training had and this speech has not have their mean."""
-        row, starts = self.mean.astype(float), np.cumsum([0, *self.sizes])
-        result = np.tile(row, (len(kinds[0]), 1))
-        for kind, start, size in zip(kinds, starts, self.sizes, strict=False):
-            result[:, start : start + min(size, kind.shape[1])] = kind[:, :size]
-        return result
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the regression; the coefficients at half precision."""

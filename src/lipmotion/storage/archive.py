@@ -127,7 +127,7 @@ def _member(name: str, method: int) -> zipfile.ZipInfo:
 
 
 LOG = logging.getLogger("lipmotion")
-CHECKPOINT_FORMAT = "lipmotion.checkpoint"
+CHECKPOINT, CHECKPOINT_FORMAT = ".checkpoint", "lipmotion.checkpoint"
 
 
 @dataclass(frozen=True)
@@ -145,9 +145,8 @@ class Checkpoint:
 
     def load(self, stage: str) -> dict[str, NDArray[Any]] | None:
         """Return the arrays stored for a stage; None: there are none, or they are damaged or of another job."""
-        if self.folder is None or not self._path(self.folder, stage).is_file():
+        if self.folder is None or not (path := self.folder / f"{stage}{CHECKPOINT}").is_file():
             return None
-        path = self._path(self.folder, stage)
         try:
             if read_archive_header(path) != self._header():
                 LOG.info("%s: of another corpus, configuration or version; not used", path)
@@ -160,13 +159,10 @@ class Checkpoint:
     def save(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Store the state of a stage, replacing an earlier one. Raises ExportError: it cannot be written."""
         if self.folder is not None:
-            write_archive(self._path(self.folder, stage), self._header(), arrays, compressed=False)
+            write_archive(self.folder / f"{stage}{CHECKPOINT}", self._header(), arrays, compressed=False)
 
     def _header(self) -> dict[str, str]:
         return {"format": CHECKPOINT_FORMAT, "fingerprint": self.fingerprint}
-
-    def _path(self, folder: Path, stage: str) -> Path:
-        return folder / f"{stage}.checkpoint"
 
 
 NO_CHECKPOINT = Checkpoint()

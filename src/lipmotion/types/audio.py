@@ -160,8 +160,5 @@ def frames_of(span: Span[Any], frames: int) -> tuple[int, int]:
 
     frames : length of the recording; both are cut to it
     """
-    return _find_next_frame(span.start_s, frames), _find_next_frame(span.end_s, frames)
-
-
-def _find_next_frame(time_s: float, frames: int) -> int:
-    return ceil(min(max(time_s * FRAME_RATE_HZ - 1e-6, 0), frames))
+    first, stop = (ceil(min(max(s * FRAME_RATE_HZ - 1e-6, 0), frames)) for s in (span.start_s, span.end_s))
+    return first, stop

@@ -130,7 +130,12 @@ class Configuration:
             present = cls.aliases.get(name, name)
             if present not in known:
                 raise InputError(cls._unknown(name))
-            options[present] = _part(present, known[present], value)
+            if issubclass(known[present], Configuration) and isinstance(value, Mapping):
+                try:
+                    value = known[present].parsed(value)  # noqa: PLW2901
+                except InputError as error:
+                    raise InputError(f"in [{present}]: {error}") from error
+            options[present] = value
         return cls(**options)
 
     @classmethod
@@ -139,16 +144,24 @@ class Configuration:
 
         Raises InputError: a text without value, an unknown option, or a value that is not of the option's type.
         """
-        options = {option_field.name: option_field for option_field in fields(cls)}
-        values = {}
+        kinds = {option_field.name: kind_of(option_field) for option_field in fields(cls)}
+        values: dict[str, Any] = {}
         for setting in settings:
             name, equals, text = setting.partition("=")
             if not equals:
                 raise InputError(f"the setting {setting!r} has no value; required NAME=VALUE")
             present = cls.aliases.get(name, name)
-            if present not in options:
+            if present not in kinds:
                 raise InputError(cls._unknown(name))
-            values[present] = _from_text(options[present], text)
+            kind = kinds[present]
+            if kind is int:
+                values[present] = parse_whole(text, f"{present} is")
+            elif kind is float:
+                values[present] = parse_number(text, f"{present} is", "a number", finite=False)
+            elif kind is bool and text.lower() not in _BOOLEANS:
+                raise InputError(f"{present} is {describe_value(text)}, required {_WORDS[kind]}")
+            else:
+                values[present] = _BOOLEANS[text.lower()] if kind is bool else kind(text)
         return values
 
     @classmethod
@@ -210,25 +223,3 @@ def kind_of(option_field: Field[Any]) -> type[Any]:
     """Return the type of an option: the one that it names, or else that of its default value."""
     kind: type[Any] = option_field.metadata.get("kind") or type(option_field.default)
     return kind
-
-
-def _part(name: str, kind: type[Any], value: Any) -> Any:
-    """Return the value of an option; of a part of a configuration, the part that a table holds."""
-    if not (issubclass(kind, Configuration) and isinstance(value, Mapping)):
-        return value
-    try:
-        return kind.parsed(value)
-    except InputError as error:
-        raise InputError(f"in [{name}]: {error}") from error
-
-
-def _from_text(option_field: Field[Any], text: str) -> Any:
-    """Return the value of an option that a text holds. Raises InputError: a text of another type."""
-    kind, name = kind_of(option_field), option_field.name
-    if kind is int:
-        return parse_whole(text, f"{name} is")
-    if kind is float:
-        return parse_number(text, f"{name} is", "a number", finite=False)
-    if kind is bool and text.lower() not in _BOOLEANS:
-        raise InputError(f"{name} is {describe_value(text)}, required {_WORDS[kind]}")
-    return _BOOLEANS[text.lower()] if kind is bool else kind(text)

@@ -19,7 +19,7 @@ from lipmotion.engines.trajectory.model import (
     model_from_arrays,
 )
 from lipmotion.motion.frame_labels import find_digital_silence, label_full_context, with_unit_names
-from lipmotion.motion.general_motion import hear_articulators
+from lipmotion.motion.network_steps import hear_articulators
 from lipmotion.motion.predictors import count_conditions
 from lipmotion.printable import printable
 from lipmotion.storage.archive import NO_CHECKPOINT, Checkpoint

@@ -31,27 +31,6 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 
-def skin_vertices(weights: csr_array, matrices: Array, vertices: Array) -> Array:
-    """Return the vertices under the blended transformations of the control points [shape=(N, 3)].
-
-    weights  : of each control point on each vertex [shape=(N, C), sparse rows]; a row of sum below 1 leaves the rest of
-               its vertex where it is
-    matrices : rotation, scale and shift of each control point [shape=(C, 3, 4)]
-    vertices : at rest [shape=(N, 3)]
-    v′ = Σ wᵢ Mᵢ v + (1 − Σ wᵢ) v: the matrices are blended, then applied, which is the same and costs less.
-    Source: Hofer 2008, Eq. 12.  Deviation: a fixed control point has what the weights leave of 1, so that the face
-    beyond the mouth stands still.
-    Cost: O(12 · (number of weights) + 12 N).
-    """
-    blended = (weights @ (matrices - np.eye(3, 4)).reshape(len(matrices), 12)).reshape(-1, 3, 4)
-    moved: Array = blended[:, :, 0] * vertices[:, :1]
-    moved += blended[:, :, 1] * vertices[:, 1:2]
-    moved += blended[:, :, 2] * vertices[:, 2:]
-    moved += blended[:, :, 3]
-    moved += vertices
-    return moved
-
-
 @dataclass(frozen=True, eq=False)
 class ControlBinding:
     """Weights of control points on the vertices of a mesh.
@@ -85,11 +64,20 @@ class ControlBinding:
         return self.transformed(mesh, matrices)
 
     def transformed(self, mesh: Mesh, matrices: Array) -> Array:
-        """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)] (Hofer 2008,
-        Eq. 12).
+        """Return the vertices [shape=(V, 3)] under transformations of the control points [shape=(C, 3, 4)].
+
+        v′ = Σ wᵢ Mᵢ v + (1 − Σ wᵢ) v: the matrices are blended, then applied, which is the same and costs less.
+        Source: Hofer 2008, Eq. 12.  Deviation: a fixed control point has what the weights leave of 1, so that the face
+        beyond the mouth stands still.
+        Cost: O(12 · (number of weights) + 12 N).
         """
-        vertices = mesh.vertices.copy()
-        vertices[self.rows] = skin_vertices(self.matrix, matrices, mesh.vertices[self.rows])
+        vertices, at_rest = mesh.vertices.copy(), mesh.vertices[self.rows]
+        blended = (self.matrix @ (matrices - np.eye(3, 4)).reshape(len(matrices), 12)).reshape(-1, 3, 4)
+        moved: Array = blended[:, :, 0] * at_rest[:, :1]
+        moved += blended[:, :, 1] * at_rest[:, 1:2]
+        moved += blended[:, :, 2] * at_rest[:, 2:]
+        moved += blended[:, :, 3]
+        vertices[self.rows] = moved + at_rest
         return vertices
 
 
