@@ -181,10 +181,7 @@ _POSES = np.array([(shape.opening, shape.spread) for shape in SHAPES.values()])
 
 
 def compute_frame_costs(generation: Generation, frames: int, fps: float, intensity: float = 1.0) -> Array:
-    """Return the cost of every one of ``SHAPES`` in every frame [shape=(frames, 9)].
-
-    Frame k is shown from ``k / fps`` to ``(k + 1) / fps``; phones and motion count by their share of that time.
-    """
+    """Return the cost of each of ``SHAPES`` in every frame [shape=(frames, 9)]; frame k lasts from ``k / fps`` on."""
     edges_s = np.arange(frames + 1) / fps
     silence = find_phone_values(list_phone_shapes(SILENCE)[0], silent=True)
     bounds_s, sums = [-LEAD_S], [np.zeros_like(silence)]
@@ -359,11 +356,7 @@ def is_shape(name: str) -> bool:
 
 
 def choose_chart(names: Iterable[str], usual: dict[str, str] = BLAIR) -> dict[str, str]:
-    """Return the shapes by the names of one set that programs offer: the first that has all of them.
-
-    The usual one, Preston Blair's, Rhubarb's letters, Fleming and Dobbs', Meta's visemes, or the phones of CMU's
-    dictionary, with stress or without.
-    """
+    """Return the shapes by the names of the first set that has all: the usual one, or another of ``CHARTS``."""
     wanted = {name.strip().lower().removeprefix(PREFIX) for name in names}
     return next((chart for chart in (usual, *CHARTS) if wanted <= {*chart}), usual)
 

@@ -176,9 +176,7 @@ def _cut_stretch(generation: Generation, weight: Curve) -> MotionStretch:
 
 
 def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
-    """Return a generation, and its variances, that goes over to other motion of the recording where its share is over
-    0.
-    """
+    """Return a generation, and its variances, that goes over to other motion as far as that takes its place."""
     values, variance = first.motion.values.astype(np.float64), np.array(first.variance)
     for ours, theirs in ((values[other.frames], other.values), (variance[other.frames], other.variance)):
         ours[:] = np.where(other.share == 1, theirs, ours + other.share * (theirs - ours))
@@ -186,9 +184,7 @@ def apply_stretch(first: Generation, other: MotionStretch) -> Generation:
 
 
 def weigh_span(time_s: Curve, start_s: float, end_s: float, edge_s: float, after_s: float | None = None) -> Curve:
-    """Return 1 within a span, falling to 0 within ``edge_s`` before it and ``after_s`` (None: the same) after it
-    [shape=(T,)].
-    """
+    """Return 1 within a span, falling to 0 in ``edge_s`` before it and ``after_s`` after it [shape=(T,)]."""
     outside = np.maximum(np.maximum((start_s - time_s) / edge_s, (time_s - end_s) / (after_s or edge_s)), 0)
     outside[outside < 1e-6] = 0.0  # the time of a frame is rounded
     weight: Curve = (1 + np.cos(np.pi * np.clip(outside, 0, 1))) / 2

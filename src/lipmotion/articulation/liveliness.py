@@ -194,10 +194,7 @@ def find_phrases(units: Timeline[Unit], pause_s: float = PHRASE_PAUSE_S) -> list
 def blink_times(
     end_s: float, spoken: list[tuple[float, float]], words: list[tuple[float, float]], rng: np.random.Generator
 ) -> list[float]:
-    """Return when blinks begin, in seconds: at random, but rather at the end of a phrase where one is near.
-
-    spoken, words : starts and ends of phrases, and of words where they are known: no blink is in the middle of one
-    """
+    """Return when blinks begin, in seconds: at random, rather at the end of a phrase, never in the middle of a word."""
     ends = np.array([end for _, end in spoken] or [-np.inf])
     starts_s, ends_s = np.array(words).reshape(-1, 2).T
 

@@ -44,11 +44,7 @@ def find_rest_frames(motion: Motion, units: Timeline[Unit], opening: Curve | Non
 
 
 def add_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Motion, Timeline[Unit], slice]:
-    """Return frames of a motion with their phones, beside silence in the rest pose of the whole, and where they are.
-
-    So the rest pose of what is returned is that of the whole: there is more of that silence than of others in it. It
-    comes before the frames; after them, where they are the first ones, which nothing then smooths.
-    """
+    """Return frames of a motion with their phones, beside enough silence to have the same rest pose, and where."""
     values, rate_hz, rest = motion.values[frames], motion.rate_hz, find_rest_frames(motion, units)
     still = np.median(motion.values[rest], axis=0)
     count = int(np.count_nonzero(rest[frames])) + len(values) // 5 + 1

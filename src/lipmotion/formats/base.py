@@ -250,10 +250,7 @@ def _name_errors(path: Path) -> Iterator[None]:
 
 
 def read_units(path: Path) -> Timeline[Unit]:
-    """Return the units of a motion file, or of a ``.json`` that holds the member ``units`` without motion.
-
-    Raises InputError: as ``read_motion``.
-    """
+    """Return the units of a motion file, or of a ``.json`` of units alone. Raises InputError: as ``read_motion``."""
     read = _format_of(path).units if find_suffix(path) else None
     if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS_BYTES:
         with _name_errors(path):

@@ -441,10 +441,7 @@ def _plain(name: str) -> str:
 
 
 def _steady(places: Array, rigid: int) -> Array:
-    """Return places moved so that the first markers lie as in the first frame, by least squares [shape=(T, N, 3)].
-
-    Source: Kabsch 1976, "A solution for the best rotation to relate two sets of vectors".
-    """
+    """Return places [shape=(T, N, 3)] moved so that the first ones lie as in the first frame (Kabsch 1976)."""
     centres = places[:, :rigid].mean(axis=1, keepdims=True)
     wanted = places[0, :rigid] - centres[0]
     covariances = np.einsum("tni,nj->tij", places[:, :rigid] - centres, wanted)

@@ -4,7 +4,8 @@ Every shape becomes one phone with its mouth, and an opening and a width, which 
 phones (``articulation.phone_targets``). So p, b and m stay closed, and lips and tongue follow from the phones.
 
 ``tsv``: one line per cue with its start and its shape; the last line is the end, with the shape at rest.
-``xml``, ``json``: metadata, and the start, the end and the shape of every cue.
+``xml``: metadata, and one element per cue with its start and end.
+``json``: metadata and cues, each with start, end and value.
 ``dat``: switch data of Moho, also read by OpenToonz: frames and Preston Blair's names of the shapes.
 ``pgo``: a project of Papagayo, version 1: phrases, words and Preston Blair's shapes in frames, to be edited there.
 Frames count from 0; a shape lasts to the next one of its word or to the word's last frame, which is included; outside
@@ -90,7 +91,7 @@ def parse_tsv(text: str) -> CueSheet:
 
 
 def format_xml(sheet: CueSheet, sound_file: str) -> str:
-    """Return the content of the file, in ASCII; characters that XML cannot hold are escaped as in Python."""
+    """Return the content of an ``.xml``, in ASCII; what XML cannot hold is escaped as in Python."""
     name = _NOT_XML.sub(lambda match: match[0].encode("unicode_escape").decode(), sound_file)
     name = _CONTROL.sub(lambda match: f"&#{ord(match[0])};", escape(name, quote=False))
     cues = "".join(
@@ -117,7 +118,7 @@ def _build_sheet(cues: Sequence[tuple[str, str, str, str]], chart: dict[str, str
 
 
 def format_json(sheet: CueSheet, sound_file: str) -> str:
-    """Return the content of the file: one line per cue, in ASCII."""
+    """Return the content of a ``.json``: one line per cue, in ASCII."""
     cues = ",\n".join(
         f'    {{ "start": {cue.start_s:.2f}, "end": {cue.end_s:.2f}, "value": "{cue.label}" }}' for cue in sheet.cues
     )
@@ -126,10 +127,7 @@ def format_json(sheet: CueSheet, sound_file: str) -> str:
 
 
 def parse_json(text: str) -> CueSheet:
-    """Return the cues of a ``.json``, also events of visemes.
-
-    Raises InputError: it is no JSON, or a cue is none, with its number.
-    """
+    """Return the cues of a ``.json``, also events of visemes. Raises InputError: no JSON, or a cue that is none."""
     try:
         document: Any = json.loads(text)
         cues = document if isinstance(document, list) else next(document[name] for name in LISTS if name in document)
@@ -144,7 +142,7 @@ def parse_json(text: str) -> CueSheet:
 
 
 def format_dat(sheet: CueSheet, _sound_file: str) -> str:
-    """Return the content of the file: the first frame is 1, the last line is the frame after the end, at rest."""
+    """Return the content of a ``.dat``: the first frame is 1, the last line is the frame after the end, at rest."""
     frames = {1 + int(sheet.fps * cue.start_s): cue.label for cue in reversed(sheet.cues.spans)}
     end = max(1 + int(sheet.fps * sheet.duration_s), max(frames) + 1)
     rows = [*sorted(frames.items()), (end, sheet.rest)]
@@ -152,10 +150,7 @@ def format_dat(sheet: CueSheet, _sound_file: str) -> str:
 
 
 def parse_dat(text: str, fps: float = CUES_FPS) -> CueSheet:
-    """Return the cues of a file, whose frames count from 1; it does not say how many are a second.
-
-    Raises InputError: another first line, or a line of another form, with its number.
-    """
+    """Return the cues of a ``.dat``, whose frames count from 1. Raises InputError: another or a damaged file."""
     lines = [(number, line.split()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     if not lines or lines[0][1] != [MOHO]:
         raise InputError(f"not switch data of Moho: the first line is no {MOHO}; export it again")
@@ -181,11 +176,8 @@ Part = tuple[int, int, str]
 
 
 def format_project(sheet: CueSheet, sound_file: str) -> str:
-    """Return the content of the file: one voice; a phrase lasts from rest to rest.
-
-    Papagayo knows whole frame rates alone: of another one, frames are those of the next larger whole rate (30 for
-    29.97) at the same times, so that they do not drift from the sound.
-    """
+    """Return the content of a ``.pgo``: one voice; a phrase lasts from rest to rest."""
+    # Papagayo knows whole rates alone: 29.97 becomes 30 at the same times, so that frames do not drift from the sound
     sheet = replace(sheet, fps=float(math.ceil(sheet.fps - WHOLE_RATE_TOLERANCE)))
     shown = list_frame_shapes(sheet)
     moving = [False, *(shape != REST for shape in shown), False]
@@ -205,10 +197,7 @@ def format_project(sheet: CueSheet, sound_file: str) -> str:
 
 
 def find_words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
-    """Return the words from one frame to another, each with at least one frame, without gaps.
-
-    What is said in less than a frame is joined to the word before by a hyphen.
-    """
+    """Return the words from one frame to another without gaps; what is said within a frame joins the one before."""
     parts: list[Part] = []
     spans = sheet.words.spans
     begin = bisect_left(spans, first, key=lambda span: int(span.end_s * sheet.fps))
@@ -254,10 +243,7 @@ class _Lines:
 
 
 def parse_project(text: str) -> CueSheet:
-    """Return the cues and the words of a project: those of its first voice.
-
-    Raises InputError: not a project of version 1, cut short, or a shape that is none, with its line.
-    """
+    """Return the cues and the words of the first voice. Raises InputError: another version, cut short, or no shape."""
     lines = _Lines(text)
     if lines.next() != MARK:
         raise InputError(f"not a project of Papagayo: the first line is no {MARK!r}; save it again")

@@ -89,10 +89,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return the parameters of a file, and an empty timeline; where one is not given, it keeps its value.
-
-    Raises InputError: not such a file, cut short, or values that no face has.
-    """
+    """Return the parameters of a file; one that is not given keeps its value. Raises InputError: not such a file."""
     try:
         with path.open(encoding="utf-8-sig") as file:
             lines = (line for line in iter(partial(file.readline, LONGEST_LINE), "") if line[0] != "#" and line.strip())

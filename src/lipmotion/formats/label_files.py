@@ -212,10 +212,7 @@ def holds_timings(path: Path) -> bool:
 
 
 def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
-    """Return the labels of a file; None for JSON of another kind, if that is expected, else an error.
-
-    Raises InputError: there are labels, and none is a phone or a word.
-    """
+    """Return the labels of a file; None for JSON of another kind, if expected. Raises InputError: none is of speech."""
     text = "" if unknown_json and path.stat().st_size > LARGEST_LABELS else _read_text(path)
     where = str(path)
     tiers = _read_tiers(text, where) if is_json(text) or not unknown_json else None
@@ -404,10 +401,7 @@ def _read_text(path: Path, kind: str = "label") -> str:
 
 
 def write_labels(path: Path, units: Timeline[Unit]) -> None:
-    """Write phones and words in time in the format of the suffix.
-
-    Raises ExportError: a label that is no line of text, or the file cannot be written.
-    """
+    """Write phones and words in time in the format of the suffix. Raises ExportError: a label that is no line."""
     for label in [span.label for span in units]:
         if not is_line(label.phone + label.unit + label.word):
             what = "a line end, a control character or half a character"

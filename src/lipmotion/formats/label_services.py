@@ -183,10 +183,7 @@ def is_json(text: str) -> bool:
 
 
 def parse_service_tiers(text: str, where: str) -> list[LabelTier] | None:
-    """Return the tiers of words, lines and phones of the JSON of a service; None: it has none.
-
-    Raises InputError: it is damaged (with its line), a symbol in it is not known, or a time is none.
-    """
+    """Return the tiers of the JSON of a service; None: it has none. Raises InputError: it is damaged, with its line."""
     numbered = [(f"line {line}", value) for line, value in _decode_documents(text, where)]
     if len(numbered) == 1 and isinstance(numbered[0][1], list):
         if numbered[0][1] and all(map(_name_stamp, numbered[0][1])):

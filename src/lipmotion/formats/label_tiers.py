@@ -206,10 +206,7 @@ def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
 
 
 def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[Unit]:
-    """Return phones in time, each with the word of a tier in which its middle lies; silence has none.
-
-    A span of unknown phones has a word only if it is all of it.
-    """
+    """Return phones in time with the words in which their middles lie; unknown phones only where they are all of it."""
     timed = [label for label in labels if not math.isnan(label.start_s + label.end_s)]
     starts_s = [label.start_s for label in timed]
     spans: list[Span[Unit]] = []
@@ -408,10 +405,7 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
 
 
 def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
-    """Return a tier; one of phones in the phones of the inventory, from those, X-SAMPA or IPA, as they make sense.
-
-    Raises InputError: as ``split_ipa``.
-    """
+    """Return a tier; phones in X-SAMPA or IPA become those of the inventory. Raises InputError: as ``split_ipa``."""
     labels = tier.labels if tier.role == PHONE_LABELS else ()
     spoken = [
         WITH_GLIDES.get(label.text, label.text) for label in labels if classify_label(label.text) is SpokenAs.SPEECH

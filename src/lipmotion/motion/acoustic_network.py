@@ -108,10 +108,7 @@ class AcousticNetwork(Predictor):
         return PredictorFit(cls(network, mean, scale, variances, posterior_network, encoding))
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
-        """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
-
-        Raises InputError: speech without a spectrum.
-        """
+        """Return motion [shape=(T, Q)] and distortion, 0 to 1 [shape=(T,)]. Raises InputError: no spectrum."""
         if speech.spectrum is None:
             raise InputError("the speech has no spectrum; an engine that uses one says so by ``inputs``")
         spectrum = speech.spectrum

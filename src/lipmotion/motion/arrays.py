@@ -44,10 +44,7 @@ def motion_to_arrays(
 
 
 def learned_motion_to_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
-    """Serialise learned motion, with its limits, its variance scaling and its modulation filter.
-
-    For engines that do not store these in arrays of their own.
-    """
+    """Serialise learned motion with limits, variance scaling and modulation filter, for engines that store no more."""
     arrays = motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior) | {
         "limits": np.stack(motion.limits)
     }

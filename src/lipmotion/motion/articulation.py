@@ -82,10 +82,7 @@ class ArticulationPrior:
     known_voice_share: float = 1.0
 
     def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
-        """Return how well training knows each phone between its neighbours, 0 to 1 [shape=(frames,)].
-
-        Silence at both ends and away from speech, in which the mouth rests, is always well known.
-        """
+        """Return how well training knows each phone between its neighbours, and rest, 0 to 1 [shape=(frames,)]."""
         steps = np.ones((frames, 1))
         for left, span, right in with_neighbours(units):
             at_end = is_silent(span.label.phone) and span in (units[0], units[-1])
@@ -125,10 +122,7 @@ def draw_towards(values: Array, share: Array, statistics: Predict) -> Predict:
 
 
 def slice_dynamics(values: Array, frames: slice) -> Array:
-    """Return static value, Δ and Δ² of a range of N frames [shape=(N, 3, Q)].
-
-    values : of the whole recording [shape=(T, Q)]
-    """
+    """Return static value, Δ and Δ² [shape=(N, 3, Q)] of N frames of the values of a recording [shape=(T, Q)]."""
     start, stop, _ = frames.indices(len(values))
     first = max(start - 1, 0)
     return with_dynamics(values[first : stop + 1])[start - first :][: stop - start]
@@ -166,10 +160,7 @@ def smooth_steps(steps: Array) -> Array:
 
 @cache
 def average_classes() -> dict[bool, Array]:
-    """Return the mean of every articulator in each third of consonants (False) and vowels (True) [each shape=(3, 8)].
-
-    Phones count as often as they occur.
-    """
+    """Return the mean of articulators in each third of consonants (False) and vowels (True) [each shape=(3, 8)]."""
     table, counts = read_articulation_table(), {row["phone"]: float(row["count"]) for row in _read_csv()}
     spoken = [phone for phone in table if not is_silent(phone)]
     return {
@@ -265,11 +256,7 @@ def articulation_to_arrays(prior: ArticulationPrior | None) -> dict[str, NDArray
 
 
 def articulation_from_arrays(arrays: Arrays, dimensions: int) -> ArticulationPrior | None:
-    """Deserialise a prior; None where there is none, as in models of earlier versions.
-
-    dimensions : of the motion space, Q
-    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
-    """
+    """Deserialise a prior in Q dimensions; None: an earlier version. Raises KeyError, ValueError: damaged arrays."""
     if arrays.keys().isdisjoint(ARTICULATION):
         return None
     stored = check_arrays(arrays, ARTICULATION, Q=dimensions)
@@ -291,11 +278,7 @@ def _merge_cells(phone: str) -> str:
 
 
 def measure_articulators(motion: NDArray[np.floating[Any]], names: Sequence[str]) -> dict[str, Array]:
-    """Return the articulators that can be measured on motion, by name [each shape=(N,)].
-
-    motion : values of all channels [shape=(N, P)]
-    names  : of the channels
-    """
+    """Return the articulators that motion of named channels [shape=(N, P)] shows, by name [each shape=(N,)]."""
     curves = {name: np.asarray(curve, float) for name, curve in zip(names, np.asarray(motion).T, strict=True)}
     measured = {name: curves[name] for name in ARTICULATORS[:3] if name in curves}
     for name, (points, measure) in _MEASURES.items():
@@ -364,10 +347,7 @@ class UnseenSpeaker:
     voice: float
 
     def follow_sound(self, statistics: Predict, articulators: Array) -> Predict:
-        """Draw the motion in and near speech towards what the general network hears in the sound.
-
-        articulators : of ``network_steps.hear_articulators`` [shape=(T, 8)]
-        """
+        """Draw motion in and near speech towards articulators that the general network hears [shape=(T, 8)]."""
         spoken = np.zeros((self.frames, 1))
         for span in self.units:
             if not is_silent(span.label.phone):
@@ -382,10 +362,7 @@ class UnseenSpeaker:
         return draw_towards(heard, share, statistics)
 
     def confirm_closures(self, ranges: Sequence[slice], articulators: Array) -> list[slice]:
-        """Return the ranges of frames in which a p, b or m can be relied on, or the general network hears one.
-
-        articulators : of ``network_steps.hear_articulators`` [shape=(T, 8)]
-        """
+        """Return the ranges of p, b, m that are reliable, or that heard articulators confirm [shape=(T, 8)]."""
         reliability, opening = np.broadcast_to(self.reliability, self.frames), articulators[:, 0]
         return [r for r in ranges if reliability[r].mean() > 0.5 or opening[r].min() < CONFIRMED]
 
@@ -430,10 +407,7 @@ class UnseenSpeaker:
 
 
 def choose_closing_reach(voice: float) -> float:
-    """Return how many seconds before and after a p, b or m the lips may close; negative: seconds within it.
-
-    voice : how well training knows the voice, 0 to 1
-    """
+    """Return how many seconds around a p, b or m lips may close; negative: within; voice: how well known, 0 to 1."""
     return REACH_S - count_unseen(voice) * (REACH_S + INSET_S)
 
 

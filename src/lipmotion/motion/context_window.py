@@ -66,10 +66,7 @@ def acoustic_context_to_arrays(context: AcousticContext) -> dict[str, NDArray[An
 
 
 def acoustic_context_from_arrays(arrays: CheckedArrays) -> AcousticContext:
-    """Deserialise a context from arrays that were checked against ``WINDOW``.
-
-    Raises ValueError: a scale that is not positive, or a column of the basis that is zero.
-    """
+    """Deserialise a context from checked arrays. Raises ValueError: a scale not positive, or a column of zeros."""
     mean, scale = arrays["window"]
     if not (scale > 0).all():
         raise ValueError("window with a scale that is not more than 0")

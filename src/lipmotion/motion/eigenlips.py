@@ -50,10 +50,7 @@ class Eigenlips:
         return f"{len(self.channels)} of {width} × {height} px, {share:.1f} % of the variance of the pictures"
 
     def project(self, images: Images) -> NDArray[np.float32]:
-        """Return the coefficients [shape=(T, 3·K)] of pictures [shape=(T, H, W, 3)]: g = Aᵀ(I − Ī), Eq. 13.
-
-        Raises InputError: pictures of another size.
-        """
+        """Return coefficients [shape=(T, 3·K)] of pictures: g = Aᵀ(I − Ī), Eq. 13. Raises InputError: another size."""
         _check(images, self.size)
         flat = _sort_by_colour(images)
         return np.concatenate(
@@ -61,17 +58,11 @@ class Eigenlips:
         )
 
     def restore(self, coefficients: NDArray[np.floating[Any]]) -> Images:
-        """Return the pictures [shape=(T, H, W, 3)] at some coefficients [shape=(T, 3·K)]: I = Ī + Ag, Eq. 12.
-
-        Raises InputError: another number of coefficients.
-        """
+        """Return pictures [shape=(T, H, W, 3)]: I = Ī + Ag, Eq. 12. Raises InputError: another number of them."""
         return np.clip(np.rint(self.expand(coefficients)), 0, 255).astype(np.uint8)
 
     def expand(self, coefficients: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-        """Return the same pictures before they are rounded, float32 [shape=(T, H, W, 3)], in grey levels.
-
-        Raises InputError: another number of coefficients.
-        """
+        """Return the same pictures before they are rounded, in grey levels, float32 [shape=(T, H, W, 3)]."""
         wanted = self.basis.shape[0] * self.basis.shape[1]
         if coefficients.ndim != 2 or coefficients.shape[1] != wanted:
             raise InputError(
@@ -118,11 +109,7 @@ def eigenlips_to_arrays(eigenlips: Eigenlips) -> dict[str, NDArray[Any]]:
 
 
 def eigenlips_from_arrays(arrays: Arrays, remedy: str = "train the model again") -> Eigenlips:
-    """Deserialise eigenlips.
-
-    remedy : what to do about damaged ones, for the message
-    Raises ModelFormatError: an array is missing, or they do not fit together.
-    """
+    """Deserialise eigenlips; ``remedy``: what to do about damaged ones. Raises ModelFormatError: they are damaged."""
     with format_errors("the eigenlips", remedy, verb="are"):
         refuse_undeclared(arrays, SIZE, SPACES)
         height, width = check_arrays(arrays, SIZE)["size"].tolist()

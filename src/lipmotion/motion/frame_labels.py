@@ -39,10 +39,7 @@ def is_away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], 
 
 
 def find_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return first frame and the one after the last of each run of frames in which a mask is True [shape=(R, 2)].
-
-    mask : bool array [shape=(T,)]
-    """
+    """Return first frame and the one after the last of each run of True in a mask [shape=(T,)] [shape=(R, 2)]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     return edges.reshape(-1, 2)
 
@@ -83,10 +80,7 @@ def rate_phones(speech: Speech, distortion: Array | None, frames: int) -> Array:
 
 
 def rate_clearness(distortion: Array) -> Array:
-    """Return how far a recording is free of noise and room around each frame, 0 to 1 [shape=(T,)]: ``DISTORTIONS``.
-
-    distortion : of the sound in every frame [shape=(T,)]
-    """
+    """Return how free of noise and room a recording is, 0 to 1, from the distortion of its frames [each shape=(T,)]."""
     frames = len(distortion)
     reach = int(DISTORTION_S * FRAME_RATE_HZ)
     total, numbers = np.concatenate([[0.0], np.cumsum(distortion)]), np.arange(frames)
@@ -166,10 +160,7 @@ def with_neighbours(units: Timeline[Unit]) -> Iterator[tuple[str, Span[Unit], st
 
 
 def with_unit_names(spans: Timeline[Unit], units: UnitSet = UNIT_SETS["phone"]) -> Timeline[Unit]:
-    """Return the timeline with the full-context name of each phone's unit (``sil-p+aa``).
-
-    Where a label has no phone, its unit keeps its name.
-    """
+    """Return the timeline with the full-context name of each phone's unit (``sil-p+aa``); others keep theirs."""
     silence = units.unit(SILENCE)
     sequence = [silence, *(units.unit_of(span.label) for span in spans), silence]
     renamed = []

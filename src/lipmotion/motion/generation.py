@@ -69,10 +69,7 @@ class VarianceScaling(NamedTuple):
     rest: Array
 
     def apply(self, means: Array, precisions: Array) -> tuple[Array, Array]:
-        """Return means and precisions of the scaled movements [each shape=(T, 3, Q)].
-
-        means, precisions : of static value, Δ and Δ² [each shape=(T, 3, Q)]
-        """
+        """Return means and precisions of static value, Δ and Δ² of the scaled movements [each shape=(T, 3, Q)]."""
         scaled = means * self.factors
         scaled[:, 0] += self.rest * (1 - self.factors)
         return scaled, precisions / (self.factors * self.factors)

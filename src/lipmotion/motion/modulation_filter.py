@@ -38,10 +38,7 @@ STRENGTH = Rule(least=0, most=2)
 
 
 class ModulationFilter(NamedTuple):
-    """Filters without delay, dimension by dimension.
-
-    taps : symmetrical, of sum 1, so that a mouth at rest stays there [shape=(2 · REACH + 1, Q)]
-    """
+    """Filters without delay, symmetrical, of sum 1, so that a mouth at rest stays there [shape=(2 · REACH + 1, Q)]."""
 
     taps: Array
 
@@ -93,10 +90,7 @@ def learn_filter(
 
 
 def select_resting_motion(examples: Sequence[Example], values: Sequence[Array]) -> list[Array]:
-    """Return recorded motion in silence, further than ``RESTING_MARGIN_S`` from speech [each shape=(N_i, Q)].
-
-    values : motion of the examples in the motion space [each shape=(T, Q)]
-    """
+    """Return recorded motion in silence, ``RESTING_MARGIN_S`` from speech, in the motion space [shape=(N_i, Q)]."""
     resting = []
     for example, x in zip(examples, values, strict=True):
         far = example.valid & mark_distant(example.speech.units, len(x), RESTING_MARGIN_S)
@@ -148,11 +142,7 @@ def filter_to_arrays(modulation: ModulationFilter | None) -> dict[str, NDArray[A
 
 
 def filter_from_arrays(arrays: Arrays, dimensions: int, *, needed: bool = False) -> ModulationFilter | None:
-    """Deserialise what ``filter_to_arrays`` returned.
-
-    needed : there must be a filter
-    Raises KeyError, ValueError: it is missing, or has a wrong shape, type or range.
-    """
+    """Deserialise a filter, which may be ``needed``. Raises KeyError, ValueError: it is missing, or damaged."""
     if "modulation" not in arrays and not needed:
         return None
     return ModulationFilter(check_arrays(arrays, MODULATION, N=2 * REACH + 1, Q=dimensions)["modulation"])

@@ -137,10 +137,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
         return dict(zip(self.specs, (*self.stack(network), output), strict=True))
 
     def from_arrays(self, arrays: Arrays, outputs: int) -> NetworkT:
-        """Return the network of arrays.
-
-        Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
-        """
+        """Return the network of arrays. Raises KeyError, ValueError: one is missing or damaged."""
         stored = check_arrays(arrays, self.specs, O=outputs)
         *stacked, output = (stored[name] for name in self.specs)
         return self.network(stacked, LinearMap(output[:-1], output[-1]))
@@ -152,10 +149,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
         draw: Callable[[np.random.Generator, int], TrainingSequence],
         plan: TrainingPlan,
     ) -> NetworkT:
-        """Return a network that is trained on the examples of ``training``; from its checkpoint, if that is there.
-
-        draw : returns the inputs and targets of the example of a number, or a piece of them
-        """
+        """Return a network, trained on sequences that ``draw`` makes of numbered examples, or from its checkpoint."""
         stored = training.checkpoint.load(self.name)
         if stored is not None:
             return self.from_arrays(stored, outputs)
@@ -260,10 +254,7 @@ ENCODING_SCALE = np.float32(4)
 
 
 def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:
-    """Return articulators, in deviations from the pose of the table of articulation [shape=(T, 8)].
-
-    None: the speech has no encoding, or its phones are given for a voice that training knows.
-    """
+    """Return articulators, deviations from the table's pose [shape=(T, 8)]; None: no encoding, or a known voice."""
     if speech.encoding is None or (speech.voice >= 1 and speech.units_known):
         return None
     steps = np.asarray(speech.encoding)[::STEP].astype(np.float32) * ENCODING_SCALE

@@ -111,10 +111,7 @@ class PosteriorNetwork(Predictor):
 
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
-        """Return a network that is trained on examples as recorded; without spectra where one of them has none.
-
-        Raises CorpusError: an example without posteriors.
-        """
+        """Return a network trained on examples as recorded, with spectra if all have them. Raises CorpusError."""
         examples = training.examples
         posteriors = list_posteriors(examples)
         if posteriors is None:
@@ -157,10 +154,7 @@ class PosteriorNetwork(Predictor):
         return motion, np.zeros(frames)
 
     def hidden_units(self, posteriors: TokenPosteriors, steps: int) -> NDArray[np.float32]:
-        """Return the last hidden layer in every time step, without the spectrum [shape=(steps, H)].
-
-        Raises InputError: posteriors of another phone recogniser than in training.
-        """
+        """Return the last hidden layer, without spectrum [shape=(steps, H)]. Raises InputError: as ``predict``."""
         rows = self.network.hidden(_stack_shift(self._components(self._check(posteriors)), None, 0))
         return rows[np.minimum(np.arange(steps), len(rows) - 1)]
 

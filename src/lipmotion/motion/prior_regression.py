@@ -75,10 +75,7 @@ class EncodingRegression(Predictor):
         return PredictorFit(cls(fitted.coefficients, fitted.centre, variances))
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
-        """Return motion in the motion space [shape=(T, Q)], and no distortion: 0 [shape=(T,)].
-
-        Raises InputError: speech without an encoding.
-        """
+        """Return motion [shape=(T, Q)], and no distortion: 0 [shape=(T,)]. Raises InputError: no encoding."""
         if speech.encoding is None:
             raise InputError("the speech has no encoding; an engine that uses one says so by ``inputs``")
         frames = len(speech.features.values)
@@ -206,10 +203,7 @@ class PriorRegression(Predictor):
         return speech.prior is not None or not any(self.sizes[:2])
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
-        """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
-
-        Raises InputError: an unknown phone.
-        """
+        """Return motion [shape=(T, Q)] and distortion, 0 to 1 [shape=(T,)]. Raises InputError: an unknown phone."""
         kinds = _regressors(speech)
         row, starts = self.mean.astype(float), np.cumsum([0, *self.sizes])
         result = np.tile(row, (len(kinds[0]), 1))  # what the training had and this speech has not has its mean

@@ -49,10 +49,7 @@ class MotionSpace:
     def restore(
         self, values: NDArray[np.float64], variance: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values and variances of all channels [each shape=(T, P)].
-
-        values, variance : in the motion space [each shape=(T, Q)]
-        """
+        """Return values and variances of channels [each shape=(T, P)], from the motion space [each shape=(T, Q)]."""
         motion, spread = (np.empty((len(values), len(self.channels))) for _ in range(2))
         count = len(self.direct)
         motion[:, self.direct], spread[:, self.direct] = values[:, :count], variance[:, :count]
@@ -153,10 +150,7 @@ MIN_SPAN = 1e-3
 
 
 class MotionLimits(NamedTuple):
-    """Smallest and largest values of the poses, or of the motion, of a model.
-
-    low, high : smallest and largest value of each dimension of the motion space [each shape=(Q,)]
-    """
+    """Smallest and largest value of each dimension of the motion space, of poses or motion [each shape=(Q,)]."""
 
     low: Array
     high: Array
@@ -235,10 +229,7 @@ def _span(low: Array, high: Array) -> Array:
 
 
 def check_spread(poses: NDArray[np.floating], variances: NDArray[np.floating]) -> None:
-    """Raise ValueError if poses span many more of their standard deviations than those of trained models.
-
-    poses, variances : means and variances of densities [each shape=(N, Q)]
-    """
+    """Raise ValueError if means and variances of densities [each shape=(N, Q)] span far more deviations than usual."""
     deviation = np.sqrt(variances.mean(axis=0, dtype=float))
     spread = float(np.quantile(np.ptp(poses, axis=0) / deviation, 0.5))
     if spread > LARGEST_SPREAD:

@@ -76,11 +76,7 @@ class SpeakerMap:
         return change
 
     def to_person(self, values: NDArray[np.floating[Any]], restful: Array) -> Array:
-        """Return the motion of this person, of the mean person's.
-
-        values  : all channels [shape=(T, P)]
-        restful : from ``measure_restfulness`` [shape=(T,)]
-        """
+        """Return this person's motion of the mean person's [shape=(T, P)]; restful : as measured [shape=(T,)]."""
         return self.offset + self.gain * values + restful[:, None] * self.rest
 
     def to_mean(self, values: NDArray[np.floating[Any]], restful: Array) -> Array:
@@ -275,10 +271,7 @@ class PersonStatistics:
 
 
 def measure_person(examples: Sequence[Example], column: int | None) -> PersonStatistics:
-    """Return the statistics of one person's motion.
-
-    column : of the opening (None: there is no such channel)
-    """
+    """Return the statistics of one person's motion; column : of the opening (None: there is no such channel)."""
     silent, silence, spoken, measured, smallest = [], [], [], [], []
     for example in examples:
         values, valid, units = np.asarray(example.motion.values, float), example.valid, example.speech.units
@@ -308,10 +301,7 @@ def measure_person(examples: Sequence[Example], column: int | None) -> PersonSta
 
 
 def estimate_rest_poses(people: Sequence[PersonStatistics]) -> Array:
-    """Return the rest poses of all people [shape=(S, P)].
-
-    Whoever is never silent rests as far from their median pose in speech as the others do.
-    """
+    """Return the rest poses of all people [shape=(S, P)]; who is never silent rests as far from speech as others."""
     rests, spoken = np.stack([person.rest for person in people]), np.stack([person.spoken for person in people])
     known: NDArray[np.bool_] = np.asarray(np.isfinite(rests).all(axis=1))
     usual = (rests - spoken)[known].mean(axis=0) if known.any() else np.zeros(rests.shape[1])

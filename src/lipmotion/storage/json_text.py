@@ -91,10 +91,7 @@ def replace_nan(content: Any) -> Any:
 
 
 def from_json(text: str | bytes) -> Any:
-    """Return the content of JSON text.
-
-    Raises ValueError: it is none, has a key twice, is nested too deeply, or holds a number that is not finite.
-    """
+    """Return the content of JSON text. Raises ValueError: it is none, a key is twice, or a number is not finite."""
     try:
         numbers: Any = {"parse_constant": _refuse, "parse_float": finite, "parse_int": _whole}
         return json.loads(text, object_pairs_hook=_check_keys, **numbers)
@@ -142,11 +139,7 @@ def finite(text: str) -> float:
 
 
 def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    instead : what to use with Python 3.10, which cannot read TOML
-    Raises InputError: no such file, no TOML, or Python 3.10.
-    """
+    """Return the content of a TOML file. Raises InputError: no TOML, or Python 3.10: what to use ``instead``."""
     if sys.version_info < (3, 11):
         raise InputError(f"{path}: TOML is read by Python 3.11 or newer; {instead}")
     import tomllib

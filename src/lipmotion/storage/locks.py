@@ -127,10 +127,7 @@ else:
 
 @contextmanager
 def open_temporary() -> Iterator[Path]:
-    """Give a folder in the system's place for temporary files, which is removed at the end.
-
-    Those that killed runs have left there are removed first: nobody holds their locks.
-    """
+    """Give a temporary folder, removed at the end; those that killed runs left, whose locks nobody holds, go first."""
     place = Path(tempfile.gettempdir())
     for left in place.glob(f"{FOLDER_PREFIX}*/{LOCK}"):
         with suppress(ExportError, OSError), confine(place):  # it is in use, or another user's

@@ -65,11 +65,7 @@ class CheckedArrays:
 
 @contextmanager
 def format_errors(what: str, remedy: str = "train or download it again", *, verb: str = "is") -> Iterator[None]:
-    """Turn the errors of damaged arrays that are raised inside into a ModelFormatError.
-
-    what, remedy : what is damaged, as ``the joint model``, and what its user can do
-    verb : ``are`` where ``what`` is a plural
-    """
+    """Turn errors of damaged arrays into a ModelFormatError; ``remedy``: what the user can do; ``verb``: is or are."""
     try:
         yield
     except (KeyError, ValueError, IndexError, TypeError, OverflowError) as error:

@@ -255,10 +255,7 @@ _NO_MISTAKE = {
 
 
 def check_kind(path: Path, wanted: str, kind: str = "") -> None:
-    """Raise InputError for a file that is known to be something else, whatever its suffix, with the next step.
-
-    wanted : ``recording``, ``video``, ``text``, ``motion file``, or another noun;  kind : noun for the message
-    """
+    """Raise InputError for a file that is known to be no ``wanted`` (in words: ``kind``), with the next step."""
     if not is_file(path):
         return
     with suppress(OSError), path.open("rb") as file:

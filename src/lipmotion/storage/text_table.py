@@ -57,10 +57,7 @@ class TextTable:
 
 @contextmanager
 def open_table(path: Path) -> Iterator[TextTable]:
-    """Open a table to read its rows one by one; rows without any field are left out.
-
-    Raises OSError: it cannot be opened. Raises InputError, also for a ValueError inside: it is no table of numbers.
-    """
+    """Open a table to read its rows, without empty ones. Raises OSError, InputError: it is no table of numbers."""
     with path.open("rb") as file:
         start = file.read(2)
     encoding = "utf-16" if start in {b"\xff\xfe", b"\xfe\xff"} else "utf-16-le" if start[1:] == b"\0" else "utf-8-sig"
@@ -118,11 +115,7 @@ def parse_numbers(fields: Sequence[str], line: int) -> list[float]:
 
 
 def read_whole_table(path: Path, kind: str, largest: int, required: Sequence[str]) -> tuple[list[str], Rows]:
-    """Return the names of the columns of a table that people write, and its rows.
-
-    required : the columns, for messages
-    Raises InputError: as ``read_text_file``, or it is no table.
-    """
+    """Return columns and rows of a table; ``required``: columns for messages. Raises InputError: it is no table."""
     text = read_text_file(path, kind, largest)
     try:
         table = read_table(io.StringIO(text, newline=""))

@@ -114,10 +114,7 @@ class Configuration:
 
     @classmethod
     def parsed(cls: type[ConfigurationT], values: Mapping[str, Any]) -> ConfigurationT:
-        """Return a configuration with some options, by name; all others have their default values.
-
-        Raises InputError: unknown option, or a value that is not allowed.
-        """
+        """Return a configuration with some options, by name. Raises InputError: unknown, or a value not allowed."""
         known = {option_field.name: kind_of(option_field) for option_field in fields(cls)}
         options: dict[str, Any] = {}
         for name, value in values.items():
@@ -140,10 +137,7 @@ class Configuration:
 
     @classmethod
     def values_of(cls, settings: Sequence[str]) -> dict[str, Any]:
-        """Return the values of options, by name, that are parsed from texts ``NAME=VALUE``.
-
-        Raises InputError: a text without value, an unknown option, or a value that is not of the option's type.
-        """
+        """Return the values of options in texts ``NAME=VALUE``. Raises InputError: no value, or of another type."""
         kinds = {option_field.name: kind_of(option_field) for option_field in fields(cls)}
         values: dict[str, Any] = {}
         for setting in settings:

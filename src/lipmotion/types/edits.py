@@ -43,10 +43,7 @@ class Pin:
 
 @dataclass(frozen=True)
 class SlopedPin(Pin):
-    """A pin through which the curve goes at a slope.
-
-    slope : of the curve, in its unit per second
-    """
+    """A pin through which the curve goes at a slope, in its unit per second."""
 
     slope: float
 

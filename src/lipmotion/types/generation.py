@@ -180,10 +180,7 @@ class Generation:
         return change(self.spread)
 
     def resampled(self, rate_hz: float) -> Generation:
-        """Return the generation at another frame rate: interpolated values, and the state of the nearest frame.
-
-        Raises InputError: the rate is not more than 0.
-        """
+        """Return the generation at another rate, with the nearest states. Raises InputError: a rate not more than 0."""
         motion = self.motion.resampled(rate_hz)
         spread = self.change_frames(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
@@ -217,10 +214,7 @@ class SpokenText(NamedTuple):
 
 @dataclass(frozen=True)
 class NamedProbability:
-    """A name and a probability: of a state, or of a regression.
-
-    probability : 0 to 1
-    """
+    """A name and a probability, 0 to 1: of a state, or of a regression."""
 
     name: str
     probability: float

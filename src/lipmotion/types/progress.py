@@ -85,10 +85,7 @@ def with_progress(
 
 @contextmanager
 def warnings_to(receive: Callable[[str], object], *, of_thread: bool = False, propagate: bool = True) -> Iterator[None]:
-    """Give the package's warnings to a function while the block lasts; ``of_thread``: those of this thread alone.
-
-    propagate : whether they go on to where they are written otherwise
-    """
+    """Give the package's warnings to a function; ``of_thread``: this thread's alone; propagate : whether they go on."""
     logger, handler, thread = logging.getLogger("lipmotion"), logging.Handler(logging.WARNING), threading.get_ident()
     handler.emit = lambda record: receive(record.getMessage())  # type: ignore[assignment,method-assign]
     handler.addFilter(lambda record: not of_thread or record.thread == thread)

@@ -169,10 +169,7 @@ def items(schema: Schema, least: int = 0, most: int | None = None) -> Schema:
 
 
 def members(table: Mapping[str, Schema], needed: Collection[str] = (), *, alone: bool = False) -> Schema:
-    """Return the schema of an object: a table of its members, and which of them must be there.
-
-    alone : whether others are refused; else they are dropped
-    """
+    """Return the schema of an object: its members, which are needed; ``alone``: others are refused, else dropped."""
 
     def checked(value: Any) -> dict[str, Any]:
         if type(value) is not dict:

@@ -166,10 +166,7 @@ class DrivenCharacter:
     table: Mapping[str, RigRow] = field(default_factory=dict)
 
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
-        """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
-
-        Raises InputError: the character has no blendshapes of the mouth, or as ``solve_shape_weights``.
-        """
+        """Return blendshapes' weights over time, by the mesh's names. Raises InputError: it has none of the mouth."""
         if self.shapes is None:
             raise InputError(
                 "the character is moved by control points and has no weights of blendshapes; write a video, or the "

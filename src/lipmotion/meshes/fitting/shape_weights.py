@@ -110,10 +110,7 @@ def blend_visemes(held: Array, gap: Array, protrusion: Array) -> Array:
 
 
 def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Return how far each of the 15 visemes is being said at some times, 0 to 1 [each shape=(len(time_s),)].
-
-    Pauses in which the mouth goes on (``articulation.pauses``) belong to the phones beside them.
-    """
+    """Return how far each of 15 visemes is said, 0 to 1 [each shape=(T,)]; short pauses belong to the phones beside."""
     weights = crossfade_phones(share_short_pauses(units), time_s, lambda phone: VISEME_OF_PHONE.get(phone, "sil"))
     return {name: np.clip(weights.get(name, np.zeros(len(time_s))), 0.0, 1.0) for name in VISEMES_15}
 
@@ -353,9 +350,7 @@ def _find_opposed(known: tuple[str, ...]) -> list[list[NDArray[np.bool_]]]:
 
 
 def cancel_opposed(weights: Array, known: Sequence[str]) -> Array:
-    """Return the weights of one frame, of shapes that undo each other only the larger side, as far as it is larger
-    [shape=(S,)]. ``separate_opposed`` keeps the look better, but needs many frames and some time.
-    """
+    """Return the weights of one frame [shape=(S,)]; of shapes that undo each other, the larger less the smaller."""
     left = weights.copy()
     for one, other in _find_opposed(tuple(known)):
         strong, weak = (weights[each].max(initial=0.0) for each in (one, other))
@@ -379,11 +374,7 @@ def round_lips(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
 
 
 def weigh_moods(mouth: SpokenMouth, shapes: FaceShapes) -> Array | None:
-    """Return the weights of ARKit's blendshapes of the mouth in a mood, 0 to 1 [shape=(T, S)]; None: in none.
-
-    They leave the lips as free as the phones need (``articulation.mouth``); the distance between the lips is set
-    afterwards (``with_gap``).
-    """
+    """Return the weights of ARKit's blendshapes of the mouth in a mood, 0 to 1 [shape=(T, S)]; None: in none."""
     weights = np.zeros((len(mouth.gap), len(shapes.names)))
     for name, (curve, full) in MOOD_SHAPES.items():
         if (row := shapes.row(name)) is not None:

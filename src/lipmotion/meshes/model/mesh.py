@@ -58,9 +58,7 @@ OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """A picture on a surface: sRGB and opacity, 0 to 255, from the top [shape=(H, W, 4)]. Raises InputError: another
-    shape.
-    """
+    """A picture: sRGB and opacity, 0 to 255, from the top [shape=(H, W, 4)]. Raises InputError: another shape."""
 
     pixels: NDArray[np.uint8]
 

@@ -50,10 +50,7 @@ class RigRow:
 
 
 def read_rig_table(path: Path) -> tuple[RigRow, ...]:
-    """Return the rows of a table ``control,source,gain,offset,low,high`` (CSV); empty fields have their usual value.
-
-    Raises InputError: no such file, other columns, no rows, or a row that is damaged.
-    """
+    """Return the rows of a CSV of ``COLUMNS``; empty fields have their usual value. Raises InputError: damaged."""
     names, lines = read_whole_table(path, "rig table", LARGEST_TABLE_BYTES, COLUMNS)
     if names[:2] != list(COLUMNS[:2]) or not set(names) <= set(COLUMNS):
         raise InputError(f"{path}: the columns are {shorten(','.join(names))!r}, required {','.join(COLUMNS)}")

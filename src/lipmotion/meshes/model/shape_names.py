@@ -49,10 +49,7 @@ _COPY = re.compile(r"[._ ]\d{1,4}$")
 
 
 def to_arkit(name: str) -> str | None:
-    """Return ARKit's name of a blendshape as files spell it, or None.
-
-    ``head.mouthSmile_L``, ``Face_mouthSmileL`` and ``mouth_smile_left.001`` are ``mouthSmileLeft``.
-    """
+    """Return ARKit's name of a blendshape as files spell it, or None: ``head.mouthSmile_L`` is ``mouthSmileLeft``."""
     text = re.sub(r"(?<=[a-z])([LR])$", r"_\1", re.split(r"[.:|]", _COPY.sub("", name))[-1])
     words = [word for word in re.split(r"[\s_\-]+", text) if word]
     for first in range(len(words)):
@@ -76,9 +73,7 @@ def find_vowel(name: str) -> str | None:
 
 
 def find_spoken_name(name: str) -> str | None:
-    """Return the viseme or vowel (``viseme_ih``, ``vowel_aa``) of a blendshape as files spell it, or None; silence is
-    none.
-    """
+    """Return the viseme or vowel (``viseme_ih``, ``vowel_aa``) of a blendshape as files spell it; None: no speech."""
     viseme, vowel = find_viseme(name), find_vowel(name)
     if viseme is not None:
         return None if viseme == "sil" else f"viseme_{viseme}"
