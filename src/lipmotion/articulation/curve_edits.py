@@ -21,13 +21,10 @@ from lipmotion.types.edits import Locked
 
 Curve = NDArray[np.float64]
 
-PIN_REACH_S = 0.1
-"""A pin bends a curve within this time before and after it."""
-GAIN_EDGE_S = 0.1
-"""A gain grows and fades in this time."""
+PIN_REACH_S = 0.1  # a pin bends a curve within this time before and after it
+GAIN_EDGE_S = 0.1  # a gain grows and fades in this time
 SAME_GAP = 1e-6
-LOCK_EDGE_S = 0.05
-"""Motion goes over into a locked span, or one that is held, and out of it, in this time."""
+LOCK_EDGE_S = 0.05  # motion goes over into a locked span, or one that is held, and out of it, in this time
 
 
 def apply_curve_edits(

@@ -29,10 +29,8 @@ from lipmotion.types.delivery import MOODS, MoodKey
 
 Curve = NDArray[np.float64]
 
-PREFIX: Final = "mood_"
-"""The channels of moods are called so, and the mood: ``mood_happy``, a weight."""
-CHANGE_S: Final = (0.25, 0.2)
-"""A mood begins to change so long before its time, and has changed so long after it."""
+PREFIX: Final = "mood_"  # the channels of moods are called so, and the mood: ``mood_happy``, a weight
+CHANGE_S: Final = (0.25, 0.2)  # a mood begins to change so long before its time, and has changed so long after it
 
 
 @cache

@@ -17,14 +17,10 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Motion
 
-UPPER_MIDDLE, LOWER_MIDDLE = 13, 14
-"""The middles of the inner lips; the channel ``opening`` is their distance."""
-RIGHT_CORNER, LEFT_CORNER = 61, 291
-"""The lip corners; the channel ``width`` is their distance."""
-INNER_CORNERS = (78, 308)
-"""Where the lips part, right and left."""
-UPPER_EDGE, LOWER_EDGE = 0, 17
-"""The middles of the outer lips; the channel ``outer`` is their distance."""
+UPPER_MIDDLE, LOWER_MIDDLE = 13, 14  # the middles of the inner lips; the channel ``opening`` is their distance
+RIGHT_CORNER, LEFT_CORNER = 61, 291  # the lip corners; the channel ``width`` is their distance
+INNER_CORNERS = (78, 308)  # where the lips part, right and left
+UPPER_EDGE, LOWER_EDGE = 0, 17  # the middles of the outer lips; the channel ``outer`` is their distance
 CHIN = 152
 FACING = ((13, 14), (82, 87), (312, 317), (81, 178), (311, 402))
 """Pairs of an upper and a lower point of the inner lips that touch when the mouth is closed."""

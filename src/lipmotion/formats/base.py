@@ -30,17 +30,13 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, 
 LOG = logging.getLogger("lipmotion")
 Array = NDArray[np.float64]
 About = Mapping[str, str]
-LARGEST_MOTION_BYTES = 1 << 31
-"""Most bytes of a motion file: four hours of a hundred channels."""
+LARGEST_MOTION_BYTES = 1 << 31  # most bytes of a motion file: four hours of a hundred channels
 
-LARGEST_UNITS_BYTES = 1 << 28
-"""Most bytes of a file of units alone: phones of a day."""
+LARGEST_UNITS_BYTES = 1 << 28  # most bytes of a file of units alone: phones of a day
 
 
-LARGEST_WEIGHT = 4.0
-"""Largest weight of a blendshape that is read; captures and sculpted faces go a little over 1."""
-TOLERATED_WEIGHT = 0.1
-"""By how much weights may go beyond 0 to 1 without a warning."""
+LARGEST_WEIGHT = 4.0  # largest weight of a blendshape that is read; captures and sculpted faces go a little over 1
+TOLERATED_WEIGHT = 0.1  # by how much weights may go beyond 0 to 1 without a warning
 
 
 @dataclass(frozen=True)
@@ -120,8 +116,7 @@ OTHER_JSON = {
     b'"visemes":': ".tsv",
 }
 """What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
-JSON_HEAD = 1 << 16
-"""How many bytes of a ``.json`` are searched for them."""
+JSON_HEAD = 1 << 16  # how many bytes of a ``.json`` are searched for them
 CUE_LINE = re.compile(
     rb'^"?[0-9][0-9:.,]{0,20}"?(?:[;,]\s?"?[0-9:.,]{1,20}"?)?[;,]\s?"?([A-Za-z_0-9]{0,19}[A-Za-z])"?\s*$', re.M
 )
@@ -290,12 +285,9 @@ def _suffix(path: Path) -> str:
     return repr(find_suffix(path) or path.suffix) if path.suffix else "a file without a suffix"
 
 
-DECIMALS = 5
-"""A hundred-thousandth of the distance between the eyes is about a micrometre."""
-BLOCK_ROWS = 2000
-"""Rows that are formatted at a time: the text of an hour of all channels would not fit in memory."""
-LARGEST_VALUE = 1e9
-"""Blocks with larger values are formatted number by number: their digits do not fit in 64 bits."""
+DECIMALS = 5  # a hundred-thousandth of the distance between the eyes is about a micrometre
+BLOCK_ROWS = 2000  # rows that are formatted at a time: the text of an hour of all channels would not fit in memory
+LARGEST_VALUE = 1e9  # blocks with larger values are formatted number by number: their digits do not fit in 64 bits
 
 
 def format_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
@@ -353,10 +345,8 @@ def list_key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: 
     return Thinning(tolerance).choose(time_s, values[:, None]).tolist()
 
 
-MAX_ITEMS = 1 << 20
-"""Most items of a list that has not one item a frame."""
-MAX_ROWS = 1 << 22
-"""Most rows of numbers: eleven hours of frames of 10 ms."""
+MAX_ITEMS = 1 << 20  # most items of a list that has not one item a frame
+MAX_ROWS = 1 << 22  # most rows of numbers: eleven hours of frames of 10 ms
 _BLANK = re.compile(r"\s*")
 _DECODER = json.JSONDecoder()
 
@@ -430,8 +420,7 @@ def _pass(text: str, at: int, character: str) -> int:
     return at + 1
 
 
-JUMP_S = 1e-3
-"""How long a change at once may last, in seconds."""
+JUMP_S = 1e-3  # how long a change at once may last, in seconds
 
 
 @dataclass(frozen=True)

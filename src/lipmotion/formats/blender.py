@@ -27,10 +27,8 @@ FOLDER = "lipmotion_blender"
 ADDON_PLACES = (Path(__file__).parents[1] / "addons", Path(__file__).parents[3] / "extras")
 """Where the add-on's folder is: in an installed package; in a copy of the repository."""
 MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py", "takes.py")
-OLDEST = (1980, 1, 1, 0, 0, 0)
-"""The time of every file in an archive: the same version gives the same bytes."""
-NO_VERSION = "0.0.0"
-"""The version where lipmotion is not installed; Blender takes three numbers."""
+OLDEST = (1980, 1, 1, 0, 0, 0)  # the time of every file in an archive: the same version gives the same bytes
+NO_VERSION = "0.0.0"  # the version where lipmotion is not installed; Blender takes three numbers
 MANIFEST = """schema_version = "1.0.0"
 id = "lipmotion"
 version = "{version}"

@@ -45,8 +45,7 @@ INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR = 84, 85, 86
 """The processor types: the lowest byte first; the same, but fractions of DEC's own kind; the highest byte first."""
 MAX_FRAMES, OVERFLOW = 65_535, 65_536
 """Most frames that the header can number, and after how many it may begin at 0 again."""
-LARGEST_FILE_BYTES = 1 << 28
-"""Most bytes of a file that is read."""
+LARGEST_FILE_BYTES = 1 << 28  # most bytes of a file that is read
 MAX_POINTS, MAX_ANALOG_CHANNELS = 2_000, 5_000
 LONGEST_LABEL_CHARACTERS = 64
 LOG = logging.getLogger("lipmotion")
@@ -355,8 +354,7 @@ def _points(motion: Motion) -> list[int]:
 MOTION_FORMAT = MotionFormat(write, read, check)
 
 
-MILLIMETRES = 90.0
-"""The distance between the outer eye corners of a grown person, where markers do not show it."""
+MILLIMETRES = 90.0  # the distance between the outer eye corners of a grown person, where markers do not show it
 UNITS = {"mm": 1.0, "millimeter": 1.0, "cm": 10.0, "m": 1000.0, "meter": 1000.0, "in": 25.4, "inch": 25.4}
 """Units of length in millimetres."""
 LEFT_EYE = frozenset(("eyel", "leye", "lefteye", "eyeleft", "exl", "lex", "leyeouter", "eyelouter", "lefteyeouter"))
@@ -366,11 +364,9 @@ RIGID = ("forehead", "head", "nasion", "nosebridge", "glabella", "temple", "ear"
 """Beginnings of names, after a side, of other markers that do not move against the skull."""
 MIN_RIGID_MARKERS = 3
 LARGEST_COORDINATE = 1e6
-MIN_DISTANCE = 1e-3
-"""Least distance of the eye corners in any frame, as a share of the median."""
+MIN_DISTANCE = 1e-3  # least distance of the eye corners in any frame, as a share of the median
 
-DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}
-"""Channels that are the distance of two points."""
+DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}  # channels that are the distance of two points
 MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
 """The name of a marker at a point of the face mesh."""
 

@@ -53,8 +53,7 @@ from lipmotion.units import SILENCE
 from lipmotion.units.phones import LETTERS, REST, SHAPES
 
 _NOT_XML = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-_CONTROL = re.compile("[\t\n\x7f]")
-"""Characters that XML 1.0 cannot hold, and those that it would change."""
+_CONTROL = re.compile("[\t\n\x7f]")  # characters that XML 1.0 cannot hold, and those that it would change
 _CUE = re.compile(r"<mouthCue\s+start=\"([^\"<]{0,40})\"\s+end=\"([^\"<]{0,40})\"\s*>([^<]{0,40})</mouthCue>")
 MOHO = "MohoSwitch1"
 LISTS = ("mouthCues", "visemes", "cues", "events", "keyframes")
@@ -167,12 +166,9 @@ def parse_dat(text: str, fps: float = CUES_FPS) -> CueSheet:
 
 MARK = "lipsync version 1"
 FASTEST_FPS = 1000
-WHOLE_RATE_TOLERANCE = 0.01
-"""A rate that is so little over a whole one counts as that."""
-UNKNOWN = "speech"
-"""The text of speech without known words."""
-Part = tuple[int, int, str]
-"""First frame, last frame (included), and text."""
+WHOLE_RATE_TOLERANCE = 0.01  # a rate that is so little over a whole one counts as that
+UNKNOWN = "speech"  # the text of speech without known words
+Part = tuple[int, int, str]  # first frame, last frame (included), and text
 
 
 def format_project(sheet: CueSheet, sound_file: str) -> str:
@@ -279,8 +275,7 @@ def parse_project(text: str) -> CueSheet:
 
 
 VERSION, SLOT, ANIMATION = "4.2.0", "mouth", "speech"
-PIXELS = 256
-"""Width and height of a mouth until Spine has its picture."""
+PIXELS = 256  # width and height of a mouth until Spine has its picture
 
 
 def format_skeleton(sheet: CueSheet, sound_file: str) -> str:
@@ -327,8 +322,7 @@ SHAPE_OF = {phone: shape for shape, phone in PHONE_OF.items()}
 RATE_HZ = 100.0
 WIDEST_GAP = 0.25
 """The gap between the lips of a shape whose opening is 1, in eye distances: that of wide vowels of typical talkers."""
-WIDENING = 0.12
-"""By how much the mouth is wider than at rest where the spread of a shape is 1, as a share."""
+WIDENING = 0.12  # by how much the mouth is wider than at rest where the spread of a shape is 1, as a share
 LARGEST_BYTES = 1 << 24
 
 

@@ -21,8 +21,7 @@ from lipmotion.formats.steady_rate import exact_rate
 from lipmotion.meshes.fitting.blendshape_motion import move_points
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
-FAP = "fap"
-"""The unit of these channels: whole steps of a 1024th of a distance in the face, of either sign."""
+FAP = "fap"  # the unit of these channels: whole steps of a 1024th of a distance in the face, of either sign
 STEPS = 1024.0
 MOUTH_TO_NOSE = 0.30
 """The distance from the nose to where the lips meet (MNS0) in a mean face, in eye distances; the width of the mouth
@@ -58,8 +57,7 @@ PARAMETERS = (
 """The parameters of lips and jaw that points show; left and right are the speaker's own."""
 VERSION = "2.1"
 COUNT = 68
-MANY_VALUES = {1: 4, 2: 6}
-"""How many values the first two parameters have."""
+MANY_VALUES = {1: 4, 2: 6}  # how many values the first two parameters have
 NAMES = {number: f"fap{number}_{name}" for number, name, *_ in PARAMETERS}
 LARGEST_VALUE = 1_000_000
 LONGEST_LINE = 1 << 14

@@ -31,23 +31,18 @@ from lipmotion.storage.json_text import as_json
 from lipmotion.types import WEIGHT, Generation, Motion
 
 Array = NDArray[np.float64]
-FULL = 100.0
-"""A blendshape's weight in Unity where it has its whole effect."""
+FULL = 100.0  # a blendshape's weight in Unity where it has its whole effect
 UNITY_TOLERANCE, GODOT_TOLERANCE = 0.01, 1e-4
 """Largest error of a curve through the keys that are kept, of 100 and of 1."""
 UNITY_DECIMALS, GODOT_DECIMALS = 4, 5
-RENDERER = 137
-"""The class of SkinnedMeshRenderer."""
+RENDERER = 137  # the class of SkinnedMeshRenderer
 LINEAR, CONSTANT = 69, 103
 """Modes of the tangents of a key in Unity: straight, or held until the next key, on both sides."""
 RATE_HZ = 60.0
-_PLAIN = re.compile(r"[A-Za-z][\w.]*", re.ASCII)
-"""Names that need no quotes."""
+_PLAIN = re.compile(r"[A-Za-z][\w.]*", re.ASCII)  # names that need no quotes
 _EMPTY = ("m_RotationCurves", "m_CompressedRotationCurves", "m_EulerCurves", "m_PositionCurves", "m_ScaleCurves")
-NODE = "."
-"""The node whose blend shapes move in Godot: the root node of the AnimationPlayer itself."""
-FORBIDDEN = frozenset('".:@/%')
-"""Characters that no name in a path of Godot has."""
+NODE = "."  # the node whose blend shapes move in Godot: the root node of the AnimationPlayer itself
+FORBIDDEN = frozenset('".:@/%')  # characters that no name in a path of Godot has
 
 
 def _list_weights(motion: Motion) -> list[str]:
@@ -162,19 +157,14 @@ GODOT = MotionFormat(write_godot, check=check_godot, curves="face", other_curves
 
 OPEN, FORM = "ParamMouthOpenY", "ParamMouthForm"
 """Live2D's standard parameters: 0 closed to 1 open; −1 puckered to 1 wide, as in a smile."""
-FULL_GAP = 0.20
-"""The gap between the lips that is drawn as wholly open, eye distances."""
+FULL_GAP = 0.20  # the gap between the lips that is drawn as wholly open, eye distances
 LARGEST_WIDENING, LARGEST_NARROWING = 0.08, 0.12
 """By how much the mouth is wider and narrower than at rest where the form is 1 and −1, eye distances."""
-FPS = 30.0
-"""The frame rate that the file states; its keys are at any time."""
-TOLERANCE = 0.005
-"""Largest error of a curve through the keys that are kept."""
+FPS = 30.0  # the frame rate that the file states; its keys are at any time
+TOLERANCE = 0.005  # largest error of a curve through the keys that are kept
 DECIMALS = 3
-LINEAR_SEGMENT, STEPPED_SEGMENT = 0, 2
-"""Types of segments: straight to the next key, or held until it."""
-SHOWING = frozenset(("opening", "jawOpen"))
-"""Channels that say how far the mouth is open."""
+LINEAR_SEGMENT, STEPPED_SEGMENT = 0, 2  # types of segments: straight to the next key, or held until it
+SHOWING = frozenset(("opening", "jawOpen"))  # channels that say how far the mouth is open
 
 
 def check_live2d(motion: Motion) -> None:

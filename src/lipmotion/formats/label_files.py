@@ -49,23 +49,18 @@ FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNIS
 may be recognised last."""
 FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")
 """Suffixes in whose files phones are searched, in order."""
-LARGEST_LABELS = 1 << 24
-"""Most bytes of a label file: labels of a day."""
-MOTION = re.compile(r'"lipmotion\.motion"|time_s,')
-"""How our own motion files begin: a quick answer for large ones."""
+LARGEST_LABELS = 1 << 24  # most bytes of a label file: labels of a day
+MOTION = re.compile(r'"lipmotion\.motion"|time_s,')  # how our own motion files begin: a quick answer for large ones
 MASTER = re.compile(r'^(?:#!MLF!#|\.)[ \t\r]*\n"(.*)"[ \t\r]*$', re.MULTILINE)
 """The line before each recording's labels in HTK's master label files, and that with its name."""
-MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
-"""The start of RTF, HTML, XML and JSON."""
+MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')  # the start of RTF, HTML, XML and JSON
 CHAPTER = ".trans.txt"
 """Ends the name of the transcripts of a chapter in LibriSpeech: in each line the name of a recording, and its words."""
-JUDGED_LINES = 1000
-"""Lines of a text that are judged for whether they hold times."""
+JUDGED_LINES = 1000  # lines of a text that are judged for whether they hold times
 NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
 TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
 """Seconds with decimals, or a number that counts parts of a second."""
-NAMED_TIERS = 12
-"""Most names in a message."""
+NAMED_TIERS = 12  # most names in a message
 _WRITERS = {".TextGrid": write_textgrid, ".vtt": write_subtitles, ".srt": write_subtitles}
 LABEL_SUFFIXES = tuple(_WRITERS)
 """Suffixes of label files that are written, as programs write them; capitals do not matter."""

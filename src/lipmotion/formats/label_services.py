@@ -44,15 +44,12 @@ from lipmotion.units.text_normalisation import find_words
 
 LOG = logging.getLogger("lipmotion")
 _TEXT = values.text(1 << 20)
-Objects = list[tuple[str, dict[str, Any]]]
-"""Objects of a file, each with its place, for messages."""
-LATEST_S = 1e6
-"""Times beyond eleven days are an error, or in another unit."""
+Objects = list[tuple[str, dict[str, Any]]]  # objects of a file, each with its place, for messages
+LATEST_S = 1e6  # times beyond eleven days are an error, or in another unit
 SINGLE_SHARE, LONGEST_JUDGED, DEEPEST = 0.9, 1000, 12
 """A list is one of words where so many of its texts are single ones; letters of a text that are judged; how deep lists
 are searched in lists."""
-ROUNDING_S = 1.0
-"""An end may be so much before its start; recognisers write that at the edges of their windows."""
+ROUNDING_S = 1.0  # an end may be so much before its start; recognisers write that at the edges of their windows
 
 
 class Times(NamedTuple):
@@ -113,8 +110,7 @@ LINE_LISTS = (
     "paragraphs result results transcript alternatives nbest data response output prediction predictions documents"
 ).split()
 """Members in which lines or further lists are searched, in this order."""
-MISSED = "not-found-in-audio"
-"""Gentle's case of a word that is not said."""
+MISSED = "not-found-in-audio"  # Gentle's case of a word that is not said
 KINDS = ("type", "boundarytype", "kind", "category")
 NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
 """Kinds of items that are no words."""
@@ -128,13 +124,11 @@ POLLY_VISEMES = {
 AZURE_VISEMES = "sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".split()
 """A phone with the mouth of each of Azure's 22 visemes, by its number."""
 KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
-KOKORO_FRAMES_PER_S = 40
-"""Durations are in frames of 600 samples at 24 kHz."""
+KOKORO_FRAMES_PER_S = 40  # durations are in frames of 600 samples at 24 kHz
 EVENTS = ("audiooffset", "time", "timeseconds")
 """Starts of events, which last to the next one: of Azure, of Amazon Polly, of Google's marks."""
 POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
-MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")
-"""A name of one of Google's marks that is the word after it."""
+MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")  # a name of one of Google's marks that is the word after it
 COLUMNS = (
     ("characters", ("characters", "characterstarttimesseconds", "characterendtimesseconds"), 1),  # ElevenLabs
     ("characters", ("chars", "charstarttimesms", "chardurationsms"), 1000),  # ElevenLabs' web socket

@@ -29,8 +29,7 @@ from lipmotion.units.spoken_text import (
 )
 
 LOG = logging.getLogger("lipmotion")
-EARLIEST_S = -1.0
-"""A time up to this is none; recognisers write others a little before 0, where the sound begins."""
+EARLIEST_S = -1.0  # a time up to this is none; recognisers write others a little before 0, where the sound begins
 WORDS, LINES, PHONE_LABELS, RECOGNISED_PHONES, OTHER = "words", "lines", "phones", "recognised", "other"
 """What a tier holds. ``OTHER`` is neither said nor seen: pronunciations, syllables, translations, notes."""
 ROLES = (
@@ -43,25 +42,19 @@ ROLES = (
 aligners, of ELAN's users, in some languages."""
 SPEAKERS = (r"(?P<speaker>.+?)\s*[-_/:]\s*(?:words?|phones?|phonemes?)", r"[^@]+@(?P<speaker>.+)")
 """Names of tiers that hold a speaker's, too: ``ann - words`` of the Montreal Forced Aligner, ``words@ANN`` of ELAN."""
-PHONES_SHARE = 0.75
-"""A tier of which this share of the labels are phones is one of phones; the other labels are errors."""
+PHONES_SHARE = 0.75  # a tier of which this share of the labels are phones is one of phones; the other labels are errors
 SHARED_TIME = 0.5
 """Tiers of unknown kinds of which so much is at the same time are versions of one text; else they are of speakers."""
-ROUNDING_S = 1e-3
-"""Times may differ by this much: they are written with three digits or more."""
-WHOLE_WORD_S = 0.03
-"""A span of unknown phones whose ends are so near to those of a word is all of it."""
+ROUNDING_S = 1e-3  # times may differ by this much: they are written with three digits or more
+WHOLE_WORD_S = 0.03  # a span of unknown phones whose ends are so near to those of a word is all of it
 IN_CONTEXT = re.compile(r"\A[^-+]*-([^-+]+)\+.*\Z")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
-GLOTTAL_STOP = "q"
-"""TIMIT's: a sound of the throat, with any lips."""
+GLOTTAL_STOP = "q"  # TIMIT's: a sound of the throat, with any lips
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
-MAX_LABELS = 250_000
-"""Most labels of a file: phones of five hours of speech."""
-TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3
-"""How long a phone, and a word, alone or of a line, last."""
+MAX_LABELS = 250_000  # most labels of a file: phones of five hours of speech
+TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3  # how long a phone, and a word, alone or of a line, last
 UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
 """If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
 WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
@@ -71,8 +64,7 @@ UNITS = {1: "seconds", 100: "hundredths of a second", 1000: "milliseconds", 1_00
 UNITS[TICKS_PER_S] = "ticks of 100 ns"
 PAUSES = frozenset((" ", *' ^ $ . , ; : ! ? — – … ( ) “ ” " « » ¡ ¿'.split(" ")))
 """Symbols of voices for silence: padding, blanks and punctuation, which last as long as the pause."""
-LONGEST_SYMBOL = 40
-"""Most letters of a phone with all its marks."""
+LONGEST_SYMBOL = 40  # most letters of a phone with all its marks
 WITH_GLIDES = {"aj": "aɪ", "ej": "eɪ", "ɔj": "ɔɪ", "ow": "oʊ", "əw": "əʊ", "aw": "aʊ", "ɐ": "ʌ"}
 """Diphthongs, and the vowel of "cut", as the Montreal Forced Aligner writes them."""
 

@@ -44,8 +44,7 @@ from lipmotion.units import RECOGNISED, RecognisedPhone, list_recognised_phones,
 
 FORMAT = "lipmotion.motion"
 VERSION = 1
-FRAMES_AT_ONCE = 4096
-"""Frames whose variance is computed at once."""
+FRAMES_AT_ONCE = 4096  # frames whose variance is computed at once
 
 
 def _describe(
@@ -210,10 +209,8 @@ NPZ = MotionFormat(write_npz, read_npz)
 
 LOG = logging.getLogger("lipmotion")
 NAMES, WEIGHTS, RATE = "facsNames", "weightMat", "exportFps"
-SOUND, POSES, FRAMES = "trackPath", "numPoses", "numFrames"
-"""The members of a file."""
-RATE_HZ = 60.0
-"""What Audio2Face exports by default."""
+SOUND, POSES, FRAMES = "trackPath", "numPoses", "numFrames"  # the members of a file
+RATE_HZ = 60.0  # what Audio2Face exports by default
 AZURE_NAMES, AZURE_HZ = (*ARKIT_52, "headRoll", "leftEyeRoll", "rightEyeRoll"), 60.0
 """The 55 facial positions of Azure in their order, and how many frames of them make a second."""
 TICKS_PER_S = 1e7

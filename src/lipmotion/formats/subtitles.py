@@ -40,8 +40,7 @@ COUNTED = re.compile(
 RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.MULTILINE)  # MicroDVD's: {1}{1}23.976
 WORD_TIME = re.compile(rf"<{TIME}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
-NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")
-"""The start of a block of WebVTT that is not shown."""
+NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")  # the start of a block of WebVTT that is not shown
 BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 """Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
@@ -52,8 +51,7 @@ DEFAULT_FIELDS = "layer start end style name marginl marginr marginv effect text
 STYLES = re.compile(r"(\{[^{}]{0,200}\})")
 DRAWING_MODE = re.compile(r"\\p(\d)")
 """Begins a drawing (``{\\p1}``) or ends it (``{\\p0}``): the numbers in between are no words."""
-BREAK = re.compile(r"\\[Nnh]")
-"""Line breaks and hard blanks within the text."""
+BREAK = re.compile(r"\\[Nnh]")  # line breaks and hard blanks within the text
 LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
 """What lyrics say of themselves: ``[ar:Anna]``, ``[offset:+250]``."""
 SPAN = rf"\[([\d:.,]{{1,20}})s?\s{{0,3}}{ARROW}\s{{0,3}}([\d:.,]{{1,20}})s?\]"
@@ -62,8 +60,7 @@ LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]|
 as Whisper's programs print, perhaps after other lines."""
 LYRICS_TIME = re.compile(rf"\[{TIME}\]|{SPAN}")
 LYRICS_LINE = re.compile(rf"((?:(?:\[{TIME}\]|{SPAN})\s{{0,4}}){{1,100}}).*")
-PHONES = ".phones"
-"""A file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words."""
+PHONES = ".phones"  # a file whose name ends so before its suffix, as ``talk.phones.vtt``, holds phones, not words
 _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 

@@ -39,10 +39,8 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, T
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
 
-TIME = "time_s"
-"""The first column."""
-LONGEST_S = 1e6
-"""Largest time that is accepted: more than eleven days."""
+TIME = "time_s"  # the first column
+LONGEST_S = 1e6  # largest time that is accepted: more than eleven days
 CURVES = (
     *("EyeBlinkLeft", "EyeLookDownLeft", "EyeLookInLeft", "EyeLookOutLeft", "EyeLookUpLeft", "EyeSquintLeft"),
     *("EyeWideLeft", "EyeBlinkRight", "EyeLookDownRight", "EyeLookInRight", "EyeLookOutRight", "EyeLookUpRight"),
@@ -70,11 +68,9 @@ NO_CURVES = re.compile(r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no
 """The same of columns that are no curves: numbers of frames and faces, and what MediaPipe calls neutral."""
 SCORES = ("score", "value", "weight", "coefficient")
 TIMECODE_RATES = (24, 25, 30, 48, 50, 60, 120)
-APP_RATE = 60
-"""Frames a second of the timecode where a take does not show it: what the app has by default."""
+APP_RATE = 60  # frames a second of the timecode where a take does not show it: what the app has by default
 DAY_S = 86_400.0
-MISREAD_ROWS = 10
-"""More rows a second apart are frames, of which a spreadsheet made seconds."""
+MISREAD_ROWS = 10  # more rows a second apart are frames, of which a spreadsheet made seconds
 MAX_CURVES = 2000
 _TIMECODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.,])(\d{1,9}(?:[.,]\d{1,9})?))?", re.ASCII)
 

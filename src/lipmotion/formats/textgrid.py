@@ -19,8 +19,7 @@ TOKEN = re.compile(
     r'"(?P<text>[^"]*)"|![^\n]*|<(?P<flag>\w+)>|(?<!\S)(?P<number>[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?!\S)'
 )
 """What Praat itself reads: texts in quotes, flags, and numbers between blanks. All else (``xmin =``) is ignored."""
-TEXTGRID = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
-"""How Praat's files begin."""
+TEXTGRID = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')  # how Praat's files begin
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 

@@ -32,8 +32,7 @@ from lipmotion.units.spoken_text import SpokenAs, classify_label
 
 SHORTEST_TICKS = 10_000
 """Whole numbers below a millisecond are not taken as ticks at sight: "20 30 people" is a sentence."""
-LONG_SPAN = 45
-"""Whole numbers in order that are further apart than this are no seconds."""
+LONG_SPAN = 45  # Whole numbers in order that are further apart than this are no seconds
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
 WHOLE = re.compile(r"(\d+)[\s,;]\s*(\d+)[\s,;]\s*(\S+)(?:\s.*)?")
 POINTS = re.compile(r"(\d+|\d*\.\d+)\s+(?:-?\d{1,3}\s+)?([^\d\s;]\S*)\s*(?:;.*)?")
@@ -47,8 +46,7 @@ STM = re.compile(rf"(\S+)\s+\S+\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(?:<[^<>]*>\
 """Recording, channel, speaker, start and end in seconds, kind, words."""
 RTTM = re.compile(r"(?:SPEAKER|SPKR-INFO)\s+\S+\s+\S+\s")
 COMMENT = (";;", "#")
-LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")
-"""The first line of a text of LRS: what is said."""
+LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")  # the first line of a text of LRS: what is said
 LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
 COLUMNS = {
     "start": {"begin", "begintime", "start", "starttime", "starts", "tmin", "onset", "startframe", "framestart"},

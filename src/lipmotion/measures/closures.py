@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 Curve = NDArray[np.float64]
 CLOSED_SHARE = 0.10
 """The mouth is closed at openings below this share of the 95th percentile of opening on the training list."""
-REACH = 2
-"""A generated closing matches an original one within this many frames (Hofer 2008, §6)."""
+REACH = 2  # a generated closing matches an original one within this many frames (Hofer 2008, §6)
 
 
 @dataclass(frozen=True)

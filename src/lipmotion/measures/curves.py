@@ -17,8 +17,7 @@ Array = NDArray[np.float64]
 Clips = Sequence[Array]
 HIGHEST_HZ = 12.5
 """Frequencies above it hold noise of trackers rather than speech, and cameras of 25 Hz do not show them."""
-FLOOR = 1e-6
-"""Power under this share of the largest of the original counts as so much: rounding is no movement."""
+FLOOR = 1e-6  # power under this share of the largest of the original counts as so much: rounding is no movement
 
 
 def measure_modulation_distance(generated: Clips, original: Clips, rate_hz: float) -> Array:
@@ -34,8 +33,7 @@ def measure_modulation_distance(generated: Clips, original: Clips, rate_hz: floa
     return np.sqrt(np.square(difference[frequencies <= HIGHEST_HZ]).mean(axis=0))
 
 
-STILL_SHARE = 0.01
-"""Curves that move by less than this share of the widest of the same unit are rounding or noise."""
+STILL_SHARE = 0.01  # curves that move by less than this share of the widest of the same unit are rounding or noise
 
 
 def correlation(generated: Array, original: Array) -> Array:
@@ -134,8 +132,7 @@ def _correlate_shifted(generated: Clips, original: Clips, shift: int) -> float:
     return float(correlate_pooled([g for g, _ in pairs], [o for _, o in pairs])[0]) if pairs else 0.0
 
 
-DRAWS = 2000
-"""Bootstrap samples of an interval."""
+DRAWS = 2000  # bootstrap samples of an interval
 
 
 def compute_interval(

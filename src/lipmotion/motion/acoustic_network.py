@@ -35,10 +35,8 @@ Array = NDArray[np.float64]
 SHAPE = ConvolutionalShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
 """Its input is 1.2 s before and after a frame."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
-MIN_STEPS = 600
-"""Smallest number of optimiser steps: with few recordings, each is used more often."""
-MIN_MOTION_S = 120.0
-"""Seconds of measured motion from which on a network is trained."""
+MIN_STEPS = 600  # smallest number of optimiser steps: with few recordings, each is used more often
+MIN_MOTION_S = 120.0  # seconds of measured motion from which on a network is trained
 POSTERIOR_SHARES = (0.85, 1.0)
 """Share of the network that knows posteriors, for a voice that training knows and for one that it does not. It is
 trained on clean speech, the other one in noise and rooms."""

@@ -22,8 +22,7 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_err
 from lipmotion.types import Channel
 from lipmotion.units import UNIT_SETS, UnitSet
 
-PHONE_SET = UNIT_SETS["phone"]
-"""The unit set in which each phone is a unit of its own; models do not store it."""
+PHONE_SET = UNIT_SETS["phone"]  # the unit set in which each phone is a unit of its own; models do not store it
 
 
 def motion_to_arrays(

@@ -29,8 +29,7 @@ def count_unseen(voice: float) -> float:
 
 
 Array = NDArray[np.float64]
-Context = tuple[str, str, str]
-"""The phone before, the phone, and the phone after."""
+Context = tuple[str, str, str]  # the phone before, the phone, and the phone after
 Statistics = tuple[Array, Array]
 """Means and precisions of successive frames [each shape=(T, 3, Q)], or values and variances [each shape=(T, Q)]."""
 Predict = Callable[[slice], Statistics]
@@ -42,26 +41,21 @@ mean of these and of his own: few words, as GRID's, do not show how far a mouth 
 THIRDS = ("begin", "middle", "end")
 SMOOTHING_S = 0.048
 """Standard deviation of the Gaussian that joins the thirds of successive phones: 1.2 pictures at 25 Hz."""
-REST_S = 0.5
-"""Silence further than this from speech is not in the table: the mouth rests."""
+REST_S = 0.5  # silence further than this from speech is not in the table: the mouth rests
 GAIN = 2.0
 """The means of the table are made so much larger. They were measured on recognised words, of which a fifth to a third
 are wrong, so that all are drawn towards 0; of 1.3, 1.8 and 2.2, the largest was best for strangers."""
-RIDGE = 1e-2
-"""Ridge parameter of the map from articulators to the motion space, as a share of the number of frames."""
+RIDGE = 1e-2  # ridge parameter of the map from articulators to the motion space, as a share of the number of frames
 MIN_DEVIATION = 1e-6
-TABLE_WEIGHT = 4.0
-"""Weight of the table beside the means of states, in a context that training never saw."""
-TABLE_WEIGHT_WITH_PREDICTOR = 1.0
-"""The same where a predictor that asks for no context stands beside the states."""
+TABLE_WEIGHT = 4.0  # weight of the table beside the means of states, in a context that training never saw
+TABLE_WEIGHT_WITH_PREDICTOR = 1.0  # the same where a predictor that asks for no context stands beside the states
 KNOWN_VOICE_SHARE = 0.3
 """Share of that weight for a voice that training knows: of its speaker the predictor knows more than the table."""
 POWER = 3
 """The weight of the table grows with this power of the reliability, for phones that are wrong make contexts unknown,
 and of how unknown a context is: the table has a third of the weight where training saw the context once, an eighth
 where twice."""
-HALF_FAMILIAR_COUNT = 1.0
-"""Occurrences in training after which a context counts as half familiar."""
+HALF_FAMILIAR_COUNT = 1.0  # occurrences in training after which a context counts as half familiar
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,8 +302,7 @@ NOISY_SHARE = 0.3
 """The same of a voice that training knows, where noise makes its phones unreliable; none where they are reliable."""
 CONFIRMED = -0.5
 """An unreliable p, b or m closes the lips where the general network hears them less open than so many deviations."""
-NEAR_FRAMES = 20
-"""Frames before and after speech in which that holds: elsewhere the mouth rests."""
+NEAR_FRAMES = 20  # frames before and after speech in which that holds: elsewhere the mouth rests
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""

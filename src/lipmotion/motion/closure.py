@@ -12,8 +12,7 @@ from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Channel, Example, Motion, Tim
 from lipmotion.units import mark_closing_phones
 
 OPENING = "opening"
-REACH_S = 0.02
-"""Seconds before and after the span of a phone in which the lips may close: the accuracy of alignments."""
+REACH_S = 0.02  # seconds before and after the span of a phone in which the lips may close: the accuracy of alignments
 CLOSED_PERCENTILE = 2.0
 """Lips that touch are open no further than this percentile of all frames, nor than that of the frames of speech. Of six
 GRID speakers with transcripts the median over p, b and m is no more than either; of recognised phones it may be

@@ -14,10 +14,8 @@ from lipmotion.storage.schema import LARGEST_MEAN, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
 """Frames whose features are used, relative to the predicted one: up to 240 ms before and after, denser near it."""
-SCALE = 12.0
-"""Root mean square length of a reduced feature vector: ridge parameters are relative to it."""
-MIN_DEVIATION = 1e-3
-"""Added to the standard deviation of every input, so that constant inputs can be standardised."""
+SCALE = 12.0  # root mean square length of a reduced feature vector: ridge parameters are relative to it
+MIN_DEVIATION = 1e-3  # added to the standard deviation of every input, so that constant inputs can be standardised
 FEATURES = 39
 INPUTS = FEATURES * len(OFFSETS)
 WINDOW = {

@@ -14,8 +14,7 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_err
 from lipmotion.types import GREY, Channel
 
 COLOURS = "rgb"
-COMPONENTS = 30
-"""Components of each colour, as in the paper."""
+COMPONENTS = 30  # components of each colour, as in the paper
 Images = NDArray[np.uint8]
 
 

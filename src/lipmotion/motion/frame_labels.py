@@ -14,15 +14,13 @@ from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Span, Speech, Timelin
 from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, describe_unknown_phone, is_silent
 
 Array = NDArray[np.float64]
-BEFORE_SPEECH_S = 0.05
-"""Mouths open or close for the first phone this long before it."""
+BEFORE_SPEECH_S = 0.05  # mouths open or close for the first phone this long before it
 MIN_SILENCE_S, FLOOR_MARGIN = 0.05, 1e-4
 DISTORTIONS = (0.2, 0.35)
 """Recognised phones are relied on up to the first distortion of the sound, and from the second one on not at all. The
 network finds 0.17 to 0.27 in quiet recordings of its speaker, 0.40 to 0.50 in white noise at 20 dB, 0.45 to 0.63 in
 babble at 20 dB."""
-DISTORTION_S = 1.0
-"""Seconds before and after a frame over which the distortion is averaged."""
+DISTORTION_S = 1.0  # seconds before and after a frame over which the distortion is averaged
 
 
 def is_away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], margin_s: float) -> NDArray[np.bool_]:
@@ -90,8 +88,7 @@ def rate_clearness(distortion: Array) -> Array:
     return clear
 
 
-REST_STATE = -1
-"""The number of the one state of the rest pose: silence far from speech."""
+REST_STATE = -1  # the number of the one state of the rest pose: silence far from speech
 
 
 class FullContextState(NamedTuple):

@@ -39,8 +39,7 @@ from lipmotion.types import (
 )
 
 Array = NDArray[np.float64]
-LARGEST_FACTOR = 2.0
-"""No factor is larger: a dimension that hardly depends on speech would be scaled too far."""
+LARGEST_FACTOR = 2.0  # no factor is larger: a dimension that hardly depends on speech would be scaled too far
 MIN_DEVIATION = 1e-6
 
 
@@ -78,11 +77,9 @@ class VarianceScaling(NamedTuple):
 BLOCK_FRAMES, MARGIN_FRAMES = 6000, 500
 """Frames of a block, and frames before and after it that are generated with it and then dropped: frames that are
 seconds away do not change the result, and the memory does not grow with the recording."""
-DOUBLE_FRAMES = 60_000
-"""The motion of recordings beyond ten minutes is in single precision."""
+DOUBLE_FRAMES = 60_000  # the motion of recordings beyond ten minutes is in single precision
 
-Pins = dict[tuple[int, int], float]
-"""Pinned values by frame and dimension of the motion space."""
+Pins = dict[tuple[int, int], float]  # pinned values by frame and dimension of the motion space
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,21 +20,15 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Rule
 
 Array = NDArray[np.float64]
-REACH = 24
-"""Frames before and after a frame that determine it."""
+REACH = 24  # frames before and after a frame that determine it
 HIGHEST_HZ, UNCHANGED_HZ = 12.5, 20.0
 """Frequencies up to which cameras of 25 Hz show movement, and from which on it is left as it is."""
 MIN_GAIN, MAX_GAIN = 0.3, 6.0
-MIN_SHARE = 0.02
-"""At least this share of recorded power counts as movement, however strong the noise."""
-RESTING_MARGIN_S = 0.3
-"""A mouth rests so far from speech, in seconds."""
-RESTING_FRAMES = 500
-"""Without so many frames of a resting mouth the noise is not known, and not taken out."""
-HOLD_FRAMES = 5
-"""Frames on both sides of a held one over which the filter fades in."""
-STRENGTH = Rule(least=0, most=2)
-"""Strengths that the engines' option ``modulation_filter`` allows."""
+MIN_SHARE = 0.02  # at least this share of recorded power counts as movement, however strong the noise
+RESTING_MARGIN_S = 0.3  # a mouth rests so far from speech, in seconds
+RESTING_FRAMES = 500  # without so many frames of a resting mouth the noise is not known, and not taken out
+HOLD_FRAMES = 5  # frames on both sides of a held one over which the filter fades in
+STRENGTH = Rule(least=0, most=2)  # strengths that the engines' option ``modulation_filter`` allows
 
 
 class ModulationFilter(NamedTuple):

@@ -30,15 +30,12 @@ from lipmotion.types import Progress, Speech
 Array = NDArray[np.float64]
 FloatT = TypeVar("FloatT", bound=np.floating[Any])
 NetworkT = TypeVar("NetworkT", bound=SequenceNetwork)
-STEP = 4
-"""Frames of a time step, 40 ms: about a picture of a video."""
+STEP = 4  # frames of a time step, 40 ms: about a picture of a video
 DIRECT_WEIGHT = 4.0
 """Weight, in training, of the error of a channel that is modelled as it is; that of a principal component is 1."""
 MIN_DEVIATION = 1e-6
-REPORTED_STEPS = 100
-"""Progress of training is reported after so many optimiser steps."""
-LONGEST_STEPS = 250
-"""Longer recordings are cut into pieces of so many time steps, 10 s, for training."""
+REPORTED_STEPS = 100  # progress of training is reported after so many optimiser steps
+LONGEST_STEPS = 250  # longer recordings are cut into pieces of so many time steps, 10 s, for training
 
 
 def interpolate_steps(steps: Array, frames: int, first: int = 0) -> Array:
@@ -249,8 +246,7 @@ def check_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
 WEIGHTS = "general-motion.npz"
 GENERAL_SHAPE = ConvolutionalShape("general", "general network", 64, 128, (1, 2, 4, 8))
 """From the 64 values of ``Speech.encoding``, 0.6 s before and after a frame."""
-ENCODING_SCALE = np.float32(4)
-"""What the encoding is multiplied by, so that its values are about 1."""
+ENCODING_SCALE = np.float32(4)  # what the encoding is multiplied by, so that its values are about 1
 
 
 def hear_articulators(speech: Speech) -> NDArray[np.float64] | None:

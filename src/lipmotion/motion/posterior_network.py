@@ -38,20 +38,16 @@ from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, 
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, TokenPosteriors
 
 Array = NDArray[np.float64]
-ROWS = 2
-"""Rows of posteriors, of 20 ms each, in a time step of the network."""
+ROWS = 2  # rows of posteriors, of 20 ms each, in a time step of the network
 ROW_FRAMES = STEP // ROWS
 COMPONENTS = 120
 """Principal components of the logarithms of the posteriors: what the network says of phones that are not there tells
 more than the phone that is."""
-MIN_LOG_POSTERIOR = -12.0
-"""Smaller logarithms count as this: the network does not mean them."""
+MIN_LOG_POSTERIOR = -12.0  # smaller logarithms count as this: the network does not mean them
 INPUT_SCALE = 2.0
 """Standard deviation of the first principal component as input; the others keep their proportions to it."""
-SPECTRUM = STEP * SPECTRUM_BANDS
-"""The first inputs of a time step: the spectrum."""
-SPECTRUM_OFF = 0.3
-"""Share of the training in which the spectrum is switched off (0)."""
+SPECTRUM = STEP * SPECTRUM_BANDS  # the first inputs of a time step: the spectrum
+SPECTRUM_OFF = 0.3  # share of the training in which the spectrum is switched off (0)
 SHAPE = ConvolutionalShape("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
 """Its input is 0.88 s before and after a frame."""
 SHIFTS = 2
@@ -64,10 +60,8 @@ RECURRENT_BATCH, RECURRENT_DROPOUT = 8, 0.5
 RECURRENT_RATE, LARGEST_RECURRENT_RATE = 0.36, 3e-2
 """Learning rate, by one over the square root of the seconds of motion, and the largest one: large steps keep a network
 of little speech from learning it by heart (docs/results/learning-curve.md)."""
-RECURRENT_SHARE = 0.6
-"""Weight of the recurrent network beside the convolutional one, for a voice that training knows."""
-LARGEST_COMPONENT = 100.0
-"""More is in no basis."""
+RECURRENT_SHARE = 0.6  # weight of the recurrent network beside the convolutional one, for a voice that training knows
+LARGEST_COMPONENT = 100.0  # more is in no basis
 
 TARGETS = {
     "posterior_mean": ArraySpec(np.float32, "K", -LARGEST_MEAN, LARGEST_MEAN),

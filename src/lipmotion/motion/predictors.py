@@ -22,10 +22,8 @@ from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, silent_moni
 
 Array = NDArray[np.float64]
 PredictorT = TypeVar("PredictorT", bound="Predictor")
-AUTOMATIC = "auto"
-"""Stands for the predictor that suits the examples, where no name is given."""
-MIN_OWN_S = 480.0
-"""From this much measured motion on, a model does not stand on another one."""
+AUTOMATIC = "auto"  # stands for the predictor that suits the examples, where no name is given
+MIN_OWN_S = 480.0  # from this much measured motion on, a model does not stand on another one
 FOLDS = 4
 
 

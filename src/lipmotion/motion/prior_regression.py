@@ -112,15 +112,13 @@ def stack_encoding(speech: Speech, reach: int = REACH, components: int | None = 
 
 
 Array = NDArray[np.float64]
-WINDOW = 4
-"""Time steps of 40 ms before and after a frame whose spectrum is used: 160 ms."""
+WINDOW = 4  # time steps of 40 ms before and after a frame whose spectrum is used: 160 ms
 ENCODING_REACH, ENCODING_COMPONENTS = 3, 32
 """Time steps before and after a frame whose encoding is used, and its principal components: a minute of speech says no
 more of other ones (docs/results/voices.md)."""
 RIDGES = tuple(10.0**power for power in range(0, 6))
 """Ridge parameters that cross-validation chooses from, one for each kind of regressors."""
-INITIAL_RIDGE = 1000.0
-"""Ridge parameter of all kinds before the choice."""
+INITIAL_RIDGE = 1000.0  # ridge parameter of all kinds before the choice
 ROUNDS = 2
 MIN_DEVIATION = 1e-3
 KINDS = ("prior", "hidden", "articulation", "spectrum", "encoding")

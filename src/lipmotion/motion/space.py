@@ -133,20 +133,15 @@ def resample_track(track: Track, frames: int) -> tuple[Motion, NDArray[np.bool_]
 Array = NDArray[np.float64]
 LARGEST_EXCESS = 20.0
 """Motion leaves the limits by at most so many spans of the poses; features unlike all training data give about 3."""
-DEVIATIONS = 3.0
-"""Standard deviations by which motion may leave the range of the poses."""
+DEVIATIONS = 3.0  # standard deviations by which motion may leave the range of the poses
 LARGEST_SPREAD = 1000.0
 """Largest median, over dimensions, of the span of the poses in standard deviations; our models have about 10."""
-LARGEST_OFFSET = 1000.0
-"""Largest magnitude of the mean of the points, in units of the largest span of a dimension."""
-PLAUSIBLE_OPENING = 5.0
-"""Eye distances; a larger opening is implausible unless the range of all poses is as large."""
+LARGEST_OFFSET = 1000.0  # largest magnitude of the mean of the points, in units of the largest span of a dimension
+PLAUSIBLE_OPENING = 5.0  # eye distances; a larger opening is implausible unless the range of all poses is as large
 NEGATIVE_SHARE = 0.05
 """Share of the span of the opening that may be negative where the opening is larger than ``PLAUSIBLE_OPENING``."""
-LARGEST_REST_DISTANCE = 3.0
-"""Largest distance of the rest pose from the range of the poses, in spans of that range."""
-MIN_SPAN = 1e-3
-"""Smallest span of a dimension, as a share of its largest magnitude or of 1."""
+LARGEST_REST_DISTANCE = 3.0  # largest distance of the rest pose from the range of the poses, in spans of that range
+MIN_SPAN = 1e-3  # smallest span of a dimension, as a share of its largest magnitude or of 1
 
 
 class MotionLimits(NamedTuple):

@@ -22,23 +22,17 @@ from lipmotion.units import VISEME_OF, VISEMES
 NEAR_SPEECH_S, FAR_FROM_SPEECH_S = 0.1, 0.48
 """Within the first distance of speech the map is that of speech, beyond the second the rest pose is exactly the
 person's; the second is the one beyond which engines generate the rest pose."""
-RANGE_PERCENTILES = (5.0, 95.0)
-"""The range of a channel lies between these percentiles of the frames of speech."""
-RANGE_PRIOR_S = 2.0
-"""Seconds of speech that count as much as the assumption that a person's range is the mean person's."""
+RANGE_PERCENTILES = (5.0, 95.0)  # the range of a channel lies between these percentiles of the frames of speech
+RANGE_PRIOR_S = 2.0  # seconds of speech that count as much as the assumption that a person's range is the mean person's
 MIN_GAIN, MAX_GAIN = 0.25, 4.0
 """Ranges of people differ by no more; beyond, they are differences of trackers or of units."""
-MIN_FRAMES = 10
-"""Fewest frames of silence from which a rest pose is taken."""
+MIN_FRAMES = 10  # fewest frames of silence from which a rest pose is taken
 MIN_RANGE_SHARE = 0.05
 """A channel that somebody moves by less than this share of the widest range has a gain of 1 for everyone."""
-VISEME_NAMES = tuple(VISEMES)
-"""The order of the visemes in stored habits."""
+VISEME_NAMES = tuple(VISEMES)  # the order of the visemes in stored habits
 FADE_FRAMES = 11
-HABIT_PRIOR_FRAMES = 50.0
-"""Frames of a viseme that count as much as the assumption that a person has no habit in it."""
-FULL_HABIT_SHARE = 0.25
-"""Share of the mean range by which lips must be open for habits to show wholly."""
+HABIT_PRIOR_FRAMES = 50.0  # frames of a viseme that count as much as the assumption that a person has no habit in it
+FULL_HABIT_SHARE = 0.25  # share of the mean range by which lips must be open for habits to show wholly
 Array = NDArray[np.float64]
 
 

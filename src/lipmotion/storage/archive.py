@@ -23,17 +23,14 @@ from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import ParallelMap
 
 HEADER, ARRAY = "header.json", ".npy"
-OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
-"""The date of all members of an archive."""
-ZIP64_BYTES = 1 << 30
-"""Arrays from so many bytes on are written with the zip64 extension."""
+OLDEST_DATE = (1980, 1, 1, 0, 0, 0)  # the date of all members of an archive
+ZIP64_BYTES = 1 << 30  # arrays from so many bytes on are written with the zip64 extension
 UNREADABLE = (
     *(OSError, EOFError, KeyError, ValueError, TypeError, RuntimeError),
     *(zlib.error, struct.error, zipfile.BadZipFile),
 )
 """The errors that reading a damaged zip, or one of other content, may raise."""
-LAST_LETTER = 0x10FFFF
-"""The last code point of Unicode."""
+LAST_LETTER = 0x10FFFF  # the last code point of Unicode
 SMALL_ARCHIVE_BYTES, LARGEST_RATIO = 1 << 26, 20
 """An archive may have so many bytes uncompressed, or so many times its own size: our arrays are compressed to half
 their size, zip bombs to a thousandth."""
@@ -165,5 +162,4 @@ class Checkpoint:
         return {"format": CHECKPOINT_FORMAT, "fingerprint": self.fingerprint}
 
 
-NO_CHECKPOINT = Checkpoint()
-"""Checkpointing disabled: nothing is stored and nothing found."""
+NO_CHECKPOINT = Checkpoint()  # checkpointing disabled: nothing is stored and nothing found

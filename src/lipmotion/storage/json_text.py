@@ -16,8 +16,7 @@ from typing import Any, NoReturn
 from lipmotion.errors import ExportError, InputError
 from lipmotion.storage.sources import read_text_file
 
-LONGEST_WHOLE = 300
-"""Most digits of a whole number: one of 309 may be larger than any fraction."""
+LONGEST_WHOLE = 300  # most digits of a whole number: one of 309 may be larger than any fraction
 SURROGATE = re.compile("[\ud800-\udfff]")
 DEEP_KEY = re.compile(r"(?:\.[ \t]*[\w\"'-]+[ \t]*){100}")
 """A name with so many dots; the time to read it grows with the square of their number."""

@@ -30,12 +30,9 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-LOCK = f"{TEMPORARY}lock"
-"""The file that a process locks while it works on a folder."""
-FOLDER_PREFIX = "lipmotion-"
-"""Prefix of folders in the system's place for temporary files."""
-UNFINISHED = ".unfinished"
-"""Suffix of a folder of unfinished work, after the name of the file that the work is for."""
+LOCK = f"{TEMPORARY}lock"  # the file that a process locks while it works on a folder
+FOLDER_PREFIX = "lipmotion-"  # prefix of folders in the system's place for temporary files
+UNFINISHED = ".unfinished"  # suffix of a folder of unfinished work, after the name of the file that the work is for
 
 
 @contextmanager

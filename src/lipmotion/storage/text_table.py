@@ -21,16 +21,14 @@ from lipmotion.printable import is_formula
 from lipmotion.storage.files import as_text
 from lipmotion.storage.sources import read_text_file
 
-LONGEST_LINE = 1 << 20
-"""Most characters of a line."""
+LONGEST_LINE = 1 << 20  # most characters of a line
 SEPARATORS = ",;\t"
 MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(ind)", "-nan(ind)"))
 """Fields that hold no number, in lower case."""
 
 
 QUOTE = "'"
-Rows = list[tuple[int, list[str]]]
-"""Rows of a table: the number of the last line of each, and its fields."""
+Rows = list[tuple[int, list[str]]]  # rows of a table: the number of the last line of each, and its fields
 
 
 def as_field(text: str) -> str:

@@ -41,8 +41,7 @@ CHANNELS = tuple(map(Channel, ("opening", "width", "x_17", "y_17", "z_17", "x_61
 OPENINGS = {"sil": 0.02, "p": 0.0, "b": 0.0, "m": 0.0, "aa": 0.30, "iy": 0.12, "uw": 0.08, "t": 0.10, "s": 0.07}
 WIDTHS = {"sil": 0.55, "p": 0.54, "b": 0.54, "m": 0.54, "aa": 0.56, "iy": 0.62, "uw": 0.42, "t": 0.57, "s": 0.58}
 PHONES = tuple(OPENINGS)
-MARGIN_S = 0.6
-"""Silence at both ends, long enough for the mouth to rest in it."""
+MARGIN_S = 0.6  # silence at both ends, long enough for the mouth to rest in it
 
 
 def timeline(phones: Sequence[str], duration_s: float = 0.1) -> Timeline[Unit]:
@@ -156,8 +155,7 @@ def require_error(kind: type[LipMotionError], call: Callable[[], object], what: 
 
 
 SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
-MIN_CORRELATION = 0.5
-"""Between generated and recorded opening, in a sentence of the kind trained on."""
+MIN_CORRELATION = 0.5  # between generated and recorded opening, in a sentence of the kind trained on
 
 
 class TrainedEngine:

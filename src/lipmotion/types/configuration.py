@@ -11,8 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.types.values import describe_value, is_path, parse_number, parse_whole
 
 ConfigurationT = TypeVar("ConfigurationT", bound="Configuration")
-LARGEST_NUMBER = 1e6
-"""Largest absolute value of a number in a configuration."""
+LARGEST_NUMBER = 1e6  # largest absolute value of a number in a configuration
 _WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
 _WORDS |= {Path: "a path", tuple: "a list of texts"}
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}

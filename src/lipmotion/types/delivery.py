@@ -16,8 +16,7 @@ NEUTRAL = "neutral"
 MOODS = ("happy", "sad", "angry", "afraid", "disgusted", "surprised", "tense", "tired")
 """The moods that a face shows beside none, ``NEUTRAL``."""
 PLAIN = "plain"
-MANNERS = ("whisper", "shout", "mumble")
-"""The manners of speaking beside the usual one, ``PLAIN``."""
+MANNERS = ("whisper", "shout", "mumble")  # the manners of speaking beside the usual one, ``PLAIN``
 _NAMES = (NEUTRAL, *MOODS, PLAIN, *MANNERS)
 _NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?)"
 _KEY = re.compile(rf"([a-z]+)(?::{_NUMBER})?(?:\s+at\s+{_NUMBER})?", re.IGNORECASE)
@@ -200,8 +199,7 @@ class Delivery(Configuration):
 
 
 SCENE, TRANSPARENT = "scene", "transparent"
-SMALLEST_PX, LARGEST_PX = 64, 4096
-"""Range of the height of pictures, in pixels."""
+SMALLEST_PX, LARGEST_PX = 64, 4096  # range of the height of pictures, in pixels
 _MOVING: dict[str, Any] = {
     "still": "--still",
     "metavar": "NAME,NAME",

@@ -42,12 +42,9 @@ class ReducedVariance:
     mixing: NDArray[np.floating[Any]]
 
 
-BLOCK_FRAMES = 60_000
-"""Frames whose variances are in memory at once."""
-FULL_FIT_SHARE = 0.995
-"""A transcript that fits as large a share of the speech fits all of it, rounded."""
-SURE_CONFIDENCE = 0.8
-"""Words that were recognised with less confidence deserve an ear, and a transcript."""
+BLOCK_FRAMES = 60_000  # frames whose variances are in memory at once
+FULL_FIT_SHARE = 0.995  # a transcript that fits as large a share of the speech fits all of it, rounded
+SURE_CONFIDENCE = 0.8  # words that were recognised with less confidence deserve an ear, and a transcript
 
 
 @dataclass(frozen=True)

@@ -128,8 +128,7 @@ UNFAMILIAR, UNFAMILIAR_MOVEMENT, UNFAMILIAR_DOUBT = 0.45, 0.75, 0.15
 unit of squared distance from the mean, and where no phone is sure."""
 OTHER_WORDS = 0.5
 """Squared error that a transcript of something else adds: 0.5 on average of eight strangers, 0.2 for a known voice."""
-MIN_DEVIATION = 0.02
-"""A curve that moves less, in eye distances or as a weight, counts as moving so far."""
+MIN_DEVIATION = 0.02  # a curve that moves less, in eye distances or as a weight, counts as moving so far
 
 
 @dataclass(frozen=True)

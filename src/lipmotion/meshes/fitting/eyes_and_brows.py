@@ -22,18 +22,13 @@ from lipmotion.types.motion import RADIAN, WEIGHT
 
 Array = NDArray[np.float64]
 
-FULL_LOOK_RAD = 0.55
-"""ARKit's blendshapes of looking turn the eyes so far at weight 1, in radians."""
-FULL_BROW_RISE = 0.08
-"""Brows are raised so far at weight 1, in eye distances."""
-CHEEK_SQUINT = 0.6
-"""Raised cheeks narrow the eyes by this part of their weight."""
-OUTER_BROW_SHARE = 0.6
-"""The outer ends of the brows rise by this part of the weight of the inner ends."""
+FULL_LOOK_RAD = 0.55  # ARKit's blendshapes of looking turn the eyes so far at weight 1, in radians
+FULL_BROW_RISE = 0.08  # brows are raised so far at weight 1, in eye distances
+CHEEK_SQUINT = 0.6  # raised cheeks narrow the eyes by this part of their weight
+OUTER_BROW_SHARE = 0.6  # the outer ends of the brows rise by this part of the weight of the inner ends
 LOOKS = tuple(f"{way}{side}" for side in SIDES for way in ("Out", "In", "Up", "Down"))
 """The ways that ARKit's blendshapes turn each eye."""
-LARGEST_COUNTER_RAD = 0.4
-"""The eyes turn at most so far against a head whose angles are given."""
+LARGEST_COUNTER_RAD = 0.4  # the eyes turn at most so far against a head whose angles are given
 MOVED_BY = {
     "blinks": ("eyeBlinkLeft", "eyeBlinkRight"),
     "gaze": tuple(f"eyeLook{name}" for name in LOOKS),

@@ -24,8 +24,7 @@ from lipmotion.types import Channel, Motion
 from lipmotion.types.values import parse_number
 
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
-CONTROL = "control"
-"""The unit of controls of a user's rig."""
+CONTROL = "control"  # the unit of controls of a user's rig
 LARGEST_TABLE_BYTES, MAX_CONTROLS = 1 << 20, 2000
 LARGEST_NUMBER = 1e6
 SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)

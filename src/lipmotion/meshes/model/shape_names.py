@@ -33,10 +33,8 @@ ARKIT_52 = (*ARKIT_OTHERS[:14], *ARKIT_MOUTH[:-1], *ARKIT_OTHERS[14:], ARKIT_MOU
 """All of them, in the order of ARKit's documentation: eyes, jaw and mouth, brows, cheeks, nose, tongue."""
 VISEMES_15 = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou")
 """The visemes of Oculus and OpenXR, in their order."""
-VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")
-"""The mouth shapes of VRM."""
-VRM_EMOTIONS = ("angry", "happy", "relaxed", "sad", "surprised")
-"""The expressions of VRM that moods use."""
+VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")  # the mouth shapes of VRM
+VRM_EMOTIONS = ("angry", "happy", "relaxed", "sad", "surprised")  # the expressions of VRM that moods use
 _VISEME_SPELLINGS = {"i": "ih", "o": "oh", "u": "ou"} | {name.lower(): name for name in VISEMES_15}
 _VOWEL_SPELLINGS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"} | {name: name for name in VRM_VOWELS}
 _VOWEL_SPELLINGS |= dict(zip("あいうえお", VRM_VOWELS, strict=True))
@@ -44,8 +42,7 @@ _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
 
-_COPY = re.compile(r"[._ ]\d{1,4}$")
-"""What programs add to a name that is there already: ``jawOpen.001``."""
+_COPY = re.compile(r"[._ ]\d{1,4}$")  # what programs add to a name that is there already: ``jawOpen.001``
 
 
 def to_arkit(name: str) -> str | None:
@@ -86,8 +83,7 @@ def is_known(name: str) -> bool:
 
 
 Array = NDArray[np.float64]
-Sources = Mapping[str, tuple[tuple[str, float], ...]]
-"""The sources and gains of blendshapes, by ARKit's names."""
+Sources = Mapping[str, tuple[tuple[str, float], ...]]  # the sources and gains of blendshapes, by ARKit's names
 SIDES = ("Left", "Right")
 OPENS = "jawOpen"
 
@@ -104,8 +100,7 @@ def _invert(forms: Mapping[str, str]) -> Sources:
 
 
 PAIRED = frozenset(("mouthSmile", "mouthStretch", "mouthPress", "mouthLowerDown", "mouthUpperUp"))
-CLOSED = "closed"
-"""The name of lips that are pressed together, beside the vowels of VRM."""
+CLOSED = "closed"  # the name of lips that are pressed together, beside the vowels of VRM
 VOWEL_FORMS = {
     "aa": "jawOpen 0.5",
     "ih": "jawOpen 0.15 mouthStretch 0.5 mouthSmile 0.3",
