@@ -90,6 +90,5 @@ def list_action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, 
 
 def read_moods(motion: Motion) -> dict[str, Curve]:
     """Return how strong each mood of a motion is, 0 to 1, by its name [each shape=(T,)]."""
-    return {
-        name[len(PREFIX) :]: np.clip(motion[name].astype(np.float64), 0, 1) for name in motion.names if is_mood(name)
-    }
+    names = filter(is_mood, motion.names)
+    return {name[len(PREFIX) :]: np.clip(motion[name].astype(np.float64), 0, 1) for name in names}

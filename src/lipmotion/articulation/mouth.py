@@ -245,9 +245,7 @@ def check_spoken(motion: Motion, fps: float) -> None:
         raise InputError("the motion has no frames; there is nothing to draw")
     for name in (*DRAWN, GAP):
         if name in motion.names and not np.isfinite(motion[name]).all():
-            raise InputError(
-                f"the channel {name!r} has values that are not finite; interpolate the missing frames first"
-            )
+            raise InputError(f"the channel {name!r} has values that are not finite; interpolate missing frames first")
 
 
 def weigh_upper(gap: Any) -> Any:

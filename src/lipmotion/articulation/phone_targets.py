@@ -58,9 +58,8 @@ Targets = Mapping[str, GestureTarget]
 
 def _steady(values: Mapping[str, float], dominance: float = 1.0, width_s: float = 0.035) -> dict[str, GestureTarget]:
     """Return the same target from begin to end for phones: ``{"t d n": 0.6}``."""
-    return {
-        p: GestureTarget(value, value, dominance, width_s) for phones, value in values.items() for p in phones.split()
-    }
+    pairs = [(phone, value) for phones, value in values.items() for phone in phones.split()]
+    return {phone: GestureTarget(value, value, dominance, width_s) for phone, value in pairs}
 
 
 _CLOSED = " ".join(LIP_CLOSING)

@@ -323,9 +323,7 @@ def format_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
         yield from text[used].tobytes().decode("ascii").splitlines()
 
 
-def write_json(
-    path: Path, before: Mapping[str, Any], rows_of: str, values: NDArray[Any], after: Mapping[str, Any]
-) -> None:
+def write_json(path: Path, before: Mapping[str, Any], rows_of: str, values: Array, after: Mapping[str, Any]) -> None:
     """Write one JSON object: members ``before``, one called ``rows_of`` with a row a line, members ``after``."""
     start, end = as_json(before, ensure_ascii=False)[:-1], as_json(after, ensure_ascii=False)[1:]
     with path.open("w", encoding="utf-8") as file:

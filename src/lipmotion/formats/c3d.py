@@ -125,15 +125,12 @@ def read_c3d(path: Path) -> C3dFile:
         places = placed[..., :3] * (1.0 if scale < 0 else scale)
         unseen = (placed[..., 3] < 0) | ~np.isfinite(places).all(axis=2) | (places == 0).all(axis=2)
         places[unseen] = np.nan
-        labels = [
-            label for name in ("POINT.LABELS", "POINT.LABELS2", "POINT.LABELS3") for label in _texts(parameters, name)
-        ]
+        labels = [label for n in ("", "2", "3") for label in _texts(parameters, f"POINT.LABELS{n}")]
         labels = [*labels, *(f"point{number}" for number in range(len(labels) + 1, points + 1))][:points]
         curves = rows[:, points * 4 :] if samples == 1 else rows[:, :0]
-        names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(curves.shape[1]))][
-            : curves.shape[1]
-        ]
-        units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
+        count = curves.shape[1]
+        names = [*_texts(parameters, "ANALOG.LABELS"), *(f"analog{n}" for n in range(count))][:count]
+        units = [*_texts(parameters, "ANALOG.UNITS"), *[""] * count][:count]
         unit, software = (next(iter(_texts(parameters, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
         exact_hz = exact_rate(float(f"{rate_hz:.7g}"), 5e-6)
         return C3dFile(tuple(labels), places, exact_hz, unit or "mm", software, curves, tuple(names), tuple(units))
@@ -467,9 +464,7 @@ POINT_CHANNELS = "Xposition Yposition Zposition"
 def check_bvh(motion: Motion) -> None:
     """Raise ExportError if motion has no opening, or no frames."""
     if "opening" not in motion.names or not len(motion.values):
-        raise ExportError(
-            "the motion has no channel 'opening' to place lip points by, or no frames; write .json or .csv"
-        )
+        raise ExportError("the motion has no channel 'opening' to place lip points by, or no frame; write .json, .csv")
 
 
 def write_bvh(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:

@@ -246,9 +246,7 @@ def parse_project(text: str) -> CueSheet:
     lines.next()
     fps, frames, voices = (lines.count() for _ in range(3))
     if not 1 <= fps <= FASTEST_FPS or not voices:
-        raise InputError(
-            f"{voices} voices at {fps} frames a second, required one, at 1 to {FASTEST_FPS}; save it again"
-        )
+        raise InputError(f"{voices} voices at {fps} frames a second, required one at 1 to {FASTEST_FPS}; save it again")
     lines.next()
     lines.next()
     shapes: list[tuple[float, str, str]] = []

@@ -124,9 +124,7 @@ def check_godot(motion: Motion) -> None:
     for name in names:
         if FORBIDDEN & {*name}:
             letters = '. : @ / % "'
-            raise ExportError(
-                f"the blendshape {name!r} has one of the letters {letters}, which Godot replaces; rename it"
-            )
+            raise ExportError(f"the blendshape {name!r} has one of the letters {letters}, which Godot replaces: rename")
 
 
 def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -138,9 +136,8 @@ def write_godot(path: Path, generation: Generation, _source: Mapping[str, str], 
     ]
     for number, name in enumerate(_list_weights(motion)):
         times_s, values, steps = _choose_keys(generation, name, 1.0, GODOT_DECIMALS, GODOT_TOLERANCE)
-        keys = ", ".join(
-            f"{time_s:.6g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in zip(times_s, values, strict=True)
-        )
+        rows = zip(times_s, values, strict=True)
+        keys = ", ".join(f"{time_s:.6g}, 1, {value:.{GODOT_DECIMALS}g}" for time_s, value in rows)
         track = f"tracks/{number}"
         lines += [
             *(f'{track}/type = "blend_shape"', f"{track}/imported = false", f"{track}/enabled = true"),

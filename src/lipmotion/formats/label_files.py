@@ -221,9 +221,7 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
             raise InputError(f"{where}: {chosen[0].name} holds no word; remove the file if the words are not known")
         return RecordingLabels(transcript)
     several = len(phones) > 1
-    timeline = merge_timelines(
-        [read_phone_tier(tier, _choose_words(tier, chosen), where, with_gaps=several) for tier in phones]
-    )
+    timeline = merge_timelines([read_phone_tier(t, _choose_words(t, chosen), where, with_gaps=several) for t in phones])
     unknown_s = [span.start_s for span in timeline if span.label.unit == UNKNOWN_PHONES]
     if unknown_s:
         what = f"the phones of {len(unknown_s)} stretches of speech are not known, the first at {unknown_s[0]:.2f} s"

@@ -9,6 +9,7 @@ from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from statistics import median
 
 from lipmotion.errors import InputError, shorten
@@ -188,9 +189,8 @@ def split_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
     if any(map(holds_phones, unknown)) or not all(spoken):
         return tiers
     first, others = spoken[0], [label for labels in spoken[1:] for label in labels]
-    shared_s = sum(
-        max(min(a.end_s, b.end_s) - max(a.start_s, b.start_s), 0.0) for a in first[:1000] for b in others[:1000]
-    )
+    pairs = product(first[:1000], others[:1000])
+    shared_s = sum(max(min(a.end_s, b.end_s) - max(a.start_s, b.start_s), 0.0) for a, b in pairs)
     spoken_s = sum(min(label.end_s - label.start_s, 60.0) for label in first[:1000])
     if shared_s > SHARED_TIME * spoken_s:
         return tiers
@@ -251,9 +251,8 @@ def _find_times(label: TimedLabel, where: str) -> tuple[float | None, float | No
 
 
 def _reverse(label: TimedLabel, where: str) -> InputError:
-    return InputError(
-        f"{where}: {label.position} ends at {label.end_s:g} s, before its start at {label.start_s:g} s; correct it"
-    )
+    ends = f"{label.position} ends at {label.end_s:g} s, before its start"
+    return InputError(f"{where}: {ends} at {label.start_s:g} s; correct it")
 
 
 def read_phone_tier(
@@ -399,9 +398,8 @@ def split_ipa(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
 def map_to_inventory(tier: LabelTier, where: str) -> LabelTier:
     """Return a tier; phones in X-SAMPA or IPA become those of the inventory. Raises InputError: as ``split_ipa``."""
     labels = tier.labels if tier.role == PHONE_LABELS else ()
-    spoken = [
-        WITH_GLIDES.get(label.text, label.text) for label in labels if classify_label(label.text) is SpokenAs.SPEECH
-    ]
+    texts = [label.text for label in labels if classify_label(label.text) is SpokenAs.SPEECH]
+    spoken = [WITH_GLIDES.get(text, text) for text in texts]
     known = sum(to_phone(text) is not None for text in spoken)
     in_xsampa = sum(bool(xsampa_to_ipa(text)) for text in spoken)
     if known == len(spoken) or (known >= PHONES_SHARE * len(spoken) and in_xsampa < len(spoken)):

@@ -243,9 +243,7 @@ def read_audio2face(path: Path) -> tuple[Motion, Timeline[Unit]]:
         LOG.warning("%s: %d frames are stated, %d are there", path, stated, len(rows))
     if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.shape[1] != len(names):
         shape = rows.shape if isinstance(rows, np.ndarray) else "no"
-        raise InputError(
-            f"the member {WEIGHTS!r} has {shape} rows and columns, required a column for each of {NAMES!r}"
-        )
+        raise InputError(f"the member {WEIGHTS!r} has {shape} rows and columns, required a column for each of {NAMES}")
     return Motion(rows, rate_hz, tuple(Channel(name, WEIGHT) for name in names)), Timeline(())
 
 

@@ -295,9 +295,7 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
     if not mark:
         starts = np.flatnonzero(np.diff(seconds)) + 1
         if len(starts) < 2:
-            raise ValueError(
-                "the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet has shortened them"
-            )
+            raise ValueError("the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet cut them")
         rate = (starts[-1] - starts[0]) / ((seconds[starts[-1]] - seconds[starts[0]]) % DAY_S)
         LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(seconds), rate)
         return np.asarray(np.arange(len(seconds)) / rate)

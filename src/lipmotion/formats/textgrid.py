@@ -103,9 +103,7 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     phones = [(float(span.start_s), float(span.end_s), span.label.phone or span.label.unit) for span in units]
     words = [(float(span.start_s), float(span.end_s), span.label) for span in group_words(units)]
     tiers = [("phones", phones), ("words", words)]
-    recognised = [
-        (phone.start_s, phone.end_s, f"{phone.name} {phone.confidence}") for phone in list_recognised_phones(units)
-    ]
+    recognised = [(p.start_s, p.end_s, f"{p.name} {p.confidence}") for p in list_recognised_phones(units)]
     if recognised:
         tiers.append((RECOGNISED, recognised))
     end_s = max((float(span.end_s) for span in units), default=0.0)

@@ -141,16 +141,14 @@ class AcousticNetwork(Predictor):
         output = self.network.output
         distortion = np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
         if self.posterior_network is not None and speech.posteriors is not None:
-            hidden = np.concatenate(
-                [hidden, self.posterior_network.hidden_units(speech.posteriors, len(hidden))], axis=1
-            )
+            beside = self.posterior_network.hidden_units(speech.posteriors, len(hidden))
+            hidden = np.concatenate([hidden, beside], axis=1)
         return hidden, distortion
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the network, at half precision."""
-        arrays: dict[str, NDArray[Any]] = {
-            name: array.astype(np.float16) for name, array in SHAPE.arrays(self.network).items()
-        }
+        stored = SHAPE.arrays(self.network)
+        arrays: dict[str, NDArray[Any]] = {name: array.astype(np.float16) for name, array in stored.items()}
         arrays |= {"network_targets": np.stack([self.mean, self.scale]), "network_variances": self.variances}
         for part in (self.posterior_network, self.encoding):
             arrays |= part.arrays() if part is not None else {}

@@ -44,10 +44,13 @@ def motion_to_arrays(
 
 def learned_motion_to_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
     """Serialise learned motion with limits, variance scaling and modulation filter, for engines that store no more."""
-    arrays = motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior) | {
-        "limits": np.stack(motion.limits)
-    }
-    return arrays | scaling_to_arrays(motion.scaling) | filter_to_arrays(motion.modulation)
+    arrays = motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior)
+    return (
+        arrays
+        | {"limits": np.stack(motion.limits)}
+        | scaling_to_arrays(motion.scaling)
+        | filter_to_arrays(motion.modulation)
+    )
 
 
 def scaling_to_arrays(scaling: VarianceScaling | None) -> dict[str, NDArray[Any]]:
@@ -104,9 +107,7 @@ def motion_from_arrays(
         stored = check_arrays(arrays, CLOSURE, Q=space.dimensions)
         column, closed = stored["closure"]
         if column != space.direct_names.index(OPENING) or closed < 0:
-            raise ValueError(
-                f"closure of column {column:g} at {closed:g}, required the column of {OPENING} and 0 or more"
-            )
+            raise ValueError(f"closure of column {column:g} at {closed:g}, required that of {OPENING} and 0 or more")
         closure = Closure(int(column), float(closed), stored["closure_follow"])
     unit_set = PHONE_SET
     if units != PHONE_SET.name:

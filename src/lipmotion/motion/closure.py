@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Channel, Example, Motion, Timeline, Unit
 from lipmotion.units import mark_closing_phones
 
+Array = NDArray[np.float64]
 OPENING = "opening"
 REACH_S = 0.02  # seconds before and after the span of a phone in which the lips may close: the accuracy of alignments
 CLOSED_PERCENTILE = 2.0
@@ -81,10 +82,7 @@ def estimate_closed_opening(smallest: Sequence[float], *groups: NDArray[np.float
 
 
 def estimate_closure(
-    values: Sequence[NDArray[np.float64]],
-    valid: Sequence[NDArray[np.bool_]],
-    timelines: Sequence[Timeline[Unit]],
-    column: int,
+    values: Sequence[Array], valid: Sequence[NDArray[np.bool_]], timelines: Sequence[Timeline[Unit]], column: int
 ) -> Closure:
     """Return the closure of the lips, estimated from motion with its phones.
 
@@ -107,9 +105,7 @@ def estimate_closure(
     return Closure(column, closed, opening @ centred / max(float(opening @ opening), 1e-12))
 
 
-def choose_closed_frames(
-    closure: Closure, opening: NDArray[np.float64], ranges: Sequence[slice], pinned: Sequence[int]
-) -> list[int]:
+def choose_closed_frames(closure: Closure, opening: Array, ranges: Sequence[slice], pinned: Sequence[int]) -> list[int]:
     """Return the frames in which the lips must be made to close: the least open frame of each p, b and m.
 
     opening : generated opening [shape=(T,)]
@@ -125,9 +121,7 @@ def choose_closed_frames(
     return closed
 
 
-def fit_closure(
-    names: Sequence[str], values: Sequence[NDArray[np.float64]], examples: Sequence[Example]
-) -> Closure | None:
+def fit_closure(names: Sequence[str], values: Sequence[Array], examples: Sequence[Example]) -> Closure | None:
     """Return the closure of the lips in some examples, or None where no channel is called ``opening``.
 
     names  : of the first dimensions of the motion space

@@ -51,9 +51,8 @@ def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -
     """
     mean, covariance = measure_covariance(_stack(features, slice(None)) for features in recordings)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + MIN_DEVIATION
-    basis = np.ascontiguousarray(
-        find_principal_axes(covariance / np.outer(scale, scale), size).T
-    )  # stored in this order
+    axes = find_principal_axes(covariance / np.outer(scale, scale), size)
+    basis = np.ascontiguousarray(axes.T)  # stored in this order
     factor = SCALE / np.sqrt(basis.shape[1])
     return AcousticContext(*(array.astype(np.float32) for array in (mean, scale, basis * factor)))
 

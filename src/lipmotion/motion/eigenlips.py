@@ -52,9 +52,8 @@ class Eigenlips:
         """Return coefficients [shape=(T, 3·K)] of pictures: g = Aᵀ(I − Ī), Eq. 13. Raises InputError: another size."""
         _check(images, self.size)
         flat = _sort_by_colour(images)
-        return np.concatenate(
-            [(flat[c] - self.mean[c]) @ self.basis[c].T for c in range(len(COLOURS))], axis=1, dtype=np.float32
-        )
+        colours = [(flat[c] - self.mean[c]) @ self.basis[c].T for c in range(len(COLOURS))]
+        return np.concatenate(colours, axis=1, dtype=np.float32)
 
     def restore(self, coefficients: NDArray[np.floating[Any]]) -> Images:
         """Return pictures [shape=(T, H, W, 3)]: I = Ī + Ag, Eq. 12. Raises InputError: another number of them."""
@@ -64,9 +63,7 @@ class Eigenlips:
         """Return the same pictures before they are rounded, in grey levels, float32 [shape=(T, H, W, 3)]."""
         wanted = self.basis.shape[0] * self.basis.shape[1]
         if coefficients.ndim != 2 or coefficients.shape[1] != wanted:
-            raise InputError(
-                f"coefficients of shape {coefficients.shape}, required (T, {wanted}), as project gives them"
-            )
+            raise InputError(f"coefficients of shape {coefficients.shape}, required (T, {wanted}), as of project")
         parts = np.split(coefficients.astype(np.float32), len(COLOURS), axis=1)
         flat = np.stack([part @ self.basis[c] + self.mean[c] for c, part in enumerate(parts)], axis=-1)
         return flat.reshape(-1, *self.size, len(COLOURS))

@@ -165,9 +165,8 @@ class LearnedMotion:
         motion = np.empty((frames, len(space.channels)), precision)
         spread = np.empty((frames, space.dimensions), precision)
         for inner, outer in split_into_blocks(frames):
-            block_pins = {
-                (frame - outer.start, c): v for (frame, c), v in pins.items() if outer.start <= frame < outer.stop
-            }
+            inner_pins = (((f, c), v) for (f, c), v in pins.items() if outer.start <= f < outer.stop)
+            block_pins = {(f - outer.start, c): v for (f, c), v in inner_pins}
             block_ranges = [
                 slice(closing.start - outer.start, closing.stop - outer.start)
                 for closing in ranges

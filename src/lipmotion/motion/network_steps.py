@@ -155,9 +155,8 @@ class NetworkShape(ABC, Generic[NetworkT]):
 
         def report(step: int, error: float) -> None:
             if step % REPORTED_STEPS == 0 or step == plan.steps:
-                training.monitor(
-                    Progress(f"training the {self.name}", step, plan.steps, step / plan.steps, figure=error)
-                )
+                stage = f"training the {self.name}"
+                training.monitor(Progress(stage, step, plan.steps, step / plan.steps, figure=error))
 
         start = self.initial(outputs, plan.seed)
         network = fit_network(start, draw, len(training.examples), weights, plan, report)

@@ -109,9 +109,7 @@ class PosteriorNetwork(Predictor):
         examples = training.examples
         posteriors = list_posteriors(examples)
         if posteriors is None:
-            raise CorpusError(
-                "examples without posteriors, which the predictor posteriors needs; train with the recogniser auto"
-            )
+            raise CorpusError("examples without posteriors, which this predictor needs; train with the recogniser auto")
         centre, scale = measure_poses(training)
         rows = [limit_logarithms(each) for each in posteriors]
         mean, basis = fit_components(rows)
@@ -189,9 +187,7 @@ class PosteriorNetwork(Predictor):
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> PosteriorNetwork:
         """Deserialise a network; as ``Predictor.from_arrays``. Raises ModelFormatError, too: one of an earlier form."""
         if "posterior_variances" not in arrays:
-            raise ModelFormatError(
-                "a posterior network without spectra, as of 2026-11-23; required one with spectra: train again"
-            )
+            raise ModelFormatError("a posterior network of 2026-11-23, required one with spectra: train again")
         stored = check_arrays(arrays, TARGETS, Q=dimensions)
         centre, scale = stored["posterior_targets"]
         return cls(

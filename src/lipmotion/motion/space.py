@@ -15,6 +15,8 @@ from lipmotion.stats.curves import mark_known_dynamics
 from lipmotion.stats.pca import Pca, fit_pca
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion, Track, check_magnitude
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, eq=False)
 class MotionSpace:
@@ -39,16 +41,14 @@ class MotionSpace:
         """The number of dimensions, Q."""
         return len(self.direct) + (len(self.points.basis) if self.points is not None else 0)
 
-    def reduce(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def reduce(self, values: Array) -> Array:
         """Return motion of the channels [shape=(T, P)] in the motion space [shape=(T, Q)]."""
         direct = values[:, self.direct]
         if self.points is None:
             return direct
         return np.concatenate([direct, self.points.project(values[:, self._reduced])], axis=1)
 
-    def restore(
-        self, values: NDArray[np.float64], variance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def restore(self, values: Array, variance: Array) -> tuple[Array, Array]:
         """Return values and variances of channels [each shape=(T, P)], from the motion space [each shape=(T, Q)]."""
         motion, spread = (np.empty((len(values), len(self.channels))) for _ in range(2))
         count = len(self.direct)
@@ -59,7 +59,7 @@ class MotionSpace:
         return motion, spread
 
     @property
-    def mixing(self) -> NDArray[np.float64]:
+    def mixing(self) -> Array:
         """The matrix from variances of the dimensions to variances of the channels [shape=(Q, P)]."""
         mixing, count = np.zeros((self.dimensions, len(self.channels))), len(self.direct)
         mixing[np.arange(count), self.direct] = 1
@@ -72,7 +72,7 @@ class MotionSpace:
         return np.setdiff1d(np.arange(len(self.channels)), self.direct)
 
 
-def fit_space(channels: tuple[Channel, ...], poses: NDArray[np.float64], components: int) -> MotionSpace:
+def fit_space(channels: tuple[Channel, ...], poses: Array, components: int) -> MotionSpace:
     """Return the motion space of some poses [shape=(N, P)]; all channels but points (``x_17``, ...) stay as they are.
 
     components : principal components that the points are reduced to
@@ -82,7 +82,7 @@ def fit_space(channels: tuple[Channel, ...], poses: NDArray[np.float64], compone
     return MotionSpace(channels, np.nonzero(~is_point)[0].astype(np.intp), points)
 
 
-def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[NDArray[np.float64]]]:
+def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[MotionSpace, list[Array]]:
     """Return the motion space of some examples, and the motion of each in it [each shape=(T, Q)].
 
     components : principal components that all point channels are reduced to
@@ -99,8 +99,8 @@ def fit_reduced_motion(examples: Sequence[Example], components: int) -> tuple[Mo
 
 
 def resample_to_model(
-    values: NDArray[np.float64], seen: NDArray[np.bool_], rate_hz: float, frames: int, frame_rate_hz: float
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    values: Array, seen: NDArray[np.bool_], rate_hz: float, frames: int, frame_rate_hz: float
+) -> tuple[Array, NDArray[np.bool_]]:
     """Return curves at the rate of a model by a cubic spline, and the frames that are valid.
 
     values : curves at ``rate_hz`` [shape=(T, P)]
@@ -130,7 +130,6 @@ def resample_track(track: Track, frames: int) -> tuple[Motion, NDArray[np.bool_]
     return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
 
 
-Array = NDArray[np.float64]
 LARGEST_EXCESS = 20.0
 """Motion leaves the limits by at most so many spans of the poses; features unlike all training data give about 3."""
 DEVIATIONS = 3.0  # standard deviations by which motion may leave the range of the poses
@@ -202,9 +201,7 @@ def check_poses(limits: MotionLimits, space: MotionSpace, closure: Closure | Non
         if not plausible and (low < -NEGATIVE_SHARE * span or low > LARGEST_EXCESS * span):
             raise ValueError(f"poses whose {OPENING} is {low:g} to {high:g}")
         if closure.closed > max(high + LARGEST_EXCESS * span, PLAUSIBLE_OPENING):
-            raise ValueError(
-                f"lips that are closed at {closure.closed:g}, with poses whose {OPENING} is {low:g} to {high:g}"
-            )
+            raise ValueError(f"lips closed at {closure.closed:g}, with poses whose {OPENING} is {low:g} to {high:g}")
 
 
 def check_rest(rest: Array, limits: MotionLimits) -> None:

@@ -279,10 +279,8 @@ def is_text(path: Path) -> bool:
         text = head.decode(
             "utf-16" if head[:2] in {b"\xff\xfe", b"\xfe\xff"} else "utf-8", "strict" if len(head) < HEAD else "ignore"
         )
-        return (
-            all(letter.isprintable() or letter in "\t\n\r\f\ufeff" for letter in text)
-            and 2 * len(text) > len(head) // 2
-        )
+        printable = all(letter.isprintable() or letter in "\t\n\r\f\ufeff" for letter in text)
+        return printable and 2 * len(text) > len(head) // 2
     return False
 
 

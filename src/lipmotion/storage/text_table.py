@@ -105,9 +105,7 @@ def parse_numbers(fields: Sequence[str], line: int) -> list[float]:
     except ValueError:
         pass
     try:
-        return [
-            float("nan") if field.strip().lower() in MISSING else float(field.replace(",", ".")) for field in fields
-        ]
+        return [float("nan") if f.strip().lower() in MISSING else float(f.replace(",", ".")) for f in fields]
     except ValueError as error:
         raise ValueError(f"line {line}: {error}") from error
 

@@ -119,9 +119,8 @@ class Configuration:
         for name, value in values.items():
             if name in cls.removed and name not in known:
                 if value != cls.removed[name]:
-                    raise InputError(
-                        f"{name} is {value!r}; this option no longer exists, required {cls.removed[name]!r}"
-                    )
+                    stated = f"{name} is {value!r}; this option no longer exists"
+                    raise InputError(f"{stated}, required {cls.removed[name]!r}")
                 continue
             present = cls.aliases.get(name, name)
             if present not in known:

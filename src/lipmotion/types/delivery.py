@@ -232,9 +232,7 @@ class Staging(Configuration):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.size and not (SMALLEST_PX <= self.size <= LARGEST_PX and self.size % 2 == 0):
-            raise InputError(
-                f"the size is {self.size} pixels, required an even number from {SMALLEST_PX} to {LARGEST_PX}"
-            )
+            raise InputError(f"the size is {self.size} pixels, required an even number, {SMALLEST_PX} to {LARGEST_PX}")
         if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
             raise InputError(
                 f"the background is {shorten(self.background)!r}, required scene, transparent, or a colour as "

@@ -129,9 +129,8 @@ class Generation:
 
     def __repr__(self) -> str:
         frames, channels = self.motion.values.shape
-        return (
-            f"Generation({frames} frames at {self.motion.rate_hz:g} Hz, {channels} channels, {len(self.units)} units)"
-        )
+        shape = f"{frames} frames at {self.motion.rate_hz:g} Hz, {channels} channels"
+        return f"Generation({shape}, {len(self.units)} units)"
 
     @property
     def variance(self) -> NDArray[np.floating[Any]]:
@@ -181,9 +180,8 @@ class Generation:
         motion = self.motion.resampled(rate_hz)
         spread = self.change_frames(lambda rows: interpolate_rows(rows, self.motion.rate_hz, motion.time_s))
         nearest = np.minimum(np.round(motion.time_s * self.motion.rate_hz).astype(int), len(self.trace.frames) - 1)
-        return replace(
-            self, motion=motion, spread=spread, trace=StateTrace(self.trace.states, self.trace.frames[nearest])
-        )
+        trace = StateTrace(self.trace.states, self.trace.frames[nearest])
+        return replace(self, motion=motion, spread=spread, trace=trace)
 
     def change_frames(self, change: RowChange) -> NDArray[np.floating[Any]] | ReducedVariance:
         """Return the variances with other rows, which a function makes of those of all frames."""

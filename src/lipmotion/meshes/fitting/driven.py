@@ -101,9 +101,8 @@ def _solve_with_table(
     if stated:
         others = [name for name in motion.names if name not in {*stated, *(row.control for row in rows)}]
         values = np.stack([*(motion[name] for name in others), *stated.values()], axis=1)
-        channels = [motion.channels[motion.column(name)] for name in others] + [
-            Channel(name, WEIGHT) for name in stated
-        ]
+        channels = [motion.channels[motion.column(name)] for name in others]
+        channels += [Channel(name, WEIGHT) for name in stated]
         solved = solve_shape_weights(Motion(values, motion.rate_hz, tuple(channels)), units, scaled)
     else:
         solved = solve_shape_weights(motion, units, shapes)

@@ -66,9 +66,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
                 for name, default in (("gain", 1.0), ("offset", 0.0), ("low", -np.inf), ("high", np.inf))
             }
             if numbers["low"] > numbers["high"]:
-                raise ValueError(
-                    f"the control {texts['control']!r} goes from {numbers['low']:g} to {numbers['high']:g}"
-                )
+                raise ValueError(f"{texts['control']!r} goes from {numbers['low']:g} to {numbers['high']:g}")
             rows.append(RigRow(texts["control"], texts["source"], **numbers))
         except ValueError as error:
             raise InputError(f"{path}: line {line}: {shorten(str(error))}") from error
@@ -84,9 +82,8 @@ def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
         table.writerow(COLUMNS)
         for row in rows:
             limits = [f"{limit:g}" if np.isfinite(limit) else "" for limit in (row.low, row.high)]
-            table.writerow(
-                [as_field(row.control), as_field(row.source), f"{row.gain:.4g}", f"{row.offset:.4g}", *limits]
-            )
+            names = (as_field(row.control), as_field(row.source))
+            table.writerow([*names, f"{row.gain:.4g}", f"{row.offset:.4g}", *limits])
 
 
 def suggest_names(name: str, names: Iterable[str]) -> str:
@@ -141,9 +138,8 @@ def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
             near = suggest_names(row.control, mesh.shape_names)
             raise InputError(f"{path}: there is no blendshape {control!r}; {near}")
         if row.source not in {"", row.control, *SOURCES}:
-            raise InputError(
-                f"{path}: {control!r} follows {source!r}, which is no curve; {suggest_names(row.source, SOURCES)}"
-            )
+            near = suggest_names(row.source, SOURCES)
+            raise InputError(f"{path}: {control!r} follows {source!r}, which is no curve; {near}")
         if row.control in table:
             raise InputError(f"{path}: the blendshape {control!r} occurs twice; leave one row")
         table[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))
