@@ -55,8 +55,7 @@ def compare(found: dict[str, Any], wanted: dict[str, list[float]], names: Path, 
     assert found["last"] == len(wanted["jawOpen"])
     for which in ("face", "other"):
         values = np.array([frame[which] for frame in found["frames"]])
-        expected = np.array([wanted[name] for name in listed]).T
-        assert np.abs(values - expected).max() < least
+        assert np.abs(values - np.array([wanted[name] for name in listed]).T).max() < least
     assert np.ptp([frame["face"][listed.index("jawOpen")] for frame in found["frames"]]) > 0.2
     assert found["strips"] == ["lipmotion sound"] * found["plays_sound"]
     assert found["end"] >= found["last"]

@@ -109,8 +109,7 @@ def test_p_b_m_win_over_f_v_where_there_is_no_room_for_both() -> None:
 
 
 def test_a_shape_is_there_with_its_sound_or_a_frame_before() -> None:
-    sheet = choose_cues(spoken("s aa s aa s", 0.2))
-    starts = [cue.start_s for cue in sheet.cues if cue.label == "D"]
+    starts = [cue.start_s for cue in choose_cues(spoken("s aa s aa s", 0.2)).cues if cue.label == "D"]
     for start_s, sound_s in zip(starts, (0.5, 0.9), strict=True):
         assert sound_s - 0.09 < start_s < sound_s + 0.01
 

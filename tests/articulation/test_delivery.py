@@ -100,8 +100,7 @@ def test_movements_grow_and_closures_stay(said: Generation, intensity: float) ->
 
 
 def test_weights_stay_between_0_and_1(said: Generation) -> None:
-    time_s = said.motion.time_s
-    ramp = np.interp(time_s, [0.5, 0.9, 1.3], [0, 0.8, 0])[:, None]
+    ramp = np.interp(said.motion.time_s, [0.5, 0.9, 1.3], [0, 0.8, 0])[:, None]
     weights = Motion(np.hstack([ramp, ramp]), 100.0, (Channel("jawOpen", WEIGHT), Channel("protrusion", WEIGHT)))
     larger = intensify(replace(said, motion=weights, spread=np.zeros((len(ramp), 2))), 3.0).motion
     assert larger.values.min() >= 0

@@ -95,8 +95,7 @@ def test_without_glances_the_eyes_hold_their_target_while_the_head_turns():
 def test_loud_and_high_moments_raise_the_brows_and_nod_the_head():
     time_s = frames(100)
     accent = (time_s % 2.0 > 0.9) & (time_s % 2.0 < 1.2)
-    voice = Prosody(-30 + 20.0 * accent, 4.94 + 0.45 * accent)
-    moved = compute_liveliness(time_s, MINUTE, SAID, voice)
+    moved = compute_liveliness(time_s, MINUTE, SAID, Prosody(-30 + 20.0 * accent, 4.94 + 0.45 * accent))
     flat = compute_liveliness(time_s, MINUTE, SAID, Prosody(np.full(6001, -30.0), np.full(6001, 4.94)))
     brows, nods = (moved.brows, flat.brows, -15), (-moved.turn[:, 1], -flat.turn[:, 1], 5)
     for one, other, later in (brows, nods):
@@ -105,8 +104,7 @@ def test_loud_and_high_moments_raise_the_brows_and_nod_the_head():
 
 
 def test_glances_are_steps_between_rests_and_of_limited_size():
-    time_s = frames(100)
-    moved = compute_liveliness(time_s, MINUTE, SAID, None, head=False)
+    moved = compute_liveliness(frames(100), MINUTE, SAID, None, head=False)
     assert np.abs(moved.gaze[:, 0]).max() <= LARGEST_GLANCE[0]
     assert np.abs(moved.gaze[:, 0]).max() > 0.08
     assert (np.abs(np.diff(moved.gaze[:, 0])) < 1e-6).mean() > 0.8

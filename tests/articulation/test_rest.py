@@ -93,8 +93,7 @@ def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
 
 def test_a_phrase_that_begins_with_closed_lips_takes_no_breath():
     units = said((0, 1, "sil"), (1, 1.2, "m"), (1.2, 2.5, "aa"), (2.5, 3.0, "sil"))
-    moved = rest_in_pauses(generation(units, 0.01), REST)
-    assert moved.motion["opening"][80:110].max() <= 0.0101
+    assert rest_in_pauses(generation(units, 0.01), REST).motion["opening"][80:110].max() <= 0.0101
 
 
 def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():
@@ -108,8 +107,7 @@ def test_a_pin_in_a_pause_holds_and_all_silence_is_rest():
     moved = rest_in_pauses(generation(LINE), REST, [1.25])
     assert moved.motion["opening"][125] == pytest.approx(0.1)
     assert moved.motion["opening"][20] <= CLOSED_OPENING
-    silent = rest_in_pauses(generation(said((0, 3, "sil"))), REST)
-    assert silent.motion["opening"].max() <= CLOSED_OPENING
+    assert rest_in_pauses(generation(said((0, 3, "sil"))), REST).motion["opening"].max() <= CLOSED_OPENING
 
 
 def test_short_pauses_are_shared_by_the_phones_beside_them():
@@ -138,8 +136,7 @@ def test_laughter_opens_the_mouth_with_its_calls_and_leaves_speech_alone():
     assert opening[100] < opening[70] < opening[50]
     assert opening[160] <= CLOSED_OPENING
     assert opening[210:250] == pytest.approx(0.1)
-    speaking = rest_in_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"]
-    assert speaking[45:95] == pytest.approx(0.1)
+    assert rest_in_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"][45:95] == pytest.approx(0.1)
 
 
 def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
@@ -150,5 +147,4 @@ def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
     moving = of_motion(Motion(values, 100.0, plain.motion.channels), QUIET)
     moved = rest_in_pauses(moving, REST, events=[LAUGH]).motion
     assert moved["width"][50] == pytest.approx(0.6 - 0.5 * moved["opening"][50], abs=1e-6)
-    natural = rest_in_pauses(moving, NATURAL, events=[LAUGH])
-    assert natural is moving
+    assert rest_in_pauses(moving, NATURAL, events=[LAUGH]) is moving

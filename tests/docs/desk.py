@@ -49,8 +49,7 @@ def set_desk(folder: Path, models: dict[str, Path]) -> None:
     _motion(folder, words)
     _of_other_programs(folder, words)
     _characters(folder)
-    draw = np.random.default_rng(2)
-    judged = ratings(draw, np.array([3.0, 4.0]), (8, 6), Effects())
+    judged = ratings(np.random.default_rng(2), np.array([3.0, 4.0]), (8, 6), Effects())
     write_answers(folder / "answers.csv", rated_answers(replace(judged, conditions=("ph-HMM", "ph-CHMM"))))
 
 

@@ -60,7 +60,6 @@ def blocks(page: str) -> Iterator[Block]:
     bare = FENCED.sub(lambda match: re.sub(r"\S", "x", match[0]), text)
     found += [match for match in INDENTED.finditer(bare) if COMMAND.match(match["text"].strip())]
     for match in sorted(found, key=lambda match: match.start()):
-        given = match.groupdict()
-        language = LANGUAGES.get(given.get("language", "sh"))
+        language = LANGUAGES.get(match.groupdict().get("language", "sh"))
         if language:
             yield Block(page, language, dedent(match["text"]), match["last"] or "")

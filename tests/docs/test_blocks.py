@@ -42,10 +42,9 @@ def test_every_command_is_understood():
 
 
 def test_what_runs_here_is_ours_and_markers_say_when_and_what():
-    foreign = [
+    assert [
         words for block in HERE if block.language == "sh" for words in commands(block) if words[0] != "lipmotion"
-    ]
-    assert foreign == []
+    ] == []
     for block in ALL:
         assert not block.last or re.match(r"(20\d\d-\d\d-\d\d[^:]*|not run): .", block.last), block
     for test in TESTED.values():

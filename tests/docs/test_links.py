@@ -87,13 +87,12 @@ def test_no_page_uses_a_former_name_of_an_option():
     former = {old for config in configurations for old in config.aliases} - present - {*ENGINES.built_in}
     assert {"listens", "follows", "full_range", "crosses", "recognises"} <= former
     setting = re.compile(rf"`(?:--set )?({'|'.join(sorted(former))})`|\b({'|'.join(sorted(former))}) ?= ?\w")
-    found = {
+    assert {
         f"{page.relative_to(ROOT)}: {match.group()}"
         for page in PAGES
         if page.name != "CHANGELOG.md"
         for match in setting.finditer(page.read_text(encoding="utf-8"))
-    }
-    assert found == set()
+    } == set()
 
 
 def test_readme_is_short():

@@ -338,8 +338,7 @@ def test_it_lies_in_the_lower_right_corner(size, frame_size):
     inner = (made[rows, columns] == 130).all(axis=2)
     assert 1 <= inner.any(axis=1).sum() <= HEIGHT_SHARE * frame_size[0] + 1
     assert 1 <= inner.any(axis=0).sum() <= WIDTH_SHARE * frame_size[1] + 1
-    border = made[rows, columns][~inner]
-    assert (border == WHITE).all()
+    assert (made[rows, columns][~inner] == WHITE).all()
     assert np.array_equal(np.unique(made[rows, columns]), [130, WHITE])
 
 
@@ -358,8 +357,7 @@ def test_the_picture_keeps_its_form_and_its_place():
     assert inner[-4, 3].tolist() == [0, 0, 0]
     assert inner[3, -4].tolist() == [200, 200, 0]
     assert inner[-4, -4].tolist() == [0, 200, 0]
-    middle = np.abs(np.diff(inner[-4, :, 1])).argmax()
-    assert middle == pytest.approx(width / 2, abs=1.5)
+    assert np.abs(np.diff(inner[-4, :, 1])).argmax() == pytest.approx(width / 2, abs=1.5)
     (turned,) = add_inset([frame], [picture[::-1, ::-1]])
     assert np.abs(turned[rows, columns].astype(int) - made[rows, columns][::-1, ::-1]).max() <= 1
 

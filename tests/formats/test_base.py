@@ -237,8 +237,7 @@ RATE_HZ = 22_050
 
 
 def tone(duration_s: float = 2.0, level: float = 0.5) -> Audio:
-    count = round(duration_s * RATE_HZ)
-    return Audio((level * np.sin(np.arange(count) * 0.1)).astype(np.float32), RATE_HZ)
+    return Audio((level * np.sin(np.arange(round(duration_s * RATE_HZ)) * 0.1)).astype(np.float32), RATE_HZ)
 
 
 @pytest.mark.parametrize("rate_hz", [16_000, 22_050, 44_100])

@@ -50,8 +50,7 @@ def talking_bvh() -> Generation:
     opening = 0.01 + 0.15 * (time_s > 0.3) * np.sin(2 * np.pi * 2 * time_s) ** 2
     width = 0.6 + 0.03 * np.sin(2 * np.pi * time_s)
     motion = Motion(np.stack([opening, width], axis=1), 50.0, (Channel("opening"), Channel("width")))
-    units = Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 1.2, Unit("aa"))))
-    return of_motion(motion, units)
+    return of_motion(motion, Timeline((Span(0.0, 0.3, Unit("sil")), Span(0.3, 1.2, Unit("aa")))))
 
 
 @pytest.fixture
@@ -209,15 +208,14 @@ def _damaged(content: bytes, at: int, new: bytes) -> bytes:
 def test_damaged_files_are_refused(vmd_path: Path) -> None:
     good = vmd_path.read_bytes()
     morphs = 50 + 4 + 111 * VMD_FRAMES + 4
-    cases = {
+    for message, content in {
         "its first bytes are not those of the format": b"PK" + good[2:],
         "is cut short": good[:-200],
         "a key of '頭' at frame 4294967295 is none": _damaged(good, 54 + 15, b"\xff" * 4),
         "a rotation of the bone 頭 is none": _damaged(good, 54 + 31, bytes(16)),
         "a key of 'あ' at frame 0 is none": _damaged(good, morphs + 19, struct.pack("<f", np.nan)),
         "has none of the morphs あ い う え お; its morphs are: none": good[:50] + bytes(20),
-    }
-    for message, content in cases.items():
+    }.items():
         vmd_path.write_bytes(content)
         with pytest.raises(InputError, match=message):
             read_motion(vmd_path)
@@ -245,8 +243,7 @@ def talking_live2d() -> Generation:
     opening = 0.01 + 0.15 * speaking * np.sin(2 * np.pi * 2 * time_s) ** 2
     width = 0.6 + 0.08 * speaking * np.sin(2 * np.pi * time_s)
     motion = Motion(np.stack([opening, width], axis=1), 100.0, (Channel("opening"), Channel("width")))
-    units = Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 3.0, Unit("aa"))))
-    return of_motion(motion, units)
+    return of_motion(motion, Timeline((Span(0.0, 1.0, Unit("sil")), Span(1.0, 3.0, Unit("aa")))))
 
 
 def read(path: Path) -> tuple[dict, dict[str, tuple[np.ndarray, np.ndarray]]]:

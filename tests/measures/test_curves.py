@@ -65,8 +65,7 @@ def test_pooled_means_are_those_of_all_frames_and_per_clip_of_each():
 
 def test_distance_is_the_mean_norm_not_its_square():
     generated = [np.array([[3.0, 4.0], [0.0, 0.0]]), np.array([[0.0, 1.0]])]
-    original = [np.zeros((2, 2)), np.zeros((1, 2))]
-    assert measure_mean_distance(generated, original) == pytest.approx((5 + 0 + 1) / 3)
+    assert measure_mean_distance(generated, [np.zeros((2, 2)), np.zeros((1, 2))]) == pytest.approx((5 + 0 + 1) / 3)
 
 
 def test_error_is_in_units_of_the_channels_deviation():
@@ -108,8 +107,7 @@ def test_jerk_by_hand_never_looks_across_clips():
 
 
 def smooth(seed: int, frames: int) -> np.ndarray:
-    draw = np.random.default_rng(seed)
-    return np.convolve(draw.normal(0, 1, frames + 60), np.hanning(9), "same")
+    return np.convolve(np.random.default_rng(seed).normal(0, 1, frames + 60), np.hanning(9), "same")
 
 
 @given(seed=SEEDS, late=st.integers(-8, 8), rate_hz=st.sampled_from([25.0, 29.97, 100.0]))
@@ -134,14 +132,12 @@ def test_channels_that_move():
     clips = [wave * (1, 0.5, 0.009, 0, 90) + (0, 0, 0, 7, 0), np.tile([0, 0, 0, 7, 0.0], (9, 1))]
     assert select_moving(clips, ["m", "m", "m", "m", "degrees"]).tolist() == [True, True, False, False, True]
     assert select_moving([wave * (1e-9, 0)], ["m", "degrees"]).tolist() == [True, False]
-    steps = [np.full((5, 1), 1.0), np.full((5, 1), 2.0)]
-    assert select_moving(steps, ["m"]).tolist() == [True]
+    assert select_moving([np.full((5, 1), 1.0), np.full((5, 1), 2.0)], ["m"]).tolist() == [True]
 
 
 def test_a_constant_with_rounding_is_a_constant():
     for value in (1e-3, 0.3, 1e4):
-        rng = np.random.default_rng(0)
-        wave = rng.normal(size=(200, 1))
+        wave = np.random.default_rng(0).normal(size=(200, 1))
         still = value * (1 + 1e-8 * wave)
         assert correlation(still, wave) == 0
         assert correlation(wave, still) == 0

@@ -110,8 +110,7 @@ def test_a_step_at_the_outline_is_a_seam():
 def test_a_step_of_a_vertical_edge_has_half_its_height_on_two_pixels():
     region = np.zeros((HEIGHT, WIDTH), bool)
     region[:, WIDTH // 2 :] = True
-    pictures = np.where(region[None, ..., None], 130.0, 100.0) * np.ones((2, 1, 1, 3))
-    slopes = outline_slopes(pictures, region)
+    slopes = outline_slopes(np.where(region[None, ..., None], 130.0, 100.0) * np.ones((2, 1, 1, 3)), region)
     assert slopes.at == pytest.approx([15, 15])
     assert slopes.inside == pytest.approx([0, 0], abs=1e-9)
     assert np.isnan(slopes.seam)

@@ -123,8 +123,7 @@ def packed_attributes(elements: np.ndarray) -> bytes:
     for first in range(0, count, rows):
         block = elements[first : first + rows]
         for column in range(stride):
-            values = np.concatenate([[last[column]], block[:, column]]).astype(int)
-            deltas = np.diff(values) & 255
+            deltas = np.diff(np.concatenate([[last[column]], block[:, column]]).astype(int)) & 255
             signed = np.where(deltas > 127, deltas - 256, deltas)
             coded = np.where(signed < 0, -2 * signed - 1, 2 * signed).astype(np.uint8)
             groups = -(-len(coded) // 16)

@@ -38,8 +38,7 @@ def lip_points(mesh: Mesh, size: float = SIZE) -> dict[int, int]:
     names = {}
     for point, x in ((61, -HALF), (291, HALF)):
         names[point] = int(np.abs(places - [x, SEAM, _depth(x, SEAM)]).sum(axis=1).argmin())
-    middle = np.flatnonzero(np.abs(places[:, 0]) + np.abs(places[:, 1] - SEAM) < 1e-6)
-    upper, lower = middle[:2].tolist()
+    upper, lower = np.flatnonzero(np.abs(places[:, 0]) + np.abs(places[:, 1] - SEAM) < 1e-6)[:2].tolist()
     return names | {13: upper, 14: lower}
 
 

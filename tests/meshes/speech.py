@@ -25,8 +25,7 @@ def motion(*, points: bool = True, rate_hz: float = 100.0) -> Motion:
     """Curves through the middles of the phones; with points, the lips open about the seam and the chin follows."""
     time_s = np.arange(int(2.0 * rate_hz) + 1) / rate_hz
     middles = [start + share * (end - start) for _, start, end in PHONES for share in (0.3, 0.5, 0.7)]
-    curves = (np.interp(time_s, middles, np.repeat(values, 3)) for values in (OPENINGS, WIDTHS, JAWS))
-    opening, width, jaw = curves
+    opening, width, jaw = (np.interp(time_s, middles, np.repeat(values, 3)) for values in (OPENINGS, WIDTHS, JAWS))
     channels = [Channel("opening"), Channel("width")]
     columns = [opening, width]
     if points:

@@ -64,8 +64,7 @@ def test_the_lips_follow_the_motion(files, by):
         character = load_character(files / "head.glb", by_points=by == "control points")
     assert (character.shapes is None) == (by != "blendshapes")
     gaps = [_gap(character, vertices) for vertices in character.vertices(motion(), units(), TIME_S)]
-    opening = motion().at(TIME_S)[:, 0]
-    assert np.corrcoef(gaps, opening)[0, 1] > 0.98
+    assert np.corrcoef(gaps, motion().at(TIME_S)[:, 0])[0, 1] > 0.98
     assert max(gaps[14], gaps[24]) < 0.004  # m and p
     assert max(gaps[:10]) < 0.004
 
@@ -73,8 +72,7 @@ def test_the_lips_follow_the_motion(files, by):
 def test_only_the_moving_vertices_move_and_finer_shapes_show_no_whole_expressions(files):
     character = load_character(files / "head.glb")
     still = np.setdiff1d(np.arange(len(character.mesh.vertices)), character.moving)
-    others = {"eyeBlinkLeft": np.linspace(0, 1, len(TIME_S))}
-    for vertices in character.vertices(motion(), units(), TIME_S, others):
+    for vertices in character.vertices(motion(), units(), TIME_S, {"eyeBlinkLeft": np.linspace(0, 1, len(TIME_S))}):
         np.testing.assert_allclose(vertices[still], character.mesh.vertices[still], atol=1e-12)
     eyes = character.mesh.vertices[:, 1] > 2.1
     assert np.abs(vertices - character.mesh.vertices)[eyes, 1].max() == pytest.approx(0.5, abs=1e-5)
@@ -115,8 +113,7 @@ def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_p
     write_glb(tmp_path / "head.glb", _expressive("Happy", "surprised"))
     character = load_character(tmp_path / "head.glb")
     moved = with_moods(motion(), parse_moods("happy:0.5, afraid at 1.5"))
-    mouth = find_mouth(moved, units())
-    weights = character.expressions(moved, mouth)
+    weights = character.expressions(moved, find_mouth(moved, units()))
     assert {*weights} == {"Happy", "surprised"}
     assert weights["Happy"][:100] == pytest.approx(0.5)
     assert weights["surprised"][-1] == pytest.approx(0.5)

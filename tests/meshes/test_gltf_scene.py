@@ -60,8 +60,7 @@ def test_quantised_positions(tmp_path):
     content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": 32, "byteStride": 8})
     content["accessors"][0] = {"bufferView": 4, "componentType": 5122, "count": 4, "type": "VEC3", "normalized": True}
     content["nodes"][0]["scale"] = [3, 3, 3]
-    mesh = _read(tmp_path, content, binary + small.tobytes())
-    np.testing.assert_allclose(mesh.vertices, 3 * POSITIONS, atol=1e-6)
+    np.testing.assert_allclose(_read(tmp_path, content, binary + small.tobytes()).vertices, 3 * POSITIONS, atol=1e-6)
 
 
 def test_sparse_targets(tmp_path):
@@ -71,20 +70,17 @@ def test_sparse_targets(tmp_path):
     binary, _ = with_array(content, binary, moved, "VEC3")
     sparse = {"count": 2, "indices": {"bufferView": 4, "componentType": 5123}, "values": {"bufferView": 5}}
     content["accessors"][1] = {"componentType": 5126, "count": 4, "type": "VEC3", "sparse": sparse}
-    mesh = _read(tmp_path, content, binary)
-    np.testing.assert_allclose(shaped(mesh, {"jawOpen": 1}), POSITIONS + OPEN, atol=1e-7)
+    np.testing.assert_allclose(shaped(_read(tmp_path, content, binary), {"jawOpen": 1}), POSITIONS + OPEN, atol=1e-7)
 
 
 def test_compressed_attributes(tmp_path):
     content, binary = document()
-    stored = np.ascontiguousarray(POSITIONS).view(np.uint8).reshape(4, 12)
-    packed = packed_attributes(stored)
+    packed = packed_attributes(np.ascontiguousarray(POSITIONS).view(np.uint8).reshape(4, 12))
     extension = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(packed), "byteStride": 12, "count": 4}
     content["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": extension | {"mode": "ATTRIBUTES"}}
     content["bufferViews"][0]["buffer"] = 1
     content["buffers"].append({"byteLength": 48})
-    mesh = _read(tmp_path, content, binary + packed)
-    np.testing.assert_allclose(mesh.vertices, POSITIONS, atol=1e-7)
+    np.testing.assert_allclose(_read(tmp_path, content, binary + packed).vertices, POSITIONS, atol=1e-7)
 
 
 def test_skins_at_rest(tmp_path):

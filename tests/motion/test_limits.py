@@ -262,8 +262,7 @@ def test_frames_beyond_the_end_or_nearest_to_an_unseen_camera_frame_are_not_vali
     curves, valid = resample_to_model(values, seen(5), 25.0, 30, 100.0)
     assert curves[17:, 0] == pytest.approx(np.full(13, 4.0))  # the last value holds
     assert np.nonzero(~valid)[0].tolist() == [*range(18, 30)]  # the last camera frame is at 16; 18 is half a frame on
-    mask = np.array([True, True, False, True, True])
-    _, valid = resample_to_model(values, mask, 25.0, 17, 100.0)
+    _, valid = resample_to_model(values, np.array([True, True, False, True, True]), 25.0, 17, 100.0)
     assert np.nonzero(~valid)[0].tolist() == [6, 7, 8, 9]
 
 

@@ -27,10 +27,8 @@ FILTER = fit_modulation_filter(RECORDED, GENERATED)
 def test_the_filtered_motion_has_the_spectrum_of_the_recorded_motion() -> None:
     filtered = [FILTER.apply(clip) for clip in GENERATED]
     before = measure_modulation_distance(GENERATED, RECORDED, FRAME_RATE_HZ)
-    after = measure_modulation_distance(filtered, RECORDED, FRAME_RATE_HZ)
-    assert (after < 0.25 * before).all()
-    same = fit_modulation_filter(RECORDED, RECORDED).apply(RECORDED[0])
-    assert same == pytest.approx(RECORDED[0], abs=1e-9)
+    assert (measure_modulation_distance(filtered, RECORDED, FRAME_RATE_HZ) < 0.25 * before).all()
+    assert fit_modulation_filter(RECORDED, RECORDED).apply(RECORDED[0]) == pytest.approx(RECORDED[0], abs=1e-9)
 
 
 def test_each_dimension_has_its_own_filter_without_delay() -> None:
@@ -59,8 +57,7 @@ def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wa
     found = learn_filter(0.5, zip(values, smooth, strict=True), training, values)
     errors = [np.abs(found.taps - each.scale_to(0.5).taps).max() for each in (noisy, freed)]
     assert errors[1] < 0.1 * errors[0]
-    nothing = learn_filter(1.0, [], training, values)
-    assert nothing.apply(values[0]) == pytest.approx(values[0])
+    assert learn_filter(1.0, [], training, values).apply(values[0]) == pytest.approx(values[0])
 
     def unwanted():
         pytest.fail("motion is generated for a filter of no strength")
@@ -94,8 +91,7 @@ def test_noise_of_the_tracker_is_not_learned() -> None:
     noisy, freed = fit_modulation_filter(tracked, GENERATED), fit_modulation_filter(tracked, GENERATED, resting)
     error = [np.abs(each.taps - FILTER.taps).max() for each in (noisy, freed)]
     assert error[1] < 0.5 * error[0]
-    short = [resting[0][:REACH]] * 100
-    assert np.array_equal(fit_modulation_filter(tracked, GENERATED, short).taps, noisy.taps)
+    assert np.array_equal(fit_modulation_filter(tracked, GENERATED, [resting[0][:REACH]] * 100).taps, noisy.taps)
 
 
 def test_what_never_moves_is_left_as_it_is() -> None:
@@ -105,8 +101,7 @@ def test_what_never_moves_is_left_as_it_is() -> None:
 
 
 def test_it_is_stored() -> None:
-    stored = filter_from_arrays(filter_to_arrays(FILTER), 2)
-    assert np.array_equal(stored.taps, FILTER.taps)
+    assert np.array_equal(filter_from_arrays(filter_to_arrays(FILTER), 2).taps, FILTER.taps)
     nothing = filter_to_arrays(None)
     assert filter_from_arrays(nothing, 2) is None
     too_large = np.full_like(FILTER.taps, MODULATION["modulation"].maximum + 1)

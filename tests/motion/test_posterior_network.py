@@ -21,8 +21,7 @@ def posteriors(number: int, source: str = SOURCE) -> TokenPosteriors:
     """Return posteriors in which one of three tokens is probable for 0.2 s each."""
     rng = np.random.default_rng(number)
     values = rng.normal(-8, 0.5, (FRAMES // 2, TOKENS))
-    said = np.repeat(rng.integers(3, size=FRAMES // 20), 10)
-    values[np.arange(len(values)), said] = -0.1
+    values[np.arange(len(values)), np.repeat(rng.integers(3, size=FRAMES // 20), 10)] = -0.1
     return TokenPosteriors(values.astype(np.float16), source, 0.95)
 
 

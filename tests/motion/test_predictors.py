@@ -270,8 +270,7 @@ def test_a_useless_prior_is_left_out() -> None:
 
 def test_folds_part_all_examples() -> None:
     for count in (1, 2, 5, 9):
-        outside = [number for _, out in split_folds(count) for number in out]
-        assert sorted(outside) == list(range(count))
+        assert sorted([number for _, out in split_folds(count) for number in out]) == list(range(count))
     assert all(not set(inside) & set(out) for inside, out in split_folds(5))
 
 

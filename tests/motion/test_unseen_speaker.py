@@ -204,8 +204,7 @@ def test_lips_close_within_the_phones_of_unknown_voices() -> None:
 
 
 def test_a_voice_is_known_as_well_with_its_phones_given(welcome: Speech) -> None:
-    with_units = analyse(load_model(), Request(WELCOME, units=welcome.units))
-    assert with_units.voice == pytest.approx(welcome.voice)
+    assert analyse(load_model(), Request(WELCOME, units=welcome.units)).voice == pytest.approx(welcome.voice)
 
 
 @pytest.mark.long

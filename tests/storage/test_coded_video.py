@@ -57,8 +57,7 @@ def test_any_order_gives_the_same_frames(stored, order):
 def test_odd_sizes():
     for size in ((47, 64), (48, 63), (17, 19)):
         frames = film(3, size)
-        stored = encode_video(frames, 25.0)
-        shown = np.stack(list(stored.decode(range(3))))
+        shown = np.stack(list(encode_video(frames, 25.0).decode(range(3))))
         assert shown.shape == frames.shape
         assert psnr_db(shown, frames) > 34
         pictures = decode_pictures(encode_pictures(frames))
@@ -114,8 +113,7 @@ class TestDamage:
         data = stored.data.copy()
         at = int(draw.integers(len(data)))
         if change == "flip":
-            places = draw.integers(len(data), size=20)
-            data[places] ^= draw.integers(1, 256, size=20).astype(np.uint8)
+            data[draw.integers(len(data), size=20)] ^= draw.integers(1, 256, size=20).astype(np.uint8)
         elif change == "cut":
             data = data[:at]
         elif change == "zeros":

@@ -122,8 +122,7 @@ def generation(frames: int = 101) -> Generation:
     """A second of a line, its variance the square of the frame's number, ten states."""
     line = np.arange(frames, dtype=float)[:, None]
     units = Timeline((Span(0.0, 1.0, Unit("aa")),))
-    states = tuple(f"state {number}" for number in range(10))
-    trace = StateTrace(states, np.minimum(np.arange(frames) // 10, 9))
+    trace = StateTrace(tuple(f"state {number}" for number in range(10)), np.minimum(np.arange(frames) // 10, 9))
     return Generation(Motion(line, 100.0, (Channel("opening"),)), line**2, units, trace)
 
 
@@ -227,7 +226,7 @@ def test_what_fits_is_taken_out_in_its_type() -> None:
 
 
 def test_what_does_not_fit_is_named_with_its_place() -> None:
-    wrong = {
+    for message, value in {
         "at is missing, required a value": {},
         "at[1] is 2, required a number from -1 to 1": {"at": [0, 2]},
         "at[0] is true, required a number": {"at": [True, 0]},
@@ -240,8 +239,7 @@ def test_what_does_not_fit_is_named_with_its_place() -> None:
         "kind is true, required one of a, 1": {"at": [0, 0], "kind": True},
         "kind is an object": {"at": [0, 0], "kind": {}},
         "the document is a list, required an object": [],
-    }
-    for message, value in wrong.items():
+    }.items():
         with pytest.raises(SchemaError) as refused:
             POINT(value)
         assert str(refused.value).startswith(message)

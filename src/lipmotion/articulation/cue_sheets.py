@@ -212,8 +212,7 @@ def compute_frame_costs(generation: Generation, frames: int, fps: float, intensi
         spread = np.clip(intensity * spread, *limits)
         cost += SPREAD_WEIGHT * voiced[:, None] * (spread[:, None] - _POSES[:, 1]) ** 2
     cost *= COST_RATE_HZ / fps
-    closing = mark_closing_phones(generation.units)
-    for span, closes in zip(generation.units, closing, strict=True):
+    for span, closes in zip(generation.units, mark_closing_phones(generation.units), strict=True):
         if closes or span.label.phone in LIP_BITING:
             shape, penalty = ("A", UNCLOSED_COST) if closes else ("G", UNBITTEN_COST)
             frame = min(int(_find_least_open_s(span, generation.motion) * fps), frames - 1)

@@ -141,8 +141,7 @@ def mark_edited(motion: Motion, edits: Sequence[CurveEdit]) -> Motion:
 def weigh_edits(time_s: Curve, edits: Sequence[CurveEdit]) -> Curve:
     """Return how far some of the edits act at each time, 0 to 1 [shape=(T,)]."""
     ends = [(edit.time_s,) * 2 if isinstance(edit, Pin) else (edit.start_s, edit.end_s) for edit in edits]
-    none = np.zeros(len(time_s))
-    return np.max([none, *(weigh_span(time_s, *each, PIN_REACH_S) for each in ends)], axis=0)
+    return np.max([np.zeros(len(time_s)), *(weigh_span(time_s, *each, PIN_REACH_S) for each in ends)], axis=0)
 
 
 class MotionStretch(NamedTuple):

@@ -73,8 +73,7 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
         curves = {mood: curve + share * (wanted[mood] - curve) for mood, curve in curves.items()}
     added = [curve[:, None].astype(motion.values.dtype) for curve in curves.values()]
     values = np.concatenate([others.values, *added], axis=1)
-    channels = (*others.channels, *(Channel(PREFIX + mood, WEIGHT) for mood in curves))
-    return Motion(values, motion.rate_hz, channels)
+    return Motion(values, motion.rate_hz, (*others.channels, *(Channel(PREFIX + mood, WEIGHT) for mood in curves)))
 
 
 def list_action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:

@@ -78,12 +78,11 @@ def build_mouth() -> MouthTemplate:
     text = resources.files("lipmotion.articulation").joinpath("lip_points.csv").read_text(encoding="ascii")
     rows = list(csv.DictReader(text.splitlines()))
     points = tuple(int(row["point"]) for row in rows)
-    kinds = {kind: np.array([kind in row["place"] for row in rows]) for kind in "upper lower corner jaw inner".split()}
     return MouthTemplate(
         points,
         np.array([[float(row[axis]) for axis in "xyz"] for row in rows]),
         mirrored=np.array([points.index(int(row["mirrored"])) for row in rows]),
-        **kinds,
+        **{kind: np.array([kind in row["place"] for row in rows]) for kind in "upper lower corner jaw inner".split()},
     )
 
 

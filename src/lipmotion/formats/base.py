@@ -446,8 +446,7 @@ class Thinning:
         for each_s in self.closed_s:
             nearest = int(np.abs(time_s - each_s).argmin())
             is_kept[max(nearest - 1, 0) : nearest + 2] = True
-        fixed = np.flatnonzero(is_kept).tolist()
-        open_ends = list(pairwise(fixed))
+        open_ends = list(pairwise(np.flatnonzero(is_kept).tolist()))
         while open_ends:
             first, last = open_ends.pop()
             if last - first < 2:

@@ -436,8 +436,7 @@ def _plain(name: str) -> str:
 def _steady(places: Array, rigid: int) -> Array:
     """Return places [shape=(T, N, 3)] moved so that the first ones lie as in the first frame (Kabsch 1976)."""
     centres = places[:, :rigid].mean(axis=1, keepdims=True)
-    wanted = places[0, :rigid] - centres[0]
-    covariances = np.einsum("tni,nj->tij", places[:, :rigid] - centres, wanted)
+    covariances = np.einsum("tni,nj->tij", places[:, :rigid] - centres, places[0, :rigid] - centres[0])
     left, _, right = np.linalg.svd(covariances)
     signs = np.ones((len(places), 3))
     signs[:, 2] = np.sign(np.linalg.det(left @ right))

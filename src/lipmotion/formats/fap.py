@@ -140,8 +140,7 @@ def move_faps(motion: Motion, units: Timeline[Unit]) -> Motion:
         np.rint(sign * moved[:, template.row(point), axis] / lengths[unit] * STEPS)
         for _, _, point, axis, sign, unit in PARAMETERS
     ]
-    channels = tuple(Channel(name, FAP) for name in NAMES.values())
-    return Motion(np.stack(columns, axis=1), motion.rate_hz, channels)
+    return Motion(np.stack(columns, axis=1), motion.rate_hz, tuple(Channel(name, FAP) for name in NAMES.values()))
 
 
 MOTION_FORMAT = MotionFormat(write, read, check, curves="fap")

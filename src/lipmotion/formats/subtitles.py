@@ -227,8 +227,7 @@ def _read_dialogue(text: str, where: str) -> Iterator[TimedLabel]:
 
 def clock(seconds: float, mark: str) -> str:
     """Return a time as ``HH:MM:SS.mmm``; ``mark``: what stands before the thousandths."""
-    thousandths = round(seconds * 1000)
-    minutes, rest = divmod(thousandths, 60_000)
+    minutes, rest = divmod(round(seconds * 1000), 60_000)
     return f"{minutes // 60:02d}:{minutes % 60:02d}:{rest // 1000:02d}{mark}{rest % 1000:03d}"
 
 

@@ -128,8 +128,7 @@ def timecode(time_s: float) -> str:
     >>> timecode(3725.025)
     '01:02:05:01.500'
     """
-    thousandths = round(time_s * TICKS_HZ * 1000)
-    seconds, part = divmod(thousandths, TICKS_HZ * 1000)
+    seconds, part = divmod(round(time_s * TICKS_HZ * 1000), TICKS_HZ * 1000)
     frames, part = divmod(part, 1000)
     return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}:{frames:02d}.{part:03d}"
 

@@ -244,8 +244,7 @@ def _read_table(text: str, columns: dict[str, int], where: str, given: str = "")
             raise InputError(f"{where}: {place} is {shorten(line)!r}; required, as in line 1: {header}") from error
         start_s, end_s = (require_time(time, place, where) for time in times)
         end_s += 0.0 if row.get("end") else start_s
-        key = (row.get("kind", named), row.get("speaker", ""))
-        kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))
+        kinds[(row.get("kind", named), row.get("speaker", ""))].append(TimedLabel(start_s, end_s, row["text"], place))
     tiers = [find_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
     whole = all(label.start_s % 1 == 0 == label.end_s % 1 for tier in tiers for label in tier.labels)
     return parse_seconds(tiers, where, 1000 if whole and header == "start\tend\ttext" else 0)  # Whisper's

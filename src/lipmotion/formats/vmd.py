@@ -109,8 +109,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             f"the motion has none of the morphs あ い う え お; its morphs are: {named}; "
             f"it moves {len(bones)} bones and has {camera} keys of a camera; save the motion of the face"
         )
-    last = max(keys[-1][0] for keys in (*morphs.values(), *bones.values()))
-    frames = np.arange(last + 1)
+    frames = np.arange(max(keys[-1][0] for keys in (*morphs.values(), *bones.values())) + 1)
     curves: dict[str, tuple[np.ndarray, str]] = {}
     for morph, keys in sorted(morphs.items(), key=lambda each: each[0] not in MORPHS):
         at, values = zip(*keys, strict=True)

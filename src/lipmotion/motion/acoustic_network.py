@@ -187,8 +187,7 @@ def _train(training: PredictorTraining, mean: Array, scale: Array) -> Convolutio
         versions = pieces()[number]
         return cut_random_piece(versions[int(rng.integers(len(versions)))], rng)
 
-    plan = TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED)
-    return SHAPE.train(training, len(mean) + 1, draw, plan)
+    return SHAPE.train(training, len(mean) + 1, draw, TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED))
 
 
 def _sequence(version: ConditionSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:

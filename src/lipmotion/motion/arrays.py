@@ -44,9 +44,8 @@ def motion_to_arrays(
 
 def learned_motion_to_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
     """Serialise learned motion with limits, variance scaling and modulation filter, for engines that store no more."""
-    arrays = motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior)
     return (
-        arrays
+        motion_to_arrays(PHONE_SET, motion.space, motion.closure, motion.prior)
         | {"limits": np.stack(motion.limits)}
         | scaling_to_arrays(motion.scaling)
         | filter_to_arrays(motion.modulation)

@@ -148,8 +148,7 @@ def smooth_steps(steps: Array) -> Array:
     reach = int(np.ceil(4 * deviation))
     weights = np.exp(-np.square(np.arange(-reach, reach + 1) / deviation) / 2)
     padded = np.pad(steps, ((reach, reach), (0, 0)), mode="edge")
-    columns = [np.convolve(column, weights / weights.sum(), mode="valid") for column in padded.T]
-    return np.stack(columns, axis=1)
+    return np.stack([np.convolve(column, weights / weights.sum(), mode="valid") for column in padded.T], axis=1)
 
 
 @cache

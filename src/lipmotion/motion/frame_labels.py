@@ -38,8 +38,7 @@ def is_away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], 
 
 def find_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Return first frame and the one after the last of each run of True in a mask [shape=(T,)] [shape=(R, 2)]."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    return edges.reshape(-1, 2)
+    return np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]))).reshape(-1, 2)
 
 
 def list_speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:

@@ -51,8 +51,7 @@ def fit_scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Ar
     ``LARGEST_FACTOR``.
     """
     wanted, made = (np.mean([clip.std(axis=0) for clip in clips], axis=0) for clips in (recorded, generated))
-    ratio = wanted / np.maximum(made, MIN_DEVIATION)
-    return np.clip(ratio, 1.0, LARGEST_FACTOR)
+    return np.clip(wanted / np.maximum(made, MIN_DEVIATION), 1.0, LARGEST_FACTOR)
 
 
 class VarianceScaling(NamedTuple):
@@ -180,8 +179,7 @@ class LearnedMotion:
             spread[inner] = variance[inside]
         weights = [channel.unit == WEIGHT for channel in space.channels]
         motion[:, weights] = np.maximum(motion[:, weights], 0)
-        variances = ReducedVariance(spread, space.mixing.astype(precision))
-        return Motion(motion, FRAME_RATE_HZ, space.channels), variances
+        return Motion(motion, FRAME_RATE_HZ, space.channels), ReducedVariance(spread, space.mixing.astype(precision))
 
     def _solve_block(self, statistics: Statistics, pins: Pins, ranges: Sequence[slice]) -> Statistics:
         """Return values and variances of a block [each shape=(T, Q)], with the lips closed once in every range.

@@ -158,8 +158,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
                 stage = f"training the {self.name}"
                 training.monitor(Progress(stage, step, plan.steps, step / plan.steps, figure=error))
 
-        start = self.initial(outputs, plan.seed)
-        network = fit_network(start, draw, len(training.examples), weights, plan, report)
+        network = fit_network(self.initial(outputs, plan.seed), draw, len(training.examples), weights, plan, report)
         training.checkpoint.save(self.name, self.arrays(network))
         return network
 

@@ -246,8 +246,7 @@ def pins_are_exact(trained: TrainedEngine) -> None:
     """A pinned value holds in the nearest frame, with variance 0; of two in one frame the last holds."""
     spoken = speech(timeline(("p", "aa", "m")))
     draw = np.random.default_rng(0)
-    frames = len(spoken.features.values)
-    pins = {int(frame): float(draw.uniform(0, 0.5)) for frame in draw.integers(0, frames, 8)}
+    pins = {int(frame): float(draw.uniform(0, 0.5)) for frame in draw.integers(0, len(spoken.features.values), 8)}
     result = trained.generate(spoken, *(Pin(frame / RATE_HZ, "width", value) for frame, value in pins.items()))
     for frame, value in pins.items():
         found = float(result.motion["width"][frame])
@@ -291,8 +290,7 @@ def a_model_comes_back_from_arrays(trained: TrainedEngine) -> None:
     difference = float(np.abs(stored.motion.values - result.motion.values).max())
     require(difference < 5e-3, f"motion of the stored model differs by {difference:g}")
     require(stored.motion.channels == result.motion.channels, "other channels")
-    again = engine.from_arrays(engine.to_arrays(back))
-    _require_same(engine.generate(again, spoken), stored, "storing twice")
+    _require_same(engine.generate(engine.from_arrays(engine.to_arrays(back)), spoken), stored, "storing twice")
 
 
 def damaged_arrays_are_format_errors(trained: TrainedEngine) -> None:
@@ -313,26 +311,23 @@ def damaged_arrays_are_format_errors(trained: TrainedEngine) -> None:
 def every_phone_can_be_said(trained: TrainedEngine) -> None:
     """All phones of the inventory, in a context that was not trained on."""
     for phone in INVENTORY:
-        result = trained.generate(speech(timeline(("aa", phone, "zh", phone))))
-        opening = result.motion["opening"]
+        opening = trained.generate(speech(timeline(("aa", phone, "zh", phone)))).motion["opening"]
         plausible = bool(np.isfinite(opening).all() and -1 < opening.min() <= opening.max() < 2)
         require(plausible, f"the opening in {phone!r} is from {opening.min():g} to {opening.max():g}")
 
 
 def odd_timelines_are_no_problem(trained: TrainedEngine) -> None:
     """No units, silence alone, gaps, hardly any time, beyond both ends; recordings of one frame."""
-    timelines = (
+    for units in (
         Timeline[Unit](()),
         Timeline((Span(0.0, 0.5, Unit("sil")),)),
         Timeline((Span(0.0, 0.5, Unit("aa")),)),
         Timeline((Span(0.1, 0.1, Unit("p")), Span(0.2, 0.2001, Unit("aa")), Span(0.31, 0.4, Unit("m")))),
         Timeline((Span(-1.0, 0.2, Unit("aa")), Span(0.2, 9.0, Unit("p")))),
-    )
-    for units in timelines:
+    ):
         for frames in (1, 2, 3, 51):
             features = Features(np.zeros((frames, 39), np.float32), (frames - 1) / RATE_HZ)
-            result = trained.generate(Speech(features, units))
-            _require_numbers(result, (frames, len(CHANNELS)))
+            _require_numbers(trained.generate(Speech(features, units)), (frames, len(CHANNELS)))
 
 
 def nothing_to_learn_from_is_a_corpus_error(trained: TrainedEngine) -> None:
@@ -364,8 +359,7 @@ def one_short_example_is_enough(trained: TrainedEngine) -> None:
     """Training on two phones gives finite motion."""
     model = trained.engine.fit([example(("p", "aa"))], silent_monitor).model
     spoken = speech(timeline(SENTENCE))
-    result = trained.engine.generate(model, spoken)
-    _require_numbers(result, (len(spoken.features.values), len(CHANNELS)))
+    _require_numbers(trained.engine.generate(model, spoken), (len(spoken.features.values), len(CHANNELS)))
 
 
 def optional_members_are_kept(trained: TrainedEngine) -> None:

@@ -315,8 +315,7 @@ def _separate_lips(heights: Array, across: Array, gap: Array) -> Array:
 def _invent_points(motion: Motion, rest: NDArray[np.bool_], mouth: SpokenMouth) -> Array:
     """Return displacements of the points from distances alone [shape=(T, 52, 3)]."""
     template = build_mouth()
-    across = np.clip(template.places[:, 0] / (template.width / 2), -1, 1)
-    middle = np.sqrt(1 - across**2)
+    middle = np.sqrt(1 - np.clip(template.places[:, 0] / (template.width / 2), -1, 1) ** 2)
     rise = weigh_upper(mouth.gap)
     drop = mouth.gap - rise
     moved = np.zeros((len(mouth.gap), len(template.points), 3))

@@ -52,8 +52,7 @@ class ControlBinding:
         """The weights as sparse rows [shape=(N, C)]."""
         from scipy.sparse import csr_array
 
-        count = self.controls.shape[1]
-        starts = np.arange(0, self.controls.size + 1, count)
+        starts = np.arange(0, self.controls.size + 1, self.controls.shape[1])
         shape = (len(self.rows), len(self.placement.points))
         return csr_array((self.weights.reshape(-1), self.controls.reshape(-1), starts), shape=shape)
 
