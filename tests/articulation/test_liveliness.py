@@ -19,9 +19,7 @@ from meshes.speech import motion, units
 
 MINUTE = Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),))
 PHRASE = ((0, 3, "aa"), (3, 4, "sil"))
-SAID = Timeline(
-    tuple(Span(4.0 * n + start, 4.0 * n + end, Unit(phone)) for n in range(15) for start, end, phone in PHRASE)
-)
+SAID = Timeline(tuple(Span(s + start, s + end, Unit(phone)) for s in range(0, 60, 4) for start, end, phone in PHRASE))
 
 
 SILENT = Timeline((Span(0.0, 60.0, Unit("sil")),))

@@ -114,9 +114,7 @@ def test_all_pages_say_the_same_of_how_long_training_takes():
     said = [re.findall(r"(\w+ \w+ \w+) for 22 minutes of recordings", page) for page in pages]
     assert said == [["about three minutes"], ["about three minutes"]]
     speed = (DOCS / "results" / "figures.md").read_text(encoding="utf-8").split("## Speed")[1]
-    seconds, clips = re.findall(r"`train`, (\d+) clips .* about three minutes for the 452 .* \| (\d+) s \|", speed)[0][
-        ::-1
-    ]
+    ((clips, seconds),) = re.findall(r"`train`, (\d+) clips .* about three minutes for the 452 .* \| (\d+) s \|", speed)
     assert 150 <= float(seconds) * 452 / float(clips) <= 210
 
 

@@ -233,9 +233,8 @@ def shapes(request):
 @pytest.fixture(scope="module")
 def weights(shapes):
     """Of motion with points for the mesh, of distances alone for the reference."""
-    return shape_weights.solve_shape_weights(
-        motion(points=shapes is not blendshape_motion.arkit_mouth()), units(), shapes
-    )
+    of_mesh = shapes is not blendshape_motion.arkit_mouth()
+    return shape_weights.solve_shape_weights(motion(points=of_mesh), units(), shapes)
 
 
 def test_weights_are_between_0_and_1_and_smooth_and_pucker_in_oo(weights):

@@ -229,9 +229,7 @@ def test_what_is_written_of_a_character_is_read(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_uneven_keys_are_sampled(
-    tmp_path: Path, kind: str, values: Any, expected: dict[float, tuple[float, float]]
-) -> None:
+def test_uneven_keys_are_sampled(tmp_path, kind, values, expected):
     motion, _ = read_motion(animated(tmp_path, [0.5, 1.0, 2.0], values, kind))
     assert motion.rate_hz == 60
     for time_s, row in expected.items():
@@ -441,9 +439,7 @@ def test_held_weights_change_at_once(original: Path, tmp_path: Path) -> None:
     assert stored["jawOpen"] == pytest.approx([0, 0, 0, 1])
 
 
-def test_what_is_no_morph_target_and_buffers_elsewhere_are_left_to_another_writer(
-    original: Path, tmp_path: Path
-) -> None:
+def test_what_is_no_morph_target_and_buffers_elsewhere_are_left_to_another_writer(original, tmp_path):
     content, binary = gltf.document()
     content["buffers"][0]["uri"] = gltf.data_uri(binary)
     (tmp_path / "elsewhere.gltf").write_text(json.dumps(content))

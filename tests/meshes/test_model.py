@@ -175,10 +175,8 @@ def _table(tmp_path, text):
 
 
 def test_controls_follow_their_sources_or_are_constant(tmp_path):
-    text = (
-        "control,source,gain,offset,low,high\nJaw.rz,jawOpen,-25,,-20,0\nLips,mouthPucker,0.5\nLips,jawOpen,-0.25,0.1\n"
-    )
-    motion = apply_rig(_table(tmp_path, text), SOURCES, 25.0)
+    rows = "Jaw.rz,jawOpen,-25,,-20,0\nLips,mouthPucker,0.5\nLips,jawOpen,-0.25,0.1\n"
+    motion = apply_rig(_table(tmp_path, f"control,source,gain,offset,low,high\n{rows}"), SOURCES, 25.0)
     assert motion.names == ("Jaw.rz", "Lips")
     np.testing.assert_allclose(motion["Jaw.rz"], [0, -12.5, -20])
     np.testing.assert_allclose(motion["Lips"], [0.1, 0.475, -0.15])

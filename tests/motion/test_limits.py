@@ -227,9 +227,8 @@ def test_distances_are_modelled_as_they_are_points_in_components_and_variance_is
     variance = np.random.default_rng(2).uniform(0.1, 1, (1, 4))
     _, spread = space.restore(np.zeros((1, 4)), variance)
     assert spread[0, [1, 3]] == pytest.approx(variance[0, :2])
-    assert spread[0, [0, 2, 4]] == pytest.approx(
-        np.diag(space.points.basis.T @ np.diag(variance[0, 2:]) @ space.points.basis)
-    )
+    basis = space.points.basis
+    assert spread[0, [0, 2, 4]] == pytest.approx(np.diag(basis.T @ np.diag(variance[0, 2:]) @ basis))
 
 
 def seen(count: int) -> np.ndarray:
@@ -346,9 +345,8 @@ def test_the_modulation_filter_keeps_pins_closures_and_blocks(whole):
     assert len(ranges) > 5
     for each in ranges:
         assert filtered[each].min() <= plain[each].min()
-    assert ENGINE.generate(model, *delayed()).motion["opening"][BEFORE + 100 :] == pytest.approx(
-        filtered[100:], abs=1e-7
-    )
+    late = ENGINE.generate(model, *delayed()).motion["opening"]
+    assert late[BEFORE + 100 :] == pytest.approx(filtered[100:], abs=1e-7)
 
 
 OPTIONS = {"articulation": False, "states": 3, "silent_states": 7, "components": 2, "acoustic_components": 20}
@@ -376,9 +374,8 @@ def noisy_clips():
 
 @pytest.mark.long
 def test_the_full_range_is_nearer_to_the_original(noisy_clips):
-    engines = [
-        engine_named("trajectory", {**OPTIONS, "variance_scaling": on, "closures": False}) for on in (False, True)
-    ]
+    options = {**OPTIONS, "closures": False}
+    engines = [engine_named("trajectory", {**options, "variance_scaling": on}) for on in (False, True)]
     learned = engines[0].fit(noisy_clips, silent_monitor).model
     assert 1 < learned.variance_factors[0] <= LARGEST_FACTOR
     spreads = [

@@ -27,10 +27,8 @@ from lipmotion.testing import example, examples, speech, timeline
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example, PriorOutput, TokenPosteriors, silent_monitor
 
 PAGE = Path(__file__).parents[2] / "docs" / "extend" / "predictor.md"
-SMALL = {
-    "trajectory": {"acoustic_regression": False, "joint_recogniser": False},
-    "selection": {"joint_recogniser": False},
-}
+ALONE = {"joint_recogniser": False}
+SMALL = {"trajectory": {"acoustic_regression": False, **ALONE}, "selection": ALONE}
 PREFIX = "predictor.frames."
 
 

@@ -187,10 +187,9 @@ def test_habits_are_what_is_left_in_each_viseme() -> None:
     mapped, maps = speaker_maps.map_to_mean_person(examples, names)
     planted = np.zeros((len(speaker_maps.VISEME_NAMES), 3))
     planted[speaker_maps.VISEME_NAMES.index("lr1"), 1], planted[speaker_maps.VISEME_NAMES.index("al"), 2] = 0.1, -0.2
-    generated = [each.motion.values for each in mapped[:6]]
-    generated += [
-        x.motion.values - speaker_maps.weigh_visemes(x.speech.units, len(x.motion.values)) @ planted for x in mapped[6:]
-    ]
+    generated = [each.motion.values.copy() for each in mapped]
+    for each, values in zip(mapped[6:], generated[6:], strict=True):
+        values[:] -= speaker_maps.weigh_visemes(each.speech.units, len(values)) @ planted
     found = speaker_maps.add_habits(maps, mapped, names, generated)
     np.testing.assert_allclose(found.of("anna").habits, 0, atol=1e-12)
     habits = found.of("ben").habits

@@ -146,9 +146,8 @@ def _speak_sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.ra
     while sum(durations_s[1:]) < SPEECH_S:
         words.append(next(vocabulary))
         labels += [Unit(phone, word=words[-1]) for phone in WORDS[words[-1]]]
-        durations_s += [
-            (0.17 if phone[0] in "aeiou" else 0.105) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]
-        ]
+        usual_s = (0.17 if phone[0] in "aeiou" else 0.105 for phone in WORDS[words[-1]])
+        durations_s += [duration_s * rng.uniform(0.85, 1.15) for duration_s in usual_s]
     labels, durations_s = [*labels, Unit("sil")], [*durations_s, rng.uniform(*SILENCE_S)]
     phones = [(label.phone, duration_s) for label, duration_s in zip(labels, durations_s, strict=True)]
     audio, units = synthesise(phones, pitch_hz=rng.uniform(*PITCH_HZ), seed=int(rng.integers(2**31)))
@@ -173,9 +172,8 @@ def _utterance(sentence: ToySentence) -> Utterance:
         picture = (1 - share) * picture + share * np.array(colour)
     track = Track(motion, np.ones(len(motion.values), dtype=bool), np.rint(picture).astype(np.uint8))
     source = {"file": "", "licence": "synthesised by lipmotion"}
-    return Utterance(
-        sentence.name, sentence.audio, analysed(sentence.audio).mfcc(), track, sentence.words, sentence.split, source
-    )
+    features = analysed(sentence.audio).mfcc()
+    return Utterance(sentence.name, sentence.audio, features, track, sentence.words, sentence.split, source)
 
 
 def _targets(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArray[np.float64]:

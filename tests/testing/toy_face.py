@@ -134,10 +134,8 @@ def _levels(sentence: ToySentence, frames: int) -> Array:
 
 def _shapes(motion: Motion) -> Array:
     """Return opening, width, outer and place of the chin in every frame, px of the face [shape=(T, 4)]."""
-    distances = (
-        np.stack([motion[name] for name in ("opening", "width", "outer")], axis=1) * mouth_region.EYE_DISTANCE_PX
-    )
-    return np.column_stack([distances, toy_chin_px(motion)])
+    distances = [motion[name] * mouth_region.EYE_DISTANCE_PX for name in ("opening", "width", "outer")]
+    return np.column_stack([*distances, toy_chin_px(motion)])
 
 
 def _picture(x: Values, y: Values, shape: Array, pixel_px: float, noise: float, draw: np.random.Generator) -> Pictures:

@@ -323,11 +323,11 @@ def format_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
         yield from text[used].tobytes().decode("ascii").splitlines()
 
 
-def write_json(path: Path, before: Mapping[str, Any], rows_of: str, values: Array, after: Mapping[str, Any]) -> None:
-    """Write one JSON object: members ``before``, one called ``rows_of`` with a row a line, members ``after``."""
+def write_json(path: Path, before: Mapping[str, Any], key: str, values: NDArray[Any], after: Mapping[str, Any]) -> None:
+    """Write one JSON object: members ``before``, one called ``key`` with a row a line, members ``after``."""
     start, end = as_json(before, ensure_ascii=False)[:-1], as_json(after, ensure_ascii=False)[1:]
     with path.open("w", encoding="utf-8") as file:
-        file.write(f'{start}, "{rows_of}": [\n')
+        file.write(f'{start}, "{key}": [\n')
         for number, row in enumerate(format_rows(values)):
             file.write(f",\n[{row}]" if number else f"[{row}]")
         file.write(f"\n]{', ' if after else ''}{end}\n")
