@@ -15,8 +15,7 @@ from programs import python_with, run_with
 
 __all__ = ["generation"]
 pytestmark = [pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)"), pytest.mark.long]
-ROUNDED = 6e-5
-"""The frames that show a closure are chosen among values of five decimals, or of six."""
+ROUNDED = 6e-5  # the frames that show a closure are chosen among values of five decimals, or of six
 RIG = "jaw.master.rotation.x,jawOpen,25\njaw.master[open],opening,1\n[lips],opening,2\n"
 
 

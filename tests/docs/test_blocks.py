@@ -19,8 +19,7 @@ TESTED = {
     "recipes/": "docs/test_corpus_recipes.py",
 }  # fmt: skip
 """Pages, or folders of pages, with a test of their own."""
-RESULTS = "docs/results/"
-"""Pages that are the output of the commands on them: their sheets have commit and date."""
+RESULTS = "docs/results/"  # pages that are the output of the commands on them: their sheets have commit and date
 ALL = [block for page in ("README", *pages()) for block in blocks(page)]
 HERE = [block for block in ALL if not block.last and not block.page.startswith((*TESTED, RESULTS))]
 

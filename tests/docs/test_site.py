@@ -10,8 +10,7 @@ from children import environment, run_child
 from docs.site_pages import ROOT, SETTINGS, pages
 from docs.test_links import links
 
-TOOLS = Path(sys.prefix) / "site-tools"
-"""Where ``make site`` installs Sphinx."""
+TOOLS = Path(sys.prefix) / "site-tools"  # where ``make site`` installs Sphinx
 
 
 def test_the_sidebar_holds_every_page_once():

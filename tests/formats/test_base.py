@@ -25,10 +25,8 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.resampling import resample_speech
 from lipmotion.types import Audio, Channel, Generation, Motion, ReducedVariance, Timeline, from_sixteen_bits
 
-EXACT = (".json", ".csv", ".npz", ".c3d")
-"""Formats that hold any channels."""
-UNITLESS = (".csv", ".c3d")
-"""Formats that hold no phones."""
+EXACT = (".json", ".csv", ".npz", ".c3d")  # formats that hold any channels
+UNITLESS = (".csv", ".c3d")  # formats that hold no phones
 
 
 def write(path: Path, generation: Generation) -> Path:

@@ -27,8 +27,7 @@ from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline,
 from lipmotion_faces.characters.gltf_document import read_gltf_document
 
 BVH_FRAMES = 60
-BLENDER = os.environ.get("LIPMOTION_BPY_PYTHON", "")
-"""A Python that has the package ``bpy``."""
+BLENDER = os.environ.get("LIPMOTION_BPY_PYTHON", "")  # a Python that has the package ``bpy``
 IN_BLENDER = """
 import bpy, json, sys
 bpy.ops.wm.read_factory_settings(use_empty=True)

@@ -260,8 +260,7 @@ def long_capture(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-TWO = b"\x02\x01\x02"
-"""What stands before a parameter of two whole numbers."""
+TWO = b"\x02\x01\x02"  # what stands before a parameter of two whole numbers
 NO_LONG, NO_END = {b"LONG_FRAMES": b"XXXX_FRAMES"}, {b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"}
 
 

@@ -48,8 +48,7 @@ def with_skin(content: dict, binary: bytes, joints: np.ndarray, weights: np.ndar
     return binary
 
 
-UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")
-"""Of the square, v goes down."""
+UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")  # of the square, v goes down
 
 
 def textured_document(picture: bytes, material=None, extension=None) -> tuple[dict, bytes]:

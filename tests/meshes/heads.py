@@ -11,12 +11,10 @@ from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.types import Motion
 from lipmotion_faces.characters import gltf_writer, scene
 
-SEAM, HALF = -0.86, 0.3
-"""Height of the mouth and half its width, in eye distances."""
+SEAM, HALF = -0.86, 0.3  # height of the mouth and half its width, in eye distances
 COLUMNS = np.linspace(-1.2, 1.2, 49)
 ROWS = np.linspace(0.34, -2.06, 49)
-SIZE = 10.0
-"""Units of the mesh in an eye distance."""
+SIZE = 10.0  # units of the mesh in an eye distance
 
 
 def head(*, shapes: bool = True, slit: bool = True, size: float = SIZE) -> Mesh:

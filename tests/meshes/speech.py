@@ -7,8 +7,7 @@ from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 PHONES = (("sil", 0.0, 0.5), ("m", 0.5, 0.6), ("aa", 0.6, 0.9), ("p", 0.9, 1.0), ("uw", 1.0, 1.3), ("sil", 1.3, 2.0))
 OPENINGS = (0.005, 0.0, 0.2, 0.0, 0.06, 0.005)
-JAWS = (0.0, 0.03, 0.15, 0.08, 0.05, 0.0)
-"""How far the chin is down: in p the jaw is still open behind closed lips."""
+JAWS = (0.0, 0.03, 0.15, 0.08, 0.05, 0.0)  # how far the chin is down: in p the jaw is still open behind closed lips
 WIDTHS = (0.59, 0.58, 0.60, 0.57, 0.50, 0.59)
 
 

@@ -138,8 +138,7 @@ def test_paint_is_checked(binding, mesh, tmp_path):
             paint_weights(binding, mesh, binding_files.read_weights(tmp_path / "paint.csv"))
 
 
-GRID = 0.05 * SIZE
-"""The distance between vertices."""
+GRID = 0.05 * SIZE  # the distance between vertices
 
 
 def _named(mesh):

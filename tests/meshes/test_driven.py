@@ -135,8 +135,7 @@ def test_control_points_raise_the_corners_in_a_smile(files):
 
 
 COLUMNS = "control,source,gain,offset\n"
-CLOSED = [20, 55, 95]
-"""Frames of silence, m and p."""
+CLOSED = [20, 55, 95]  # frames of silence, m and p
 
 
 @pytest.fixture

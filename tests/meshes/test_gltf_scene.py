@@ -159,8 +159,7 @@ def test_attributes_come_back():
         np.testing.assert_array_equal(meshopt.decode_attributes(packed_attributes(elements), count, stride), elements)
 
 
-TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")
-"""The table at the end of each stream of triangles."""
+TAIL = bytes.fromhex("76 87 56 67 78 a9 86 65 89 68 98 01 69 00 00")  # the table at the end of each stream of triangles
 
 
 @pytest.mark.parametrize(

@@ -285,8 +285,7 @@ SENTENCE = speech(timeline(["sil", *(list(PHONES) * 30)[:40], "sil"]), seed=5)
 PINNED = Constraints((Pin(3.3, "opening", 0.2), Pin(5.01, "opening", 0.1)))
 
 
-BEFORE = 5750
-"""Frames of silence after which the sentence lies on the border of two blocks."""
+BEFORE = 5750  # frames of silence after which the sentence lies on the border of two blocks
 
 
 def delayed():

@@ -12,8 +12,7 @@ from lipmotion.motion.posterior_network import RECURRENT, PosteriorNetwork
 from lipmotion.motion.predictors import PredictorTraining, predictor_from_arrays, predictor_to_arrays
 from lipmotion.types import Channel, ConditionSpectrum, Example, Features, Motion, Speech, Timeline, TokenPosteriors
 
-TRAINED_RECURRENT = posterior_network._train_recurrent
-"""The tests of all else train none (``conftest``)."""
+TRAINED_RECURRENT = posterior_network._train_recurrent  # the tests of all else train none (``conftest``)
 TOKENS, FRAMES, SOURCE = 30, 200, "hama 1.7.0 abc"
 
 

@@ -19,8 +19,7 @@ from lipmotion.types import Constraints, Generation, Pin, Span, Speech, Timeline
 from lipmotion.units import VOWELS
 
 WELCOME = Path(__file__).parent.parent.parent / "examples" / "welcome.flac"
-SHUT_OPENING = 0.015
-"""Eye distances; people do not say a vowel through lips that are so close."""
+SHUT_OPENING = 0.015  # eye distances; people do not say a vowel through lips that are so close
 CONFIDENCES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 

@@ -22,10 +22,8 @@ from lipmotion.types import Audio, Span, Timeline, Unit
 Array = NDArray[np.float64]
 Formants = tuple[float, float, float]
 
-CONTROL_HZ = 320
-"""Rate at which tracks are updated."""
-FLOOR_DB = -70.0
-"""Level of the background noise, in dB of full scale (root mean square)."""
+CONTROL_HZ = 320  # rate at which tracks are updated
+FLOOR_DB = -70.0  # level of the background noise, in dB of full scale (root mean square)
 
 _FORMANT_SMOOTHING_S, _LEVEL_SMOOTHING_S = 0.016, 0.004  # standard deviations
 _HIGH_HZ, _HIGH_WIDTHS_HZ = (4500.0, 3500.0), (280.0, 220.0)  # F5 and F4, the same for all phones

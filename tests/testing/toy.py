@@ -16,12 +16,9 @@ from lipmotion.units import is_silent
 from lipmotion.units.spelling import parse_table
 from testing.formant_synthesiser import synthesise
 
-SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)
-"""Colours, RGB."""
-INNER_WIDTH = 0.8
-"""Width of the inner lips, relative to the width of the mouth."""
-SHADE = 0.15
-"""Share by which the skin is darker at the lower edge of the picture."""
+SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)  # colours, RGB
+INNER_WIDTH = 0.8  # width of the inner lips, relative to the width of the mouth
+SHADE = 0.15  # share by which the skin is darker at the lower edge of the picture
 THINNEST_PX = 0.2
 
 
@@ -51,25 +48,19 @@ LIP_TARGETS = {
 LIPS_TOUCH = frozenset({"p", "b", "m"})
 
 CHANNELS = (Channel("opening"), Channel("width"), Channel("outer"))
-LIP_THICKNESS = 0.22
-"""``outer`` exceeds ``opening`` by this much."""
-LIP_LEAD_S = 0.03
-"""Time by which the lips are ahead of the sound."""
-BLEND_S = 0.12
-"""Time over which neighbouring targets are blended."""
-CLOSING_S = 0.08
-"""Time in which the lips close before p b m, and open after."""
+LIP_THICKNESS = 0.22  # ``outer`` exceeds ``opening`` by this much
+LIP_LEAD_S = 0.03  # time by which the lips are ahead of the sound
+BLEND_S = 0.12  # time over which neighbouring targets are blended
+CLOSING_S = 0.08  # time in which the lips close before p b m, and open after
 
-SPEECH_S = 1.27
-"""A sentence ends with the word that makes its speech at least this long."""
+SPEECH_S = 1.27  # a sentence ends with the word that makes its speech at least this long
 SILENCE_S, PITCH_HZ = (0.4, 0.6), (105.0, 135.0)  # ranges
 
 CAMERA_HZ = 25.0
 FACE_HEIGHT = 256
 _GRID_HZ = 1000
 MOTION_HZ = 100.0
-SMALL = HmmConfig(mixtures=1, iterations=2)
-"""Phone models that are trained in a second."""
+SMALL = HmmConfig(mixtures=1, iterations=2)  # phone models that are trained in a second
 
 
 @dataclass(frozen=True, eq=False)
