@@ -2,14 +2,8 @@ import numpy as np
 import pytest
 
 from formats.examples import of_motion
-from lipmotion.articulation import expression
-from lipmotion.articulation.liveliness import (
-    GAZE_COUNTER_SHARE,
-    LARGEST_GLANCE,
-    compute_liveliness,
-    find_phrases,
-    lid_closure,
-)
+from lipmotion.articulation import expression, liveliness
+from lipmotion.articulation.liveliness import compute_liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, find_mouth
 from lipmotion.pipeline.outputs.deliver import FACTORS, deliver, with_detected, with_manners
 from lipmotion.types import Channel, Generation, Motion, Prosody, Span, Timeline, Unit, VoiceEvent
@@ -46,11 +40,11 @@ def test_eyes_blink_as_people_do_and_are_open_otherwise():
 def test_every_blink_is_seen_at_25_frames_a_second():
     time_s = frames(25)
     for begin in np.arange(0.5, 1.5, 0.013):
-        assert lid_closure(time_s, [begin]).max() > 0.85
+        assert liveliness.lid_closure(time_s, [begin]).max() > 0.85
 
 
 def test_blinks_prefer_the_ends_of_phrases():
-    ends = np.array([end for _, end in find_phrases(SAID)])
+    ends = np.array([end for _, end in liveliness.find_phrases(SAID)])
     lids = (compute_liveliness(frames(100), MINUTE, SAID, None, seed=seed).lids for seed in range(10))
     near = [np.abs(ends - blink / 100).min() < 0.2 for each in lids for blink in closings(each)]
     assert np.mean(near) > 0.25  # 0.4 of every 4 s: 0.1 by chance
@@ -86,7 +80,7 @@ def test_each_part_can_be_off_and_leaves_the_others(part, curve):
 
 def test_without_glances_the_eyes_hold_their_target_while_the_head_turns():
     moved = compute_liveliness(frames(25), MINUTE, SAID, None, gaze=False)
-    assert moved.gaze == pytest.approx(-GAZE_COUNTER_SHARE * moved.turn[:, :2])
+    assert moved.gaze == pytest.approx(-liveliness.GAZE_COUNTER_SHARE * moved.turn[:, :2])
     assert np.ptp(moved.gaze) > 0.01
 
 
@@ -103,7 +97,7 @@ def test_loud_and_high_moments_raise_the_brows_and_nod_the_head():
 
 def test_glances_are_steps_between_rests_and_of_limited_size():
     moved = compute_liveliness(frames(100), MINUTE, SAID, None, head=False)
-    assert np.abs(moved.gaze[:, 0]).max() <= LARGEST_GLANCE[0]
+    assert np.abs(moved.gaze[:, 0]).max() <= liveliness.LARGEST_GLANCE[0]
     assert np.abs(moved.gaze[:, 0]).max() > 0.08
     assert (np.abs(np.diff(moved.gaze[:, 0])) < 1e-6).mean() > 0.8
 

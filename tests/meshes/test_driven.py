@@ -11,14 +11,8 @@ from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import InputError
-from lipmotion.meshes.fitting import driven, eyes_and_brows, shape_weights
-from lipmotion.meshes.fitting.blendshape_motion import (
-    arkit_mouth,
-    arkit_weights,
-    find_own_weights,
-    is_of_blendshapes,
-    with_mouth,
-)
+from lipmotion.meshes.fitting import blendshape_motion, driven, eyes_and_brows, shape_weights
+from lipmotion.meshes.fitting.blendshape_motion import arkit_mouth, with_mouth
 from lipmotion.meshes.model import face_shapes, rig_tables, shape_names
 from lipmotion.meshes.model.mesh import ANGLES, HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit, delivery
@@ -317,19 +311,19 @@ def test_motion_that_became_weights_comes_back() -> None:
 
 
 def test_weights_that_are_given_are_taken_and_other_motion_stays_as_it_is() -> None:
-    given = find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
+    given = blendshape_motion.find_own_weights(weights(head_jawOpen=[0.2, 1.4], mouthPucker=[0.1, 0.2]), arkit_mouth())
     assert given.names == arkit_mouth().names
     assert given["jawOpen"].tolist() == [0.2, 1.0]
     assert given["mouthFunnel"].tolist() == [0.0, 0.0]
     for other in (motion(), weights(mouthPucker=[0.1, 0.2])):  # without a jaw
-        assert find_own_weights(other, arkit_mouth()) is None
+        assert blendshape_motion.find_own_weights(other, arkit_mouth()) is None
         assert with_mouth(other) is other
-        assert not is_of_blendshapes(other)
+        assert not blendshape_motion.is_of_blendshapes(other)
     facegood = weights(mouth_stretch_c=[0.0, 0.6], mouth_pucker_l=[0.4, 0.0], mouth_pucker_r=[0.4, 0.0])
-    found = arkit_weights(facegood)
+    found = blendshape_motion.arkit_weights(facegood)
     assert found["jawOpen"].tolist() == [0.0, 0.6]
     assert found["mouthPucker"].tolist() == pytest.approx([0.4, 0.0])
-    assert is_of_blendshapes(facegood)
+    assert blendshape_motion.is_of_blendshapes(facegood)
 
 
 def test_a_mesh_shows_the_weights_that_are_given() -> None:

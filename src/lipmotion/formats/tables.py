@@ -23,15 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shorten
+from lipmotion.formats import steady_rate
 from lipmotion.formats.base import MotionFormat, format_rows
-from lipmotion.formats.steady_rate import (
-    TIME_COLUMN,
-    clean_column,
-    convert_times,
-    exact_rate,
-    resample_rows,
-    tabulate_frames,
-)
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, is_known, to_arkit
 from lipmotion.storage.text_table import LONGEST_LINE, open_table, parse_numbers
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
@@ -119,7 +112,7 @@ def read_table_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")
-    return Motion(values[:, 1:], exact_rate(round(float(1 / step_s), 6)), channels), Timeline(())
+    return Motion(values[:, 1:], steady_rate.exact_rate(round(float(1 / step_s), 6)), channels), Timeline(())
 
 
 def timecode(time_s: float) -> str:
@@ -186,8 +179,8 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     """
     with open_table(path) as table:
         names = table.names
-        keys = list(map(clean_column, names))
-        timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
+        keys = list(map(steady_rate.clean_column, names))
+        timed = next((column for column, key in enumerate(keys) if steady_rate.TIME_COLUMN.fullmatch(key)), None)
         used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
         if timed is None or not 0 < len(used) <= MAX_CURVES:
             raise ValueError(
@@ -199,8 +192,9 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
         if coded:
             time_s = _read_timecodes([_parse_timecode(text, line) for line, text in times])
         else:
-            time_s = convert_times(np.array([parse_numbers([text], line)[0] for line, text in times]), keys[timed])
-        return resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
+            written = np.array([parse_numbers([text], line)[0] for line, text in times])
+            time_s = steady_rate.convert_times(written, keys[timed])
+        return steady_rate.resample_rows(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
 
 
 def _read_rows(
@@ -264,7 +258,7 @@ def _read_single_scores(
         time = fields[timed].strip()
         lines.setdefault(time, line)
         frames.setdefault(time, {})[fields[named].strip()] = parse_numbers([fields[score]], line)[0]
-    known, values = tabulate_frames(list(frames.values()))
+    known, values = steady_rate.tabulate_frames(list(frames.values()))
     return [(line, time) for time, line in lines.items()], known, values
 
 

@@ -7,12 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.articulation import (
-    ARTICULATION,
-    ArticulationPrior,
-    articulation_from_arrays,
-    articulation_to_arrays,
-)
+from lipmotion.motion import articulation
 from lipmotion.motion.closure import OPENING, Closure
 from lipmotion.motion.generation import LearnedMotion, VarianceScaling
 from lipmotion.motion.modulation_filter import MODULATION, filter_from_arrays, filter_to_arrays
@@ -26,7 +21,7 @@ PHONE_SET = UNIT_SETS["phone"]  # the unit set in which each phone is a unit of 
 
 
 def motion_to_arrays(
-    units: UnitSet, space: MotionSpace, closure: Closure | None, prior: ArticulationPrior | None = None
+    units: UnitSet, space: MotionSpace, closure: Closure | None, prior: articulation.ArticulationPrior | None = None
 ) -> dict[str, NDArray[Any]]:
     """Serialise the mapping of phones to units, the motion space, the closure and the prior."""
     arrays: dict[str, NDArray[Any]] = {
@@ -39,7 +34,7 @@ def motion_to_arrays(
         arrays |= {"points_mean": space.points.mean, "points_basis": space.points.basis.astype(np.float32)}
     if closure is not None:
         arrays |= {"closure": np.array([closure.column, closure.closed]), "closure_follow": closure.follow}
-    return arrays | articulation_to_arrays(prior)
+    return arrays | articulation.articulation_to_arrays(prior)
 
 
 def learned_motion_to_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
@@ -81,7 +76,7 @@ def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> Lea
 
 def motion_from_arrays(
     arrays: Arrays, units: str
-) -> tuple[UnitSet, MotionSpace, Closure | None, ArticulationPrior | None]:
+) -> tuple[UnitSet, MotionSpace, Closure | None, articulation.ArticulationPrior | None]:
     """Deserialise the mapping of phones to units, the motion space, the closure and the prior.
 
     units : the name of the unit set; the set itself is in the arrays
@@ -115,7 +110,7 @@ def motion_from_arrays(
         if len(unit_of_phone) != len(pairs):
             raise ValueError("a phone with two units")
         unit_set = UnitSet(units, unit_of_phone)
-    return unit_set, space, closure, articulation_from_arrays(arrays, space.dimensions)
+    return unit_set, space, closure, articulation.articulation_from_arrays(arrays, space.dimensions)
 
 
 CHANNELS = {"channels": ArraySpec(np.str_, "P 2"), "direct": ArraySpec(np.intp, "d", 0, 1e6)}
@@ -127,7 +122,7 @@ CLOSURE = {"closure": ArraySpec(np.float64, "2"), "closure_follow": ArraySpec(np
 UNITS = {"units": ArraySpec(np.str_, "N 2")}
 LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
 SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
-MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *ARTICULATION)
+MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *articulation.ARTICULATION)
 """Names of the arrays of ``motion_to_arrays``: P channels, of which R are reduced to K dimensions."""
-LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTICULATION, *MODULATION)
+LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *articulation.ARTICULATION, *MODULATION)
 """Names of the arrays of ``learned_motion_to_arrays``."""

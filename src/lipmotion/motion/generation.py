@@ -11,16 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
 from lipmotion.kernels.banded import solve_mlpg
-from lipmotion.motion.articulation import (
-    ArticulationPrior,
-    Predict,
-    Statistics,
-    UnseenSpeaker,
-    choose_closing_reach,
-    count_unseen,
-    fit_articulation_prior,
-    widen_range,
-)
+from lipmotion.motion import articulation
 from lipmotion.motion.closure import Closure, choose_closed_frames, find_closable_ranges, fit_closure, is_never_negative
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionLimits, MotionSpace, fit_reduced_motion, measure_limits
@@ -97,7 +88,7 @@ class LearnedMotion:
     closure: Closure | None
     limits: MotionLimits
     scaling: VarianceScaling | None = None
-    prior: ArticulationPrior | None = None
+    prior: articulation.ArticulationPrior | None = None
     modulation: ModulationFilter | None = None
 
     def for_voice(self, voice: float) -> LearnedMotion:
@@ -108,14 +99,14 @@ class LearnedMotion:
         """
         if self.modulation is None or voice == 1:
             return self
-        strength = np.full(self.space.dimensions, 1 - count_unseen(voice))
+        strength = np.full(self.space.dimensions, 1 - articulation.count_unseen(voice))
         if "width" in self.space.direct_names:
             strength[self.space.direct_names.index("width")] **= 2
         return replace(self, modulation=self.modulation.scale_to(strength))
 
     def generate(  # noqa: PLR0913
         self,
-        statistics: Predict,
+        statistics: articulation.Predict,
         frames: int,
         units: Timeline[Unit],
         constraints: Constraints | None = None,
@@ -150,14 +141,14 @@ class LearnedMotion:
         if self.prior is not None:
             statistics = self.prior.blend(statistics, units, frames, reliability, voice)
             if (voice < 1 or articulators is not None) and scaling is not None and self.closure is not None:
-                speaker = UnseenSpeaker(self.prior, units, frames, reliability, voice)
+                speaker = articulation.UnseenSpeaker(self.prior, units, frames, reliability, voice)
                 statistics = speaker.raise_contrast(statistics)
                 statistics = speaker.open_before_speech(statistics)
-                ranges = find_closable_ranges(units, frames, closing_units, choose_closing_reach(voice))
+                ranges = find_closable_ranges(units, frames, closing_units, articulation.choose_closing_reach(voice))
                 if articulators is not None:
                     statistics = speaker.follow_sound(statistics, articulators)
                     ranges = speaker.confirm_closures(ranges, articulators)
-                gain = widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
+                gain = articulation.widen_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)
         ranges = ranges if close else []
         space, precision = self.space, np.float32 if frames > DOUBLE_FRAMES else np.float64
@@ -181,7 +172,9 @@ class LearnedMotion:
         motion[:, weights] = np.maximum(motion[:, weights], 0)
         return Motion(motion, FRAME_RATE_HZ, space.channels), ReducedVariance(spread, space.mixing.astype(precision))
 
-    def _solve_block(self, statistics: Statistics, pins: Pins, ranges: Sequence[slice]) -> Statistics:
+    def _solve_block(
+        self, statistics: articulation.Statistics, pins: Pins, ranges: Sequence[slice]
+    ) -> articulation.Statistics:
         """Return values and variances of a block [each shape=(T, Q)], with the lips closed once in every range.
 
         Where lips are to close, the opening is generated again with pins at the closed frames; the change of the
@@ -274,5 +267,5 @@ def fit_motion(examples: Sequence[Example], components: int) -> tuple[LearnedMot
     space, values = fit_reduced_motion(examples, components)
     closure = fit_closure(space.direct_names, values, examples)
     valid = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
-    prior = fit_articulation_prior(space, values, examples)
+    prior = articulation.fit_articulation_prior(space, values, examples)
     return LearnedMotion(space, closure, measure_limits(valid), prior=prior), values
