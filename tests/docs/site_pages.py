@@ -11,11 +11,9 @@ from types import ModuleType
 ROOT = Path(__file__).parents[2]
 FENCED = re.compile(
     r"(?:^ *<!--long: (?P<last>[^>]*?)-->\n)?^(?P<indent> *)```(?P<language>\w*)\n(?P<text>.*?)^(?P=indent)```$",
-    re.MULTILINE | re.DOTALL,
+    re.M | re.DOTALL,
 )
-INDENTED = re.compile(
-    r"(?:^<!--long: (?P<last>[^>]*?)-->\n|(?<=\n\n))(?P<text>(?:    \S.*\n(?:     .*\n)*)+)", re.MULTILINE
-)
+INDENTED = re.compile(r"(?:^<!--long: (?P<last>[^>]*?)-->\n|(?<=\n\n))(?P<text>(?:    \S.*\n(?:     .*\n)*)+)", re.M)
 LANGUAGES = {"sh": "sh", "py": "python", "python": "python"}
 COMMAND = re.compile(r"(?:lipmotion|python|make|pip|ffmpeg|dask|export) ")
 

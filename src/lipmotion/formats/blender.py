@@ -89,11 +89,7 @@ def read_addon(names: Iterable[str]) -> dict[str, str]:
 
 
 def write_addon(program: str, path: str | Path) -> None:
-    """Write the add-on for a program to a file.
-
-    program : ``blender``: a ``.zip`` that Blender 4.2 and later installs from disk
-    Raises ExportError: no such program, another suffix, or the file cannot be written.
-    """
+    """Write the add-on for Blender 4.2 and later to a ``.zip``. Raises ExportError: another program or suffix."""
     path = Path(path)
     if program not in PROGRAMS:
         raise ExportError(f"there is no add-on for {program!r}, required one of {', '.join(PROGRAMS)}")

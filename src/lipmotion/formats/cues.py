@@ -340,11 +340,7 @@ def write_cue_file(path: Path, sheet: CueSheet, sound_file: str, form: str) -> N
 
 
 def read_cues(path: Path, fps: float | None = None) -> CueSheet:
-    """Return the cues of a file in the form of its suffix.
-
-    fps : frames a second of a ``.dat``, which does not say it; None: ``CUES_FPS``
-    Raises InputError: it cannot be read, or is damaged, or has times and needs no rate.
-    """
+    """Return the cues of a file; ``fps``: of a ``.dat``. Raises InputError: unreadable, damaged, or no rate is needed."""
     chosen = CUE_FORMATS.get("tsv" if path.suffix.lower() == ".csv" else path.suffix.lower().removeprefix("."))
     if chosen is None or chosen.parse is None:
         readable = " ".join(f".{name}" for name, form in CUE_FORMATS.items() if form.parse)

@@ -398,9 +398,8 @@ def _read_gentle_phones(item: dict[str, Any], word: Row, place: str, where: str)
 
 
 def _find_speaker(item: dict[str, Any]) -> str:
-    return next(
-        (str(item[name]) for name in SPEAKERS if isinstance(item.get(name), str | int) and item[name] != ""), ""
-    )
+    names = (item[name] for name in SPEAKERS if isinstance(item.get(name), str | int))
+    return next((str(name) for name in names if name != ""), "")
 
 
 def _read_lists(objects: Objects, where: str) -> list[LabelTier] | None:

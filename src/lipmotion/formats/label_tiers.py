@@ -151,11 +151,7 @@ def find_time_unit(spans: Sequence[tuple[float, float, str]], role: str, where: 
 
 
 def parse_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[LabelTier]:
-    """Return tiers in seconds; times of which a word would last a minute are in the unit that they seem to be.
-
-    per_s : how many of their units are a second; 0: how long words last decides
-    Raises InputError: as ``find_time_unit``.
-    """
+    """Return tiers in seconds; ``per_s``: units in one, 0: as words last. Raises InputError: as ``find_time_unit``."""
     spoken = [tier for tier in tiers if tier.role != OTHER]
     judged = next((tier for tier in spoken if tier.role == WORDS or holds_phones(tier)), next(iter(spoken), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []

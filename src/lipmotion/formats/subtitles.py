@@ -22,29 +22,26 @@ TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
 ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
 """The arrow between the times, also as people and programs damage it: ``->``, ``- ->``, ``–>``, ``--&gt;``."""
 CUE = re.compile(
-    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d",
-    re.MULTILINE,
+    rf"^.{{0,40}}\d\s*-->\s*\d|^.{{0,20}}:\d{{1,2}}(?:[.,]\d{{1,6}})?\s{{0,4}}{ARROW}\s{{0,4}}\d{{1,4}}:\d", re.M
 )
 """The times of a subtitle."""
 FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
 FRAMES, GAP = r"\d\d(?:[:;]\d\d){3}", r"[^\w\n]{1,12}"
-NO_ARROW = re.compile(rf"^\s{{0,20}}(?:{FULL_CLOCK}{GAP}{FULL_CLOCK}\s{{0,20}}$|{FRAMES}{GAP}{FRAMES})", re.MULTILINE)
+NO_ARROW = re.compile(rf"^\s{{0,20}}(?:{FULL_CLOCK}{GAP}{FULL_CLOCK}\s{{0,20}}$|{FRAMES}{GAP}{FRAMES})", re.M)
 """A line of two times without an arrow that is known, or that begins with two timecodes; times of day do not count."""
 TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
-SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2}:\d\d[.,]\d{1,6})"), re.MULTILINE)
+SBV = re.compile(r"^TIME\s?,\s?TIME\s*?$".replace("TIME", r"((?:\d{1,4}:)?\d{1,2}:\d\d[.,]\d{1,6})"), re.M)
 """The times of YouTube's own format and of SubViewer, ``0:00:01.000,0:00:02.500``."""
-COUNTED = re.compile(
-    r"^([{\[])(\d{1,7})[}\]][{\[](\d{0,7})[}\]][ \t/]*(.*)$|^(\d{1,2}:\d\d:\d\d)[:=](?!\d)", re.MULTILINE
-)
+COUNTED = re.compile(r"^([{\[])(\d{1,7})[}\]][{\[](\d{0,7})[}\]][ \t/]*(.*)$|^(\d{1,2}:\d\d:\d\d)[:=](?!\d)", re.M)
 """The start of lines of MicroDVD (``{25}{63}Hello``, frames), MPL2 (``[10][25]``, tenths), TMPlayer (``00:00:01:``)."""
-RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.MULTILINE)  # MicroDVD's: {1}{1}23.976
+RATE = re.compile(r"\{\d\}\{\d\}(\d{2,3}(?:[.,]\d{1,6})?)[ \t]*$", re.M)  # MicroDVD's: {1}{1}23.976
 WORD_TIME = re.compile(rf"<{TIME}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
 NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")  # the start of a block of WebVTT that is not shown
 BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 """Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
-SUBSTATION = re.compile(rf"\A\s*\[(?i:Script Info)\]|^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.MULTILINE)
+SUBSTATION = re.compile(rf"\A\s*\[(?i:Script Info)\]|^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.M)
 """SubStation Alpha: its first line, or, where an editor saved none, a line that is shown, with its start and end."""
 DEFAULT_FIELDS = "layer start end style name marginl marginr marginv effect text".split()
 """The fields of a line where no line ``Format:`` says them."""
@@ -55,7 +52,7 @@ BREAK = re.compile(r"\\[Nnh]")  # line breaks and hard blanks within the text
 LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
 """What lyrics say of themselves: ``[ar:Anna]``, ``[offset:+250]``."""
 SPAN = rf"\[([\d:.,]{{1,20}})s?\s{{0,3}}{ARROW}\s{{0,3}}([\d:.,]{{1,20}})s?\]"
-LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]|^[ \t]{{0,20}}{SPAN}", re.MULTILINE)
+LYRICS = re.compile(rf"\A(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]|^[ \t]{{0,20}}{SPAN}", re.M)
 """The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``, ``[0.00s -> 2.50s] Hello``
 as Whisper's programs print, perhaps after other lines."""
 LYRICS_TIME = re.compile(rf"\[{TIME}\]|{SPAN}")

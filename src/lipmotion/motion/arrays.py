@@ -60,11 +60,7 @@ def scaling_from_arrays(arrays: Arrays, dimensions: int) -> VarianceScaling | No
 
 
 def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> LearnedMotion:
-    """Deserialise what ``learned_motion_to_arrays`` returned; other arrays are ignored.
-
-    filtered : there must be a modulation filter
-    Raises ModelFormatError: an array is missing, or has a wrong shape, type or range.
-    """
+    """Deserialise a learned motion; ``filtered``: with a modulation filter. Raises ModelFormatError: damaged arrays."""
     with format_errors("the learned motion"):
         _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
         limits = MotionLimits(*check_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])

@@ -122,11 +122,7 @@ def choose_closed_frames(closure: Closure, opening: Array, ranges: Sequence[slic
 
 
 def fit_closure(names: Sequence[str], values: Sequence[Array], examples: Sequence[Example]) -> Closure | None:
-    """Return the closure of the lips in some examples, or None where no channel is called ``opening``.
-
-    names  : of the first dimensions of the motion space
-    values : motion of each example in this space [each shape=(T, Q)]
-    """
+    """Return the closure of the lips in motion of examples [each shape=(T, Q)]; None without a channel ``opening``."""
     if OPENING not in names:
         return None
     masks, timelines = [example.valid for example in examples], [example.speech.units for example in examples]

@@ -44,11 +44,7 @@ class AcousticContext:
 
 
 def fit_acoustic_context(recordings: Iterable[NDArray[np.float32]], size: int) -> AcousticContext:
-    """Return the acoustic context of some recordings: the principal components of all their frames.
-
-    recordings : acoustic features of each [each shape=(T, D)]
-    size       : number of components, or fewer where there are fewer inputs
-    """
+    """Return the first ``size`` principal components, or all, of acoustic features [each shape=(T, D)]."""
     mean, covariance = measure_covariance(_stack(features, slice(None)) for features in recordings)
     scale = np.sqrt(np.maximum(np.diagonal(covariance), 0)) + MIN_DEVIATION
     axes = find_principal_axes(covariance / np.outer(scale, scale), size)

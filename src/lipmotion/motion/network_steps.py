@@ -67,11 +67,7 @@ def measure_poses(training: PredictorTraining) -> tuple[Array, Array]:
 
 
 def measure_error_variances(training: PredictorTraining, predicted: Iterable[Array], scale: Array) -> Array:
-    """Return the variances of the error of static value, Δ and Δ² in the examples [shape=(3, Q)].
-
-    predicted : motion of each example [each shape=(T, Q)]
-    scale     : standard deviation of the motion [shape=(Q,)]; the variances are not much smaller
-    """
+    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)], not much smaller than ``scale``."""
     squares, count = np.zeros((3, len(scale))), 0
     for example, x, motion in zip(training.examples, training.values, predicted, strict=True):
         frames = mark_known_dynamics(example.valid)
@@ -166,11 +162,7 @@ class NetworkShape(ABC, Generic[NetworkT]):
 @final
 @dataclass(frozen=True)
 class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
-    """Shape of a convolutional network.
-
-    hidden_units : of every hidden layer
-    dilations    : time steps between the taps of each layer
-    """
+    """Shape of a convolutional network: units of every hidden layer, time steps between the taps of each layer."""
 
     hidden_units: int
     dilations: tuple[int, ...]
@@ -201,11 +193,7 @@ class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
 @final
 @dataclass(frozen=True)
 class RecurrentShape(NetworkShape[RecurrentNetwork]):
-    """Shape of a recurrent network.
-
-    cells  : of every layer, in either direction of time
-    layers : their number, two or more
-    """
+    """Shape of a recurrent network: cells of every layer, two layers or more, in either direction of time."""
 
     cells: int
     layers: int

@@ -73,10 +73,7 @@ class MotionSpace:
 
 
 def fit_space(channels: tuple[Channel, ...], poses: Array, components: int) -> MotionSpace:
-    """Return the motion space of some poses [shape=(N, P)]; all channels but points (``x_17``, ...) stay as they are.
-
-    components : principal components that the points are reduced to
-    """
+    """Return the motion space of poses [shape=(N, P)]; points (``x_17``, ...) are reduced to principal components."""
     is_point = np.array([channel.name[:2] in ("x_", "y_", "z_") for channel in channels])
     points = fit_pca(poses[:, is_point], components) if is_point.any() else None
     return MotionSpace(channels, np.nonzero(~is_point)[0].astype(np.intp), points)

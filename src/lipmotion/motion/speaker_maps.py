@@ -138,11 +138,7 @@ def measure_restfulness(units: Timeline[Unit], frames: int) -> Array:
 
 
 def weigh_visemes(units: Timeline[Unit], frames: int) -> Array:
-    """Return how much of each viseme is in each frame at 100 Hz [shape=(frames, V)].
-
-    Visemes fade into each other over ``FADE_FRAMES``; in silence away from speech, and where no phone is known, all
-    weights are 0.
-    """
+    """Return the weights of visemes in frames at 100 Hz [shape=(frames, V)]; 0 far from speech and for no phone."""
     from scipy.ndimage import convolve1d
 
     weights = np.zeros((frames, len(VISEME_NAMES)))
@@ -388,11 +384,7 @@ def compose_maps(first: SpeakerMap | None, second: SpeakerMap) -> SpeakerMap:
 
 
 def select_channels(motion: Motion, channels: Sequence[Channel], where: str) -> Motion:
-    """Return the motion of a person in the channels of a model, in their order.
-
-    where : name of the recording, for the message
-    Raises InputError: the motion has no such channel.
-    """
+    """Return motion in the channels of a model. Raises InputError, which names the recording: a channel is missing."""
     missing = [channel for channel in channels if channel not in motion.channels]
     if missing:
         raise InputError(
