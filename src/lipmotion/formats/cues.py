@@ -340,7 +340,7 @@ def write_cue_file(path: Path, sheet: CueSheet, sound_file: str, form: str) -> N
 
 
 def read_cues(path: Path, fps: float | None = None) -> CueSheet:
-    """Return the cues of a file; ``fps``: of a ``.dat``. Raises InputError: unreadable, damaged, or no rate is needed."""
+    """Return the cues of a file; ``fps``: of a ``.dat``, the only one without a rate. Raises InputError: unreadable."""
     chosen = CUE_FORMATS.get("tsv" if path.suffix.lower() == ".csv" else path.suffix.lower().removeprefix("."))
     if chosen is None or chosen.parse is None:
         readable = " ".join(f".{name}" for name, form in CUE_FORMATS.items() if form.parse)
