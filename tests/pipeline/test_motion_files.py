@@ -12,7 +12,7 @@ from lipmotion.articulation.delivery import find_closed_times
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import find_mouth
 from lipmotion.errors import InputError
-from lipmotion.formats.keys import Thinning
+from lipmotion.formats.base import Thinning
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, compute_living_curves, eye_and_brow_weights
 from lipmotion.meshes.model.rig_tables import RigRow, read_rig_table
 from lipmotion.pipeline.analysis.read_request import read_units

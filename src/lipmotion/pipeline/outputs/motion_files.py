@@ -17,6 +17,7 @@ from lipmotion.articulation.mouth import find_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.base import (
+    Thinning,
     check_motion,
     find_motion_format,
     find_suffix,
@@ -26,7 +27,6 @@ from lipmotion.formats.base import (
 )
 from lipmotion.formats.cues import read_cue_motion
 from lipmotion.formats.fap import FAP
-from lipmotion.formats.keys import Thinning
 from lipmotion.formats.steady_rate import match_sound_rate
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
