@@ -490,7 +490,7 @@ def test_memory_is_that_of_the_result(tmp_path: Path) -> None:
 def test_sound_and_silence_are_bounded_together() -> None:
     """30 s of sound and 620 s of holes are each short enough for 810 bytes; their sum is not."""
     decoder = object.__new__(_TrackDecoder)
-    decoder._name, decoder._size, decoder._sound_s, decoder._silence_s = "a.mkv", 810_000, 30.0, 620.0
+    decoder._name, decoder._size, decoder._sound_s, decoder.silence_s = "a.mkv", 810_000, 30.0, 620.0
     decoder._check_silence()
     decoder._size = 810
     with pytest.raises(InputError, match="810 bytes of sound last 650 s"):
