@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
@@ -164,10 +164,8 @@ class AnalysedAudio(Audio):
         for (first, own, _), part in zip(self.passages, parts, strict=True):
             between = np.asarray(part[-1] if silence is None else silence, part.dtype)
             start, stop = max(first, own.start), min(first + len(part), own.stop)
-            before, after = (
-                np.broadcast_to(between, (n, *part.shape[1:])) for n in (start - own.start, own.stop - stop)
-            )
-            rows += [before, part[start - first : stop - first], after]
+            silent = np.broadcast_to(between, (len(range(own.start, own.stop)), *part.shape[1:]))
+            rows += [silent[: start - own.start], part[start - first : stop - first], silent[: own.stop - stop]]
         return JoinedRows(rows)
 
     def mfcc(self, warp: float = 1.0) -> Features:
@@ -176,7 +174,7 @@ class AnalysedAudio(Audio):
 
     def joined_mfcc(self) -> Features:
         """Return ``mfcc`` with values that are ``JoinedRows``."""
-        values: Any = self.joined_rows(partial(_compute_mfcc, warp=1.0))
+        values: Any = self.joined_rows(lambda audio: audio.mfcc().values)
         return Features(values, self.duration_s)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
@@ -193,7 +191,10 @@ class AnalysedAudio(Audio):
                 del audio._mfcc[warp]
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        return [Features(self.joined(partial(_compute_mfcc, warp=warp)), self.duration_s) for warp in warps]
+        def join(warp: float) -> Features:
+            return Features(self.joined(lambda audio: audio.mfcc(warp).values), self.duration_s)
+
+        return list(map(join, warps))
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
@@ -218,10 +219,6 @@ class AnalysedAudio(Audio):
     def stretch(self, first: int, stop: int) -> AnalysedAudio:
         """Return some frames of the recording, with the features that they have in the whole."""
         return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, whole=self, first=first)
-
-
-def _compute_mfcc(audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
-    return audio.mfcc(warp).values
 
 
 class Passage(NamedTuple):
