@@ -64,7 +64,7 @@ def test_a_library_without_data_has_no_voices(faked: Path) -> None:
 
 @pytest.mark.usefixtures("faked")
 def test_another_language_keeps_its_words_and_takes_the_nearest_phones(caplog: pytest.LogCaptureFixture) -> None:
-    _, units = next(speak_sentences(["«Hällo!»"], find_voice("espeak-ng:de+f2")))
+    _, units, _ = next(speak_sentences(["«Hällo!»"], find_voice("espeak-ng:de+f2")))
     assert [(span.label.phone, span.label.word) for span in units] == [
         ("sil", ""), ("hh", "hällo"), ("ax", "hällo"), ("l", "hällo"), ("ow", "hällo"), ("sil", ""),
     ]  # fmt: skip
@@ -73,7 +73,7 @@ def test_another_language_keeps_its_words_and_takes_the_nearest_phones(caplog: p
 
 @pytest.mark.usefixtures("faked")
 def test_phones_that_no_table_has_are_reported(caplog: pytest.LogCaptureFixture) -> None:
-    _, units = next(speak_sentences(["strange"], find_voice("de")))
+    _, units, _ = next(speak_sentences(["strange"], find_voice("de")))
     assert units[4].label.phone == "ax"
     assert "no table has, shown as the nearest or as ax: ꙮ" in caplog.text
 
@@ -111,19 +111,19 @@ class TestPackage:
     @pytest.mark.parametrize("language", ["de", *(pytest.param(each, marks=pytest.mark.long) for each in ("fr", "pt"))])
     def test_other_languages(self, language: str, caplog: pytest.LogCaptureFixture) -> None:
         text, words = SENTENCES[language]
-        audio, units = next(speak_sentences([text], find_voice(language)))
+        audio, units, _ = next(speak_sentences([text], find_voice(language)))
         said = [span.label.word for span in units if not is_silent(span.label.phone)]
         assert list(dict.fromkeys(said)) == words.split()
         assert units[-1].end_s == pytest.approx(audio.duration_s)
         assert caplog.text == ""
 
     def test_numbers_and_signs_have_the_words_that_are_said(self) -> None:
-        _, units = next(speak_sentences(["It cost 42 euros, mother-in-law."], find_voice("espeak-ng:en-us+f2")))
+        _, units, _ = next(speak_sentences(["It cost 42 euros, mother-in-law."], find_voice("espeak-ng:en-us+f2")))
         said = dict.fromkeys(span.label.word for span in units if span.label.word)
         assert list(said) == "it cost forty two euros mother in law".split()
 
     def test_letters_of_other_scripts_are_said_somehow(self) -> None:
-        _, units = next(speak_sentences(["שלום 12345678901234567890"], find_voice("espeak-ng:en-us+f2")))
+        _, units, _ = next(speak_sentences(["שלום 12345678901234567890"], find_voice("espeak-ng:en-us+f2")))
         assert len(units) > 40
 
 

@@ -35,7 +35,7 @@ def test_voices_are_listed() -> None:
 @pytest.mark.usefixtures("faked")
 def test_a_voice_says_phones_in_time() -> None:
     for voice in EACH:
-        audio, units = next(installed.speak_sentences(["Hello"], voice))
+        audio, units, _ = next(installed.speak_sentences(["Hello"], voice))
         assert audio.rate_hz == 16_000
         assert audio.duration_s == pytest.approx(1.0)
         found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
@@ -132,7 +132,7 @@ def test_a_synthesiser_that_does_not_work_is_left_out(faked: Path, caplog: pytes
 
 @pytest.mark.usefixtures("faked")
 def test_a_sound_is_there_until_the_next() -> None:
-    with closing(installed.voice_sentences(["hello", "hello"], FAKED[0])) as said:
+    with closing(installed.speak_sentences(["hello", "hello"], FAKED[0])) as said:
         first = next(said)
         assert first.own_sound().rate_hz == 16_000
         list(said)
@@ -163,7 +163,7 @@ TEXTS = ["Please put both blue bowls on the table.", "The judge measured the bei
 
 def test_real_voices_say_what_the_dictionary_says(real: synthesiser.SyntheticVoice) -> None:
     lexicon = Lexicon()
-    for text, (audio, units) in zip(TEXTS[:2], installed.speak_sentences(TEXTS[:2], real), strict=True):
+    for text, (audio, units, _) in zip(TEXTS[:2], installed.speak_sentences(TEXTS[:2], real), strict=True):
         words = split_words(text)
         assert [span.label.word for span in units if not is_silent(span.label.phone)] != []
         assert list(dict.fromkeys(span.label.word for span in units if span.label.word)) == list(dict.fromkeys(words))
@@ -178,7 +178,7 @@ def test_real_voices_say_what_the_dictionary_says(real: synthesiser.SyntheticVoi
 @pytest.mark.long
 def test_the_times_of_real_voices_are_those_of_the_aligner(real: synthesiser.SyntheticVoice, toy_model: Model) -> None:
     recogniser, late_s = recogniser_of(toy_model, "general"), []
-    for audio, units in installed.speak_sentences(TEXTS, real):
+    for audio, units, _ in installed.speak_sentences(TEXTS, real):
         room = mix_noise(audio, "white", 50)
         placed = recogniser.align_phones(room, features_of(room), units)
         said, aligned = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))

@@ -43,15 +43,13 @@ def convert_phones(
     said: list[tuple[str, float, float]] = []
     for span in labels:
         if span.label not in phone_map:
-            raise InputError(
-                f"the synthesiser says {span.label!r}, which is no phone; known are: {' '.join(phone_map)}"
-            )
+            raise InputError(f"the synthesiser says {span.label!r}, which is no phone; known: {' '.join(phone_map)}")
         names = phone_map[span.label]
         if not names and said:
             said[-1] = (*said[-1][:2], span.end_s)
         each_s = span.duration_s / max(len(names), 1)
         said += [(phone, span.start_s + i * each_s, span.start_s + (i + 1) * each_s) for i, phone in enumerate(names)]
-    phones = _join(_cover([(phone, start, end) for phone, start, end in said if end > start], duration_s))
+    phones = _cover([(phone, start, end) for phone, start, end in said if end > start], duration_s)
     spoken = [phone for phone in phones if not is_silent(phone[0])]
     if not spoken:
         raise InputError("the synthesiser says no phone; give another text")
@@ -146,20 +144,14 @@ def _cost(phone: str, other: str) -> float:
 
 
 def _cover(phones: Phones, duration_s: float) -> list[tuple[str, float, float]]:
-    """Return phones with silence where none was, cut at the end of the sound."""
+    """Return phones with silence where none was, cut at the end of the sound; neighbouring silences are one."""
     covered: list[tuple[str, float, float]] = []
     now = 0.0
-    for phone, start, end in phones:
-        covered += [(SILENCE, now, min(start, duration_s)), (phone, start, min(end, duration_s))]
+    for phone, start, end in [*phones, (SILENCE, duration_s, duration_s)]:
+        for name, first, last in ((SILENCE, now, min(start, duration_s)), (phone, start, min(end, duration_s))):
+            if last > first and is_silent(name) and covered and covered[-1][0] == SILENCE:
+                covered[-1] = (SILENCE, covered[-1][1], last)
+            elif last > first:
+                covered.append((SILENCE if is_silent(name) else name, first, last))
         now = min(end, duration_s)
-    covered.append((SILENCE, now, duration_s))
-    return [(phone, start, end) for phone, start, end in covered if end > start]
-
-
-def _join(phones: Phones) -> list[tuple[str, float, float]]:
-    """Return phones in which neighbouring silences are one."""
-    joined: list[tuple[str, float, float]] = []
-    for silent, run in groupby(phones, key=lambda phone: is_silent(phone[0])):
-        part = list(run)
-        joined += [(SILENCE, part[0][1], part[-1][2])] if silent else part
-    return joined
+    return covered
