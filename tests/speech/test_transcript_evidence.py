@@ -140,7 +140,7 @@ def best_by_trying(log_posteriors: NDArray[np.float64], words: list[list[int]]) 
     """Return the score of the best path, and which words it says: all of them are tried, one after another."""
     phones = [phone for word in words for phone in word]
     edges = list(np.cumsum([0, *map(len, words)]))
-    silent = np.logaddexp.reduce(log_posteriors[:, module._find_silent()], axis=1)
+    silent = np.logaddexp.reduce(log_posteriors[:, module.SILENT], axis=1)
     anything = np.maximum(log_posteriors.max(axis=1), silent)
     spoken = np.log(np.exp(log_posteriors) @ module._count_taken())
 
@@ -272,7 +272,7 @@ def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> 
 
 
 def test_places_near_one_another_are_one_stretch() -> None:
-    assert agreement._joined([(0.0, 1.0), (1.4, 2.0), (3.0, 3.5)]) == ((0.0, 2.0), (3.0, 3.5))
+    assert agreement._join([(0.0, 1.0), (1.4, 2.0), (3.0, 3.5)]) == ((0.0, 2.0), (3.0, 3.5))
     fit = agreement.TranscriptFit(-1.0, ((0.0, 2.0), (3.0, 3.5)), 10.0)
     assert fit.missing_s == pytest.approx(2.5)
     assert fit.share == pytest.approx(0.75)

@@ -152,7 +152,7 @@ def test_words_of_a_sentence() -> None:
     assert sum(word.posterior for word in words) > len(words) / 2
     assert {"please", "speak", "lips", "five", "big", "blue", "boats"} <= set(found)
     assert all(Lexicon().known(word) for word in found)
-    assert not any(word_search.is_filler(word) or "(" in word for word in found)
+    assert not any({"<", "[", "+", "("} & set(word) for word in found)
 
 
 def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers() -> None:
@@ -162,8 +162,6 @@ def test_no_sound_has_no_words_and_the_samples_of_a_stretch_are_clipped_integers
     assert len(samples) == 320
     assert samples[0] == pytest.approx(16_383, abs=1)
     assert samples[-1] == -32_768
-    assert all(word_search.is_filler(entry) for entry in ("<s>", "</s>", "[NOISE]", "++UH++"))
-    assert not word_search.is_filler("'bout")
 
 
 def test_one_recording_does_not_change_the_next() -> None:

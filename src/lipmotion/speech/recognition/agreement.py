@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -113,7 +113,7 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
                 inside = slice(*np.searchsorted(scored.frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
                 if float(scored.scores[inside].mean()) < LONG_PHONE_SCORE:
                     missing.append((span.start_s, span.end_s))
-    return TranscriptFit(scored.mean(), _joined(missing), speech_s)
+    return TranscriptFit(scored.mean(), _join(missing), speech_s)
 
 
 def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArray[np.float64] | None) -> TranscriptFit:
@@ -125,19 +125,17 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
     """
     spoken = [span for span in units if not is_silent(span.label.phone)]
     if log_posteriors is not None:
-        found = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
-        idle, wrong = found.idle, found.wrong
-        loud = _joined(
-            [(at, at + 1 / FRAME_RATE_HZ) for at in np.flatnonzero(find_loud_frames(audio.log_energy)) / FRAME_RATE_HZ]
-        )
-        missing = tuple(_find_unlabelled(stretch, spoken, loud) for stretch in found.missing)
+        heard, idle, wrong = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
+        loud_s = np.flatnonzero(find_loud_frames(audio.log_energy)) / FRAME_RATE_HZ
+        loud = _join([(at_s, at_s + 1 / FRAME_RATE_HZ) for at_s in loud_s])
+        missing = tuple(_find_unlabelled(stretch, spoken, loud) for stretch in heard)
     else:
         quiet = find_quiet_frames(audio.log_energy)
-        silent = _joined([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
+        silent = _join([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
         idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= MIN_IDLE_S)
         missing, wrong = measure_fit(audio, units).missing, ()
-    fit = TranscriptFit(0.0, missing, sum(span.duration_s for span in spoken), None, idle, wrong)
-    return replace(fit, speech_s=fit.speech_s + fit.missing_s)
+    speech_s = sum(span.duration_s for span in spoken) + sum(end_s - start_s for start_s, end_s in missing)
+    return TranscriptFit(0.0, missing, speech_s, None, idle, wrong)
 
 
 def _find_unlabelled(
@@ -151,7 +149,7 @@ def _find_unlabelled(
     return max(min(around[0][0], start_s), before_s), min(max(around[-1][1], end_s), after_s)
 
 
-def _joined(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+def _join(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
     """Return places in time, those near one another as one."""
     joined: list[tuple[float, float]] = []
     for start_s, end_s in places:

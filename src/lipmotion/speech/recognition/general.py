@@ -98,9 +98,8 @@ def find_density(phone: str, state: int, states: int) -> int:
     state  : from 0
     states : how many states our model of the phone has; where it is not 3, the general state at the same share is used
     """
-    return PHONES.index(GENERAL_PHONE_NAMES.get(phone, phone.upper())) * STATES + (2 * state + 1) * STATES // (
-        2 * states
-    )
+    first = PHONES.index(GENERAL_PHONE_NAMES.get(phone, phone.upper())) * STATES
+    return first + (2 * state + 1) * STATES // (2 * states)
 
 
 GENERAL_PHONE_NAMES = {"ax": "AH", "axr": "ER", "ix": "IH", "el": "L", "em": "M", "en": "N", "sp": "SIL"}
@@ -207,30 +206,24 @@ def load_bigram(units: Sequence[str]) -> NDArray[np.float64]:
 
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
-    kinds = _phones()
     spelt = ["SIL" if unit.startswith("+") else GENERAL_PHONE_NAMES.get(unit, unit.upper()) for unit in units]
-    rows = [kinds.index(name) for name in spelt]
+    rows = [PHONES[2:].index(name) for name in spelt]
     pairs = _read_bigram()[np.ix_(rows, rows)] * np.array([PROBABILITY_SHARE.get(unit, 1.0) for unit in units])
     return pairs / pairs.sum(axis=1, keepdims=True)
 
 
-def _phones() -> list[str]:
-    return [phone for phone in PHONES if not phone.startswith("+")]
-
-
 @cache
 def _read_bigram() -> NDArray[np.float64]:
-    """Return P(next | phone) of the phone language model that comes with pocketsphinx."""
+    """Return P(next | phone) of the phone language model that comes with pocketsphinx, without the noises."""
     try:
         from pocketsphinx import Config, LogMath, NGramModel
     except ImportError as error:
-        raise MissingDependencyError(
-            "the phone language model comes with pocketsphinx: pip install pocketsphinx"
-        ) from error
+        message = "the phone language model comes with pocketsphinx: pip install pocketsphinx"
+        raise MissingDependencyError(message) from error
     log_math = LogMath()
     model = NGramModel(Config(), log_math, str(find_english_data() / "en-us-phone.lm.bin"))
-    names = _phones()
-    return np.array([[log_math.exp(model.prob([following, phone])) for following in names] for phone in names])
+    pairs = [[log_math.exp(model.prob([following, phone])) for following in PHONES[2:]] for phone in PHONES[2:]]
+    return np.array(pairs)
 
 
 NOISES = ("+nsn+", "+spn+")

@@ -267,29 +267,25 @@ class Recogniser:
         self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None = None, aligning: bool = False
     ) -> tuple[UnitHmm, LogLikelihoods]:
         """Return the models that are used, and the log likelihoods of a recording under them."""
-        if self.kind == "own":
-            hmm, warp = self.own, self._own_transform(audio, similarity)[0]
-            log_likelihoods = compute_log_likelihoods(hmm, self._own_features(audio, warp))
+        own_alone = self.kind == "own"
+        general_alone = self.kind == "general" or (aligning and self._has_few_gaussians and not own_alone)
+        warp, weight = 1.0, 0.0  # of the own models
+        if self.adaptation is not None and not general_alone:
+            weight = self.adaptation.own_weight
+        elif not general_alone:
+            similarity = similarity or speaker_similarity(self.own, audio)
+            warp, weight = similarity.warp, weigh_own_model(similarity.score)
+        if weight <= 0 and not own_alone:  # not evaluated: any features will do; those of an hour are large
+            own = audio.mfcc().values
         else:
-            hmm, general_alone = self.combined.hmm, self.kind == "general" or (aligning and self._has_few_gaussians)
-            warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
-            # own models without weight are not evaluated: any features will do, and those of a long one are large
-            own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
+            own = audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
+        if own_alone:
+            hmm, log_likelihoods = self.own, compute_log_likelihoods(self.own, own)
+        else:
             general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
-            log_likelihoods = combine_likelihoods(self.combined, own, weight, general)
+            hmm, log_likelihoods = self.combined.hmm, combine_likelihoods(self.combined, own, weight, general)
         audio.forget_warps()
         return hmm, penalise_speech(hmm, log_likelihoods, find_quiet_frames(audio.log_energy))
-
-    def _own_transform(self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None) -> tuple[float, float]:
-        """Return the warp of the frequencies for the own models, and the weight of these models, 0 to 1."""
-        if self.adaptation is not None:
-            return self.adaptation.warp, self.adaptation.own_weight
-        similarity = similarity or speaker_similarity(self.own, audio)
-        return similarity.warp, weigh_own_model(similarity.score)
-
-    def _own_features(self, audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
-        """Return the features for the own models, warped and, where there is an adaptation, transformed."""
-        return audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
 
 
 def _aligned(

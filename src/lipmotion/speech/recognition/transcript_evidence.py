@@ -46,6 +46,8 @@ LABEL_REACH_S, COMPARED, MIN_AGREEING = 0.1, 9, 0.4
 RUN_PAUSE_S, MIN_RUN, MIN_DOUBT_S = 0.5, 3, 0.3
 """What is doubted is a stretch if it is nearer to one another, and so much and so long together."""
 
+SILENT = [*(number for number, phone in enumerate(PHONES) if is_silent(phone)), len(PHONES)]
+"""The columns of silence, of pauses and of none of the phones."""
 Array = NDArray[np.float64]
 Columns = NDArray[np.intp]
 
@@ -124,7 +126,8 @@ def find_evidence(
     others: list[OtherSpeech] = []
     for part in _parts(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
         at, stop = round(part.start_s / frame_s), round(part.end_s / frame_s)
-        path = _best_path(log_posteriors[at : None if part.is_last else stop], part.columns(), costs)
+        columns = [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in part.words]
+        path = _best_path(log_posteriors[at : None if part.is_last else stop], columns, costs)
         for (begin, end), (left, back) in path.free:
             start_s, end_s = (at + begin) * frame_s, (at + end) * frame_s
             others.append(OtherSpeech(start_s, end_s, len(words) + left, len(words) + back))
@@ -143,10 +146,6 @@ class _Part(NamedTuple):
     end_s: float
     words: list[list[Span[Unit]]]
     is_last: bool
-
-    def columns(self) -> list[Columns]:
-        """Return the columns of the phones of each word."""
-        return [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in self.words]
 
 
 def _parts(units: Timeline[Unit], divided: bool) -> Iterator[_Part]:
@@ -192,7 +191,7 @@ def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[flo
     frames, count = len(log_posteriors), len(columns)
     edges = np.cumsum([0, *map(len, words)])
     spoken = np.log(np.exp(log_posteriors) @ _count_taken())[:, columns]
-    silent = np.logaddexp.reduce(log_posteriors[:, _find_silent()], axis=1)
+    silent = np.logaddexp.reduce(log_posteriors[:, SILENT], axis=1)
     anything = np.maximum(log_posteriors.max(axis=1), silent)
     same = np.concatenate([[False], columns[1:] == columns[:-1]])[:count] & ~np.isin(np.arange(count), edges)
     entered = np.zeros((frames, count), bool)
@@ -204,10 +203,8 @@ def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[flo
     for t in range(frames + 1):
         arrived = np.maximum(blank, phone)
         arrivals[t] = np.where(phone >= blank, PHONE, BLANK)
-        either = np.maximum(free, instead)
-        arrivals[t, edges] = np.where(
-            either > arrived[edges], np.where(free > instead, FREE, INSTEAD), arrivals[t, edges]
-        )
+        either, way = np.maximum(free, instead), np.where(free > instead, FREE, INSTEAD)
+        arrivals[t, edges] = np.where(either > arrived[edges], way, arrivals[t, edges])
         arrived[edges] = np.maximum(arrived[edges], either)
         if t == frames:
             break
@@ -286,7 +283,7 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     ends_s = np.array([span.end_s for span in spoken], float)
     phones = np.array([PHONES.index(span.label.phone) for span in spoken], np.intp)
     best = log_posteriors.argmax(axis=1)
-    heard = np.flatnonzero(~np.isin(best, _find_silent()) & (np.diff(best, prepend=-1) != 0))
+    heard = np.flatnonzero(~np.isin(best, SILENT) & (np.diff(best, prepend=-1) != 0))
     times_s: Array = ((heard + 0.5) * frame_s).astype(float)
     first = np.searchsorted(ends_s, times_s - LABEL_REACH_S)
     stop = np.searchsorted(starts_s, times_s + LABEL_REACH_S, "right")
@@ -301,16 +298,15 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     compared_s = np.concatenate([times_s[~alone], middles_s[is_near]])
     order = compared_s.argsort()
     right = np.concatenate([confirmed[~alone], agrees[is_near]])[order].astype(float)
-    window = np.ones(min(COMPARED, max(len(right), 1)))
-    share = (
-        np.convolve(right, window, "same") / np.convolve(np.ones(len(right)), window, "same") if len(right) else right
-    )
+    share, window = right, np.ones(min(COMPARED, max(len(right), 1)))
+    if len(right):
+        share = np.convolve(right, window, "same") / np.convolve(np.ones(len(right)), window, "same")
     doubted_s = compared_s[order][share < MIN_AGREEING]
     idle, wrong = _runs(starts_s[~is_near], ends_s[~is_near]), _runs(doubted_s, doubted_s)
     return LabelEvidence(_runs(times_s[alone], times_s[alone], MIN_GAP_S), idle, wrong)
 
 
-def _runs(starts_s: Array, ends_s: Array, least_s: float = MIN_DOUBT_S) -> tuple[tuple[float, float], ...]:
+def _runs(starts_s: Array, ends_s: Array, min_s: float = MIN_DOUBT_S) -> tuple[tuple[float, float], ...]:
     """Return stretches of at least ``MIN_RUN`` times near one another."""
     if not len(starts_s):
         return ()
@@ -319,7 +315,7 @@ def _runs(starts_s: Array, ends_s: Array, least_s: float = MIN_DOUBT_S) -> tuple
     return tuple(
         (float(first[0]), float(last[-1]))
         for first, last in runs
-        if len(first) >= MIN_RUN and last[-1] - first[0] >= least_s
+        if len(first) >= MIN_RUN and last[-1] - first[0] >= min_s
     )
 
 
@@ -331,7 +327,3 @@ def _count_taken() -> Array:
         for other in others:
             taken[PHONES.index(phone), PHONES.index(other)] = taken[PHONES.index(other), PHONES.index(phone)] = 1.0
     return taken
-
-
-def _find_silent() -> list[int]:
-    return [number for number, phone in enumerate(PHONES) if is_silent(phone)] + [len(PHONES)]
