@@ -21,10 +21,11 @@ from lipmotion.speech.recognition.recognised_speech import (
     build_recognition,
     label_words,
     splice,
+    time_phones,
 )
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.stats.constrained_mllr import log_determinant
-from lipmotion.types import Audio, Span, Timeline, Unit
+from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon
 from lipmotion.units.phones import SHORT_PAUSE_S, count_phone_edits
 from pipeline.made import features_of, read_sound
@@ -82,7 +83,7 @@ def test_the_words_are_found_where_they_are(hmm: Any, sentences: list[ToySentenc
 
 def test_frame_n_reaches_from_half_a_frame_before_to_half_a_frame_after_and_silences_are_one() -> None:
     bounds = np.array([0, 10, 12, 40, 60, 80, 100])
-    found = recogniser._timeline([(phone, "") for phone in ("sil", "p", "sil", "aa", "sil", "sil")], bounds, 1.0)
+    found = time_phones([(phone, "") for phone in ("sil", "p", "sil", "aa", "sil", "sil")], bounds, 1.0)
     assert [span.start_s for span in found] == pytest.approx([0, 0.095, 0.115, 0.395, 0.595])
     assert covers(found, 1.0)
     assert phones(found) == ["sil", "p", "sil", "aa", "sil"]
@@ -257,19 +258,16 @@ def test_fits_are_means_over_the_frames_of_each_word() -> None:
 
 def test_what_was_recognised() -> None:
     labels = [LabelledFrames(*each) for each in ((0, "sil"), (10, "b", 0), (20, "iy", 0), (40, "z"))]
-    spans = ((0.0, 0.1, "sil", ""), (0.1, 0.2, "b", "bee"), (0.2, 0.4, "iy", "bee"), (0.4, 0.5, "z", ""))
-    units = Timeline(tuple(Span(start, end, Unit(phone, word=word)) for start, end, phone, word in spans))
-    found = build_recognition(units, labels, [RecognisedWord("bee", 0.8)], -7.0)
+    found, doubtful = (build_recognition(labels, [RecognisedWord("bee", sure)], 51, 0.5, None) for sure in (0.8, 0.3))
     (word,) = found.words
     assert (word.start_s, word.end_s, word.label.text) == (pytest.approx(0.1), pytest.approx(0.4), "bee")
-    assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.1))
+    assert [span.label.word for span in found.units] == ["", "bee", "bee", ""]
+    assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.105))
     assert found.confidence == pytest.approx(0.8)
-    assert found.reliability == pytest.approx(1)
-    doubtful = build_recognition(units, labels, [RecognisedWord("bee", 0.3)], -7.0)
-    assert doubtful.reliability == pytest.approx(0)
+    assert (found.reliability, doubtful.reliability) == pytest.approx((1, 0))
     shares = [replace(found, posterior=posterior).reliability for posterior in (0.6, 0.8, 0.95)]
     assert shares == pytest.approx([0, 0.5, 1])
-    wordless = build_recognition(units, [LabelledFrames(0, "sil")], [], -7.0)
+    wordless = build_recognition([LabelledFrames(0, "sil")], [], 51, 0.5, None)
     assert replace(wordless, posterior=0.575).reliability == pytest.approx(0.5)
 
 

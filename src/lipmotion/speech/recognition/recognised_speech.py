@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -15,11 +15,12 @@ from lipmotion.hmm.align import align_states, choose_pronunciations
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.hmm.network import penalise_silence, wrap_log_likelihoods
 from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
+from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity
 from lipmotion.speech.recognition.general import NOISES
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, find_similar_phone, is_silent
-from lipmotion.units.phones import FULL_FORMS
+from lipmotion.units.phones import FULL_FORMS, SHORT_PAUSE_S
 
 COMPARED_FORMS = FULL_FORMS | {PAUSE: SILENCE} | dict.fromkeys(NOISES, SILENCE)
 """Phones that count as another one when phones of words and phones without words are compared."""
@@ -213,19 +214,38 @@ def measure_level_range(log_energy: NDArray[np.floating[Any]]) -> float:
     return float(np.ptp(np.percentile(heard, RANGE_PERCENTILES)) * 10 / np.log(10))
 
 
+def time_phones(labels: Sequence[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
+    """Return phones in time, each with its word.
+
+    bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
+    Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
+    """
+    silent = [is_silent(phone) for phone, _ in labels]
+    first = [i for i in range(len(labels)) if i == 0 or not (silent[i] and silent[i - 1])]
+    labels, bounds = [labels[i] for i in first], np.append(bounds[first], bounds[-1])
+    edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
+    edges[-1] = duration_s
+    spans = []
+    for i, ((phone, word), (start_s, end_s)) in enumerate(zip(labels, pairwise(edges.tolist()), strict=True)):
+        is_pause = 0 < i < len(labels) - 1 and end_s - start_s < SHORT_PAUSE_S
+        name = (PAUSE if is_pause else SILENCE) if is_silent(phone) else phone
+        spans.append(Span(start_s, end_s, Unit(name, word=word)))
+    return Timeline(tuple(spans))
+
+
 def build_recognition(
-    units: Timeline[Unit],
     labels: Sequence[LabelledFrames],
     recognised: Sequence[RecognisedWord],
-    similarity: float | None,
+    frames: int,
+    duration_s: float,
+    similarity: SpeakerSimilarity | None,
 ) -> Recognition:
-    """Return a recognition.
-
-    recognised : the words that ``labels`` number
-    similarity : as of ``Recognition``
-    """
-    ends = [label.first for label in labels[1:]] + [round(units[-1].end_s * FRAME_RATE_HZ)] if labels else []
+    """Return a recognition of labels of a recording; ``recognised`` are the words that they number."""
+    named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
+    firsts = [label.first for label in labels]
+    units = time_phones(named, np.array([*firsts, frames]), duration_s)
     words = []
+    ends = [*firsts[1:], round(duration_s * FRAME_RATE_HZ)]
     for number, group in groupby(zip(labels, ends, strict=True), key=lambda pair: pair[0].word):
         if number >= 0:
             phones = list(group)
@@ -233,7 +253,7 @@ def build_recognition(
     spoken = [span for span in units if not is_silent(span.label.phone)]
     word_s = sum(span.duration_s for span in spoken if span.label.word)
     phone_s = sum(span.duration_s for span in spoken) - word_s
-    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity)
+    return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity.score if similarity else None)
 
 
 def place_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[LabelT]:

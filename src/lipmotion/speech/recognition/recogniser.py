@@ -47,6 +47,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     build_recognition,
     join_recognition,
     splice,
+    time_phones,
 )
 from lipmotion.speech.recognition.word_search import (
     WordSearch,
@@ -55,9 +56,8 @@ from lipmotion.speech.recognition.word_search import (
     list_wordless,
     recognise_free,
 )
-from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, find_similar_phone, is_silent
-from lipmotion.units.phones import SHORT_PAUSE_S
 
 RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 """Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
@@ -119,8 +119,7 @@ class Recogniser:
         """
         audio = analysed(audio, features)
         if not features.values.any() or not audio.passages:
-            silence = _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
-            return build_recognition(silence, [LabelledFrames(0, SILENCE)], (), None)
+            return build_recognition([LabelledFrames(0, SILENCE)], (), len(features.values), features.duration_s, None)
         if not audio.is_passage:
             if (network := find_network(self.kind)) is not None:
                 find_stretches(network, audio, each)  # of all passages at once: several processes work on them
@@ -155,7 +154,7 @@ class Recogniser:
                 hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words"
             ).words_of(spoken)
             labels = splice(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
-        return _recognition(labels, recognised, len(path), features.duration_s, similarity)
+        return build_recognition(labels, recognised, len(path), features.duration_s, similarity)
 
     def _network_recognition(
         self,
@@ -174,7 +173,7 @@ class Recogniser:
         else:
             parts, recognised = list_wordless(hmm, self._loop, log_likelihoods, found), []
         labels = splice([LabelledFrames(0, SILENCE)], parts, len(loud))
-        recognition = _recognition(labels, recognised, len(loud), features.duration_s, similarity)
+        recognition = build_recognition(labels, recognised, len(loud), features.duration_s, similarity)
         return replace(recognition, posterior=mean_posterior(found))
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
@@ -183,7 +182,7 @@ class Recogniser:
         if self.kind not in WEIGHTED or not self._has_few_gaussians:
             return labels
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
-        phones = _timeline(named, np.array([*bounds, len(path)]), features.duration_s)
+        phones = time_phones(named, np.array([*bounds, len(path)]), features.duration_s)
         try:
             aligned = self.align_phones(audio, features, phones)
         except AlignmentError:
@@ -221,7 +220,7 @@ class Recogniser:
             for phone, word in form:
                 if phone != PAUSE or item.units[len(labels) - said] == PAUSE:  # else it was not made
                     labels.append((phone, word))
-        return _timeline(labels, bounds, features.duration_s)
+        return time_phones(labels, bounds, features.duration_s)
 
     def best_path_densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
         """Return the density of each frame's state on the most probable path [shape=(T,)].
@@ -308,18 +307,6 @@ def _aligned(
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
 
 
-def _recognition(
-    labels: list[LabelledFrames],
-    recognised: list[RecognisedWord],
-    frames: int,
-    duration_s: float,
-    similarity: SpeakerSimilarity | None,
-) -> Recognition:
-    named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
-    units = _timeline(named, np.array([*(label.first for label in labels), frames]), duration_s)
-    return build_recognition(units, labels, recognised, similarity.score if similarity is not None else None)
-
-
 def find_network(kind: str) -> str | None:
     """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
     return find_installed_recogniser() if kind == "auto" else None
@@ -334,27 +321,3 @@ def open_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | N
 def weigh_own_model(score: float) -> float:
     """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
     return min(max((score - STRANGER_SCORE) / (FULL_WEIGHT_SCORE - STRANGER_SCORE), 0.0), 1.0)
-
-
-def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
-    """Return phones in time, each with its word.
-
-    bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
-    Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
-    """
-    first = [
-        i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
-    ]
-    labels, bounds = [labels[i] for i in first], np.append(bounds[first], bounds[-1])
-    edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
-    edges[-1] = duration_s
-    spans = []
-    for i, ((phone, word), start_s, end_s) in enumerate(
-        zip(labels, edges[:-1].tolist(), edges[1:].tolist(), strict=True)
-    ):
-        name = phone
-        if is_silent(phone):
-            inside = 0 < i < len(labels) - 1
-            name = PAUSE if inside and end_s - start_s < SHORT_PAUSE_S else SILENCE
-        spans.append(Span(start_s, end_s, Unit(name, word=word)))
-    return Timeline(tuple(spans))
