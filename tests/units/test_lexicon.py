@@ -155,7 +155,7 @@ def test_the_dictionary_is_searched_as_if_line_by_line() -> None:
     words += [line[0].partition("(")[0] for line in lines[:: len(lines) // 40]]
     for word in words:
         expected = tuple(tuple(line[1:]) for line in lines if line[0].partition("(")[0] == word)
-        assert lexicon._list_entries(word) == expected
+        assert lexicon.list_entries(word) == expected
 
 
 def test_a_made_up_word_is_read_as_people_read_it() -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.util import find_spec
+from io import StringIO
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -105,13 +105,17 @@ class Lexicon:
         Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``, ``MAX_LINES``,
         ``LONGEST_LINE``, ``MAX_VARIANTS``), no phones after a word, or an unknown phone (with its line).
         """
+        text = read_text_file(Path(path), "lexicon", LARGEST_LEXICON_BYTES)
+        count = text.count("\n") + 1
+        if count > MAX_LINES:
+            raise InputError(f"{path}: {count} lines, required at most {MAX_LINES}; keep the words that are said")
         user: dict[str, list[Pronunciation]] = {}
-        for number, line in enumerate(_lines(Path(path)), start=1):
-            where = f"{path}, line {number}"
-            if len(line) > LONGEST_LINE:
+        for number, line in enumerate(StringIO(text), start=1):
+            where, length = f"{path}, line {number}", len(line.rstrip("\n"))
+            if length > LONGEST_LINE:
                 raise InputError(
-                    f"{where}: {len(line)} characters, required at most {LONGEST_LINE}; write one pronunciation of a "
-                    "word a line"
+                    f"{where}: {length} characters, required at most {LONGEST_LINE}; write one pronunciation of a word "
+                    "a line"
                 )
             word, *labels = line.split("#", maxsplit=1)[0].split() or [""]
             if not word:
@@ -119,21 +123,20 @@ class Lexicon:
             if not labels:
                 raise InputError(f"{where}: a word without phones; write the word, then its phones")
             word = VARIANT_NUMBER.sub("", normalise_text(word)).strip("'")  # as in ``split_words``
-            phones = tuple([phone for phone in map(_find_phone, labels) if phone])
-            if len(phones) < len(labels):
-                wrong = shorten(next(label for label in labels if not _find_phone(label)))
-                raise InputError(f"{where}: unknown phone {wrong!r}; the phones are: {' '.join(PHONES)}")
+            phones = tuple([find_phone(label) or "" for label in labels])
+            for label, phone in zip(labels, phones, strict=True):
+                if not phone or is_silent(phone):
+                    raise InputError(f"{where}: unknown phone {shorten(label)!r}; the phones are: {' '.join(PHONES)}")
             variants = user.setdefault(word, [])
             if len(variants) == MAX_VARIANTS:
-                raise InputError(
-                    f"{where}: more than {MAX_VARIANTS} pronunciations of {shorten(word)!r}; keep those that are said"
-                )
+                what = f"more than {MAX_VARIANTS} pronunciations of {shorten(word)!r}"
+                raise InputError(f"{where}: {what}; keep those that are said")
             variants.append(phones)
         return cls({word: tuple(variants) for word, variants in user.items()})
 
     def known(self, word: str) -> bool:
         """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
-        said = (each in self.user or is_in_dictionary(each) for each in list_readings(word.removesuffix("'s"))[0])
+        said = (each in self.user or list_entries(each) for each in list_readings(word.removesuffix("'s"))[0])
         return word in self.user or all(said) or bool(expand_lengthened(word) or SOUNDED.fullmatch(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
@@ -168,21 +171,14 @@ class Lexicon:
     def _pronounce(self, word: str) -> tuple[Pronunciation, ...]:
         if word in self.user:
             return self.user[word]
-        entries = _list_entries(word) or _list_entries(remove_accents(word))
-        variants = [reduce_vowels(word, entry) for entry in entries]
-        if variants:
-            return tuple(dict.fromkeys(variants))
+        if entries := list_entries(word):
+            return tuple(dict.fromkeys(reduce_vowels(word, entry) for entry in entries))
         if word[1:].endswith("'s"):
             return tuple((*each, *OWNED.get(each[-1], ("z",))) for each in self._pronounce(word[:-2]))
         by_rules = guess_pronunciation(word)
         if SOUNDED.fullmatch(word):
             return (by_rules,)
         return (reduce_vowels(word, pronounce_by_network(remove_accents(word)) or by_rules),)
-
-
-def is_in_dictionary(word: str) -> bool:
-    """Return whether the dictionary has a word, perhaps without accents."""
-    return bool(_list_entries(word) or _list_entries(remove_accents(word)))
 
 
 @cache
@@ -193,7 +189,7 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     part that is repeated: ``hahaha``.
     """
     plain = remove_accents(word)
-    if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or is_in_dictionary(word):
+    if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or list_entries(word):
         return ()
     runs = [found[0] for found in re.finditer(r"(.)\1*", plain)]
     choices = [
@@ -202,29 +198,10 @@ def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     ]
     if max(map(len, runs)) > 2 and sum(len(each) > 1 for each in choices) <= MAX_LENGTHENED:
         shortest = 3 if SOUNDED.fullmatch(plain) else 1  # "sss" is no name of a letter
-        known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and is_in_dictionary(each)]
+        known = [each for each in map("".join, product(*choices)) if len(each) >= shortest and list_entries(each)]
         return tuple((each,) for each in sorted(known, key=lambda each: each not in OFTEN_LENGTHENED))
     found = REPEATED.fullmatch(plain)
-    return ((found[1],) * found[0].count(found[1]),) if found and is_in_dictionary(found[1]) else ()
-
-
-def _lines(path: Path) -> Iterator[str]:
-    """Yield the lines of a lexicon file. Raises InputError: not a text, or more than a lexicon holds."""
-    text = read_text_file(path, "lexicon", LARGEST_LEXICON_BYTES)
-    count = text.count("\n") + 1
-    if count > MAX_LINES:
-        raise InputError(f"{path}: {count} lines, required at most {MAX_LINES}; keep the words that are said")
-    start = 0
-    for number in range(1, count + 1):
-        end = text.find("\n", start) if number < count else len(text)
-        yield text[start:end]
-        start = end + 1
-
-
-@lru_cache(maxsize=4096)
-def _find_phone(label: str) -> str | None:
-    name = find_phone(label)
-    return None if name is None or is_silent(name) else name
+    return ((found[1],) * found[0].count(found[1]),) if found and list_entries(found[1]) else ()
 
 
 def find_english_data() -> Path:
@@ -244,8 +221,11 @@ def _dictionary() -> bytes:
 
 
 @cache
-def _list_entries(word: str) -> tuple[Pronunciation, ...]:
-    """Return the pronunciations of a word in the dictionary, by binary search in its text; none if it is not in it."""
+def list_entries(word: str) -> tuple[Pronunciation, ...]:
+    """Return the pronunciations of a word in the dictionary, by binary search in its text.
+
+    Of a word that is not in it: those of the same word without accents, or none.
+    """
     text, wanted, entries = _dictionary(), word.encode(), []
     low, high = 0, len(text) - 1  # each at the line break before a line
     while low < high:
@@ -258,7 +238,8 @@ def _list_entries(word: str) -> tuple[Pronunciation, ...]:
         end = text.index(b"\n", low + 1)
         entries.append(tuple(text[low:end].decode().lower().split()[1:]))
         low = end
-    return tuple(entries)
+    plain = remove_accents(word)
+    return tuple(entries) if entries or plain == word else list_entries(plain)
 
 
 def _head(text: bytes, line_break: int) -> bytes:

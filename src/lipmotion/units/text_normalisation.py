@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from lipmotion.errors import AlignmentError, InputError, shorten
-from lipmotion.units.lexicon import SOUNDED, expand_lengthened, is_in_dictionary
+from lipmotion.units.lexicon import SOUNDED, expand_lengthened, list_entries
 from lipmotion.units.spelling import convert_to_plain, normalise_text
 from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, list_readings
 
@@ -73,7 +73,7 @@ def tokenise(text: str) -> tuple[str, ...]:
     tokens = []
     for token in (found[0] for found in _scanner().finditer(plain)):
         is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
-        is_short = not shouted and INITIALS.fullmatch(token) and not is_in_dictionary(token.lower())
+        is_short = not shouted and INITIALS.fullmatch(token) and not list_entries(token.lower())
         is_short = is_short and not (expand_lengthened(token.lower()) or SOUNDED.fullmatch(token.lower()))
         tokens.append(token.lower() if is_word and not is_short else token)
     return tuple(tokens)
