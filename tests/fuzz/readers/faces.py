@@ -19,8 +19,7 @@ from PIL import Image
 
 from faces.test_cut_out import draw
 from formats.examples import of_motion, written
-from fuzz.inputs import Files, Good, Reader
-from fuzz.plausible import require, short_speech
+from fuzz.inputs import Files, Good, Reader, require, short_speech
 from lipmotion import Corpus, CueSheet, load_face, save_face
 from lipmotion.formats.c3d import C3dFile, write_c3d
 from lipmotion.formats.cues import CUE_FORMATS

@@ -12,8 +12,18 @@ from formats.test_labels import TIERS, long_form
 from formats.test_reported_cases import LINES, OTHERS, SERVICES, SPEAKERS
 from formats.test_transcripts import OF_LINES, OF_WORDS
 from formats.timing_samples import SAMPLES
-from fuzz.inputs import Files, Good, Reader, picked_up
-from fuzz.plausible import LONGEST_S, check_generation, check_motion, good_model, require, short_speech
+from fuzz.inputs import (
+    LONGEST_S,
+    Files,
+    Good,
+    Reader,
+    check_generation,
+    check_motion,
+    good_model,
+    picked_up,
+    require,
+    short_speech,
+)
 from lipmotion import Corpus, Request, animate, load_model, read_motion, write
 from lipmotion.formats.label_files import read_labels
 from lipmotion.speech.features.analysed_audio import analysed

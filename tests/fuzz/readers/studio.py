@@ -22,8 +22,7 @@ from unittest import mock
 import numpy as np
 from websockets.sync.client import connect
 
-from fuzz.inputs import Files, Good, Reader
-from fuzz.plausible import good_model, refuse_constant, require, short_speech
+from fuzz.inputs import Files, Good, Reader, good_model, refuse_constant, require, short_speech
 from lipmotion import Edits, Job, LiveFrame, Request, Stream, errors
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.batch import BatchLine, read_lines
