@@ -120,8 +120,7 @@ OUTPUTS = len(ARTICULATORS) + len(VISEMES_15)
 SHAPE = ConvolutionalShape("live", "live-network", STEP_FRAMES * (SPECTRUM_BANDS + 1), 256, (1, 2, 4, 8, 16, 1, 2, 4))
 """It hears the last 1.5 s."""
 START_LEVEL, QUIETEST_LEVEL = 1.0, -2.0
-"""Natural logarithm of the power of loud speech that is assumed before anything is heard, and the least: sound that is
-quieter than this is not made louder."""
+"""Natural logarithm of the power of loud speech that is assumed at first, and the least: quieter sound stays quiet."""
 FALL = 2.3 / (6 * FRAME_RATE_HZ)
 """The level that is assumed falls by so much a frame, 10 dB in 6 s: who begins too loud is not lost afterwards."""
 ATTACK = 0.25

@@ -67,16 +67,14 @@ LONGEST_LENGTHENED, MAX_LENGTHENED = 100, 5
 VARIANT_NUMBER = re.compile(r"\(\d+\)$")
 """The number by which the dictionary marks a further pronunciation."""
 MAX_VARIANTS = 32
-"""Most pronunciations of a word: alignment tries each after each of the word before. In the dictionary there are up to
-six."""
+"""Most pronunciations of a word: alignment tries each after each of the word before. The dictionary has up to six."""
 
 
 @lru_cache(maxsize=4096)
 def find_phone(label: str) -> str | None:
     """Return the phone that a label names, or None.
 
-    A label is ARPAbet in either case, stressed or not, TIMIT's, with its place in the word as in Kaldi (``hh_B``), or
-    our own name.
+    A label is ARPAbet in either case, stressed or not, TIMIT's, with its place in a word as in Kaldi (``hh_B``), ours.
     """
     name = re.sub(r"\d?(_[bies])?$", "", label.lower())
     name = REDUCED_VOWELS.get(name, name) if label[len(name) :].startswith("0") else OTHER_NAMES.get(name, name)
@@ -143,8 +141,7 @@ class Lexicon:
         """Return every pronunciation of a lower-case word, or of a written form (``1995``) in all its readings.
 
         Of an unknown one: those of the same word without accents or lengthened letters, if the dictionary has it
-        (``cafe`` for ``café``, ``boom`` for ``boooom``), else that of ``hama``'s network, where it is installed, else
-        that of the letter-to-sound rules.
+        (``cafe`` for ``café``, ``boom`` for ``boooom``), else that of ``hama``'s network, where installed, or of rules.
         Raises InputError: as ``guess_pronunciation``.
         """
         forms = (tuple(phone for phone, _ in form if phone != PAUSE) for form in self.spoken_forms(word))
@@ -185,8 +182,7 @@ class Lexicon:
 def expand_lengthened(word: str) -> tuple[tuple[str, ...], ...]:
     """Return the words of the dictionary that a lengthened word stands for, the likeliest first; none of any other.
 
-    Letters that stand there three times and more are meant once or twice: ``nooo``, ``boooom``. Else the word may be a
-    part that is repeated: ``hahaha``.
+    Letters that stand there three times and more are meant once or twice: ``nooo``, ``boooom``; or a part is repeated.
     """
     plain = remove_accents(word)
     if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or list_entries(word):

@@ -139,8 +139,7 @@ MAX_CHARACTERS = 50_000
 LONGEST_SENTENCE = 400
 """A longer sentence is divided at a comma, else between words; in characters."""
 LONGEST_WORD = 200
-"""Most characters without a blank in scripts that have blanks; a longer one is no word, but would be spoken for
-minutes."""
+"""Most characters without a blank in scripts that have blanks; a longer one is no word, but would take minutes."""
 ABBREVIATIONS = (
     "mr mrs ms dr prof st jr sr vs etc no vol fig inc ltd co gen col capt lt sgt rev hon e.g i.e a.m p.m approx"
 )
@@ -153,9 +152,8 @@ _BREAK = re.compile(r"[,;:–—、，；：]\s*|\s-+\s")
 def clean_text(text: str) -> str:
     """Return a text without control characters and surrogates; an empty line ends a sentence."""
     ended = re.sub(r"(\w)[ \t]*\r?\n[ \t]*\r?\n", r"\1.\n", text)
-    return " ".join(
-        "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Co", "Cn", "Zl", "Zp") else c for c in ended).split()
-    )
+    spoken = (" " if unicodedata.category(c) in ("Cc", "Cs", "Co", "Cn", "Zl", "Zp") else c for c in ended)
+    return " ".join("".join(spoken).split())
 
 
 def split_sentences(text: str) -> list[str]:

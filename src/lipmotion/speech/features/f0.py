@@ -1,8 +1,7 @@
 """The fundamental frequency (F0) of voiced speech, frame by frame.
 
 Three steps: the signal is low-passed and sampled at 4 kHz; around every frame its autocorrelation is computed at all
-lags of the range; dynamic programming chooses one of the few best lags of every frame, or unvoiced, so that the
-sequence costs least.
+lags of the range; dynamic programming finds the cheapest sequence of one of the few best lags, or unvoiced, a frame.
 Source: the candidates, costs and search of D. Talkin, "A robust algorithm for pitch tracking (RAPT)", in Kleijn and
 Paliwal (eds.), Speech Coding and Synthesis, 1995. Deviations: one correlation, weighted around the centre of the frame
 and computed from its power spectrum, at half samples; silence is relative to the recording; no cost of the spectrum.
@@ -178,8 +177,7 @@ def lags() -> NDArray[np.float64]:
 class _Tables(NamedTuple):
     """Matrices that signals are multiplied by.
 
-    low_pass    : 10 ms → what they add to the same 10 ms at 4 kHz, and to those one and two before
-                  [shape=(160, 3 · 40)]
+    low_pass    : 10 ms → what they add to the same 10 ms at 4 kHz, and to the two before [shape=(160, 3 · 40)]
     fourier     : a frame → its windowed spectrum, real parts and then imaginary ones [shape=(_WINDOW, 2 · bins)]
     inverse     : powers of the spectrum → Σ w(t) x(t) w(t+k) x(t+k) [shape=(bins, L)]
     early, late : squares of a frame → Σ w(t) w(t+k) x²(t), and of x²(t+k) [shape=(_WINDOW, L)]

@@ -44,8 +44,7 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
     warp : factor by which frequencies are stretched before the filters, to make vocal tracts of other lengths alike
     Frame n is centred at n · 10 ms, the signal reflected at both ends: T = floor(duration · 100) + 1.
     Mean and variance are normalised over the recording.
-    Raises InputError: the rate is not 16 kHz, the recording is shorter than one window, or not one channel of
-    finite samples.
+    Raises InputError: not 16 kHz, shorter than one window, or not one channel of finite samples.
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
     """
     (features,) = mfcc_of_warps(audio, (warp,), log_energy(check_samples(audio)))

@@ -1,15 +1,13 @@
 """Voice events: what a sound says beside words: laughter, breaths in pauses, phrases that are whispered or shouted.
 
-Everything but where phones are follows from the sound. Each rule is strict: an event that is not there is worse than
-one that is missed.
+Everything but where phones are follows from the sound. Rules are strict: a false event is worse than a missed one.
 
 Sources: whispering, which has no voice, R. W. Morris and M. A. Clements, "Reconstruction of speech from whispers",
 Medical Engineering & Physics 24, 2002; shouting, which is louder, higher, and has more energy at high frequencies, H.
 Traunmueller and A. Eriksson, "Acoustic effects of variation in vocal effort by men, women, and children", Journal of
 the Acoustical Society of America 107, 2000; breaths, D. Ruinskiy and Y. Lavner, "An effective algorithm for automatic
 detection and exact demarcation of breath sounds in speech and song signals", IEEE Transactions on Audio, Speech and
-Language Processing 15, 2007; laughter as ``features.laughter`` says. The limits are ours, chosen on recordings
-(docs/expression.md).
+Language Processing 15, 2007. The limits are ours, chosen on recordings (docs/expression.md).
 """
 
 from __future__ import annotations
@@ -74,22 +72,19 @@ def _find_fall(heights: Curve, lowest: Curve) -> Curve:
     return np.array(falls)
 
 
-def _rate_laughter(
-    audio: AnalysedAudio, level_db: Curve, voiced: Voiced, calls: list[int], first: int, end: int
-) -> float:
+def _rate_laughter(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, calls: list[int], run: slice) -> float:
     """Return the probability that a run of calls is laughter; 0: its voiced share is not that of laughter.
 
     ``WEIGHTS`` weigh the mean correlation of the spectra of successive calls; how far the level falls between them, in
     decibels; the voiced share; that of the gaps where they are quietest; the log number of calls.
     """
-    share = float(voiced[first:end].mean())
+    share = float(voiced[run].mean())
     if not VOICED_SHARES[0] <= share <= VOICED_SHARES[1]:
         return 0.0
     quietest = [before + int(level_db[before:after].argmin()) for before, after in pairwise(calls)]
     peaks = level_db[calls]
     depth = np.mean(np.minimum(peaks[1:], peaks[:-1]) - level_db[quietest])
-    bands = log_bands(audio.samples[first * HOP : (end - 1) * HOP])
-    spectra = bands[np.array(calls) - first].astype(np.float64)
+    spectra = _bands(audio, run)[np.array(calls) - run.start].astype(np.float64)
     spectra -= spectra.mean(axis=1, keepdims=True)
     spectra /= np.maximum(np.linalg.norm(spectra, axis=1, keepdims=True), 1e-9)
     likeness = (spectra[1:] * spectra[:-1]).sum(axis=1).mean()
@@ -202,7 +197,7 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
         if len(calls) < MIN_CALLS:
             continue
         first, end = max(int(calls[0]) - EDGE_FRAMES, 0), min(int(calls[-1]) + EDGE_FRAMES + 1, len(level_db))
-        probability = _rate_laughter(audio, level_db, voiced, calls.tolist(), first, end)
+        probability = _rate_laughter(audio, level_db, voiced, calls.tolist(), slice(first, end))
         start_s, end_s = first / FRAME_RATE_HZ, end / FRAME_RATE_HZ
         word_s = sum(_find_overlap((span.start_s, span.end_s), (start_s, end_s)) for span in words)
         if probability >= MIN_PROBABILITY and word_s <= MAX_WORD_SHARE * (end_s - start_s):

@@ -33,6 +33,8 @@ MIN_FITTING_SHARE = 0.9
 """A transcript that fits less of the speech is worth a remark."""
 JOINED_S = 0.5
 """Places nearer than this are one stretch."""
+Place = tuple[float, float]
+"""Start and end in seconds."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +49,11 @@ class TranscriptFit:
     """
 
     score: float
-    missing: tuple[tuple[float, float], ...]
+    missing: tuple[Place, ...]
     speech_s: float
     evidence: TranscriptEvidence | None = None
-    idle: tuple[tuple[float, float], ...] = ()
-    wrong: tuple[tuple[float, float], ...] = ()
+    idle: tuple[Place, ...] = ()
+    wrong: tuple[Place, ...] = ()
 
     @property
     def is_doubtful(self) -> bool:
@@ -138,9 +140,7 @@ def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArr
     return TranscriptFit(0.0, missing, speech_s, None, idle, wrong)
 
 
-def _find_unlabelled(
-    stretch: tuple[float, float], spoken: list[Span[Unit]], loud: tuple[tuple[float, float], ...]
-) -> tuple[float, float]:
+def _find_unlabelled(stretch: Place, spoken: list[Span[Unit]], loud: tuple[Place, ...]) -> Place:
     """Return all the sound around a stretch in which phones are heard, as far as no phone is given."""
     start_s, end_s = stretch
     before_s = max((span.end_s for span in spoken if span.end_s <= start_s), default=0.0)
@@ -149,9 +149,9 @@ def _find_unlabelled(
     return max(min(around[0][0], start_s), before_s), min(max(around[-1][1], end_s), after_s)
 
 
-def _join(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+def _join(places: list[Place]) -> tuple[Place, ...]:
     """Return places in time, those near one another as one."""
-    joined: list[tuple[float, float]] = []
+    joined: list[Place] = []
     for start_s, end_s in places:
         if joined and start_s - joined[-1][1] <= JOINED_S:
             joined[-1] = (joined[-1][0], end_s)

@@ -70,9 +70,8 @@ def find_anchors(transcript: TimedTranscript) -> Anchors:
 def fit_transcript(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: float) -> TimedTranscript:
     """Return a transcript whose times fit a recording as a whole.
 
-    If all are late or early they are corrected; lines that begin after the end of the recording are left out. Both are
-    logged as warnings.
-    loud       : which frames are loud [shape=(T,)]
+    loud : which frames are loud [shape=(T,)]
+    If all are late or early they are corrected; lines that begin after the end are left out. Warnings say so.
     Raises InputError: all lines begin after the end.
     """
     late_s = measure_lateness(transcript, loud)
@@ -97,9 +96,8 @@ def measure_lateness(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> fl
     """Return by how many seconds all times of a transcript are late, as of subtitles for another cut; 0: unclear.
 
     loud : which frames are loud [shape=(T,)]
-    It is the shift at which the spans of the times and the loud frames correlate best, up to ``MAX_SHIFT_S``, if it is
-    larger than the tolerance of lines, and the correlation at least ``MIN_CORRELATION``, and by ``MIN_GAIN`` better
-    than without a shift.
+    It is the shift up to ``MAX_SHIFT_S`` at which the spans of the times and the loud frames correlate best: by at
+    least ``MIN_CORRELATION``, and ``MIN_GAIN`` better than without; 0 within the tolerance of lines.
     """
     anchors = find_anchors(transcript)
     known = ~np.isnan(anchors.start_s) & ~np.isnan(anchors.end_s)

@@ -235,8 +235,7 @@ and take 500 bytes a frame. Those of a longer recording are computed twice."""
 class CombinedPhones(NamedTuple):
     """Models of every phone of the inventory and of the noises.
 
-    hmm     : the own models; a phone without an own model borrows that of the most similar phone with one
-              (``units.SIMILAR_PHONES``)
+    hmm     : the own models; a phone without one borrows that of the most similar phone (``units.SIMILAR_PHONES``)
     columns : the general density that goes with each of its densities [shape=(G,)]
     """
 

@@ -46,8 +46,7 @@ def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
 
     audio : at 16 kHz
     kind  : ``whisper`` or ``vosk``, of ``INSTALLED_RECOGNISERS``
-    The model is the folder that the environment variable ``LIPMOTION_WHISPER_MODEL`` or ``LIPMOTION_VOSK_MODEL``
-    names. Nothing is ever downloaded.
+    ``LIPMOTION_WHISPER_MODEL`` and ``LIPMOTION_VOSK_MODEL`` name the folders of models. Nothing is ever downloaded.
     Raises MissingDependencyError: the package is not installed. Raises InputError: no model, or one it cannot read.
     """
     recogniser = INSTALLED_RECOGNISERS[kind]

@@ -123,11 +123,9 @@ class Recogniser:
         if not audio.is_passage:
             if (network := find_network(self.kind)) is not None:
                 find_stretches(network, audio, each)  # of all passages at once: several processes work on them
-            passages = [
-                (passage, self.recognition(passage.audio, passage.audio.mfcc(), each, english=english))
-                for passage in audio.passages
-            ]
-            return join_recognition(passages, features.duration_s)
+            sounds = (passage.audio for passage in audio.passages)
+            recognitions = [self.recognition(sound, sound.mfcc(), each, english=english) for sound in sounds]
+            return join_recognition(list(zip(audio.passages, recognitions, strict=True)), features.duration_s)
         is_judged = self.adaptation is None and self.kind != "general"  # else nothing depends on it
         similarity = speaker_similarity(self.own, audio) if is_judged else None
         known = (
@@ -195,9 +193,8 @@ class Recogniser:
     ) -> Timeline[Unit]:
         """Return the phones of a known transcript in time: forced alignment.
 
-        words           : of the transcript, in lower case, and written forms (``1995``), in whose place the words stand
-                          that are said
-        anchors         : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
+        words   : of the transcript, in lower case, and written forms (``1995``): the words that are said replace these
+        anchors : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
         The reading and the pronunciation of each word, and the pauses, are those with the most probable path. A phone
         without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
         Raises AlignmentError: the transcript does not fit into the recording.
@@ -225,8 +222,7 @@ class Recogniser:
     def best_path_densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
         """Return the density of each frame's state on the most probable path [shape=(T,)].
 
-        They are numbered as in ``combined``, with the kind ``own`` as in the own models. Digital silence has that of
-        silence.
+        They are numbered as in ``combined``, with the kind ``own`` as in the own models; of digital silence as silence.
         Raises MissingDependencyError: as ``recognise``.
         """
         if not features.values.any():

@@ -312,11 +312,8 @@ def _runs(starts_s: Array, ends_s: Array, min_s: float = MIN_DOUBT_S) -> tuple[t
         return ()
     cuts = np.flatnonzero(starts_s[1:] - ends_s[:-1] > RUN_PAUSE_S) + 1
     runs = zip(np.split(starts_s, cuts), np.split(ends_s, cuts), strict=True)
-    return tuple(
-        (float(first[0]), float(last[-1]))
-        for first, last in runs
-        if len(first) >= MIN_RUN and last[-1] - first[0] >= min_s
-    )
+    spans = [(float(starts[0]), float(ends[-1])) for starts, ends in runs if len(starts) >= MIN_RUN]
+    return tuple((start_s, end_s) for start_s, end_s in spans if end_s - start_s >= min_s)
 
 
 @cache

@@ -104,8 +104,7 @@ def add_noise(audio: Audio, noise: NDArray[np.floating], snr_db: float) -> Audio
     snr_db : 10 · log10 of the mean power of the recording over that of the noise, both over the samples of speech
              (``mark_spoken``); noise that the recording already has counts as speech there
     The samples are not clipped: beyond full scale they are exact for features, not for sound files of integers.
-    Raises InputError: the ratio is not finite, the lengths differ, the noise is silent or not finite, or there is no
-    speech in the recording.
+    Raises InputError: a ratio that is not finite, other lengths, noise that is silent or not finite, or no speech.
     """
     if not np.isfinite(snr_db):
         raise InputError(f"the signal-to-noise ratio is {snr_db} dB, required a finite number")
@@ -123,8 +122,7 @@ def make_babble(voices: Sequence[Audio], samples: int, seed: int = 0) -> NDArray
     """Return the sum of several talkers, each with the same power [shape=(samples,)].
 
     voices : at least ``MIN_TALKERS`` recordings at 16 kHz, none of them of the speaker to whom they are added
-    Every recording begins at a random sample and is repeated from its start at its end. All have mean power 1 over
-    their samples of speech.
+    Every recording begins at a random sample, and again at its end. All have mean power 1 over their speech.
     Raises InputError: too few recordings, another rate, or a recording too short or silent.
     """
     if len(voices) < MIN_TALKERS:

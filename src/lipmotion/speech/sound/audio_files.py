@@ -28,6 +28,7 @@ speech needs less than 56, digital silence in FLAC 27. A small file must not fil
 LOWEST_HZ, HIGHEST_HZ = 4000, 1_000_000
 """Lowest and highest sampling rate: below, speech is not intelligible; no recorder samples at a higher one."""
 MAX_CHANNELS = 64
+AGAIN = "export the recording again"
 PIECE_BYTES = 1 << 20
 """Sound is collected in pieces of this size, and without digital silence."""
 
@@ -38,11 +39,9 @@ def check_sound_format(name: str, rate_hz: int, channels: int) -> None:
     A wrong header could fill the memory: at a rate of 1 Hz, 16,000 samples are made out of one.
     """
     if not LOWEST_HZ <= rate_hz <= HIGHEST_HZ:
-        raise InputError(
-            f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; export the recording again"
-        )
+        raise InputError(f"{name}: sampled at {rate_hz} Hz, required {LOWEST_HZ} to {HIGHEST_HZ}; {AGAIN}")
     if not 1 <= channels <= MAX_CHANNELS:
-        raise InputError(f"{name}: has {channels} channels, required 1 to {MAX_CHANNELS}; export the recording again")
+        raise InputError(f"{name}: has {channels} channels, required 1 to {MAX_CHANNELS}; {AGAIN}")
 
 
 class _TrackDecoder:
@@ -136,7 +135,7 @@ class _TrackDecoder:
         if duration_s > LONGEST_HOLE_S:
             raise InputError(
                 f"{self._name}: the time stamps of its sound jump by {duration_s:.0f} s, at most "
-                f"{LONGEST_HOLE_S:.0f} s are bridged; export the recording again"
+                f"{LONGEST_HOLE_S:.0f} s are bridged; {AGAIN}"
             )
         return round(duration_s * self.rate_hz)
 
@@ -145,7 +144,7 @@ class _TrackDecoder:
         if self.silence_s > max_s:
             raise InputError(
                 f"{self._name}: the time stamps of its sound leave holes of {self.silence_s:.0f} s beside "
-                f"{self._sound_s:.1f} s of sound, at most {max_s:.0f} s are bridged; export the recording again"
+                f"{self._sound_s:.1f} s of sound, at most {max_s:.0f} s are bridged; {AGAIN}"
             )
         self._check_length(self._sound_s + self.silence_s)
 
@@ -154,7 +153,7 @@ class _TrackDecoder:
         if length_s > max_s:
             raise InputError(
                 f"{self._name}: {self._size} bytes of sound last {length_s:.0f} s, required at most {max_s:.0f} s "
-                f"({MIN_BYTES_PER_S:.0f} bytes a second); export the recording again"
+                f"({MIN_BYTES_PER_S:.0f} bytes a second); {AGAIN}"
             )
 
     def _flush(self) -> None:
@@ -230,7 +229,7 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
             sound = _decode(path, rate_hz, sound.centre)
     damage = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
     if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
-        raise InputError(f"{path}: damaged: {damage}; required: at least half of them; export the recording again")
+        raise InputError(f"{path}: damaged: {damage}; required: at least half of them; {AGAIN}")
     if sound.damaged or sound.silence_s >= SHORTEST_S:
         holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= MIN_HOLES_S else ""
         LOG.log(level, "%s: damaged: %s%s", path, damage, holes)
@@ -241,7 +240,7 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     if audio.duration_s < SHORTEST_S:
         raise InputError(f"{path}: holds {audio.duration_s * 1000:.0f} ms of sound, required at least 100 ms")
     if not np.isfinite([audio.samples.min(), audio.samples.max()]).all():  # which needs no further array
-        raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); export the recording again")
+        raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); {AGAIN}")
     return audio
 
 

@@ -36,8 +36,7 @@ LEVEL_STEP = 15 * DECIBEL
 PASSAGE_MARGIN = 75
 """Frames before and after the sound of a passage that belong to it, where they are not digital silence."""
 CUT_FROM, CUT_FRAMES, CUT_STEP = 6, 6, 6 * DECIBEL
-"""So many frames beside sound and more, a level that changes at once by the last of these, and for good, is of another
-recording."""
+"""So many frames and more beside sound, a level that changes at once by the last, for good, is of another recording."""
 LOCAL_FRAMES, LOCAL_DROP, SOFTEST_DROP = 301, 30 * DECIBEL, 42 * DECIBEL
 """Sound lies less than the second below the loudest within the first, and less than the third below all of it."""
 STEADY, STEADY_FRAMES = 10 * DECIBEL, 201
@@ -181,8 +180,7 @@ def fill_gaps(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> 
     """Return the samples of a passage with noise in the digital silence between its words, as of a noise gate.
 
     samples, log_energy : as of ``find_passage_gain``: the samples are those of the passage
-    Where nothing is recorded, features are unlike those of any room: all else would look alike beside them, and every
-    voice like that of the training.
+    Features of nothing are unlike those of any room: beside them all voices would look like that of the training.
     """
     loud = float(average_power(log_energy).max())
     runs = find_sound_runs(log_energy < loud - GATED_DROP, 1)

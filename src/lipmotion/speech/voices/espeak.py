@@ -51,8 +51,7 @@ CLOSURE_SHARE = 0.03
 """Share of the largest sample that no sample of a closure exceeds: some variants have breath in it."""
 LONGEST_CLOSURE_S = 0.06
 LATE_L_S, L_SHARE = 0.045, 0.45
-"""An l that is reported so shortly before its end is late; it then gets this share of the vowel and l together, as in
-the project's own alignments."""
+"""An l that is reported so shortly before its end is late: it gets this share of vowel and l, as in our alignments."""
 
 Starts = Sequence[tuple[str, float]]
 

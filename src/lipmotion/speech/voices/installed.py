@@ -182,8 +182,7 @@ def find_voice(name: str) -> SyntheticVoice:
 
     name : ``SYNTHESISER:VOICE``, as in ``flite:slt`` or ``espeak-ng:de``; or the voice's name alone, where only one
            synthesiser has it. A language of espeak-ng may be followed by a variant: ``espeak-ng:de+f3``.
-    Raises MissingDependencyError: no synthesiser is installed, or not that one. Raises InputError: no such voice, or
-    several.
+    Raises MissingDependencyError: no synthesiser, or not that one, is installed. Raises InputError: none, or several.
     """
     maker, colon, rest = name.rpartition(":")
     if colon and maker not in SYNTHESISERS:

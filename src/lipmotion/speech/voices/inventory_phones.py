@@ -17,8 +17,7 @@ from lipmotion.units.phones import REDUCED_VOWELS, SHORT_PAUSE_S
 from lipmotion.units.spelling import normalise_text
 
 GAP_COST, OWN_FORM_COST, OWN_KIND_COST, OTHER_KIND_COST = 0.7, 0.3, 0.8, 1.5
-"""Costs of matching a phone with none, with a form of itself, with another of its kind (vowel or consonant), and with
-one of the other kind."""
+"""Costs of matching a phone with none, a form of itself, another of its kind (vowel, consonant), and the other kind."""
 VOWELS = list_phone_classes()["vowel"]
 WRITTEN_EDGES = re.compile(r"^[^\w]+|[^\w]+$")
 """Punctuation at the ends of a written word."""
@@ -70,8 +69,7 @@ def convert_phones(
 def with_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) -> list[Unit]:
     """Return phones with their words; AH, ER and IH are reduced where the dictionary reduces them.
 
-    Both follow from the cheapest match with the words' first pronunciations; a phone that matches none belongs to the
-    word before it.
+    Both follow from the cheapest match with the words' first pronunciations; other phones belong to the word before.
     """
     expected = [(phone, number) for number, word in enumerate(words) for phone in _pronunciation(word, lexicon)]
     units, number = [], expected[0][1] if expected else 0

@@ -43,9 +43,7 @@ _ESPEAK: dict[str, str] = {
     # parts of what is before: the glide from a vowel to the next, the beginning of an unstressed vowel
     "; @-": "",
 }  # fmt: skip
-ESPEAK_PHONES: PhoneMap = {
-    label: tuple(phones.split()) for labels, phones in _ESPEAK.items() for label in labels.split()
-}
+ESPEAK_PHONES: PhoneMap = {name: tuple(phones.split()) for names, phones in _ESPEAK.items() for name in names.split()}
 """espeak-ng's mnemonics (as ``espeak-ng -x`` writes them), voice en-us."""
 
 
@@ -148,8 +146,7 @@ def run_program(
     """Return the standard output of a program. When it has ended, in whatever way, so have the programs it started.
 
     sentences : how many it synthesises, which sets its limits
-    Raises MissingDependencyError: there is no such program. Raises InputError: it fails, takes too long, or prints or
-    writes too much.
+    Raises MissingDependencyError: no such program. Raises InputError: it fails, takes too long, or writes too much.
     """
     program = shutil.which(command[0])
     if program is None:

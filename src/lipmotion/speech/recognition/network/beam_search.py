@@ -1,8 +1,7 @@
 """The search for words in posteriors: the most probable sequence of words, and of phones outside of words.
 
 Words and their neighbours decide together: a path says the phones of one word after the other, each in a row of
-posteriors or several, with blanks between. Where no word fits, a path may say any phones: names, other languages, and
-what is no word.
+posteriors or several, with blanks between. Where no word fits, as of names, a path may say any phones.
 
 Source: Graves, Fernández, Gomez and Schmidhuber 2006, "Connectionist temporal classification" (paths with blanks); Ney,
 Haeb-Umbach, Tran and Oerder 1992, "Improvements in beam search" (the tree of words, and the score of the most probable
