@@ -176,8 +176,8 @@ def test_the_best_path_is_the_best_of_all(seed: int) -> None:
     logits = draw.normal(0, 12, (5, len(PHONES) + 1))
     log_posteriors = logits - np.logaddexp.reduce(logits, axis=1)[:, None]
     _, said = best_by_trying(log_posteriors, words)
-    path = _best_path(log_posteriors, [np.array(word) for word in words])
-    assert [word is not None for word in path.words] == said
+    frames_of_words, _ = _best_path(log_posteriors, [np.array(word) for word in words])
+    assert [frames is not None for frames in frames_of_words] == said
 
 
 ROW_S = 2 * FRAME_S

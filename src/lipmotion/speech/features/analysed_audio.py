@@ -235,12 +235,7 @@ class Passage(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """The sound between two digital silences, without what is before and after it.
-
-    frame    : of the recording, in which it begins
-    energy   : the log energy of its frames [shape=(T,)]
-    passages : what is said in it, in its frames;  tones : where it is a steady tone
-    """
+    """The sound between two digital silences, from a frame of the recording on; passages and tones are in its frames."""
 
     frame: int
     samples: NDArray[np.float32]
@@ -384,10 +379,7 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
 
 
 def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return samples without a constant offset, which would make pauses as loud as speech; digital silence stays.
-
-    It is that of the quietest sound between digital silences, and taken off where it is most of what is heard there.
-    """
+    """Return samples without constant offsets that are most of the quietest sound between digital silences."""
     count = len(samples) // HOP if samples.ndim == 1 else 0
     sound, result = np.flatnonzero(samples[: count * HOP].reshape(count, HOP).any(axis=1)), samples
     for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +99,7 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
     analysis = analysed(audio)
-    scored = _score_frames(analysis, units)
+    frames, scores, mean = _score_frames(analysis, units)
     loud = find_loud_frames(analysis.log_energy)
     missing, speech_s = [], 0.0
     for span in units:
@@ -112,10 +111,10 @@ def measure_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
         else:
             speech_s += span.duration_s
             if span.duration_s >= LONG_PHONE_S and len(loud_s) >= MIN_LOUD_S * FRAME_RATE_HZ:
-                inside = slice(*np.searchsorted(scored.frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
-                if float(scored.scores[inside].mean()) < LONG_PHONE_SCORE:
+                inside = slice(*np.searchsorted(frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
+                if float(scores[inside].mean()) < LONG_PHONE_SCORE:
                     missing.append((span.start_s, span.end_s))
-    return TranscriptFit(scored.mean(), _join(missing), speech_s)
+    return TranscriptFit(mean, _join(missing), speech_s)
 
 
 def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArray[np.float64] | None) -> TranscriptFit:
@@ -169,31 +168,11 @@ def score_agreement(audio: Audio, units: Timeline[Unit]) -> float:
     phone (at least ``WORST_SCORE``): 0 where no other phone is more probable, or nothing is spoken.
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
-    return _score_frames(analysed(audio), units).mean()
+    return _score_frames(analysed(audio), units)[2]
 
 
-class _ScoredFrames(NamedTuple):
-    """Every fourth frame of speech.
-
-    frames : their numbers [shape=(S,)]
-    phones : the number of the phone in each, among those that are no silence [shape=(S,)]
-    scores : how well the phone agrees with the sound there [shape=(S,)]
-    """
-
-    frames: NDArray[np.intp]
-    phones: NDArray[np.intp]
-    scores: NDArray[np.float32]
-
-    def mean(self) -> float:
-        """Return the agreement score: every phone counts the same."""
-        if not len(self.frames):
-            return 0.0
-        counts = np.bincount(self.phones)
-        sums = np.bincount(self.phones, np.maximum(self.scores, WORST_SCORE))
-        return float((sums[counts > 0] / counts[counts > 0]).mean())
-
-
-def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames:
+def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.float32], float]:
+    """Return every fourth frame of speech, how well its phone agrees with the sound there, and the agreement score."""
     spoken = [span for span in units if not is_silent(span.label.phone)]
     each = [np.arange(of_span.start, of_span.stop) for of_span in map(_frames_of, spoken)]
     phones = np.repeat(np.arange(len(spoken)), [len(of_span) for of_span in each])
@@ -201,10 +180,12 @@ def _score_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames:
     frames = np.concatenate([np.zeros(0, np.intp), *each])
     frames, phones, states = (rows[::FRAME_STEP] for rows in (frames, phones, first))
     if not len(frames):
-        return _ScoredFrames(frames, phones, np.zeros(0, np.float32))
+        return frames, np.zeros(0, np.float32), 0.0
     log_densities = load_general().log_density(audio.general_features[frames])
     of_phone = np.take_along_axis(log_densities, states[:, None] + np.arange(STATES), axis=1)
-    return _ScoredFrames(frames, phones, of_phone.max(axis=1))
+    scores, counts = of_phone.max(axis=1), np.bincount(phones)
+    sums = np.bincount(phones, np.maximum(scores, WORST_SCORE))
+    return frames, scores, float((sums[counts > 0] / counts[counts > 0]).mean())  # every phone counts the same
 
 
 def _first_frame(time_s: float) -> int:

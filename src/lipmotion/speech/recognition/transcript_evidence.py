@@ -124,32 +124,23 @@ def find_evidence(
     log_posteriors = np.maximum(log_posteriors, MIN_LOG_POSTERIOR)
     words: list[WordEvidence] = []
     others: list[OtherSpeech] = []
-    for part in _parts(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
-        at, stop = round(part.start_s / frame_s), round(part.end_s / frame_s)
-        columns = [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in part.words]
-        path = _best_path(log_posteriors[at : None if part.is_last else stop], columns, costs)
-        for (begin, end), (left, back) in path.free:
+    for first_s, stop_s, spans_of_words in _divide(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
+        at, stop = round(first_s / frame_s), None if stop_s is None else round(stop_s / frame_s)
+        columns = [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in spans_of_words]
+        frames_of_words, free = _best_path(log_posteriors[at:stop], columns, costs)
+        for (begin, end), (left, back) in free:
             start_s, end_s = (at + begin) * frame_s, (at + end) * frame_s
             others.append(OtherSpeech(start_s, end_s, len(words) + left, len(words) + back))
-        for spans, heard in zip(part.words, path.words, strict=True):
-            said, (start_s, end_s) = tuple(span.label.phone for span in spans), (spans[0].start_s, spans[-1].end_s)
+        for spans, heard in zip(spans_of_words, frames_of_words, strict=True):
+            phones, (start_s, end_s) = tuple(span.label.phone for span in spans), (spans[0].start_s, spans[-1].end_s)
             if heard is not None:
                 start_s, end_s = (at + heard[0]) * frame_s, (at + heard[1]) * frame_s
-            words.append(WordEvidence(spans[0].label.word, said, start_s, end_s, heard is not None))
+            words.append(WordEvidence(spans[0].label.word, phones, start_s, end_s, heard is not None))
     return TranscriptEvidence(tuple(words), tuple(others))
 
 
-class _Part(NamedTuple):
-    """A part of a recording, and the phones of its words in time."""
-
-    start_s: float
-    end_s: float
-    words: list[list[Span[Unit]]]
-    is_last: bool
-
-
-def _parts(units: Timeline[Unit], divided: bool) -> Iterator[_Part]:
-    """Yield a recording; ``divided``: in parts that are short enough to be searched, cut in silence if possible."""
+def _divide(units: Timeline[Unit], divided: bool) -> Iterator[tuple[float, float | None, list[list[Span[Unit]]]]]:
+    """Yield start, end (None: the last) and words of a recording, or of parts that are short enough to be searched."""
     start_s = before_s = 0.0
     words: list[list[Span[Unit]]] = []
     for (silent, _), group in groupby(units, key=lambda span: (is_silent(span.label.phone), span.label.word)):
@@ -159,32 +150,24 @@ def _parts(units: Timeline[Unit], divided: bool) -> Iterator[_Part]:
         pause_s, so_far_s = spans[0].start_s - before_s, before_s - start_s
         if divided and words and so_far_s > (MIN_STRETCH_S if pause_s > 0 else LONGEST_STRETCH_S):
             cut_s = before_s + pause_s / 2
-            yield _Part(start_s, cut_s, words, is_last=False)
+            yield start_s, cut_s, words
             start_s, words = cut_s, []
         words.append(spans)
         before_s = spans[-1].end_s
-    yield _Part(start_s, units[-1].end_s if len(units) else 0.0, words, is_last=True)
+    yield start_s, None, words
 
 
-class _Path(NamedTuple):
-    """The best path through some frames.
-
-    words : the first frame of each word and the one after its last; None: it is left out
-    free  : where anything is said: the first frame in which a phone is heard and the one after the last; the first word
-            that is left out there and the one after the last
-    """
-
-    words: list[tuple[int, int] | None]
-    free: list[tuple[tuple[int, int], tuple[int, int]]]
-
-
+Range = tuple[int, int]
+"""The first of some frames or words, and the one after the last."""
+Path = tuple[list[Range | None], list[tuple[Range, Range]]]
+"""The frames of each word, None where it is left out; and those in which anything is said, with the words left out."""
 BLANK, PHONE, FREE, INSTEAD = range(4)
 """How a path is after n phones: in a blank; in the nth of them; it says anything between words, or in place of some."""
 STAYED, BEGAN, SKIPPED = range(3)
 """How it came to say anything there: it did before; it begins; a word more is left out."""
 
 
-def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float] = WORD_COSTS) -> _Path:
+def _best_path(log_posteriors: Array, words: Sequence[Columns], costs: tuple[float, float] = WORD_COSTS) -> Path:
     """Return the best path that says words, leaves some of them out, and says anything between them."""
     word_cost, phone_cost = costs
     columns = np.concatenate([np.zeros(0, np.intp), *words])
@@ -231,12 +214,12 @@ def _trace(
     same: NDArray[np.bool_],
     edges: Columns,
     heard: Array,
-) -> _Path:
-    """Return the words and free stretches of the best path, which is followed from its end."""
+) -> Path:
+    """Return the best path, which is followed from its end."""
     place, how = int(edges[-1]), int(arrivals[-1, -1])
-    words: list[tuple[int, int] | None] = [None] * (len(edges) - 1)
-    free: list[tuple[tuple[int, int], tuple[int, int]]] = []
-    last: tuple[int, int] | None = None  # the end of a free stretch: its frame, the word after it
+    words: list[Range | None] = [None] * (len(edges) - 1)
+    free: list[tuple[Range, Range]] = []
+    last: Range | None = None  # the end of a free stretch: its frame, the word after it
     for t in reversed(range(len(heard))):
         word = int(np.searchsorted(edges, place))  # the one that ends at this place is before it
         if how == BLANK:
@@ -257,7 +240,7 @@ def _trace(
                 where = (int(loud[0]), int(loud[-1]) + 1) if len(loud) else (t, t)
                 free.append((where, (word, last[1])))
                 last, how = None, int(arrivals[t, place])
-    return _Path(words, free[::-1])
+    return words, free[::-1]
 
 
 class LabelEvidence(NamedTuple):

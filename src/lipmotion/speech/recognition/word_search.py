@@ -77,24 +77,17 @@ def spot_words(samples: bytes) -> tuple[FoundWord, ...]:
         decoder.end_utt()
         lattice = _segments(decoder)
     words = []
-    for one in found:
-        same = (two for two in lattice if one.word == two.word and max(one.first, two.first) <= min(one.last, two.last))
-        words.append(FoundWord(one.word, max((two.posterior for two in same), default=0.0)))
+    for word, start, end, _ in found:
+        same = (each[3] for each in lattice if each[0] == word and max(start, each[1]) <= min(end, each[2]))
+        words.append(FoundWord(word, max(same, default=0.0)))
     return tuple(words)
 
 
-class _Segment(NamedTuple):
-    word: str
-    first: int
-    last: int
-    posterior: float
-
-
-def _segments(decoder: Any) -> list[_Segment]:
-    """Return the words of the decoder's present best path, and their frames."""
+def _segments(decoder: Any) -> list[tuple[str, int, int, float]]:
+    """Return the words of the decoder's present best path, their first and last frames, and their posteriors."""
     entries = decoder.seg() if decoder.hyp() is not None else ()
     return [
-        _Segment(VARIANT.sub("", entry.word), entry.start_frame, entry.end_frame, min(max(entry.prob, 0.0), 1.0))
+        (VARIANT.sub("", entry.word), entry.start_frame, entry.end_frame, min(max(entry.prob, 0.0), 1.0))
         for entry in entries
         if entry.word[:1] not in ("<", "[", "+")  # silence and noise: <sil>, [NOISE], ++UH++
     ]
@@ -221,20 +214,6 @@ POSTERIOR_BONUS, REACH_FRAMES = 30.0, 4
 """By so many nats a phone is more probable where its posterior is 1; around it, by less, to nothing further away."""
 
 
-@dataclass(frozen=True)
-class SpokenItem:
-    """A word, or phones that belong to no word, as they are aligned.
-
-    text       : of the word; empty: of no word
-    variants   : pronunciations
-    confidence : the probability that the word is right, 0 to 1
-    """
-
-    text: str
-    variants: tuple[Pronunciation, ...]
-    confidence: float
-
-
 def decode_network(
     hmm: UnitHmm, aligning: LogLikelihoods, loud: NDArray[np.bool_], found: Sequence[PosteriorStretch]
 ) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
@@ -248,21 +227,21 @@ def decode_network(
     for stretch, posteriors in found:
         if not (items := list_spoken(posteriors)):
             continue
-        lexicon = Lexicon({str(number): item.variants for number, item in enumerate(items)})
+        lexicon = Lexicon({str(number): variants for number, (_, variants) in enumerate(items)})
         values = aligning.stretch(*stretch)
         aligned = align_recognised_words(hmm, values, loud[slice(*stretch)], [*lexicon.user], lexicon)
         if aligned is not None:
-            wordless = {len(recognised) + number for number, item in enumerate(items) if not item.text}
+            wordless = {len(recognised) + number for number, (word, _) in enumerate(items) if not word.text}
             parts += [
                 (frames, [label._replace(word=-1) if label.word in wordless else label for label in labels])
                 for frames, labels in label_words(aligned, stretch, np.ones(len(items), bool), len(recognised))
             ]
-        recognised += [RecognisedWord(item.text, item.confidence) for item in items]
+        recognised += [word for word, _ in items]
     return parts, recognised
 
 
-def list_spoken(posteriors: PhonePosteriors) -> list[SpokenItem]:
-    """Return what is said in a stretch of English, in order; nothing where the network finds no phone."""
+def list_spoken(posteriors: PhonePosteriors) -> list[tuple[RecognisedWord, tuple[Pronunciation, ...]]]:
+    """Return the words of a stretch of English with their pronunciations; phones of no word have an empty text."""
     if not _finds_phones(posteriors):
         return []
     items = []
@@ -276,7 +255,7 @@ def list_spoken(posteriors: PhonePosteriors) -> list[SpokenItem]:
             agreement = max(1 - count_phone_edits(each, heard) / max(len(each), len(heard)) for each in variants)
             score = AGREEMENT_WEIGHT * agreement + NETWORK_WEIGHT * posteriors.mean_posterior(word.first, word.end)
             confidence = float(1 / (1 + np.exp(-(score + NETWORK_CONSTANT))))
-        items.append(SpokenItem(word.text, variants, confidence))
+        items.append((RecognisedWord(word.text, confidence), variants))
     return items
 
 
