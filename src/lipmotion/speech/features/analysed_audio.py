@@ -235,7 +235,7 @@ class Passage(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """The sound between two digital silences, from a frame of the recording on; passages and tones are in its frames."""
+    """The sound between two digital silences, from a frame of the recording on; the rest is in frames of its own."""
 
     frame: int
     samples: NDArray[np.float32]
