@@ -92,9 +92,9 @@ def test_the_number_of_frames_is_that_of_the_features_and_very_short_recordings_
         assert result.shape == (len(read_sound(Audio(noise(count), RATE_HZ)).mfcc().values),)
         assert result.dtype == np.float32
     for count in (400, 401, 639, 1600):
-        result = found(voice(steady(200))[:count])
-        assert len(result) == count // 160 + 1
-        assert np.nanmax(np.abs(result / 200 - 1), initial=0) < 0.5
+        hertz = found(voice(steady(200))[:count])
+        assert len(hertz) == count // 160 + 1
+        assert np.nanmax(np.abs(hertz / 200 - 1), initial=0) < 0.5
     assert found(voice(steady(200, 0.1)))[2:-2] == pytest.approx(200, rel=0.02)
 
 
