@@ -49,12 +49,14 @@ def transcript(words: list[str], end_s: float, word_s: float = 0.1) -> Timeline[
     return Timeline((*spans, Span(at_s, max(end_s, at_s + 0.1), Unit("sil"))))
 
 
-def test_a_right_transcript_is_said() -> None:
+def test_a_right_transcript_is_said_and_words_that_do_not_fit_into_the_frames_are_not() -> None:
     found = find_evidence(heard([*SAID]), FRAME_S, transcript([*SAID], 1.0))
     assert [word.word for word in found.words] == [*SAID]
     assert (found.unsaid, found.others, found.is_doubtful) == ((), (), False)
     assert found.words[0].start_s == pytest.approx(0.22)
     assert found.words[0].end_s == pytest.approx(0.36)  # four phones and the blanks between them
+    crowded = find_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
+    assert (crowded.unsaid, crowded.gaps) == (crowded.words, ())
 
 
 def test_another_transcript_is_doubtful() -> None:
@@ -121,12 +123,6 @@ def test_a_long_recording_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [word[:2] for word in parts.words] == [word[:2] for word in whole.words]
     (one,), (other,) = whole.others, parts.others
     assert other == pytest.approx(one, abs=0.05)
-
-
-def test_words_that_do_not_fit_into_the_frames_are_not_said() -> None:
-    found = find_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
-    assert found.unsaid == found.words
-    assert found.gaps == ()
 
 
 def test_posteriors_of_something_else_are_refused() -> None:
@@ -225,10 +221,8 @@ def test_it_is_the_mean_over_phones_of_the_best_state_of_what_is_said(sentences:
     ]
     wanted: dict[int, list[float]] = {}
     for frame, number, phone in spoken[:: agreement.FRAME_STEP]:
-        row = general.PHONES.index(names.get(phone, phone.upper()))
-        wanted.setdefault(number, []).append(
-            max(density[frame].reshape(len(general.PHONES), 3)[row].max(), agreement.WORST_SCORE)
-        )
+        states = density[frame].reshape(len(general.PHONES), 3)[general.PHONES.index(names.get(phone, phone.upper()))]
+        wanted.setdefault(number, []).append(max(states.max(), agreement.WORST_SCORE))
     mean = np.mean([np.mean(scores) for scores in wanted.values()])
     assert agreement.score_agreement(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
 
@@ -276,9 +270,7 @@ def test_places_near_one_another_are_one_stretch() -> None:
     fit = agreement.TranscriptFit(-1.0, ((0.0, 2.0), (3.0, 3.5)), 10.0)
     assert fit.missing_s == pytest.approx(2.5)
     assert fit.share == pytest.approx(0.75)
-    assert agreement.TranscriptFit(agreement.DOUBTFUL_SCORE - 0.1, (), 10.0).share == pytest.approx(
-        0
-    )  # of something else
+    assert agreement.TranscriptFit(agreement.DOUBTFUL_SCORE - 0.1, (), 10.0).share == 0  # of something else
 
 
 @pytest.mark.recordings

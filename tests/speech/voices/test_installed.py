@@ -33,8 +33,10 @@ def test_voices_are_listed() -> None:
 
 
 @pytest.mark.usefixtures("faked")
-def test_a_voice_says_phones_in_time() -> None:
+def test_a_voice_says_phones_in_time_and_any_letters_reach_it() -> None:
+    lexicon = Lexicon({"helló": (("hh", "ax", "l", "ow"),)})
     for voice in EACH:
+        assert len(list(installed.speak_sentences(HARD, voice, lexicon))) == len(HARD)
         audio, units, _ = next(installed.speak_sentences(["Hello"], voice))
         assert audio.rate_hz == 16_000
         assert audio.duration_s == pytest.approx(1.0)
@@ -45,31 +47,18 @@ def test_a_voice_says_phones_in_time() -> None:
         ]  # fmt: skip
 
 
-@pytest.mark.parametrize("voice", EACH)
-@pytest.mark.usefixtures("faked")
-def test_any_letters_reach_the_synthesiser(voice: synthesiser.SyntheticVoice) -> None:
-    lexicon = Lexicon({"helló": (("hh", "ax", "l", "ow"),)})
-    assert len(list(installed.speak_sentences(HARD, voice, lexicon))) == len(HARD)
-
-
-@pytest.mark.parametrize("voice", EACH)
-def test_errors_are_clear_and_nothing_stays(faked: Path, voice: synthesiser.SyntheticVoice) -> None:
-    for text, message in (("they crash", "failed with 1 .no such sound"), ("nonsense", "nonsense")):
+def test_errors_are_clear_and_nothing_stays_even_if_not_all_is_read(faked: Path) -> None:
+    crashes = [(voice, "they crash", "failed with 1 .no such sound") for voice in EACH]
+    for voice, text, message in (
+        *crashes,
+        *((voice, "nonsense", "nonsense") for voice in EACH),
+        (FAKED[0], "no bytes", "cannot be run|nonsense"),
+        (FAKED[0], "... ", "holds no word"),
+        (FAKED[2], "stop here", "0 of 1 sentences"),
+    ):
         with pytest.raises(errors.InputError, match=message):
-            next(installed.speak_sentences([text], voice))
+            list(installed.speak_sentences([text], voice))
         assert list(faked.iterdir()) == []
-
-
-def test_what_is_no_text_or_has_no_words_is_refused_and_what_festival_leaves_out_is_missed(faked: Path) -> None:
-    for text, message in (("no bytes", "cannot be run|nonsense"), ("... ", "holds no word")):
-        with pytest.raises(errors.InputError, match=message):
-            next(installed.speak_sentences([text], FAKED[0]))
-    with pytest.raises(errors.InputError, match="1 of 2 sentences"):
-        list(installed.speak_sentences(["hello", "stop here"], FAKED[2]))
-    assert list(faked.iterdir()) == []
-
-
-def test_temporary_files_go_even_if_not_all_is_read(faked: Path) -> None:
     said = installed.speak_sentences(["hello", "hello"], FAKED[0])
     next(said)
     assert len(list(faked.iterdir())) == 1
@@ -221,19 +210,18 @@ def test_a_program_is_stopped(script: str, message: str, tmp_path: Path) -> None
 
 
 @needs_scripts
-def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
-    child = int(synthesiser.run_program([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
+def test_a_program_reads_what_it_is_given_and_what_it_started_ends_with_it(tmp_path: Path) -> None:
+    for name in ("reader", "starter"):
+        (tmp_path / name).mkdir()
+    reader = [str(_program(tmp_path / "reader", "exec cat"))]
+    assert synthesiser.run_program(reader, "a-package", given="Helló\n") == "Helló\n"
+    child = int(synthesiser.run_program([str(_program(tmp_path / "starter", "sleep 30 & echo $!"))], "a-package"))
     for _ in range(100):
         if not _is_running(child):
             return
         time.sleep(0.01)
     os.kill(child, 9)
     pytest.fail("it is still running")
-
-
-@needs_scripts
-def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
-    assert synthesiser.run_program([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
 
 
 def _program(folder: Path, script: str) -> Path:
