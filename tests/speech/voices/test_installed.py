@@ -48,9 +48,8 @@ def test_a_voice_says_phones_in_time_and_any_letters_reach_it() -> None:
 
 
 def test_errors_are_clear_and_nothing_stays_even_if_not_all_is_read(faked: Path) -> None:
-    crashes = [(voice, "they crash", "failed with 1 .no such sound") for voice in EACH]
     for voice, text, message in (
-        *crashes,
+        *((voice, "they crash", "failed with 1 .no such sound") for voice in EACH),
         *((voice, "nonsense", "nonsense") for voice in EACH),
         (FAKED[0], "no bytes", "cannot be run|nonsense"),
         (FAKED[0], "... ", "holds no word"),
