@@ -31,7 +31,7 @@ def sound() -> np.ndarray:
 
 
 def all_of(stream: Stream, samples: np.ndarray, sizes: list[int]) -> list[LiveFrame]:
-    frames, coming = [], itertools.cycle(sizes)
+    frames, coming = list[LiveFrame](), itertools.cycle(sizes)
     while len(samples):
         pieces = np.split(samples, [next(coming)])
         frames, samples = frames + stream.push(pieces[0]), pieces[1]

@@ -72,8 +72,8 @@ class Resampler:
 
     def finish(self) -> NDArray[np.float32]:
         """Return the rest, with silence after it."""
-        seconds = self.seconds
-        pushed, rest = self.pushed, self.push(np.zeros(2 * self._reach + self._rate_hz // 50, np.float32))
+        seconds, pushed = self.seconds, self.pushed
+        rest = self.push(np.zeros(2 * self._reach + self._rate_hz // 50, np.float32))
         self.pushed = pushed
         return rest[: max(int(np.ceil(seconds * SPEECH_RATE_HZ)) - (self._made - len(rest)), 0)]
 
@@ -91,8 +91,7 @@ def mono_samples(samples: Any) -> NDArray[np.float32]:
     if (
         values.ndim not in (1, 2)
         or 0 in values.shape[1:]
-        or values.dtype.kind not in "if"
-        or (values.dtype.kind == "i" and values.itemsize != 2)
+        or not (values.dtype.kind == "f" or (values.dtype.kind == "i" and values.itemsize == 2))
     ):
         raise InputError(
             f"samples of shape {values.shape} and type {values.dtype}, required (N,) or (N, C), floats or int16"
