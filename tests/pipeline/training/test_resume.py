@@ -191,7 +191,7 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus, tmp_path):
 
 VOICES = [SyntheticVoice("low", "flite", "anna"), SyntheticVoice("high", "flite", "bert")]
 TEXTS = ["Blue baby.", "Five tea."]
-Sayings = Iterator[tuple[Audio, Timeline[Unit]]]
+Sayings = Iterator[tuple[Audio, Timeline[Unit], Path]]
 
 
 @pytest.fixture
@@ -201,10 +201,10 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
     def say(texts: list[str], voice: SyntheticVoice, _: Lexicon | None) -> Sayings:
         for text in texts:
             if text == "Bee":
-                yield synthesise([("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)])
+                yield *synthesise([("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)]), Path()
                 continue
             phones = [phone for word in split_words(text) for phone in Lexicon().pronunciations(word)[0]]
-            yield synthesise([(phone, 0.12) for phone in phones], pitch_hz=100 if voice.name == "low" else 200)
+            yield *synthesise([(phone, 0.12) for phone in phones], pitch_hz=100 if voice.name == "low" else 200), Path()
 
     monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.speak_sentences", say)
 

@@ -23,7 +23,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import ASKED, Onto, Pauses, Request
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import JoinedPieces, overlap_pieces, resample_speech
-from lipmotion.speech.voices.installed import choose_voice, find_voice, voice_sentences
+from lipmotion.speech.voices.installed import choose_voice, find_voice, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.sources import read_text_file
 from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
@@ -232,7 +232,7 @@ def _speak_sentences(
     spans: list[Span[Unit]] = []
     rate_hz, at = SPEECH_RATE_HZ, 0
     for start in range(0, len(sentences), SENTENCES_PER_RUN):
-        with closing(voice_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as voiced:
+        with closing(speak_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as voiced:
             for sentence in voiced:
                 sound = sentence.own_sound()
                 sound = sentence.audio if sound.rate_hz < SPEECH_RATE_HZ else sound

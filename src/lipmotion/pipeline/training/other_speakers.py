@@ -162,7 +162,7 @@ def synthesise_others(
 
 def _synthesise_voice(voice: SyntheticVoice, texts: Sequence[str], lexicon: Lexicon | None) -> Iterator[SpokenSentence]:
     """Yield texts in a voice, with silence before and after each of them, and with white noise."""
-    for number, (audio, units) in enumerate(speak_sentences(texts, voice, lexicon), start=1):
+    for number, (audio, units, _) in enumerate(speak_sentences(texts, voice, lexicon), start=1):
         pause = np.zeros(round(PAUSE_S * audio.rate_hz), np.float32)
         longer = Audio(np.concatenate([pause, audio.samples, pause]), audio.rate_hz)
         spoken = list(units.shifted(PAUSE_S))
