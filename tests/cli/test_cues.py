@@ -12,7 +12,7 @@ import pytest
 from children import LIPMOTION, child
 from cli.conftest import Done, RunCommand, check_refused
 from lipmotion import animate, cues, load_model, write_cues
-from lipmotion.pipeline.outputs.cues import format_cues
+from lipmotion.formats.cues import CUE_FORMATS
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def test_without_a_file_it_is_printed(run, basics, here, toy_speech, toy_model_f
     sheet = cues(animate(toy_speech, model=load_model(toy_model_file)))
     for form in ("tsv", "xml", "json", "dat"):
         done = run(*basics, *(() if form == "tsv" else ("-f", form)))
-        assert done == (0, format_cues(sheet, speech=toy_speech, form=form).splitlines(), [])
+        assert done == (0, CUE_FORMATS[form].text(sheet, str(toy_speech)).splitlines(), [])
     assert list(here.iterdir()) == []
 
 

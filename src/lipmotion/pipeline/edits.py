@@ -374,22 +374,16 @@ class SetStep(Step):
     value: str
 
     def __post_init__(self) -> None:
+        if self.name not in _KIND_OF:
+            name, known = shorten(repr(self.name)), ", ".join(_KIND_OF)
+            raise InputError(f"{str(self)!r}: nothing is called {name}; required one of: {known}")
         value: Any = self.parsed_value
-        self._kind(**{self.name: value})  # checks it
-
-    @property
-    def _kind(self) -> type[Delivery] | type[Staging]:
-        """What has a field of that name. Raises InputError: nothing has."""
-        kind = next((kind for kind in (Delivery, Staging) if self.name in _names(kind)), None)
-        if kind is None:
-            known = ", ".join((*_names(Delivery), *_names(Staging)))
-            raise InputError(f"{str(self)!r}: nothing is called {shorten(repr(self.name))}; required one of: {known}")
-        return kind
+        _KIND_OF[self.name](**{self.name: value})  # checks it
 
     @property
     def parsed_value(self) -> bool | float | int | str:
         """The value, of the type of what is set. Raises InputError: it is of another."""
-        usual = getattr(self._kind(), self.name)
+        usual = getattr(_KIND_OF[self.name](), self.name)
         if isinstance(usual, bool):
             if self.value not in _TRUTH:
                 raise InputError(f"{str(self)!r}: required one of: {', '.join(_TRUTH)}")
@@ -418,11 +412,8 @@ class MoodStep(Step):
         return keys[0]
 
 
+_KIND_OF: dict[str, Any] = {each.name: kind for kind in (Delivery, Staging) for each in fields(kind)}
 _TRUTH = {"true": True, "false": False, "yes": True, "no": False}
-
-
-def _names(kind: type[Any]) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
 
 
 STEPS: dict[str, Any] = {

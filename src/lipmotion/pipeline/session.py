@@ -44,7 +44,7 @@ from lipmotion.pipeline.edits import (
     remove_pins,
     with_span,
 )
-from lipmotion.pipeline.generation import apply_excerpt, cut_analysis, find_excerpt, find_person, generate_motion
+from lipmotion.pipeline.generation import apply_excerpt, cut_speech, find_excerpt, find_person, generate_motion
 from lipmotion.pipeline.model import Model, load_model, with_prior
 from lipmotion.pipeline.request import Request, SpeechInput, as_request
 from lipmotion.pipeline.workers import map_in_processes
@@ -407,11 +407,12 @@ class Session:
         place = (excerpt.frames.start, excerpt.frames.stop)
 
         def generate(units: Timeline[Unit], pins: tuple[Pin, ...]) -> Generation:
-            phones, constraints = excerpt.units_in(units), excerpt.pins_in(pins)
+            phones, constraints = excerpt.cut(units, pins)
 
             def make() -> Generation:
-                segment = self._cache.cached("segment", place, lambda: cut_analysis(self._recording, excerpt.frames))
-                segment = replace(segment, speech=self._with_units(segment.speech, phones))
+                plain = self._recording
+                speech = self._cache.cached("segment", place, lambda: cut_speech(plain.speech, excerpt.frames))
+                segment = replace(plain, speech=self._with_units(speech, phones), tags=(), events=())
                 return generate_motion(self.request, self.speaker, self.model, segment, constraints)
 
             return self._cache.cached("excerpt", (place, phones, constraints), make)

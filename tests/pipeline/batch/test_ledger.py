@@ -21,7 +21,7 @@ from lipmotion.pipeline.batch.ledger import (
     WORK,
     Place,
     Record,
-    check_kinds,
+    check_job,
     fingerprint_job,
     fingerprint_line,
     list_input_files,
@@ -243,7 +243,7 @@ def test_settings_have_a_fingerprint(tmp_path):
 @pytest.mark.parametrize("kinds", [(), ("wav",), ("json", "json"), ("cues.json5",), ("",)])
 def test_kinds_that_cannot_be_written(kinds):
     with pytest.raises(ExportError, match=r"required some of: json, csv|given twice"):
-        check_kinds(kinds)
+        check_job(Job(outputs=Outputs(kinds=kinds)))
 
 
 GOOD = {"outcome": "done", "words": "transcript", "confidence": 1.0, "range_db": 50.0, "warnings": []}
@@ -341,14 +341,6 @@ def test_what_is_refused(tmp_path, text, said):
     (tmp_path / "marks.csv").write_text(text)
     with pytest.raises(InputError, match=said):
         report.read_marks(tmp_path / "marks.csv")
-
-
-def test_later_marks_are_ahead_and_may_take_back():
-    kept = {"a": report.Mark("approve"), "b": report.Mark("redo"), "c": report.Mark("approve")}
-    assert report.merge_marks(kept, {"a": report.Mark("redo", "2"), "b": report.Mark("")}) == {
-        "a": report.Mark("redo", "2"),
-        "c": report.Mark("approve"),
-    }
 
 
 def test_a_line_is_due_once_for_each_mark():

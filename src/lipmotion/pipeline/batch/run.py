@@ -46,17 +46,7 @@ from lipmotion.pipeline.batch.ledger import (
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import MAX_NAMED_LINES, BatchLine, check_names, read_lines
-from lipmotion.pipeline.batch.report import (
-    APPROVE,
-    MARKS,
-    REDO,
-    Mark,
-    is_due,
-    merge_marks,
-    read_marks,
-    write_marks,
-    write_reports,
-)
+from lipmotion.pipeline.batch.report import APPROVE, MARKS, REDO, Mark, is_due, read_marks, write_marks, write_reports
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Job, check_outputs, open_face, run, write_outputs
 from lipmotion.pipeline.model import Model, load_model
@@ -362,12 +352,18 @@ def batch(
     for line in lines:
         if os.path.realpath(line.recording).startswith(inside):  # an output could replace it
             raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
-    chosen = _choose_marks(Path(place.out), marks, lines)
+    marks_file = Path(place.out) / MARKS
+    earlier = read_marks(marks_file) if marks_file.is_file() else {}
+    later = read_marks(Path(marks)) if marks is not None else {}
+    names = {line.name for line in lines}
+    if unknown := [name for name in later if name not in names]:
+        LOG.warning("%s: %d marks of lines that are not in this batch: %s", marks, len(unknown), _some(unknown))
+    chosen = {name: mark for name, mark in (earlier | later).items() if mark.kind}  # the others were taken back
     check_line_job(job, place.run)
     of_settings = fingerprint_job(job)
     with open_ledger(place, lines) as ledger:
         if marks is not None:
-            write_marks(Path(place.out) / MARKS, chosen)
+            write_marks(marks_file, chosen)
         counts = Counter[str]()
         monitor(Progress(STAGE, 0, len(lines), 0.0))
 
@@ -393,16 +389,6 @@ def batch(
                     count(record["name"], record["outcome"], record.get("error", ""))
         csv, html = write_reports(lines, ledger, Path(place.out), chosen)
     return BatchSummary(counts[DONE], counts["kept"], counts[FAILED], csv, html)
-
-
-def _choose_marks(out: Path, table: str | Path | None, lines: Sequence[BatchLine]) -> dict[str, Mark]:
-    """Return the marks in a folder of outputs, with those of a further file in their place. Raises InputError."""
-    earlier = read_marks(out / MARKS) if (out / MARKS).is_file() else {}
-    later = read_marks(Path(table)) if table is not None else {}
-    names = {line.name for line in lines}
-    if unknown := [name for name in later if name not in names]:
-        LOG.warning("%s: %d marks of lines that are not in this batch: %s", table, len(unknown), _some(unknown))
-    return merge_marks(earlier, later)
 
 
 def _find_finished(
