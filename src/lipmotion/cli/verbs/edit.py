@@ -6,6 +6,8 @@ import argparse
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output, pick_part
 from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.terminal.progress import report_progress
+from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
 
@@ -27,8 +29,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read or begin the file, add the edits, try them out, and write it."""
-    from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import create_edit_file, read_edits, write_edits
     from lipmotion.units import group_words
 

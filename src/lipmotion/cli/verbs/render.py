@@ -9,10 +9,14 @@ from pathlib import Path
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_outputs, add_pipe_format, pick_part, write_pipe
 from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.terminal.progress import report_progress
+from lipmotion.errors import InputError
+from lipmotion.extensions import load_provided
 from lipmotion.pipeline.job import Job, check_outputs, open_face, write_outputs
 from lipmotion.pipeline.job import run as run_job
 from lipmotion.pipeline.request import Request
 from lipmotion.printable import printable
+from lipmotion.storage.sources import is_file
 
 LOG = logging.getLogger("lipmotion")
 
@@ -39,8 +43,6 @@ def run(options: argparse.Namespace) -> None:
 
     The motion of a file of edits is generated again, and its outputs are written as ``animate`` does.
     """
-    from lipmotion.cli.terminal.progress import report_progress
-    from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import is_edit_file, read_edits
 
     with report_progress(options) as report:
@@ -78,9 +80,6 @@ def run(options: argparse.Namespace) -> None:
 
 def _find_sound(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
-    from lipmotion.extensions import load_provided
-    from lipmotion.storage.sources import is_file
-
     has_name = motion.suffix.lower() == ".glb" and is_file(motion)
     named = load_provided("find_named_sound")(motion) if has_name else None
     if named is None:

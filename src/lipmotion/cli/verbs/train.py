@@ -7,8 +7,10 @@ from typing import Any
 
 from lipmotion.cli.arguments.declared import add_input, add_options, add_output
 from lipmotion.cli.arguments.options import add_machine_readable, count_workers, list_or_all
-from lipmotion.cli.terminal.progress import print_line
+from lipmotion.cli.terminal.progress import print_line, report_progress
+from lipmotion.errors import InputError
 from lipmotion.pipeline.request import Request
+from lipmotion.storage.files import check_target
 
 FROM = "stand on this model (default: the one that ships), or 'none' (docs/own-model.md)"
 NONE = "none"
@@ -58,10 +60,8 @@ def run(options: argparse.Namespace) -> None:
 
     Raises InputError: a model to start from is given, but the engine's models do not stand on others.
     """
-    from lipmotion.cli.terminal.progress import report_progress
     from lipmotion.corpora import Corpus, Selection
     from lipmotion.engines import create_engine, find_visual
-    from lipmotion.errors import InputError
     from lipmotion.pipeline.model import GEOMETRY, load_model, save_model
     from lipmotion.pipeline.training.other_speakers import synthesise_others
     from lipmotion.pipeline.training.train import Run, train
@@ -111,7 +111,6 @@ def run_adapt(options: argparse.Namespace) -> None:
     """Call ``lipmotion.adapt`` and ``lipmotion.save_model``; print how much speech was used."""
     from lipmotion.pipeline.model import save_model
     from lipmotion.pipeline.training.train import adapt
-    from lipmotion.storage.files import check_target
 
     check_target(options.output)
     model = adapt(options.model, options.recordings)

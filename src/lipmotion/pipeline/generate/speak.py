@@ -25,9 +25,7 @@ from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import JoinedPieces, overlap_pieces, resample_speech
 from lipmotion.speech.voices.installed import choose_voice, find_voice, voice_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.storage.sources import read_text_file
-from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
-from lipmotion.types.delivery import MoodTag
+from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, split_words
 from lipmotion.units.mood_tags import parse_tagged_text, time_moods
 from lipmotion.units.phones import SHORT_PAUSE_S
@@ -202,26 +200,18 @@ def speak(  # noqa: PLR0913
         if onto is not None:
             raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
         loaded = model if isinstance(model, Model) else load_model(model)
-        spoken = speak_from_corpus(text, corpus, loaded, replace(request, onto_speaker=""), constraints)
-        return spoken._replace(generation=_with_moods(spoken.generation, tags))
-    sentences = split_sentences(text)
-    chosen = find_voice(voice) if isinstance(voice, str) else voice or choose_voice()
-    loaded = model if isinstance(model, Model) else load_model(model)
-    find_speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
-    sound, units = _speak_sentences(sentences, chosen, lexicon)
-    sound = quantise(sound)
-    spoken_so = {"recording": resample_speech(sound), "units": units, "manner": ASKED, "spoken_so": True}
-    request = replace(request, lexicon=None, **spoken_so)
-    return SpokenText(sound, _with_moods(animate(request, model=loaded, constraints=constraints), tags))
-
-
-def _with_moods(generation: Generation, tags: Sequence[MoodTag]) -> Generation:
-    return replace(generation, moods=time_moods(tags, generation.units))
-
-
-def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file. Raises InputError: no such file, too large, or not UTF-8."""
-    return read_text_file(path, "text", LARGEST_TEXT_BYTES)
+        sound, generation = speak_from_corpus(text, corpus, loaded, replace(request, onto_speaker=""), constraints)
+    else:
+        sentences = split_sentences(text)
+        chosen = find_voice(voice) if isinstance(voice, str) else voice or choose_voice()
+        loaded = model if isinstance(model, Model) else load_model(model)
+        find_speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
+        sound, units = _speak_sentences(sentences, chosen, lexicon)
+        sound = quantise(sound)
+        spoken_so = {"recording": resample_speech(sound), "units": units, "manner": ASKED, "spoken_so": True}
+        request = replace(request, lexicon=None, **spoken_so)
+        generation = animate(request, model=loaded, constraints=constraints)
+    return SpokenText(sound, replace(generation, moods=time_moods(tags, generation.units)))
 
 
 def _speak_sentences(
