@@ -92,7 +92,7 @@ def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path):
         opening(again, toy_sentence, "ben")
 
 
-def test_evaluation_compares_each_with_their_own_motion(two_people, model):
+def test_evaluation_compares_each_with_their_own_motion_and_names_strangers(two_people, model, tmp_path):
     own, mean = (
         evaluate(each, two_people, selection=Selection("test"), recogniser="own")
         for each in (model, replace(model, speakers=None))
@@ -101,22 +101,17 @@ def test_evaluation_compares_each_with_their_own_motion(two_people, model):
     assert own["conditions"][condition]["amse"] < 0.8 * mean["conditions"][condition]["amse"]
     assert own["strangers"] == []
     assert "strangers" not in mean
-
-
-def test_strangers_are_named_and_get_the_mean_person(two_people, model, tmp_path):
     cleo = replace(two_people.utterance(two_people.names("test")[0]), speaker="cleo")
     corpus = corpus_of(tmp_path / "cleo", [cleo])
     figures = evaluate(model, corpus, selection=Selection(None), recogniser="own")
-    assert figures["strangers"] == ["cleo"]
+    assert figures["strangers"] == ["cleo"]  # who gets the mean person
     mean = evaluate(replace(model, speakers=None), corpus, selection=Selection(None), recogniser="own")
     assert figures["conditions"] == mean["conditions"]
 
 
 def test_one_person_is_not_mapped(two_people):
-    model, _ = train(
-        two_people, selection=Selection("train", ("anna",)), recogniser=SMALL, engine=engine_named("joint", {})
-    )
-    assert model.speakers is None
+    anna = Selection("train", ("anna",))
+    assert train(two_people, selection=anna, recogniser=SMALL, engine=engine_named("joint", {}))[0].speakers is None
 
 
 @pytest.mark.parametrize("engine", ["joint", "coupled"])
@@ -154,9 +149,6 @@ def test_channels_that_all_have_are_trained_on(two_people, tmp_path, caplog):
     assert model.speakers.names == ("anna", "ben", "captured")
     generated = animate(Request(toy_utterances(3)[0].audio, speaker="captured", recogniser="own"), model=model)
     assert generated.motion.names == ("width", "opening")
-
-
-def test_no_common_channel_is_an_error(two_people, tmp_path):
     weights = tuple(Channel(name, "weight") for name in ("opening", "jaw"))
     strange = [captured(utterance, weights) for utterance in toy_utterances(3)[:1]]
     corpus = corpus_of(tmp_path / "apart", [two_people.utterance(two_people.names("train")[1]), *strange])
@@ -176,8 +168,7 @@ def of_two(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
 
 @pytest.fixture(scope="module")
 def two_model(of_two: Corpus) -> Model:
-    engine = engine_named("trajectory", {"articulation": False})
-    return train(of_two, recogniser=SMALL, engine=engine)[0]
+    return train(of_two, recogniser=SMALL, engine=engine_named("trajectory", {"articulation": False}))[0]
 
 
 def request_onto(sentence: ToySentence, onto: Onto | None = None, **more: str) -> Request:
@@ -187,8 +178,7 @@ def request_onto(sentence: ToySentence, onto: Onto | None = None, **more: str) -
 def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) -> None:
     """Raise AssertionError unless the motion is that of the model, in ben's place and range."""
     own, mapped = (
-        animate(request_onto(sentence), model=model),
-        animate(request_onto(sentence, onto, **more), model=model),
+        animate(each, model=model) for each in (request_onto(sentence), request_onto(sentence, onto, **more))
     )
     wanted = OFFSET + GAIN * toy_motion(sentence.units, 100.0).values
     ranges = [np.ptp(np.percentile(values, [2, 98], axis=0), axis=0) for values in (mapped.motion.values, wanted)]
@@ -214,9 +204,8 @@ def test_variance_and_pins_and_explanations_are_of_the_person(toy_model, toy_sen
 
 def test_a_person_of_the_model_onto_another(two_model, toy_sentence, ben):
     """Whoever of the model's people speaks, the motion is in ben's place and range."""
-    people = [
-        animate(request_onto(toy_sentence, ben, speaker=name), model=two_model).motion for name in ("", "anna", "ben")
-    ]
+    requests = [request_onto(toy_sentence, ben, speaker=name) for name in ("", "anna", "ben")]
+    people = [animate(each, model=two_model).motion for each in requests]
     ranges = np.stack([np.ptp(np.percentile(motion.values, [5, 95], axis=0), axis=0) for motion in people])
     np.testing.assert_allclose(ranges / ranges[2], 1, atol=0.15)
     anna = animate(request_onto(toy_sentence, speaker="anna"), model=two_model).motion
@@ -271,32 +260,22 @@ def test_a_map_is_kept_in_a_model(toy_model, toy_sentence, ben, tmp_path):
     wanted = animate(request_onto(toy_sentence, person), model=toy_model).motion
     found = animate(request_onto(toy_sentence, speaker="ben"), model=again).motion
     np.testing.assert_allclose(found.values, wanted.values, atol=1e-3)
-    unmapped = animate(request_onto(toy_sentence), model=toy_model).motion
-    np.testing.assert_allclose(
-        animate(request_onto(toy_sentence), model=again).motion.values, unmapped.values, atol=1e-3
-    )
+    first, second = (animate(request_onto(toy_sentence), model=each).motion.values for each in (toy_model, again))
+    np.testing.assert_allclose(second, first, atol=1e-3)
     for name in ("ben", ""):
         with pytest.raises(InputError, match="required another name than: , ben, cleo"):
             with_person(known, name, person)
 
 
-def test_other_channels_are_refused(toy_model, toy_sentence, tmp_path):
-    def weights(utterance: Utterance) -> Utterance:
-        channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
-        motion = replace(utterance.track.motion, channels=channels)
-        return replace(utterance, track=replace(utterance.track, motion=motion))
-
-    corpus = corpus_of(tmp_path / "weights", [weights(each) for each in toy_utterances(3)])
-    with pytest.raises(InputError, match=r"weights: its motion has no channel 'opening'.*3 of 3 are missing"):
-        animate(request_onto(toy_sentence, corpus), model=toy_model)
-
-
-def test_no_face_and_no_speech_are_refused(toy_model, toy_sentence, tmp_path):
-    unseen = [
-        replace(each, track=replace(each.track, seen=np.zeros_like(each.track.seen))) for each in toy_utterances(3)
-    ]
-    corpus = corpus_of(tmp_path / "unseen", unseen)
-    with pytest.raises(InputError, match=r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
-        animate(request_onto(toy_sentence, corpus), model=toy_model)
-    with pytest.raises(InputError, match="the corpus is empty"):
-        animate(request_onto(toy_sentence, Corpus.create(tmp_path / "empty")), model=toy_model)
+def test_corpora_that_are_refused(toy_model, toy_sentence, tmp_path):
+    channels = tuple(Channel(name, "weight") for name in ("jaw", "width", "outer"))
+    tracks = {"weights": [captured(each, channels) for each in toy_utterances(3)], "empty": []}
+    unseen = [replace(each.track, seen=np.zeros_like(each.track.seen)) for each in toy_utterances(3)]
+    tracks["unseen"] = [replace(each, track=track) for each, track in zip(toy_utterances(3), unseen, strict=True)]
+    for name, message in (
+        ("weights", r"weights: its motion has no channel 'opening'.*3 of 3 are missing"),
+        ("unseen", r"unseen: 0\.00 s of speech with a measured face, required 0\.5 s or more"),
+        ("empty", "the corpus is empty"),
+    ):
+        with pytest.raises(InputError, match=message):
+            animate(request_onto(toy_sentence, corpus_of(tmp_path / name, tracks[name])), model=toy_model)

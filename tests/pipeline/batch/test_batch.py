@@ -14,9 +14,8 @@ from pathlib import Path
 
 import pytest
 
-import lipmotion
 from children import LIPMOTION, NOWHERE, Child, child, run_child, wait_until
-from lipmotion import Delivery, Job, Outputs, Request, Run, save_model, train
+from lipmotion import Delivery, Job, Outputs, Request, Run, animate, load_model, save_model, train, write
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.formats import list_suffixes
@@ -62,14 +61,12 @@ def test_the_outputs_are_those_of_animate(sounds, settings, tmp_path):
     settings = replace(settings, outputs=Outputs(kinds=("json", "cues.tsv", "TextGrid")))
     found = batch(sounds, out, settings, jobs=1, monitor=lambda e: events.append(e) if isinstance(e, Item) else None)
     assert (found.done, found.kept, found.failed) == (3, 0, 1)
-    assert {item.name: item.outcome for item in events} == {
-        "broken": "failed", "deep/two": "done", "one": "done", "three": "done",
-    }  # fmt: skip
-    kinds = ("json", "cues.tsv", "TextGrid")
-    assert set(contents(out)) == {f"{name}.{kind}" for name in ("one", "deep/two", "three") for kind in kinds}
-    model = lipmotion.load_model(settings.request.model)
-    alone = lipmotion.animate(lipmotion.Request(sounds / "one.wav", "see papa mama", recogniser="own"), model=model)
-    lipmotion.write(alone, tmp_path / "one.json", speech=sounds / "one.wav", model=model)
+    outcomes = dict.fromkeys(("one", "deep/two", "three"), "done")
+    assert {item.name: item.outcome for item in events} == {"broken": "failed", **outcomes}
+    assert set(contents(out)) == {f"{name}.{kind}" for name in outcomes for kind in settings.outputs.kinds}
+    model = load_model(settings.request.model)
+    alone = animate(Request(sounds / "one.wav", "see papa mama", recogniser="own"), model=model)
+    write(alone, tmp_path / "one.json", speech=sounds / "one.wav", model=model)
     assert (out / "one.json").read_bytes() == (tmp_path / "one.json").read_bytes()
     rows = {row["name"]: row for row in ledger_rows(out)}
     assert rows["one"]["words"] == "transcript"

@@ -209,13 +209,10 @@ def test_the_speech_is_kept_with_its_motion(built):
 @pytest.mark.usefixtures("tracker")
 def test_short_footage_is_refused(videos):
     video = next(iter(videos))
-    with pytest.raises(InputError) as caught:
-        build_face(video, workers=1)
     seconds = len(videos[video].motion.values) / 25
-    assert str(caught.value) == (
-        f"{video}: {seconds:.1f} s of footage with the face, required 7 s or more, 60 s of varied speech for good "
-        "pictures; give a longer video, or a folder of several"
-    )
+    message = f"{seconds:.1f} s of footage with the face, required 7 s or more, 60 s of varied speech for good pictures"
+    with pytest.raises(InputError, match=message):
+        build_face(video, workers=1)
 
 
 @pytest.mark.long
@@ -276,17 +273,9 @@ def test_fast_video_is_learned_from_in_part(tracker, tmp_path):
 def test_what_is_left_of_the_seconds_may_be_less_than_a_frame(tmp_path):
     """599 of 600 frames of 29.97 a second are 19.99 s: no take of 0 frames follows, which no file could hold."""
     rate_hz, count = 30_000 / 1001, 600
-    channels = (Channel("opening"),)
-    footage = Footage(
-        tmp_path / "a.mp4",
-        WHOLE,
-        Track(Motion(np.zeros((count, 1)), rate_hz, channels), np.ones(count, bool)),
-        np.zeros((count, 2, 3)),
-        np.arange(count) / rate_hz,
-        (),
-        (288, 224),
-        rate_hz,
-    )
+    track = Track(Motion(np.zeros((count, 1)), rate_hz, (Channel("opening"),)), np.ones(count, bool))
+    places, times_s = np.zeros((count, 2, 3)), np.arange(count) / rate_hz
+    footage = Footage(tmp_path / "a.mp4", WHOLE, track, places, times_s, (), (288, 224), rate_hz)
     sound = Audio(np.ones(round(16_000 * count / rate_hz), np.float32), 16_000)
     take = build._Filmed(footage, np.arange(count), np.zeros((0, 128, 128, 3), np.uint8), sound)
     (kept,) = build.select_speech([take, take])

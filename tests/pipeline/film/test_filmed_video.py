@@ -151,10 +151,9 @@ def test_motion_that_the_face_cannot_show(filmed_face, motion, toy_sentence, tmp
         make_film(filmed_face, blendshapes)
     broken = motion.values.copy()
     broken[48:53, 1] = np.nan
+    film = make_film(filmed_face, Motion(broken, 100.0, motion.channels))
     with pytest.raises(InputError, match="not finite"):
-        write_film(
-            tmp_path / "a.mp4", make_film(filmed_face, Motion(broken, 100.0, motion.channels)), toy_sentence.audio
-        )
+        write_film(tmp_path / "a.mp4", film, toy_sentence.audio)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -213,15 +212,11 @@ def test_eigenlips_become_the_person(filmed_face, pictured_model, toy_sentence, 
 @pytest.mark.long
 def test_another_persons_motion_is_mapped_onto_the_face(toy_model, filmed_face, toy_sentence):
     """The person of the face opens the mouth half as far, and says the same."""
-    takes = tuple(
-        replace(take, motion=Motion(take.motion.values * [0.5, 1, 0.5], 25.0, take.motion.channels))
-        for take in filmed_face.takes
-    )
+    halved = [replace(take.motion, values=take.motion.values * [0.5, 1, 0.5]) for take in filmed_face.takes]
+    takes = tuple(replace(take, motion=motion) for take, motion in zip(filmed_face.takes, halved, strict=True))
     other = replace(filmed_face, about=filmed_face.about | {"corpus": ["someone/else"]}, takes=takes)
-    own, mapped = (
-        animate(Request(toy_sentence.audio, units=toy_sentence.units, onto=onto), model=toy_model).motion
-        for onto in (None, other)
-    )
+    requests = [Request(toy_sentence.audio, units=toy_sentence.units, onto=onto) for onto in (None, other)]
+    own, mapped = (animate(each, model=toy_model).motion for each in requests)
     ratio = np.percentile(mapped["opening"], 95) / np.percentile(own["opening"], 95)
     assert 0.35 < ratio < 0.75
     assert np.corrcoef(own["opening"], mapped["opening"])[0, 1] > 0.95
@@ -235,11 +230,9 @@ def test_writing_is_whole_or_not_at_all(filmed_face, motion, toy_sentence, tmp_p
     with pytest.raises(ExportError):
         write_film(tmp_path / "a.mp4", make_film(filmed_face, motion), Audio(np.zeros(0, np.float32), 16_000))
     damaged = replace(filmed_face.background.video, data=_spoiled(filmed_face.background.video.data))
-    background = replace(filmed_face.background, video=damaged)
+    face = replace(filmed_face, background=replace(filmed_face.background, video=damaged))
     with pytest.raises(ModelFormatError):
-        write_film(
-            tmp_path / "a.mp4", make_film(replace(filmed_face, background=background), motion), toy_sentence.audio
-        )
+        write_film(tmp_path / "a.mp4", make_film(face, motion), toy_sentence.audio)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.mp4", "older")]
 
 
