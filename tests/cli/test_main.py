@@ -42,17 +42,9 @@ def test_the_version(run):
     assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 
 
-def test_the_package_is_a_program():
-    done = run_child([sys.executable, "-m", "lipmotion", "info", "--help"], check=True)
-    assert done.stdout.startswith("usage: lipmotion info ")
-
-
-def test_a_wrong_command_line(run):
+def test_a_wrong_command_line_and_a_misspelt_option(run):
     for arguments in (["bogus"], ["corpus"], ["corpus", "bogus"], ["--bogus"], ["train"], ["cues", "a.wav", "b.wav"]):
         check_refused(run(*arguments), 2, " --help")
-
-
-def test_a_misspelt_option(run):
     for misspelt, hint in (
         (["animate", "a.wav", "-o", "a.json", "--fase", "woman"], "did you mean --face? see: lipmotion animate --help"),
         (["animate", "a.wav", "--otput", "a.json"], "did you mean --output?"),
@@ -130,7 +122,9 @@ def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, here):
     assert run_outside("animate", "a.wav").code == 2
 
 
-def test_the_console_script(run_outside):
+def test_the_package_is_a_program_and_has_a_script(run_outside):
+    done = run_child([sys.executable, "-m", "lipmotion", "info", "--help"], check=True)
+    assert done.stdout.startswith("usage: lipmotion info ")
     script = shutil.which("lipmotion", path=str(Path(sys.executable).parent))
     if script is None:
         pytest.skip("the package is not installed")
@@ -197,14 +191,11 @@ def test_the_model_inside_is_named_with_its_rights(run, toy_model_file, here):
     assert prior["attribution"].startswith("GRID corpus")
 
 
-def test_its_trees_can_be_printed(run, toy_model_file):
+def test_its_trees_or_chains_can_be_printed(run, toy_model_file, coupled_model_file):
     done = run("info", toy_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0] == "speech.0"
     assert sum("leaf (" in line for line in done.out) >= 18
-
-
-def test_the_chains_of_a_coupled_model(run, coupled_model_file):
     done = run("info", coupled_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("coupled: chains whose transitions depend on all chains")

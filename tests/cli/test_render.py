@@ -103,7 +103,8 @@ def test_motion_files_and_a_video(run, basics, here):
 
 
 @pytest.mark.long
-def test_it_is_the_function_of_the_same_name(run, basics, here, toy_speech, toy_model_file):
+def test_it_is_the_function_of_the_same_name(run, basics, here, toy_speech, toy_model_file, toy_corpus):
+    assert run(*basics, "-o", "one.npz", "--onto", toy_corpus.path) == (0, ["one.npz"], [])
     run(*basics, "-o", "command.json")
     model = load_model(toy_model_file)
     write(animate(toy_speech, model=model), ["function.json"], speech=toy_speech, model=model)
@@ -137,13 +138,6 @@ def test_a_picture_of_the_posteriors(run, coupled_model_file, toy_speech, here):
     run(*basics, "b.json")
     assert (here / "a.json").read_bytes() == (here / "b.json").read_bytes()
     assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.png", "b.json"]
-
-
-@pytest.mark.long
-def test_onto_another_person(run, here, toy_model_file, toy_speech, toy_corpus):
-    given = ["animate", toy_speech, "--model", toy_model_file, "-o", "one.npz"]
-    assert run(*given, "--onto", toy_corpus.path).code == 0
-    assert (here / "one.npz").is_file()
 
 
 def test_the_addon_is_written_or_one_line_says_why_not(run, here):

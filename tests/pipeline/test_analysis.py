@@ -210,10 +210,6 @@ def test_speech_is_as_reliable_as_its_words(found):
     given = analyse_speech(model, Request(WELCOME, transcript="please speak"))
     assert given.recognition is None
     assert analyse(model, Request(WELCOME, recogniser="fast")).confidence == pytest.approx(0)
-
-
-@pytest.mark.long
-def test_words_do_not_depend_on_the_processes():
     long = Audio(np.tile(read_welcome().samples, 7), 16_000)  # of more than half a minute
     assert recognise_words(long, workers=2).words == recognise_words(long).words
 
@@ -278,13 +274,6 @@ def test_f0_is_computed_for_engines_that_want_it(toy_sentence):
     assert build_speech(deaf, toy_sentence.audio, features, toy_sentence.units).log_f0 is None
 
 
-def test_the_name_of_a_file_is_no_transcript(toy_model, toy_sentence, tmp_path):
-    (tmp_path / "words.txt").write_text("papa", encoding="utf-8")
-    request = Request(toy_sentence.audio, transcript=str(tmp_path / "words.txt"))
-    with pytest.raises(InputError, match="is the name of a file; give Path"):
-        analyse(toy_model, request)
-
-
 def group_words(sentence: ToySentence, late_s: float = 0.0) -> TimedTranscript:
     lines = []
     for word, spans in groupby(sentence.units, key=lambda span: span.label.word):
@@ -332,11 +321,14 @@ def test_words_of_an_installed_recogniser_are_aligned(toy_model, toy_sentence, m
     assert not said
 
 
-def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other():
+def test_a_transcript_beside_a_request_is_taken_if_there_is_no_other(toy_model, toy_sentence, tmp_path):
     assert as_request(Request("a.wav"), "papa").transcript == "papa"
     assert as_request("a.wav", "papa").transcript == "papa"
     with pytest.raises(InputError, match="give one"):
         as_request(Request("a.wav", "mama"), "papa")
+    (tmp_path / "words.txt").write_text("papa", encoding="utf-8")
+    with pytest.raises(InputError, match="is the name of a file; give Path"):
+        analyse(toy_model, Request(toy_sentence.audio, transcript=str(tmp_path / "words.txt")))
 
 
 @pytest.mark.parametrize("kind", ["own", "auto"])

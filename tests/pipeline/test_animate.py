@@ -154,12 +154,13 @@ def test_constraints_and_units_that_are_none(move, toy_sentence):
 
 
 def test_speech_that_cannot_be_used(toy_model, tmp_path):
-    with pytest.raises(InputError, match="no such file"):
-        animate(tmp_path / "speech.wav", model=toy_model)
-    with pytest.raises(InputError, match="need 16000 Hz, found 44100 Hz"):
-        animate(Audio(np.zeros(44_100, np.float32), 44_100), model=toy_model)
-    with pytest.raises(InputError, match="ndarray, required a path, or samples"):
-        animate(np.zeros(16_000, np.float32), model=toy_model)  # type: ignore[arg-type]
+    for speech, message in (
+        (tmp_path / "speech.wav", "no such file"),
+        (Audio(np.zeros(44_100, np.float32), 44_100), "need 16000 Hz, found 44100 Hz"),
+        (np.zeros(16_000, np.float32), "ndarray, required a path, or samples"),
+    ):
+        with pytest.raises(InputError, match=message):
+            animate(speech, model=toy_model)
 
 
 def test_files_may_stand_for_model_and_transcript(toy_model, toy_model_file, toy_speech, tmp_path):

@@ -105,33 +105,6 @@ class PhoneIs(PhoneStep):
         return Timeline(tuple(spans))
 
 
-def _move_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: float) -> Timeline[Unit]:
-    """Return phones with another time between the phone at place ``before`` and the next one."""
-    spans = list(units)
-    if not 0 <= before < len(spans) - 1:
-        end = "first phone begins" if before < 0 else "last phone ends"
-        raise InputError(f"{str(step)!r}: the {end} with the recording")
-    first_s, last_s = spans[before].start_s, spans[before + 1].end_s
-    if not first_s + MIN_PHONE_S - 1e-9 <= time_s <= last_s - MIN_PHONE_S + 1e-9:
-        required = f"{first_s + MIN_PHONE_S:.3f} to {last_s - MIN_PHONE_S:.3f} s"
-        raise InputError(f"{str(step)!r}: required {required}, between the phones beside it")
-    for place, change in ((before, {"end_s": time_s}), (before + 1, {"start_s": time_s})):
-        label = replace(spans[place].label, confidence=None)
-        spans[place] = replace(spans[place], label=label, **change)
-    return Timeline(tuple(spans))
-
-
-@dataclass(frozen=True)
-class PhoneBegins(PhoneStep):
-    """A phone begins at another time, and the one before it ends there."""
-
-    number: int
-    time_s: float
-
-    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        return _move_border(self, units, self._index(units, self.number) - 1, self.time_s)
-
-
 @dataclass(frozen=True)
 class PhoneEnds(PhoneStep):
     """A phone ends at another time, and the one after it begins there."""
@@ -140,7 +113,30 @@ class PhoneEnds(PhoneStep):
     time_s: float
 
     def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
-        return _move_border(self, units, self._index(units, self.number), self.time_s)
+        return self._move_border(units, self._index(units, self.number))
+
+    def _move_border(self, units: Timeline[Unit], before: int) -> Timeline[Unit]:
+        """Return phones with another time between the phone at place ``before`` and the next one."""
+        spans = list(units)
+        if not 0 <= before < len(spans) - 1:
+            end = "first phone begins" if before < 0 else "last phone ends"
+            raise InputError(f"{str(self)!r}: the {end} with the recording")
+        first_s, last_s = spans[before].start_s, spans[before + 1].end_s
+        if not first_s + MIN_PHONE_S - 1e-9 <= self.time_s <= last_s - MIN_PHONE_S + 1e-9:
+            required = f"{first_s + MIN_PHONE_S:.3f} to {last_s - MIN_PHONE_S:.3f} s"
+            raise InputError(f"{str(self)!r}: required {required}, between the phones beside it")
+        for place, change in ((before, {"end_s": self.time_s}), (before + 1, {"start_s": self.time_s})):
+            label = replace(spans[place].label, confidence=None)
+            spans[place] = replace(spans[place], label=label, **change)
+        return Timeline(tuple(spans))
+
+
+@dataclass(frozen=True)
+class PhoneBegins(PhoneEnds):
+    """A phone begins at another time, and the one before it ends there."""
+
+    def apply(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+        return self._move_border(units, self._index(units, self.number) - 1)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-import lipmotion
 from lipmotion import Corpus, Model, Selection, compare
 from lipmotion import evaluate as evaluated
 from lipmotion.engines import Engine
@@ -125,12 +124,8 @@ def test_all_figures_are_there(figures):
             for row in some["channels"].values():
                 assert list(row) == ["acc", "acc_per_clip", "nrmse", "global_variance", "jerk"]
     assert json.loads(json.dumps(figures)) is not None
-    for name in CONDITIONS:
+    for name, condition in figures["conditions"].items():  # the toy model is good on sentences it has not seen
         assert name in format_figures(figures)
-
-
-def test_the_toy_model_is_good_on_sentences_it_has_not_seen(figures):
-    for condition in figures["conditions"].values():
         assert condition["acc"] > 0.9
         for row in condition["channels"].values():
             assert 0.9 < row["acc"] <= 1
@@ -146,13 +141,10 @@ def test_the_toy_model_is_good_on_sentences_it_has_not_seen(figures):
 def test_a_perfect_model_has_perfect_figures(perfect):
     for condition in perfect["conditions"].values():
         assert list(condition) == FIGURES  # an engine that pins nothing has no other figures
-        for row in condition["channels"].values():
-            assert row == pytest.approx(
-                {"acc": 1, "acc_per_clip": 1, "nrmse": 0, "global_variance": 1, "jerk": 1}, abs=1e-4
-            )
+        wanted = {"acc": 1, "acc_per_clip": 1, "nrmse": 0, "global_variance": 1, "jerk": 1}
+        assert all(row == pytest.approx(wanted, abs=1e-4) for row in condition["channels"].values())
         assert condition["opening_acc_95"] == pytest.approx((1, 1), abs=1e-6)
-        assert condition["acc"] == pytest.approx(1, abs=1e-6)
-        assert condition["amse"] == pytest.approx(0, abs=1e-6)
+        assert (condition["acc"], condition["amse"]) == pytest.approx((1, 0), abs=1e-6)
         assert condition["lag_ms"] == pytest.approx(0, abs=0.5)
         closures = condition["closures"]
         assert (closures["score"], closures["precision"], closures["timing_ms"]) == (1, 1, 0)
@@ -175,9 +167,9 @@ def test_figures_without_pins_are_those_of_the_engine_without_them(toy_model, to
 def test_a_late_model_is_late(toy_model, toy_corpus, known):
     for late in (-8, 4):
         shifted = {length: replace(m, values=np.roll(m.values, late, axis=0)) for length, m in known.items()}
-        figures = evaluate(replace(toy_model, engine=Medium(None), learned=shifted), toy_corpus)
-        assert figures["conditions"]["audio only"]["lag_ms"] == pytest.approx(10 * late, abs=8)
-        assert figures["conditions"]["audio only"]["closures"]["timing_ms"] == pytest.approx(10 * late, abs=20)
+        figures = evaluate(replace(toy_model, engine=Medium(None), learned=shifted), toy_corpus)["conditions"]
+        assert figures["audio only"]["lag_ms"] == pytest.approx(10 * late, abs=8)
+        assert figures["audio only"]["closures"]["timing_ms"] == pytest.approx(10 * late, abs=20)
 
 
 def test_frames_without_a_face_are_left_out(toy_model, toy_corpus, known, tmp_path):
@@ -189,9 +181,8 @@ def test_frames_without_a_face_are_left_out(toy_model, toy_corpus, known, tmp_pa
         motion = replace(utterance.track.motion, values=values)
         damaged.append(replace(utterance, track=replace(utterance.track, motion=motion, seen=seen)))
     perfect = replace(toy_model, engine=Medium(None), learned=known)
-    figures = evaluate(perfect, corpus_of(damaged, tmp_path))
-    assert figures["conditions"]["audio only"]["acc"] == pytest.approx(1, abs=1e-6)
-    assert figures["conditions"]["audio only"]["amse"] == pytest.approx(0, abs=1e-6)
+    found = evaluate(perfect, corpus_of(damaged, tmp_path))["conditions"]["audio only"]
+    assert (found["acc"], found["amse"]) == pytest.approx((1, 0), abs=1e-6)
 
 
 @pytest.mark.long
@@ -256,9 +247,8 @@ def test_other_channels_than_lip_distances(toy_model, toy_corpus, known, tmp_pat
 
 def test_a_model_of_two_features_is_compared_by_these(toy_model, toy_corpus, known):
     two = {name: motion.selected(("opening", "width")) for name, motion in known.items()}
-    figures = evaluate(
-        replace(toy_model, engine=Medium(SimpleNamespace(channels="opening width")), learned=two), toy_corpus
-    )
+    engine = Medium(SimpleNamespace(channels="opening width"))
+    figures = evaluate(replace(toy_model, engine=engine, learned=two), toy_corpus)
     for condition in figures["conditions"].values():
         assert list(condition["channels"]) == ["opening", "width"]
         assert condition["closures"]["score"] == 1
@@ -275,14 +265,11 @@ def test_a_model_of_other_motion_is_refused(toy_model, toy_corpus, known, tmp_pa
     faces.add(second)
     with pytest.raises(CorpusError, match="different motion channels"):
         evaluate(toy_model, faces)
-
-
-def test_motion_that_never_moves_is_refused(toy_model, toy_corpus, tmp_path):
     frozen = [renamed_utterance(u) for u in held_out(toy_corpus)]
     motions = [replace(u.track.motion, values=np.ones_like(u.track.motion.values)) for u in frozen]
     frozen = [replace(u, track=replace(u.track, motion=m)) for u, m in zip(frozen, motions, strict=True)]
     with pytest.raises(CorpusError, match="none of 5 motion channels moves in these 2 utterances"):
-        evaluate(toy_model, corpus_of(frozen, tmp_path))
+        evaluate(toy_model, corpus_of(frozen, tmp_path / "frozen"))
 
 
 def test_one_speaker(toy_model, toy_corpus, tmp_path):
@@ -396,9 +383,8 @@ def test_blendshapes_are_found_however_they_are_spelt():
     assert "mouthClose" in pair["notes"][0]
     still = moved(other, "brow_inner_up", np.full(60, 0.2))
     upper = compare(reference, still)["others"][0]["upper_face"]
-    wanted = curves.measure_upper_face(
-        [np.zeros((60, 1, 1))], [np.array(reference.values[:, 1:2, None], float)], np.zeros((1, 1))
-    )
+    moving = np.array(reference.values[:, 1:2, None], float)
+    wanted = curves.measure_upper_face([np.zeros((60, 1, 1))], [moving], np.zeros((1, 1)))
     assert upper == {"curves": 1, "deviation": pytest.approx(wanted)}
     assert wanted > 0.05
 
@@ -423,8 +409,5 @@ def test_what_does_not_move_is_named():
 def test_what_cannot_be_compared(other, words):
     with pytest.raises(InputError, match=words):
         compare(weights("jawOpen"), other)
-
-
-def test_there_must_be_another():
     with pytest.raises(InputError, match="give another motion file or video"):
-        lipmotion.compare(SPEECH)
+        compare(SPEECH)

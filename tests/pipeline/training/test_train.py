@@ -216,19 +216,16 @@ def test_training_names_the_transcripts_of_something_else_and_what_has_none(tmp_
     assert wrong.startswith("1 of 6 transcripts seem not to be what is said (toy02): the model learns wrong lips")
 
 
-def test_right_transcripts_are_not_named(right_transcripts, caplog):
-    warn_of_doubtful_transcripts(right_transcripts)
-    warn_of_missing_transcripts([utterance for utterance, _ in right_transcripts])
-    assert not caplog.records
-
-
 def half_of(units: Timeline[Unit]) -> Timeline[Unit]:
     """Return the first phones, and silence in the place of the others."""
     return Timeline((*units[:3], Span(units[3].start_s, units[-1].end_s, Unit("sil"))))
 
 
 def test_words_that_are_left_out(right_transcripts, caplog):
-    """Half of the sentence stands as silence."""
+    """Half of the sentence stands as silence; right transcripts are not named."""
+    warn_of_doubtful_transcripts(right_transcripts)
+    warn_of_missing_transcripts([utterance for utterance, _ in right_transcripts])
+    assert not caplog.records
     utterance, units = right_transcripts[0]
     warn_of_doubtful_transcripts([(utterance, half_of(units))])
     (text,) = messages(caplog)

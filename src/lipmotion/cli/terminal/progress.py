@@ -165,10 +165,19 @@ class _TerminalReport(Report):
 
     def receive(self, event: Progress | Item) -> None:
         self._stopper.check()
-        if isinstance(event, Progress):
-            self._draw(event)
-        elif event.reason:
-            self.warn(f"{event.outcome} {event.name}: {event.reason}")
+        if isinstance(event, Item):
+            if event.reason:
+                self.warn(f"{event.outcome} {event.name}: {event.reason}")
+        elif self._shown:
+            from tqdm import tqdm
+
+            stage = printable(f"{event.stage} ({event.step}/{event.steps})")
+            if self._bar is None:
+                layout = "{desc} {percentage:3.0f}% |{bar:20}| {elapsed}, left {remaining}"
+                self._bar = tqdm(total=1.0, initial=event.share, desc=stage, bar_format=layout, dynamic_ncols=True)
+            self._bar.set_description_str(stage, refresh=False)
+            self._bar.update(event.share - self._bar.n)
+            self._bar.refresh()
 
     def warn(self, text: str) -> None:
         text = f"warning: {text}"
@@ -187,19 +196,6 @@ class _TerminalReport(Report):
         if self._bar is not None:
             self._bar.close()
             self._bar = None
-
-    def _draw(self, event: Progress) -> None:
-        if not self._shown:
-            return
-        from tqdm import tqdm
-
-        stage = printable(f"{event.stage} ({event.step}/{event.steps})")
-        if self._bar is None:
-            layout = "{desc} {percentage:3.0f}% |{bar:20}| {elapsed}, left {remaining}"
-            self._bar = tqdm(total=1.0, initial=event.share, desc=stage, bar_format=layout, dynamic_ncols=True)
-        self._bar.set_description_str(stage, refresh=False)
-        self._bar.update(event.share - self._bar.n)
-        self._bar.refresh()
 
 
 class _MachineReport(Report):

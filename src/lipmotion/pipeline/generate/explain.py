@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.engines.base import explain_by_trace
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import InputError
 from lipmotion.kernels.compiler import limit_threads
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
@@ -23,7 +23,6 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechInput, as_request
 from lipmotion.pipeline.session import NO_EDITS, Session
 from lipmotion.printable import printable
-from lipmotion.storage.files import check_target
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChainPosteriors,
@@ -34,7 +33,6 @@ from lipmotion.types import (
     SpeechPart,
     frame_of,
 )
-from lipmotion.types.audio import Audio
 from lipmotion.units import is_silent
 
 if TYPE_CHECKING:
@@ -265,7 +263,6 @@ def run_lines(runs: Sequence[StateRun], count: int) -> Iterator[str]:
         yield f"and {len(runs) - len(shown)} more (--count N prints N, --json all)"
 
 
-SUFFIX = ".png"
 MAX_COLUMNS = 2000
 """Most columns of a plot; in a longer recording, each column is the mean of several frames."""
 MIN_COLUMNS = 600
@@ -282,13 +279,6 @@ MIN_TICK_DISTANCE = 80
 WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
 COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
 """The colours of the chains, in their order."""
-
-
-def check_picture(path: Path, speech: str | Path | Audio | None = None) -> None:
-    """Raise ExportError if a picture cannot be written to a path."""
-    if path.suffix.lower() != SUFFIX:
-        raise ExportError(f"{path}: unknown format {path.suffix!r}; required: {SUFFIX}")
-    check_target(path, None if isinstance(speech, Audio) else speech)
 
 
 def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors]) -> Image.Image:
