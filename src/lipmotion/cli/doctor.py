@@ -68,10 +68,10 @@ class Requirement:
 
 def parse_requirement(text: str) -> Requirement:
     """Return a requirement from its text in the metadata of a package: ``NAME>=1 ; MARKER``."""
-    found = requirements.Requirement(text)
-    marker = str(found.marker or "")
+    parsed = requirements.Requirement(text)
+    marker = str(parsed.marker or "")
     extra = EXTRA.search(marker)
-    return Requirement(found.name, str(found.specifier), EXTRA.sub("", marker).strip(), extra[1] if extra else "")
+    return Requirement(parsed.name, str(parsed.specifier), EXTRA.sub("", marker).strip(), extra[1] if extra else "")
 
 
 def list_requirements() -> tuple[Requirement, ...]:

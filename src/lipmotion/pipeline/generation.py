@@ -362,12 +362,12 @@ def _join_rows(
     rooms = [after - before >= 2 * RAMP_FRAMES for before, after in zip(edges[::2], edges[1::2], strict=True)]
     for part, inside, *is_room in zip(parts, rows, rooms, rooms[1:], strict=False):
         lead, tail = (RAMP_FRAMES if room else 0 for room in is_room)  # outside, where nobody else speaks there
-        moved = np.pad(inside, ((lead, tail), (0, 0)), "edge") - still
-        moved[:RAMP_FRAMES] *= ramp[:, None]
-        moved[-RAMP_FRAMES:] *= ramp[::-1, None]
+        change = np.pad(inside, ((lead, tail), (0, 0)), "edge") - still
+        change[:RAMP_FRAMES] *= ramp[:, None]
+        change[-RAMP_FRAMES:] *= ramp[::-1, None]
         start = part.first - lead
-        first, end = max(start, 0), min(start + len(moved), len(like))
-        joined[first:end] += moved[first - start : end - start]
+        first, end = max(start, 0), min(start + len(change), len(like))
+        joined[first:end] += change[first - start : end - start]
     return joined
 
 
@@ -379,7 +379,7 @@ def _join_units(
     placed = (place_units(each.units, part.first, part.own) for part, each in zip(parts, made, strict=True))
     units = join_units(placed, silence, end_s)
     pairs = [(part.speech.units, each.units) for part, each in zip(parts, made, strict=True)]
-    if any([span.start_s for span in given] != [span.start_s for span in moved] for given, moved in pairs):
+    if any([span.start_s for span in before] != [span.start_s for span in after] for before, after in pairs):
         return units
     starts_s = [span.start_s for span in units]  # the engine moved none: a phone over two passages stays one
     spans = []

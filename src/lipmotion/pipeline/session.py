@@ -309,8 +309,8 @@ class Session:
         from lipmotion.articulation.curve_edits import apply_stretch
         from lipmotion.articulation.phone_targets import SAID, with_gestures
 
-        said = with_gestures(generation.motion, generation.units, SAID)
-        generation = generation.with_motion(said)  # what phones beside a lock ask must not reach into it
+        asked = with_gestures(generation.motion, generation.units, SAID)
+        generation = generation.with_motion(asked)  # what phones beside a lock ask must not reach into it
         for place, lock in locks.items():
             for later in steps[place + 1 :]:
                 if lock.holds(later):
@@ -319,8 +319,8 @@ class Session:
             earlier = [edit for step in steps[:place] if isinstance(step, CurveStep) for edit in step.parts]
             before = tuple(edit for edit in generation.curve_edits if edit in earlier)
             if len(before) < len(generation.curve_edits):
-                kept = Locked(lock.start_s, lock.end_s, before)
-                generation = replace(generation, curve_edits=(*generation.curve_edits, kept))
+                locked = Locked(lock.start_s, lock.end_s, before)
+                generation = replace(generation, curve_edits=(*generation.curve_edits, locked))
         return generation
 
     def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
@@ -428,5 +428,5 @@ class Session:
 
 def read_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
     """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
-    given = step.pronunciation_of if isinstance(step, WordSaid | WordsSaidSo) else {}
-    return {word: (phones,) for text, phones in given.items() for word in split_words(text)}
+    pronunciations = step.pronunciation_of if isinstance(step, WordSaid | WordsSaidSo) else {}
+    return {word: (phones,) for text, phones in pronunciations.items() for word in split_words(text)}

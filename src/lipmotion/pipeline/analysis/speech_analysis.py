@@ -150,8 +150,8 @@ def analyse_speech(
         LOG.warning("a steady tone covers what is said at %s: the mouth rests there", format_places(tones))
     if recognition is not None and request.language == ENGLISH:
         warn_of_another_language(recognition)
-    given = request.units is not None or analysis.fit is not None
-    speech = with_voice(model.phones, audio, speech, recognition, given=given)
+    is_given = request.units is not None or analysis.fit is not None
+    speech = with_voice(model.phones, audio, speech, recognition, given=is_given)
     return replace(analysis, speech=with_prior(model.prior, speech))
 
 
@@ -346,12 +346,12 @@ def _place_in_parts(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tup
     spoken = []
     for part in parts:
         within = list(part.between(units))
-        said = [span.label for span in within if not is_silent(span.label.phone)] or [span.label for span in within]
+        labels = [span.label for span in within if not is_silent(span.label.phone)] or [span.label for span in within]
         for place in (0, -1) if within else ():  # silence between passages is as sure as the phones beside it
             if is_silent(within[place].label.phone):
-                label = replace(within[place].label, confidence=said[place].confidence)
+                label = replace(within[place].label, confidence=labels[place].confidence)
                 within[place] = replace(within[place], label=label)
-        silent = Unit(SILENCE, confidence=said[0].confidence if said else None)
+        silent = Unit(SILENCE, confidence=labels[0].confidence if labels else None)
         joined = join_units([Timeline(tuple(within))], silent, part.speech.features.duration_s)
         spoken.append(part._replace(speech=with_units(part.speech, joined)))
     return tuple(spoken)
@@ -375,7 +375,7 @@ def recognise_speech(
     audio = analysed(audio, features)
     speech = build_speech(engine, audio, features, Timeline(()), phones.kind, each)
     passages = (SpeechPart(0, slice(0, len(features.values)), speech),) if speech.parts is None else speech.parts
-    units, spoken, found = list[Timeline[Unit]](), list[SpeechPart](), None
+    units, spoken, recognition = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
         within = None
         if phones.kind not in ("general", "words") and rate_knowledge(phones.own, sound):
@@ -387,15 +387,15 @@ def recognise_speech(
                 within = None
         knows_voice = within is not None
         if within is None:
-            found = found or recognise()
-            within = part.between(select_reliable(found.units, found.reliability))
+            recognition = recognition or recognise()
+            within = part.between(select_reliable(recognition.units, recognition.reliability))
         if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < MIN_SPEECH_S:
             continue  # a click, a knock
         spoken.append(part._replace(speech=replace(part.speech, voice=float(knows_voice))))  # else ``with_voice`` says
         units.append(place_units(within, part.first, part.own))
     if speech.parts is not None:
         speech = replace(speech, parts=tuple(spoken))
-    confidence = found.reliability if found is not None else 0.0
+    confidence = recognition.reliability if recognition is not None else 0.0
     return with_units(speech, join_units(units, Unit(SILENCE, confidence=confidence), features.duration_s))
 
 

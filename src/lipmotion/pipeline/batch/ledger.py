@@ -317,8 +317,7 @@ class Ledger:
 
         It need not if it was done with the same settings from the same files, and all its outputs exist.
         """
-        fingerprint = fingerprint_line(line, of_settings)
-        if self._last.get(_key(line.name), ("", 0))[0] != fingerprint:
+        if self._last.get(_key(line.name), ("", 0))[0] != fingerprint_line(line, of_settings):
             return None
         record = self.finished(line, out)
         return record if record is not None and are_same_inputs(line, record) else None

@@ -140,8 +140,8 @@ def rate_doubt(record: Record) -> float:
     doubt += 10 * len(record.get("warnings", ()))
     doubt += 5 * (record.get("range_db", NOISY_DB) < NOISY_DB)
     if words in ("words", "phones"):
-        most = UNSURE_WORDS if words == "words" else UNSURE_PHONES
-        doubt += most * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
+        weight = UNSURE_WORDS if words == "words" else UNSURE_PHONES
+        doubt += weight * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
     if words in ("transcript", "mapped transcript", "given units") and record["confidence"] < FULL_FIT_SHARE:
         doubt += UNSURE_WORDS * (1 - record["confidence"])
     if (motion := record.get("motion")) is not None:

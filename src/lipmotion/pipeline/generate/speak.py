@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -99,21 +100,15 @@ def speak_from_corpus(
 
 
 def _plan_phones(text: str, lexicon: Lexicon, engine: SelectsRecordings, model: Model) -> Timeline[Unit]:
-    spans: list[Span[Unit]] = []
-    now_s = 0.0
-
-    def add(phone: str, word: str, duration_s: float) -> None:
-        nonlocal now_s
-        spans.append(Span(now_s, now_s + duration_s, Unit(phone, word=word)))
-        now_s += duration_s
-
+    phones: list[tuple[Unit, float]] = []
     for number, sentence in enumerate(split_sentences(text)):
-        add(SILENCE, "", BETWEEN_S if number else REST_S)
+        phones.append((Unit(SILENCE), BETWEEN_S if number else REST_S))
         for word in split_words(sentence):
             for phone in lexicon.pronunciations(word)[0]:
-                add(phone, word, engine.typical_duration_s(model.learned, phone))
-    add(SILENCE, "", REST_S)
-    return Timeline(tuple(spans))
+                phones.append((Unit(phone, word=word), engine.typical_duration_s(model.learned, phone)))
+    phones.append((Unit(SILENCE), REST_S))
+    edges_s = accumulate((duration_s for _, duration_s in phones), initial=0.0)
+    return Timeline(tuple(Span(*times_s, unit) for times_s, (unit, _) in zip(pairwise(edges_s), phones, strict=True)))
 
 
 def _find_starts(count: int, pieces: Sequence[SourcePiece], joined: JoinedPieces, rate_hz: int) -> NDArray[np.float64]:

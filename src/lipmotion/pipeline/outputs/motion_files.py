@@ -114,16 +114,16 @@ def thin_keys(held: Generation, thinning: Thinning) -> Generation:
 
     Weights that never exceed the tolerance are left out, and held poses stay as they are.
     """
-    motion, kept = held.motion, []
+    motion, moving = held.motion, []
     values = motion.values.astype(np.float64)
     for column, channel in enumerate(motion.channels):
         curve = values[:, column]
         if channel.unit != WEIGHT or np.abs(curve).max(initial=0.0) > thinning.tolerance:
-            kept.append(channel.name)
+            moving.append(channel.name)
         if channel.unit == WEIGHT and channel.name not in held.stepped:
             keys = thinning.choose(motion.time_s, curve[:, None])
             values[:, column] = np.interp(motion.time_s, motion.time_s[keys], curve[keys])
-    return replace(held, motion=replace(motion, values=values)).selected(kept)
+    return replace(held, motion=replace(motion, values=values)).selected(moving)
 
 
 def _deliver(performance: Performance) -> Generation:
@@ -211,10 +211,10 @@ def resample_curves(held: Generation, generation: Generation, rate_hz: float) ->
 
     held       : the curves;  generation : the motion that they are of, with as many frames
     """
-    resampled, shown = held.resampled(rate_hz), with_mouth(generation.motion)
-    if OPENING not in shown.names or len(held.motion.values) != len(shown.values):
+    resampled, mouth = held.resampled(rate_hz), with_mouth(generation.motion)
+    if OPENING not in mouth.names or len(held.motion.values) != len(mouth.values):
         return resampled
-    contact = find_mouth(shown, generation.units).contact
+    contact = find_mouth(mouth, generation.units).contact
     rows = sample_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
 
@@ -277,9 +277,9 @@ def read_generation(
     Raises InputError: a file that cannot be read, motion without frames, of an unlikely rate, or of more than a day.
     """
     if rate_hz is not None and Path(path).suffix.lower() in CUE_SUFFIXES:
-        motion, found = read_cue_motion(Path(path), rate_hz)
+        motion, stated = read_cue_motion(Path(path), rate_hz)
     else:
-        motion, found = read_motion(path)
+        motion, stated = read_motion(path)
         motion = motion if rate_hz is None else replace(motion, rate_hz=rate_hz)
     if not len(motion.values):
         raise InputError(f"{path}: the motion has no frames; export it again")
@@ -289,7 +289,7 @@ def read_generation(
     lasts_s = (len(motion.values) - 1) / motion.rate_hz
     if lasts_s > LONGEST_S:
         raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
-    phones = found if units is None else read_units(units) if isinstance(units, str | Path) else units
+    phones = stated if units is None else read_units(units) if isinstance(units, str | Path) else units
     channels = tuple(
         Channel(each.name, WEIGHT)
         if each.unit == EYE_DISTANCE and (is_known(each.name) or is_mood(each.name))
