@@ -77,11 +77,6 @@ def test_the_lips_move_as_the_speakers_did(move, toy_sentence, transcript):
     assert agreement(move(units=toy_sentence.units).motion, toy_sentence) > 0.8
 
 
-def test_a_file_its_name_and_its_samples_are_the_same(toy_model, toy_speech):
-    first, *others = (animate(each, model=toy_model) for each in (toy_speech, str(toy_speech), read_sound(toy_speech)))
-    assert all(np.array_equal(first.motion.values, other.motion.values) for other in others)
-
-
 def test_with_a_transcript_the_words_are_known(move, toy_sentence, transcript, caplog):
     result = move(transcript=transcript)
     said = [(s.label.phone, s.label.word) for s in toy_sentence.units]
@@ -104,15 +99,6 @@ def test_the_mouth_closes_on_p_b_m_and_rests_in_silence(move, toy_sentence):
         assert silence.std() < 1e-3
 
 
-def test_units_need_no_recogniser(move):
-    with pytest.raises(InputError, match="unknown phone 'AA' at 0"):
-        move(units=Timeline((Span(0.0, 0.5, Unit("AA")),)))
-    with pytest.raises(InputError, match="the units are an empty list"):
-        move(units=Timeline(()))
-    silent = Timeline((Span(0.0, 2.0, Unit("sil")),))
-    assert move(units=silent).motion["opening"].max() < 0.01  # nothing is said
-
-
 def test_pins_are_met_exactly(move, toy_sentence):
     vowel = next(span for span in toy_sentence.units if span.label.phone == "aa")
     middle_s = round((vowel.start_s + vowel.end_s) / 2, 2)
@@ -128,7 +114,7 @@ def test_pins_are_met_exactly(move, toy_sentence):
     assert same.values[far:] == pytest.approx(free.motion.values[far:], abs=1e-2)
 
 
-def test_a_pin_that_cannot_be_met(move):
+def test_constraints_and_units_that_are_refused(move):
     for pin, message in (
         (Pin(0.5, "jaw", 0.1), r"cannot pin 'jaw' \(is it jawOpen\?\); channels that can be pinned: opening, width"),
         (Pin(9.0, "opening", 0.1), r"pin at 9.0 s lies outside the recording \(0 to 2.76 s\)"),
@@ -137,20 +123,28 @@ def test_a_pin_that_cannot_be_met(move):
     ):
         with pytest.raises(InputError, match=message):
             move(constraints=Constraints((pin,)))
-
-
-def test_constraints_and_units_that_are_none(move, toy_sentence):
     with pytest.raises(InputError, match="the constraints are a tuple, required Constraints"):
         move(constraints=(Pin(0.5, "opening", 0.1),))
     with pytest.raises(InputError, match="units: found a list, required a path, or a Timeline"):
-        Request(toy_sentence.audio, units=[])
-    with pytest.raises(InputError, match="a unit is 'p', required a Unit"):
-        Request(toy_sentence.audio, units=Timeline((Span(0, 1, "p"),)))
-    for start_s, end_s in ((-math.inf, 0.5), (0.5, 1e308), (1e308, math.inf)):
-        with pytest.raises(InputError, match=r"the units last from .* s, required times of this recording"):
-            move(units=Timeline((Span(start_s, end_s, Unit("p")),)))
-    with pytest.raises(InputError, match=r"2000 units in time, required at most 1276 for 2.76 s of sound"):
-        move(units=Timeline(tuple(Span(i / 1e4, (i + 1) / 1e4, Unit("p")) for i in range(2000))))
+        move(units=[])
+    without_time = ((-math.inf, 0.5), (0.5, 1e308), (1e308, math.inf))
+    for spans, message in (
+        ((), "the units are an empty list"),
+        ((Span(0, 1, "p"),), "a unit is 'p', required a Unit"),
+        ((Span(0.0, 0.5, Unit("AA")),), "unknown phone 'AA' at 0"),
+        *(
+            ((Span(*times_s, Unit("p")),), "the units last from .* s, required times of this")
+            for times_s in without_time
+        ),
+        (
+            [Span(i / 1e4, (i + 1) / 1e4, Unit("p")) for i in range(2000)],
+            "2000 units in time, required at most 1276 for",
+        ),
+    ):
+        with pytest.raises(InputError, match=message):
+            move(units=Timeline(tuple(spans)))
+    silent = Timeline((Span(0.0, 2.0, Unit("sil")),))
+    assert move(units=silent).motion["opening"].max() < 0.01  # nothing is said
 
 
 def test_speech_that_cannot_be_used(toy_model, tmp_path):
@@ -163,7 +157,9 @@ def test_speech_that_cannot_be_used(toy_model, tmp_path):
             animate(speech, model=toy_model)
 
 
-def test_files_may_stand_for_model_and_transcript(toy_model, toy_model_file, toy_speech, tmp_path):
+def test_files_may_stand_for_speech_model_and_transcript(toy_model, toy_model_file, toy_speech, tmp_path):
+    first, *others = (animate(each, model=toy_model) for each in (toy_speech, str(toy_speech), read_sound(toy_speech)))
+    assert all(np.array_equal(first.motion.values, other.motion.values) for other in others)
     (tmp_path / "said.txt").write_text("see papa")
     by_file = animate(str(toy_speech), model=str(toy_model_file), transcript=tmp_path / "said.txt")
     assert next(span.label.word for span in by_file.units if span.label.word) == "see"

@@ -370,44 +370,28 @@ def test_a_table(tmp_path, name, mark, caplog):
 
 
 def test_outputs_may_be_named_with_the_suffix_of_one_of_their_kinds(tmp_path):
-    names = ("a.json", "b.cues.json", "c.take")
-    text = "file,output\n" + "".join(f"{number}.wav,{name}\n" for number, name in enumerate(names))
+    text = "file,output\n1.wav,a.json\n2.wav,b.cues.json\n3.wav,c.take\n"
     lines = listed(tmp_path, text, "t.csv", ("json", "cues.json"))
     assert [line.name for line in lines] == ["a", "b", "c.take"]
 
 
-def test_short_rows_are_filled_and_long_ones_refused(tmp_path):
+def test_lists_that_are_refused(tmp_path):
+    for source, message in ((tmp_path, "no recordings in it"), (tmp_path / "missing", "no such file or folder")):
+        with pytest.raises(InputError, match=message):
+            read_lines(source, ("json",))
     assert listed(tmp_path, "file,transcript\na.wav\n") == [BatchLine("a", str(tmp_path / "a.wav"))]
-    with pytest.raises(InputError, match="row 2: 3 columns, required at most the 2"):
-        listed(tmp_path, "file,transcript\na.wav,hello,you\n")
-    with pytest.raises(InputError, match="row 3: no recording in the column 'file'"):
-        listed(tmp_path, "file,transcript\na.wav,x\n,hello\n")
-    with pytest.raises(InputError, match=f"{MAX_LINES + 1} lines, required at most {MAX_LINES}"):
-        listed(tmp_path, "a.wav\n" * (MAX_LINES + 1))
-
-
-def test_nothing_to_do_is_an_error(tmp_path):
-    with pytest.raises(InputError, match="no recordings in it"):
-        read_lines(tmp_path, ("json",))
-    with pytest.raises(InputError, match="no such file or folder"):
-        read_lines(tmp_path / "missing", ("json",))
-    with pytest.raises(InputError, match="no recordings"):
-        listed(tmp_path, "\n")
-
-
-@pytest.mark.parametrize("text", ["a.wav\na.flac\n", "a.wav\nA.wav\n", "a.wav\na.wav\n", "é.wav\ne\u0301.flac\n"])
-def test_two_lines_with_one_name_are_refused(tmp_path, text):
-    with pytest.raises(ExportError, match="rename one of them"):
-        listed(tmp_path, text)
-
-
-@pytest.mark.parametrize("text", ["a\0b.wav\n", "file,output\na.wav,x\ty\n", "~nobody/a.wav\n"])
-def test_names_that_no_file_has(tmp_path, text):
-    if text.startswith("~"):  # only a shell knows homes
-        assert listed(tmp_path, text)[0].recording == str(tmp_path / "~nobody/a.wav")
-        return
-    with pytest.raises(InputError, match="control characters"):
-        listed(tmp_path, text)
+    assert listed(tmp_path, "~nobody/a.wav\n")[0].recording == str(tmp_path / "~nobody/a.wav")  # a shell knows homes
+    same = "a.wav\na.flac\n", "a.wav\nA.wav\n", "a.wav\na.wav\n", "é.wav\ne\u0301.flac\n"
+    for text, message in (
+        ("\n", "no recordings"),
+        ("file,transcript\na.wav,hello,you\n", "row 2: 3 columns, required at most the 2"),
+        ("file,transcript\na.wav,x\n,hello\n", "row 3: no recording in the column 'file'"),
+        ("a.wav\n" * (MAX_LINES + 1), f"{MAX_LINES + 1} lines, required at most {MAX_LINES}"),
+        *((text, "control characters") for text in ("a\0b.wav\n", "file,output\na.wav,x\ty\n")),
+        *((text, "rename one of them") for text in same),
+    ):
+        with pytest.raises(ExportError if text in same else InputError, match=message):
+            listed(tmp_path, text)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,7 @@
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -25,6 +24,7 @@ from lipmotion_lab.evaluation.held_out import AUDIO_ONLY, ComparedClip, load_hel
 from lipmotion_lab.evaluation.table import format_figures
 from meshes.speech import motion
 from pipeline import made
+from pipeline.made import corpus_of
 from testing.toy import toy_motion, toy_sentences
 
 evaluate = partial(evaluated, recogniser="own")
@@ -105,10 +105,6 @@ def perfect(toy_model: Model, toy_corpus: Corpus, known: dict[float, Motion]) ->
     return evaluate(replace(toy_model, engine=Medium(None), learned=known), toy_corpus)
 
 
-def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
-    return made.corpus_of(folder / "corpus", utterances)
-
-
 def held_out(corpus: Corpus) -> list[Utterance]:
     return [corpus.utterance(name) for name in corpus.names("test")]
 
@@ -181,7 +177,7 @@ def test_frames_without_a_face_are_left_out(toy_model, toy_corpus, known, tmp_pa
         motion = replace(utterance.track.motion, values=values)
         damaged.append(replace(utterance, track=replace(utterance.track, motion=motion, seen=seen)))
     perfect = replace(toy_model, engine=Medium(None), learned=known)
-    found = evaluate(perfect, corpus_of(damaged, tmp_path))["conditions"]["audio only"]
+    found = evaluate(perfect, corpus_of(tmp_path, damaged))["conditions"]["audio only"]
     assert (found["acc"], found["amse"]) == pytest.approx((1, 0), abs=1e-6)
 
 
@@ -196,11 +192,11 @@ def test_closed_is_closed_by_the_training_list(toy_model, toy_corpus, figures):
 
 def test_without_transcripts_there_is_audio_only_and_one_that_does_not_fit_is_named(toy_model, toy_corpus, tmp_path):
     first, second = held_out(toy_corpus)
-    untold = corpus_of([replace(first, words=None), second], tmp_path)
+    untold = corpus_of(tmp_path, [replace(first, words=None), second])
     figures = evaluate(toy_model, untold)
     assert list(figures["conditions"]) == ["audio only"]
     assert figures["without_words"] == 1
-    wrong = corpus_of([first, replace(second, words=("five",) * 100)], tmp_path / "wrong")
+    wrong = corpus_of(tmp_path / "wrong", [first, replace(second, words=("five",) * 100)])
     with pytest.raises(AlignmentError, match=rf"{second.name}: .*too short.*correct its transcript, or leave it out"):
         evaluate(toy_model, wrong)
 
@@ -230,7 +226,7 @@ def renamed_utterance(utterance: Utterance) -> Utterance:
 
 def test_other_channels_than_lip_distances(toy_model, toy_corpus, known, tmp_path):
     """Every channel that moves is compared, and what only an opening can tell is left out."""
-    faces = corpus_of([renamed_utterance(u) for u in held_out(toy_corpus)], tmp_path)
+    faces = corpus_of(tmp_path, [renamed_utterance(u) for u in held_out(toy_corpus)])
     other = replace(toy_model, engine=Medium(None), learned={key: renamed(m) for key, m in known.items()})
     figures = evaluate(other, faces)
     assert figures["closed_under"] is None
@@ -256,7 +252,7 @@ def test_a_model_of_two_features_is_compared_by_these(toy_model, toy_corpus, kno
 
 def test_a_model_of_other_motion_is_refused(toy_model, toy_corpus, known, tmp_path):
     first, second = held_out(toy_corpus)
-    faces = corpus_of([renamed_utterance(first)], tmp_path)
+    faces = corpus_of(tmp_path, [renamed_utterance(first)])
     with pytest.raises(CorpusError, match="the model has no channels jaw, pout, which the corpus has"):
         evaluate(toy_model, faces)
     other = replace(toy_model, engine=Medium(None), learned={key: renamed(m) for key, m in known.items()})
@@ -269,13 +265,13 @@ def test_a_model_of_other_motion_is_refused(toy_model, toy_corpus, known, tmp_pa
     motions = [replace(u.track.motion, values=np.ones_like(u.track.motion.values)) for u in frozen]
     frozen = [replace(u, track=replace(u.track, motion=m)) for u, m in zip(frozen, motions, strict=True)]
     with pytest.raises(CorpusError, match="none of 5 motion channels moves in these 2 utterances"):
-        evaluate(toy_model, corpus_of(frozen, tmp_path / "frozen"))
+        evaluate(toy_model, corpus_of(tmp_path / "frozen", frozen))
 
 
 def test_one_speaker(toy_model, toy_corpus, tmp_path):
     first, second = held_out(toy_corpus)
-    both = corpus_of([replace(first, speaker="anna"), replace(second, speaker="ben")], tmp_path)
-    alone = corpus_of([first], tmp_path / "alone")
+    both = corpus_of(tmp_path, [replace(first, speaker="anna"), replace(second, speaker="ben")])
+    alone = corpus_of(tmp_path / "alone", [first])
     one = evaluate(toy_model, both, selection=Selection("test", speakers=["anna"]))
     assert one["clips"] == 1
     assert one == evaluate(toy_model, alone)
@@ -285,7 +281,7 @@ def test_labelled_phones_are_the_reference(toy_model, toy_corpus, tmp_path):
     """Labels that call the p, b and m something else: then there is nothing to close in."""
     names = {"p": "t", "b": "d", "m": "n"}
     untold = [replace(u, words=None, phones=made.true_phones(u, names)) for u in held_out(toy_corpus)]
-    figures = evaluate(toy_model, corpus_of(untold, tmp_path))
+    figures = evaluate(toy_model, corpus_of(tmp_path, untold))
     assert list(figures["conditions"]) == CONDITIONS
     for condition in figures["conditions"].values():
         assert condition["closures_p_b_m"]["intervals"] == 0
@@ -310,7 +306,7 @@ def test_guessed_words_are_reported_and_a_lexicon_gives_pronunciations(toy_model
     names = {"papa": "pahpa", "mama": "日本"}
     changed = [replace(u, words=tuple(names.get(word, word) for word in u.words or ())) for u in held_out(toy_corpus)]
     lexicon = Lexicon({"日本": (("m", "aa", "m", "ax"),)})
-    figures = evaluate(toy_model, corpus_of(changed, tmp_path), lexicon=lexicon)
+    figures = evaluate(toy_model, corpus_of(tmp_path, changed), lexicon=lexicon)
     assert figures["conditions"]["with transcript"]["acc"] > 0.7
     assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
 

@@ -1,6 +1,6 @@
 import logging
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from lipmotion.units import Lexicon
 from lipmotion_lab.evaluation.held_out import generate_clips, load_held_out
 from lipmotion_lab.evaluation.table import format_figures
 from pipeline import made
-from pipeline.made import recogniser_of
+from pipeline.made import corpus_of, recogniser_of
 from testing.toy import SMALL, toy_sentences, toy_utterances
 
 JOINT = engine_named("joint", {})
@@ -37,14 +37,10 @@ def some(corpus: Corpus, count: int = 5) -> list[Utterance]:
     return [corpus.utterance(name) for name in corpus.names("train")[:count]]
 
 
-def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
-    return made.corpus_of(folder / "corpus", utterances)
-
-
 @pytest.mark.long
 def test_other_lists_all_and_given_names(toy_corpus, tmp_path):
     assert train(toy_corpus, selection=Selection("val"), recogniser=SMALL, engine=JOINT)[1].used == ("toy08", "toy09")
-    few = corpus_of([toy_corpus.utterance(name) for name in ("toy10", "toy02", "toy03")], tmp_path)
+    few = corpus_of(tmp_path, [toy_corpus.utterance(name) for name in ("toy10", "toy02", "toy03")])
     for selection, used, split in (
         (Selection(None), ("toy02", "toy03", "toy10"), "all"),
         (Selection(names=("toy10", "toy02")), ("toy10", "toy02"), "given names"),
@@ -61,7 +57,7 @@ def test_other_lists_all_and_given_names(toy_corpus, tmp_path):
 def test_untranscribed_utterances_are_recognised_and_used(toy_corpus, tmp_path, caplog):
     utterances = some(toy_corpus, 8)
     utterances[5] = replace(utterances[5], words=None)
-    mixed = corpus_of(utterances, tmp_path)
+    mixed = corpus_of(tmp_path, utterances)
     model, report = train(mixed, recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert "1 of 8 recordings have no words: their phones are recognised" in caplog.text
@@ -82,7 +78,7 @@ def test_labelled_phones_are_used_as_they_are(toy_corpus, toy_model, tmp_path):
     """Nothing is aligned, no transcript is needed, and phone models are trained on what is labelled."""
     given = [labelled(utterance) for utterance in some(toy_corpus, 8)]
     given[0] = replace(given[0], words=("not", "what", "is", "said"))
-    model, report = train(corpus_of(given, tmp_path), recogniser=SMALL, engine=JOINT)
+    model, report = train(corpus_of(tmp_path, given), recogniser=SMALL, engine=JOINT)
     assert report.used == TRAINED
     assert report.skipped == {}
     assert set(model.phones.table.units) == set(toy_model.phones.table.units)
@@ -94,7 +90,7 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus, tmp_
     utterances = some(toy_corpus)
     utterances[1] = replace(utterances[1], words=("five",) * 100)
     utterances[2] = replace(utterances[2], words=("mama", "日本"))
-    model, report = train(corpus_of(utterances, tmp_path), recogniser=SMALL, engine=JOINT)
+    model, report = train(corpus_of(tmp_path, utterances), recogniser=SMALL, engine=JOINT)
     assert report.used == ("toy00", "toy03", "toy04")
     assert set(report.skipped) == {"toy01", "toy02"}
     assert "too short" in report.skipped["toy01"]
@@ -104,7 +100,7 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus, tmp_
 
 @pytest.mark.long
 def test_without_any_transcript_the_shipped_phones_are_used(toy_corpus, tmp_path, caplog):
-    silent = corpus_of([replace(utterance, words=None) for utterance in some(toy_corpus)], tmp_path)
+    silent = corpus_of(tmp_path, [replace(utterance, words=None) for utterance in some(toy_corpus)])
     model, report = train(silent, recogniser=SMALL, engine=JOINT)
     assert model.phones.mixtures is load_model().phones.mixtures
     assert not np.array_equal(model.phones.speaker, load_model().phones.speaker)  # whose voice it is, is learned
@@ -117,7 +113,7 @@ def test_guessed_words_are_reported(toy_corpus, tmp_path, caplog):
     names = {"papa": "pahpa", "mama": "mahma"}
     utterances = [replace(u, words=tuple(names.get(w, w) for w in u.words or ())) for u in some(toy_corpus, 4)]
     lexicon = Lexicon({"mahma": (("m", "aa", "m", "ax"),)})
-    train(corpus_of(utterances, tmp_path), recogniser=SMALL, engine=JOINT, lexicon=lexicon)
+    train(corpus_of(tmp_path, utterances), recogniser=SMALL, engine=JOINT, lexicon=lexicon)
     assert [record.getMessage().split()[0] for record in caplog.records] == ["'pahpa'"]
 
 
@@ -133,7 +129,7 @@ def test_licence_and_attribution_go_with_the_model(toy_corpus):
 
 
 def test_nothing_usable_and_voices_for_engines_that_have_no_use_for_them(toy_corpus, tmp_path):
-    wrong = corpus_of([replace(u, words=("five",) * 100) for u in some(toy_corpus, 2)], tmp_path)
+    wrong = corpus_of(tmp_path, [replace(u, words=("five",) * 100) for u in some(toy_corpus, 2)])
     with pytest.raises(CorpusError, match="none of 2 utterances has a transcript that fits"):
         train(wrong, recogniser=SMALL)
     with pytest.raises(InputError, match="the engine 'joint' does not learn from other voices"):

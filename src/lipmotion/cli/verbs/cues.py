@@ -42,11 +42,6 @@ def _dialogue(path: str) -> str | None:
         return path if NO_WORDS.sub(b"", file.read(1 << 16).strip(BLANK)) else None
 
 
-def _recogniser(name: str) -> str:
-    """Return our name of a recogniser; one that is not Rhubarb's is taken for ours."""
-    return RECOGNISERS.get(name.lower(), name)
-
-
 def _threads(text: str) -> int:
     """Return a number of threads. Raises ArgumentTypeError: it is none, or under 1."""
     if (count := parse_whole(text)) < 1:
@@ -78,8 +73,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     unset: dict[str, Any] = {"default": argparse.SUPPRESS}
     add("-d", "--dialogFile", metavar="FILE", dest="transcript", type=_dialogue, help="--transcript FILE", **unset)
     text = "--recogniser: pocketSphinx is auto, phonetic is fast"
-    recognisers = "pocketSphinx|phonetic"
-    add("-r", "--recognizer", metavar=recognisers, dest="recogniser", type=_recogniser, help=text, **unset)
+    named: dict[str, Any] = {
+        "metavar": "pocketSphinx|phonetic",
+        "type": lambda name: RECOGNISERS.get(name.lower(), name),
+    }
+    add("-r", "--recognizer", dest="recogniser", help=text, **named, **unset)
     add("--extendedShapes", metavar="GHX", dest="shapes", help="--shapes", **unset)
     text = "--fps, for every format; in .dat shapes have their letters then"
     add("--datFrameRate", metavar="FPS", dest="fps", action=_DatFrameRate, type=float, help=text, **unset)

@@ -19,6 +19,8 @@ from lipmotion.printable import printable
 from lipmotion.storage.sources import is_file
 
 LOG = logging.getLogger("lipmotion")
+SILENT_HZ = 16_000
+"""Rate of the silence of videos without a sound."""
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -90,7 +92,3 @@ def _find_sound(motion: Path) -> Path | None:
     why = "is not there" if not start_s else f"begins at {start_s:g} s of the motion"
     LOG.warning("%s: its sound %s %s; give a sound: --sound FILE", motion, sound, why)
     return None
-
-
-SILENT_HZ = 16_000
-"""Rate of the silence of videos without a sound."""

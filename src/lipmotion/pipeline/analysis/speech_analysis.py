@@ -115,13 +115,13 @@ class SpeechAnalysis:
         return not self.speech.units_known and spoken_s < MIN_SPEECH_S
 
 
-def analyse(model: Model, request: Request, each: ParallelMap = map) -> Speech:
+def analyse(model: Model, request: Request) -> Speech:
     """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
 
     Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
     Raises AlignmentError: the transcript cannot be aligned with the recording.
     """
-    return analyse_speech(model, request, each).speech.with_arrays()
+    return analyse_speech(model, request).speech.with_arrays()
 
 
 def analyse_speech(
