@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh, Texture
+from lipmotion.meshes.model.mesh import BLEND, MASK, Mesh, Texture
 from lipmotion_faces.characters.textures import TextureTable, decode_srgb, reduce_textures
 from lipmotion_faces.kernels.raster import draw
 from lipmotion_faces.kernels.textured import (
@@ -265,12 +265,18 @@ def prepare_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float
     unique, inverse = np.unique(keys, return_inverse=True)
     kinds, rows = unique // 2 % len(materials), unique // 2 // len(materials)
     finishes = [Finish(SCATTER, gloss=0.5 * m.gloss, focus=4 + round(2 * m.gloss)) for m in materials]
+    colours = np.array([decode_srgb(m.colour) for m in materials])[kinds]
+    if mesh.tints is not None:
+        colours = colours * mesh.tints[rows, :3]
+    if mesh.colours is not None:  # those of textures have the colour of the material alone
+        textured = np.array([m.texture is not None for m in materials])[kinds]
+        colours = np.where(textured[:, None], colours, decode_srgb(mesh.colours[rows]))
     return DrawnSurface(
         rows,
         np.where(unique % 2 == 1, -1.0, 1.0),
         kinds,
         Lighting(finishes),
-        _list_colours(mesh, materials, rows, kinds),
+        colours,
         looks._replace(triangles=inverse.reshape(corners.shape).astype(np.int32)),
     )
 
@@ -320,14 +326,3 @@ def _texture(
             looks[mine, 1] = np.where(kinds == EMPTY, EMPTY, lowered)
             alphas[mine] = np.stack([np.full(len(cover), material.cutoff), cover], axis=1)
     return TexturedTriangles(np.zeros((0, 3), np.int32), downwards, looks, alphas, table.texels, table.levels)
-
-
-def _list_colours(mesh: Mesh, materials: list[Material], rows: Rows, kinds: Rows) -> Array:
-    """Return the reflection of drawn vertices; those of textures have the colour of the material alone."""
-    of_material = np.array([decode_srgb(material.colour) for material in materials])[kinds]
-    textured = np.array([material.texture is not None for material in materials])[kinds]
-    if mesh.tints is not None:
-        of_material = of_material * mesh.tints[rows, :3]
-    if mesh.colours is None:
-        return of_material
-    return np.where(textured[:, None], of_material, decode_srgb(mesh.colours[rows]))

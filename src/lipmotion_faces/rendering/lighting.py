@@ -111,8 +111,8 @@ BIAS_DISTANCE, FADE_DISTANCE = 0.05, 0.10
 """A vertex this far behind another one begins to be hidden, and is hidden this much further behind."""
 
 
-DIRECTIONS, LAMPS = 72, 20
-"""Directions of the sky from which light comes, and places on the key light, which is large and soft."""
+DIRECTIONS, LAMPS, SMOOTHINGS = 72, 20, 4
+"""Directions of the sky from which light comes, places on the key light, which is large and soft, and means taken."""
 
 
 def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hiding: NDArray[np.bool_]) -> Real:
@@ -141,13 +141,9 @@ def measure_reach(places: Real, normals: Real, triangles: NDArray[np.int32], hid
         direct += _find_visible(
             places, hiding, normalise(key + radius * (np.cos(turn) * around + np.sin(turn) * above))
         )
-    return _smooth(np.stack([sky, direct / LAMPS], axis=1), triangles)
-
-
-def _smooth(values: Real, triangles: NDArray[np.int32], times: int = 4) -> Real:
-    """Return values of vertices as means over the triangles around them [shape=(V, 2)]."""
+    values = np.stack([sky, direct / LAMPS], axis=1)
     count = np.maximum(np.bincount(triangles.ravel(), minlength=len(values)), 1)[:, None]
-    for _ in range(times):
+    for _ in range(SMOOTHINGS):
         mean = values[triangles].mean(axis=1)
         totals = [
             sum(np.bincount(triangles[:, corner], mean[:, k], minlength=len(values)) for corner in range(3))
