@@ -348,12 +348,13 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -
     if len(frames.sizes) > 1:
         several = " and ".join(f"{width} × {height}" for height, width in sorted(frames.sizes)[:3])
         raise InputError(f"{path}: pictures of {several} pixels in one video; export the video in one size")
-    wanted_s = np.arange(frames.count) / frames.rate_hz
     times_s, rate_hz, count = frames.seen_s, frames.rate_hz, frames.count
+    cut_frames = {int(np.ceil(frames.times_s[cut] * rate_hz - 0.5)) for cut in frames.cuts}
+    cuts = sorted(n for n in cut_frames if 0 < n < count)
+    wanted_s = np.arange(count) / rate_hz
     maps = map_face(frames.points).reshape(-1, 6)
-    result = maps[find_nearest(times_s, np.arange(count) / rate_hz)]  # in scenes in which the person is not seen
-    ends = [0, *_list_cut_frames(frames), count]
-    for start, stop in pairwise(ends):
+    result = maps[find_nearest(times_s, wanted_s)]  # in scenes in which the person is not seen
+    for start, stop in pairwise([0, *cuts, count]):
         inside = (times_s * rate_hz >= start - 0.5) & (times_s * rate_hz < stop - 0.5)
         if inside.any():
             scene_s = times_s[inside] - start / rate_hz
@@ -364,7 +365,7 @@ def track_footage(path: Path, span: VideoSpan = WHOLE, *, crops: bool = False) -
         make_track(path, span, frames, crops=crops),
         result.reshape(-1, 2, 3),
         frames.times_s[find_nearest(frames.times_s, wanted_s)],
-        tuple(_list_cut_frames(frames)),
+        tuple(cuts),
         next(iter(frames.sizes)),
         frames.rate_hz,
     )
@@ -435,12 +436,6 @@ def _decode_between(footage: Footage, start: int, stop: int) -> Iterator[NDArray
         raise InputError(f"{path}: no picture from {begin_s:.2f} s on, though it was tracked; track it again")
     for _ in range(n, stop):
         yield image
-
-
-def _list_cut_frames(frames: TrackedFrames) -> list[int]:
-    """Return the frames at the constant rate before which there is a cut, rising, without repetition."""
-    at = {int(np.ceil(frames.times_s[cut] * frames.rate_hz - 0.5)) for cut in frames.cuts}
-    return sorted(n for n in at if 0 < n < frames.count)
 
 
 def read_video_frames(path: Path) -> tuple[Iterator[NDArray[np.uint8]], float]:
