@@ -253,8 +253,7 @@ def write_film(
     frames = with_reports(film.frames, film.count, RENDERING, monitor)
     if mark == "visible":
         frames = mark_frames(frames, film.covered)
-    metadata = mark_metadata() if mark != "none" else None
-    tags, xmp = (metadata.tags, metadata.xmp) if metadata is not None else (None, None)
+    tags, xmp = mark_metadata() if mark != "none" else (None, None)
     write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
 
 
