@@ -19,6 +19,7 @@ from lipmotion.storage.schema import Arrays, ArraySpec, check_arrays, format_err
 from lipmotion.storage.sources import MAX_PIXELS, bound_allocations, read_x264
 
 Frame = NDArray[np.uint8]
+Stream = NDArray[np.uint8]
 ReadFrames = Callable[[int, int], Iterable[Frame]]
 
 MAX_DECODED_BYTES = 160 * 2**20
@@ -66,9 +67,6 @@ class FrameGroups:
         self._groups.move_to_end(group)
         return self._groups[group][index - self._starts[group]]
 
-
-Pictures = NDArray[np.uint8]
-Stream = NDArray[np.uint8]
 
 VIDEO_CRF = 18.0
 """Quality of a stored background: x264's constant rate factor, 0 (lossless) to 51; smaller is better."""
@@ -124,12 +122,12 @@ class StoredVideo:
         """
         return FrameGroups(self._decode_range, self._layout[1])
 
-    def decode(self, order: Iterable[int]) -> Iterator[Pictures]:
+    def decode(self, order: Iterable[int]) -> Iterator[Frame]:
         """Yield frames by their numbers, in any order; as ``open_groups``."""
         groups = self.open_groups()
         return (groups.decode(index) for index in order)
 
-    def _decode_range(self, start: int, stop: int) -> list[Pictures]:
+    def _decode_range(self, start: int, stop: int) -> list[Frame]:
         begins = self._layout[0]
         pictures = list(_decode(self.data, begins[start : stop + 1], self.size))
         if len(pictures) != stop - start:
@@ -140,9 +138,7 @@ class StoredVideo:
         return pictures
 
 
-def encode_video(
-    frames: Iterable[Pictures], rate_hz: float, *, crf: float = VIDEO_CRF, group: int = GROUP
-) -> StoredVideo:
+def encode_video(frames: Iterable[Frame], rate_hz: float, *, crf: float = VIDEO_CRF, group: int = GROUP) -> StoredVideo:
     """Return a video whose frames can be read in any order.
 
     frames  : uint8 RGB [shape=(H, W, 3)], all of one size, at least one; taken one at a time
@@ -162,7 +158,7 @@ def encode_video(
     return StoredVideo(data, float(rate_hz), (first.shape[0], first.shape[1]), len(parts))
 
 
-def encode_pictures(pictures: Pictures, crf: float = PICTURES_CRF) -> Stream:
+def encode_pictures(pictures: Frame, crf: float = PICTURES_CRF) -> Stream:
     """Return a stack of pictures in few bytes [shape=(bytes,)].
 
     pictures : uint8 RGB [shape=(N, H, W, 3)], at least one; each is smaller where it resembles the one before
@@ -177,7 +173,7 @@ def encode_pictures(pictures: Pictures, crf: float = PICTURES_CRF) -> Stream:
     return np.frombuffer(b"".join(_encode(pictures, crf, PICTURE_GROUP, "yuv444p")), np.uint8)
 
 
-def decode_pictures(data: Stream) -> Pictures:
+def decode_pictures(data: Stream) -> Frame:
     """Return the pictures of ``encode_pictures`` [shape=(N, H, W, 3)]. Raises ModelFormatError: they are damaged."""
     with format_errors("the stored pictures", _REMEDY, verb="are"):
         begins, _ = _read_layout(data)
@@ -230,7 +226,7 @@ STORED_VIDEO = {
 _REMEDY = "build the file again, or download it again"
 
 
-def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: str) -> Iterator[bytes]:
+def _encode(frames: Iterable[Frame], crf: float, group: int, pixel_format: str) -> Iterator[bytes]:
     import av
 
     if not 0 <= crf <= 51 or group < 1:
@@ -277,7 +273,7 @@ def _read_layout(data: Stream) -> tuple[list[int], list[int]]:
     return [*begins.tolist(), len(data)], [*groups.tolist(), len(frames)]
 
 
-def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -> Iterator[Pictures]:
+def _decode(data: Stream, begins: Sequence[int], size: tuple[int, int] | None) -> Iterator[Frame]:
     """Yield the frames of some groups. ``size`` : the size required. Raises ModelFormatError: they are damaged."""
     import av
 

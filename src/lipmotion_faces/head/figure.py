@@ -17,7 +17,7 @@ from lipmotion_faces.head import eyes, inside, palette
 from lipmotion_faces.head.part import EYE, MIDDLE, Part, find_around, join, make_grid, make_part, make_tube, to_head
 from lipmotion_faces.head.pose import CharacterPose
 from lipmotion_faces.head.skin import ACROSS, AT_CORNER, REST, RINGS, VISIBLE_RINGS, Skin, find_closure, move_jaw
-from lipmotion_faces.rendering.lighting import Finish, Lighting, measure_reach, normalise
+from lipmotion_faces.rendering.lighting import Finish, Lighting, Triple, measure_reach, normalise
 
 BUN = np.array([0.0, 1.40, -0.98])
 """Middle of the bun."""
@@ -150,7 +150,7 @@ def make_earring() -> Part:
     return make_part("earring", places, make_grid(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH)
 
 
-def _lathe(name: str, table: Sequence[Sequence[float]], count: int, colour: palette.Triple, finish: Finish) -> Part:
+def _lathe(name: str, table: Sequence[Sequence[float]], count: int, colour: Triple, finish: Finish) -> Part:
     """Return a part of rings about the body from rows (height, half width, half depth, middle z, squareness)."""
     at = np.linspace(0, len(table) - 1, count)
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
@@ -201,7 +201,7 @@ def paint_skin(skin: Skin) -> Real:
     x, y, z = np.abs(skin.rest[:, 0]), skin.rest[:, 1], skin.rest[:, 2]
     colour = np.broadcast_to(np.array(palette.SKIN), skin.rest.shape).copy()
 
-    def tint(strength: float, middle: tuple[float, float], radii: tuple[float, float], wanted: palette.Triple) -> None:
+    def tint(strength: float, middle: tuple[float, float], radii: tuple[float, float], wanted: Triple) -> None:
         spot = np.exp(-(((x - middle[0]) / radii[0]) ** 2) - ((y - middle[1]) / radii[1]) ** 2)
         share = strength * spot[:, None] * (z > -0.85)[:, None]
         colour[:] = (1 - share) * colour + share * np.array(wanted)

@@ -39,5 +39,5 @@ def parts_seen(stage: Stage, pose: CharacterPose) -> dict[str, np.ndarray]:
     for name, rows in mouth_rows(stage.figure).items():
         marked = np.zeros(len(places), bool)
         marked[rows] = True
-        seen[name] = stage.canvas.mark_shown(places, marked, stage.figure.triangles)
+        seen[name] = stage.canvas.cover(places, marked, stage.figure.triangles) > 127
     return seen
