@@ -101,11 +101,6 @@ class ProjectRecording:
         version = EditVersion(self.versions[-1].number + 1 if self.versions else 1, steps)
         return replace(self, versions=(*self.versions, version))
 
-    def without_version(self, name: str) -> ProjectRecording:
-        """Return the recording without a version. Raises InputError: as ``find_version``."""
-        removed = self.find_version(name)
-        return replace(self, versions=tuple(version for version in self.versions if version != removed))
-
     def find_version(self, name: str) -> EditVersion:
         """Return a version. Raises InputError: none of that name is kept."""
         for version in self.versions:
@@ -140,10 +135,6 @@ class Project:
         """Return the project with recordings that are new, or in place of those of their numbers."""
         together = {**self.lines, **{recording.number: recording for recording in recordings}}
         return replace(self, lines=together, next_number=max([self.next_number, *(n.number + 1 for n in recordings)]))
-
-    def without_recording(self, number: int) -> Project:
-        """Return the project without a recording."""
-        return replace(self, lines={key: recording for key, recording in self.lines.items() if key != number})
 
 
 def check_recordings(project: Project) -> None:

@@ -178,13 +178,6 @@ class Studio:
         self.workspace.close()
         self._run.close()
 
-    def find_number(self, text: str) -> int:
-        """Return the number of a recording in an address. Raises HTTPException: there is no such recording."""
-        number = int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else 0
-        if number not in self.folder.project.lines:
-            raise HTTPException(404, "no such recording")
-        return number
-
     def list_recordings(
         self, first: int, count: int, *, order: str = "", status: str = "", mark: str = ""
     ) -> dict[str, Any]:

@@ -167,10 +167,6 @@ class Workspace:
         finally:
             work.users -= 1
 
-    async def run_apart(self, do: Callable[[], ResultT]) -> ResultT:
-        """Do something in another thread that needs no open recording; return the result. Raises as ``do``."""
-        return await asyncio.get_running_loop().run_in_executor(None, do)
-
     def forget(self, number: int) -> None:
         """Close a recording, and what is cached of it."""
         work = self._works.pop(number, None)

@@ -18,10 +18,9 @@ pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.storage.locks import LOCK
 from lipmotion_studio import recording as recording_module
-from lipmotion_studio.application import create_application
+from lipmotion_studio.application import TOKEN_HEADER, Access, create_application
 from lipmotion_studio.folder import ProjectFolder, open_folder
 from lipmotion_studio.project import parse_project
-from lipmotion_studio.requests import TOKEN_HEADER, Access
 from lipmotion_studio.studio import Studio, load_known_model
 from lipmotion_studio.votes import read_votes
 from studio.open_studio import HOST, TOKEN, TOY_DIGEST, OpenStudio, open_studio, toy
@@ -260,8 +259,8 @@ def test_only_the_page_itself_with_the_token_gets_an_answer(studio):
     assert studio.ask("/api/project", origin="http://example.org").status == 403
     assert studio.ask("/api/project", origin=f"http://{HOST}").status == 200
     assert studio.ask("/api/project", sec_fetch_site="cross-site").status == 403
-    access = Access(TOKEN, frozenset({HOST}))
-    keyed = access.with_key("/api/lines/1/sound.wav")
+    path = "/api/lines/1/sound.wav"
+    keyed = f"{path}?key={Access(TOKEN, frozenset({HOST})).make_key(path)}"
     assert studio.ask(keyed, **{TOKEN_HEADER: ""}).status == 200
     assert studio.ask(keyed.replace("sound.wav", "doubts"), **{TOKEN_HEADER: ""}).status == 401
     for path in (

@@ -9,7 +9,7 @@ from typing import Any
 
 from fuzz.inputs import Files, Good
 from fuzz.plausible import good_model, refuse_constant, require, short_speech
-from lipmotion_studio.requests import TOKEN_HEADER
+from lipmotion_studio.application import TOKEN_HEADER
 from lipmotion_studio.study.application import create_application
 from lipmotion_studio.study.manifest import check_videos
 from lipmotion_studio.study.store import StudyStore
