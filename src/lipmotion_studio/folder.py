@@ -46,7 +46,7 @@ from lipmotion_studio.project import (
     digest_edits,
     parse_project,
 )
-from lipmotion_studio.votes import Vote, format_votes, read_votes
+from lipmotion_studio.votes import Vote, read_votes, write_votes
 
 LOG = logging.getLogger("lipmotion")
 PROJECT, SOUNDS, EDITS, EXPORTS, LEXICON = "project.json", "sounds", "edits", "exports", "lexicon.txt"
@@ -387,8 +387,7 @@ class ProjectFolder:
         """Write a vote behind those that were cast before; return all. Raises InputError, ExportError: not possible."""
         with self.lock:
             votes = (*read_votes(self.path / VOTES), vote)
-            with atomic_file(self.path / VOTES) as temporary:
-                temporary.write_text(format_votes(votes), encoding="utf-8")
+            write_votes(self.path / VOTES, votes)
             return votes
 
     @property

@@ -9,7 +9,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.storage.files import make_portable
 from lipmotion_studio.folder import PROJECT, ProjectFolder, RevisionError, find_project_path, open_folder
 from lipmotion_studio.project import ExportRecord, Project, ProjectRecording, describe_project, parse_project
-from lipmotion_studio.votes import Side, Vote, format_votes, read_votes, tally
+from lipmotion_studio.votes import Side, Vote, read_votes, tally, write_votes
 from pipeline.made import write_sound
 from testing.toy import ToySentence
 
@@ -158,7 +158,7 @@ def test_votes_are_read_as_they_were_written_and_old_ones_by_their_names(tmp_pat
     assert [vote.better for vote in old] == [0, None]
     assert tally(old, old[0]) == {"better": [1, 0], "neither": 1}
     votes = (*old, Vote("one", (A, KEPT), 1))
-    path.write_text(format_votes(votes), encoding="utf-8")
+    write_votes(path, votes)
     assert read_votes(path) == votes
 
 
