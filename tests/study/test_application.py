@@ -2,6 +2,7 @@
 
 import socket
 import sqlite3
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -11,12 +12,12 @@ import pytest
 
 from children import wait_until
 from lipmotion.errors import InputError
-from lipmotion_studio.study import conduct, store
+from lipmotion_studio.study import store
 from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, RANKING, read_answers
 from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, RateLimit, check_sheet, create_application
-from lipmotion_studio.study.conduct import export_answers, forget_rater
 from lipmotion_studio.study.manifest import VIDEOS, Study, check_videos, order_trials
-from lipmotion_studio.study.store import AnswerSheet, StudyStore
+from lipmotion_studio.study.store import AnswerSheet, StudyStore, collect_answers, export_answers, forget_rater
+from lipmotion_studio.verbs.study import run_serve
 from lipmotion_studio.web.replies import HEADERS
 from study.asgi import Application, ask
 from study.hostile import FOREIGN, hostile_requests
@@ -267,7 +268,7 @@ def test_twenty_scripted_raters_and_kills_in_the_middle(tmp_path):
         assert [rater.failure for rater in raters] == [None] * RATERS
         assert not any(rater.is_alive() for rater in raters)
         servers[-1].kill()
-    rows = conduct.collect_answers(folder)
+    rows = collect_answers(folder)
     assert len(rows) == RATERS * len(study.trials)
     assert len({(row.rater, row.trial, row.question) for row in rows}) == len(rows)
     by_rater = sorted(
@@ -313,12 +314,12 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path):
         later.close()
         server.kill()
     assert "Traceback" not in errors.read_text(encoding="utf-8")
-    assert conduct.collect_answers(folder) == []
+    assert collect_answers(folder) == []
 
 
 def test_a_port_that_is_taken_is_said(tmp_path):
     small_study(tmp_path / "study")
-    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(InputError, match="another --port"):
-        conduct.serve_study(tmp_path / "study", port=taken.getsockname()[1])
-    with pytest.raises(InputError, match="another --port"):
-        conduct.serve_study(tmp_path / "study", port=70_000)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        for port in (taken.getsockname()[1], 70_000):
+            with pytest.raises(InputError, match="another --port"):
+                run_serve(Namespace(study=tmp_path / "study", host="127.0.0.1", port=port, name=[]))

@@ -55,9 +55,9 @@ Condition = Callable[[StudySentence, Path], MadeVideo]
 """Gives the video of a sentence; where it has to be made, as the file of the path."""
 
 
-def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
+def read_sentences(paths: Sequence[Path]) -> list[StudySentence]:
     """Return the sentences of files and folders by name. Raises InputError: none, or two of one name."""
-    sentences = [StudySentence(path.stem, path) for path in list_recordings(given)]
+    sentences = [StudySentence(path.stem, path) for path in list_recordings(paths)]
     if not sentences:
         raise InputError("no sentences; give recordings: --sentence FILE|FOLDER")
     names = [sentence.name for sentence in sentences]
@@ -69,10 +69,10 @@ def read_sentences(given: Sequence[Path]) -> list[StudySentence]:
     return sentences
 
 
-def parse_conditions(given: Sequence[str]) -> dict[str, str]:
+def parse_conditions(texts: Sequence[str]) -> dict[str, str]:
     """Return the sources of conditions by name. Raises InputError: another form, a name that is taken, or under two."""
     sources: dict[str, str] = {}
-    for text in given:
+    for text in texts:
         name, equals, source = text.partition("=")
         name, source = name.strip(), source.strip()
         if text.strip() == RECORDING:
@@ -272,7 +272,7 @@ def _encode(
     """Encode a video as it is shown, and name it by its content."""
     late_ms = settings.anchor_ms if name == ANCHOR else 0.0
     file = folder / manifest.VIDEOS / "encoded.mp4"
-    seconds = encode_video(video.file, file, sentence.recording, settings.shown_region, late_ms)
+    seconds = encode_video(video.file, file, sentence.recording, Region.parse(settings.region), late_ms)
     digest = hash_file(file)
     file.replace(file.with_name(f"{digest[:32]}.mp4"))
     made = video.made | ({"sound_late_ms": f"{late_ms:g}"} if late_ms else {})

@@ -29,11 +29,12 @@ def test_a_table_is_counted_right():
     first, second = table.count_wins()
     assert first.tolist() == [[0, 2], [1, 0]]
     assert second.tolist() == [[0, 0], [1, 0]]
-    (pair,) = paired.analyse_pairs(table)["pairs"]
+    figures = paired.analyse_pairs(table)
+    (pair,) = figures["pairs"]
     assert (pair["condition"], pair["other"], pair["wins"], pair["answers"]) == ("a", "b", 3, 4)
     assert pair["share"] == pytest.approx(2 / 3)  # of three cells: the one in both orders counts once
     assert paired.compare_orders(table).tolist() == [[1, 1], [0, 0]]
-    assert paired.measure_consistency(table) == {"pairs": 1, "consistent": 1, "share": 1.0}
+    assert figures["consistency"] == {"pairs": 1, "consistent": 1, "share": 1.0}
 
 
 def test_answers_survive_the_table():
