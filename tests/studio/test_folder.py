@@ -46,15 +46,12 @@ def test_a_project_is_there_again(lines):
         assert again.project == project
         assert again.load_lexicon().user == {"tear": (("t", "ih", "r"), ("t", "eh", "r"))}
         assert again.find_recording(number + 1).sound == "sounds/a-2.wav"
-    with open_folder(lines) as once_more:  # nothing is added twice
-        assert once_more.project == project
+    with open_folder(lines) as once_more:
+        assert once_more.project == project  # nothing is added twice
+        with pytest.raises(ExportError, match="another lipmotion"), open_folder(lines):
+            pass
     document = json.loads((folder.path / PROJECT).read_text(encoding="utf-8"))
     assert document["lines"][0]["sound"] == "../lines/a.wav"
-
-
-def test_a_second_one_is_told(lines):
-    with open_folder(lines), pytest.raises(ExportError, match="another lipmotion"), open_folder(lines):
-        pass
 
 
 def test_the_folder_of_a_project(tmp_path, lines):
@@ -136,13 +133,10 @@ OLD = [
 ]
 
 
-def test_models_of_one_name_have_tallies_of_their_own():
+def test_models_of_one_name_have_tallies_of_their_own_and_edits_count_where_they_differ():
     votes = [Vote("one", (A, C), 0), Vote("two", (C, A), 0), Vote("one", (B, C), 1), Vote("one", (A, C))]
     assert tally(votes, Vote("three", (A, C))) == {"better": [1, 1], "neither": 1}
     assert tally(votes, Vote("three", (C, B))) == {"better": [1, 0], "neither": 0}
-
-
-def test_edits_count_where_they_differ_and_names_do_not():
     renamed = Side("renamed", A.model, "d" * 64)
     votes = [Vote("one", (A, C), 0), Vote("one", (A, KEPT), 1)]
     assert tally(votes, Vote("two", (renamed, Side("other", C.model, "d" * 64)))) == {"better": [1, 0], "neither": 0}
