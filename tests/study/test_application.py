@@ -121,7 +121,9 @@ def test_too_many_requests_of_one_rater_do_not_stop_another_and_too_many_raters_
     found = [ask(place.application, "/api/state", token=first["token"]).status for _ in range(ANSWER_BURST + 30)]
     assert 429 in found
     assert ask(place.application, "/api/state", token=second["token"]).status == 200
-    found = [ask(place.application, "/api/raters", {"agrees": True}).status for _ in range(JOIN_BURST + 20)]
+    found = [
+        ask(place.application, "/api/raters", {"agrees": True}).status for _ in range(JOIN_BURST + 60)
+    ]  # a slow machine lets some more in
     assert found[:20] == [201] * 20
     assert 429 in found
 

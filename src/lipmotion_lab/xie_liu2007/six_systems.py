@@ -224,7 +224,7 @@ class _TrainingSetup:
         self, systems: Sequence[str], names: Sequence[str], monitor: Monitor
     ) -> tuple[int, HeldOutRecordings, dict[str, TrainedSystem]]:
         """Return how many utterances ``names`` are used, what is held out, and systems trained on the same phones."""
-        examples, recordings = self._prepare(names, self.held_out, sub_monitor(monitor, 0, 0.3))
+        examples, recordings = self._prepare(names, sub_monitor(monitor, 0, 0.3))
         checkpoint, trained = self.open_checkpoint(names), dict[str, TrainedSystem]()
         others = [*list_motionless(engine_named("coupled"), self.options.voices)]
         for number, name in enumerate(systems):
@@ -244,16 +244,14 @@ class _TrainingSetup:
                 trained[name] = system_from_arrays(arrays)
         return len(examples), recordings["held out"], trained
 
-    def _prepare(
-        self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
-    ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
+    def _prepare(self, names: Sequence[str], monitor: Monitor) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
         """Return the examples of some utterances, and recordings with the phones of models trained on these."""
         settings, visual = replace(self.settings, monitor=monitor), self.options.visual
         utterances = [self.corpus.utterance(name) for name in sorted(names)]
         eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
         phones, examples = runner.train_phones(utterances, settings.narrow(0, 0.7), self.open_checkpoint(names))
-        parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
+        parts = {name: part for name, part in (("held out", self.held_out), ("val", self.validation)) if part}
         recordings: dict[str, HeldOutRecordings] = {}
         for number, (name, part) in enumerate(parts.items()):
             reading = settings.narrow(0.7 + 0.15 * number, 0.85 + 0.15 * number)

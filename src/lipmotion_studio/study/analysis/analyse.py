@@ -264,35 +264,26 @@ def _list_parts(answers: Sequence[Answer], baseline: str | None, power: float, s
     parts = []
     for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
         mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
-        if kind == PAIRED:
-            figures = _analyse_comparisons(mine, power, sentences)
-        else:
-            table = tabulate_ratings(mine)
-            components, planned = average_difference_effects(table), sentences or table.values.shape[2]
-            figures = analyse_ratings(table, baseline) | {
-                "variance": components._asdict() if components else None,
-                "planned_sentences": planned,
-                "raters_needed": plan_ratings(components, kind, planned, power),
-            }
         part: Figures = {"kind": kind, "question": question, "answers": len(mine)}
         part |= {"raters": len({each.rater for each in mine}), "sentences": len({each.sentence for each in mine})}
-        parts.append(part | figures)
+        parts.append(part)
+        if kind == PAIRED:
+            compared = [each for each in mine if ANCHOR not in (each.condition, each.other)]  # the others only screen
+            if not compared:
+                part["missing"] = "all comparisons are with the anchor"
+                continue
+            pairs = tabulate_pairs(compared)
+            components, planned = average_share_effects(pairs), sentences or len(pairs.sentences)
+            part |= analyse_pairs(pairs)
+            needed = plan_pairs(components, planned, power)
+        else:
+            ratings = tabulate_ratings(mine)
+            components, planned = average_difference_effects(ratings), sentences or ratings.values.shape[2]
+            part |= analyse_ratings(ratings, baseline)
+            needed = plan_ratings(components, kind, planned, power)
+        part |= {"variance": components._asdict() if components else None, "planned_sentences": planned}
+        part["raters_needed"] = needed
     return parts
-
-
-def _analyse_comparisons(answers: Sequence[Answer], power: float, sentences: int | None) -> Figures:
-    """Return the figures of paired comparisons but those with the anchor, which only screen."""
-    mine = [each for each in answers if ANCHOR not in (each.condition, each.other)]
-    if not mine:
-        return {"missing": "all comparisons are with the anchor"}
-    table = tabulate_pairs(mine)
-    components = average_share_effects(table)
-    planned = sentences or len(table.sentences)
-    return analyse_pairs(table) | {
-        "variance": components._asdict() if components else None,
-        "planned_sentences": planned,
-        "raters_needed": plan_pairs(components, planned, power),
-    }
 
 
 NO_FIGURE = "–"
