@@ -251,10 +251,13 @@ def test_the_log_file(rhubarb, here):
     assert (here / "take.wav").read_bytes() == before
 
 
-def test_a_wrong_line_is_a_message_too_and_so_under_its_name(rhubarb, run_outside):
-    """As a link of that name, for programs that look for the program itself."""
+def test_a_wrong_line_is_a_message_too(rhubarb):
     (failure,) = map(json.loads, rhubarb("take.wav", "--machineReadable", "--bogus").err)
     assert (failure["type"], "--bogus" in failure["reason"]) == ("failure", True)
+
+
+def test_under_its_name(run_outside):
+    """As a link of that name, for programs that look for the program itself."""
     named = "import sys; sys.argv[0] = '/usr/bin/rhubarb'; from lipmotion.cli.main import main; sys.exit(main())"
     done = run_outside("--machineReadable", "missing.wav", program=(sys.executable, "-c", named))
     assert done.code == 3

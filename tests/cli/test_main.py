@@ -42,9 +42,12 @@ def test_the_version(run):
     assert f"\nversion: {version('lipmotion')}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 
 
-def test_a_wrong_command_line_and_a_misspelt_option(run):
+def test_a_wrong_command_line(run):
     for arguments in (["bogus"], ["corpus"], ["corpus", "bogus"], ["--bogus"], ["train"], ["cues", "a.wav", "b.wav"]):
         check_refused(run(*arguments), 2, " --help")
+
+
+def test_a_misspelt_option(run):
     for misspelt, hint in (
         (["animate", "a.wav", "-o", "a.json", "--fase", "woman"], "did you mean --face? see: lipmotion animate --help"),
         (["animate", "a.wav", "--otput", "a.json"], "did you mean --output?"),
@@ -74,7 +77,7 @@ def _fail(error: BaseException, _: object) -> None:
     raise error
 
 
-def test_an_error_is_one_line_and_a_bug_is_not_hidden(run, make_info):
+def test_an_error_is_one_line(run, make_info):
     errors: list[tuple[BaseException, int, str]] = [
         (LipMotionError("what"), 1, "lipmotion: error: what"),
         (AlignmentError("two\n  lines"), 5, "lipmotion: error: two\\n  lines"),
@@ -87,6 +90,9 @@ def test_an_error_is_one_line_and_a_bug_is_not_hidden(run, make_info):
     for error, code, line in errors:
         make_info(partial(_fail, error))
         assert run("info") == (code, [], [line])
+
+
+def test_a_bug_is_not_hidden(make_info):
     make_info(partial(_fail, ZeroDivisionError()))
     with pytest.raises(ZeroDivisionError):
         main.main(["info"])
@@ -122,9 +128,12 @@ def test_what_is_wrong_is_one_line_and_an_exit_code(run_outside, here):
     assert run_outside("animate", "a.wav").code == 2
 
 
-def test_the_package_is_a_program_and_has_a_script(run_outside):
+def test_the_package_is_a_program():
     done = run_child([sys.executable, "-m", "lipmotion", "info", "--help"], check=True)
     assert done.stdout.startswith("usage: lipmotion info ")
+
+
+def test_the_console_script(run_outside):
     script = shutil.which("lipmotion", path=str(Path(sys.executable).parent))
     if script is None:
         pytest.skip("the package is not installed")
@@ -230,9 +239,12 @@ def test_engines_and_keys(run):
         assert (done.code, done.err, keys(done.out)) == (0, [], [key])
 
 
-def test_every_built_in_engine_names_its_papers_and_every_entry_is_whole():
+def test_every_built_in_engine_names_its_papers():
     assert set(ENGINE_KEYS) == set(ENGINES.built_in)
     assert {key for named in ENGINE_KEYS.values() for key in named} <= set(bibliography())
+
+
+def test_every_entry_is_whole():
     for entry in bibliography().values():
         assert entry.count("{") == entry.count("}")
         assert {"author", "title", "year"} <= set(re.findall(r"^ {2}(\w+) +=", entry, flags=re.MULTILINE))

@@ -74,9 +74,12 @@ def test_a_glb_plays_with_its_sound_wherever_its_folder_goes(run, toy_speech, to
     assert "is not there; give a sound" in run("render", "new/a.glb", "-o", "b.json").err[0]
 
 
-def test_a_single_pose_is_written_and_motion_of_more_than_a_day_is_refused(run, here):
+def test_motion_of_more_than_a_day_is_refused(run, here):
     (here / "long.csv").write_text("time_s,opening\n" + "".join(f"{second},0\n" for second in range(86_402)))
     check_refused(run("render", "long.csv", "-o", "a.json"), 3, "lasts 86401 s, required at most 86400; cut it")
+
+
+def test_a_single_pose_is_written(run, here):
     (here / "pose.csv").write_text("time_s,opening\n0,0.1\n0.01,0.1\n")
     assert run("render", "pose.csv", "-o", "a.livelink.csv", "a.mp4", "a%05d.png", "--size", "64").code == 0
     assert {path.name for path in here.glob("a*")} == {"a.livelink.csv", "a.mp4", "a00000.png"}
@@ -90,13 +93,19 @@ def test_the_rate_of_motion_can_be_given(run, here):
     assert is_one_error(run("render", "a.csv", "--motion-rate", "0", "-o", "b.json"), 3)
 
 
-def test_motion_files_and_a_video(run, basics, here):
+def test_motion_files(run, basics, here):
     done = run(*basics, "-o", "a.json", "a.csv", "-o", "a.npz", "--rate", "50")
     assert done == (0, ["a.json", "a.csv", "a.npz"], [])
     assert sorted(path.name for path in here.iterdir()) == ["a.csv", "a.json", "a.npz"]
     assert read_motion(Path("a.json"))[0].rate_hz == 50
+
+
+def test_a_video(run, basics, here):
     assert run(*basics, "-o", "a.mp4", "--fps", "5", "--size", "160") == (0, ["a.mp4"], [])
     assert (here / "a.mp4").stat().st_size > 5000
+
+
+def test_articulation_in_motion_files(run, basics, here):
     assert run(*basics, "-o", "b.csv", "--articulation").code == 0
     header = (here / "b.csv").read_text().splitlines()[0].split(",")
     assert header[-6:] == ["tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth"]

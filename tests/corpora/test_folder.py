@@ -16,15 +16,18 @@ def touch(folder: Path, *names: str) -> None:
         (folder / name).touch()
 
 
-def test_videos_of_any_kind_are_found_and_those_of_one_name_reported(tmp_path):
+def test_videos_of_any_kind_are_found(tmp_path):
     touch(tmp_path, "b.MP4", "a.mov", "day 1/c.webm", "notes.pdf", "speech.wav", ".cache/d.mp4", ".part-e.mkv")
     found = discover(tmp_path)
     assert found.kind == "folder of videos"
     assert [item.name for item in found.recordings] == ["a", "b", "day 1-c"]
     assert [item.words for item in found.recordings] == [None, None, None]
     assert {item.split for item in found.recordings} == {"train"}
-    touch(tmp_path, "same/a.mp4", "same/a.mkv", "same/b.mp4", "same/anna/a.mp4", "same/anna-a.mp4")
-    found = discover(tmp_path / "same")
+
+
+def test_recordings_of_the_same_name_are_reported(tmp_path):
+    touch(tmp_path, "a.mp4", "a.mkv", "b.mp4", "anna/a.mp4", "anna-a.mp4")
+    found = discover(tmp_path)
     assert [item.name for item in found.recordings] == ["b"]
     for name in ("a", "anna-a"):
         assert "2 recordings share this name" in found.problems[name]
@@ -420,9 +423,12 @@ def test_a_recorder_belongs_to_its_recording(studio):
     assert "others" not in found.problems
 
 
-def test_what_is_wrong_with_a_table_is_said_but_not_a_spreadsheets_own_marks(tmp_path):
+def test_a_spreadsheet_writes_its_own_marks(tmp_path):
     (tmp_path / "offsets.csv").write_text("sep=;\nname;offset_ms;\nanna/c;-12,5\n;\n", encoding="utf-8-sig")
     assert read_offsets(tmp_path / "offsets.csv") == {"anna-c": pytest.approx(-0.0125)}
+
+
+def test_what_is_wrong_with_a_table_is_said(tmp_path):
     for text, message in (
         ("", "the columns are '', required name,offset_ms"),
         ("name,offset_ms\na\n", "line 2: 1 fields, required a name and milliseconds"),

@@ -66,11 +66,14 @@ def test_an_utterance_survives_the_round_trip(tmp_path, crops):
             assert getattr(found, name) == getattr(given, name)
 
 
-def test_large_arrays_stay_on_disk_and_reading_needs_no_video_packages(corpus):
+def test_large_arrays_stay_on_disk(corpus):
     found = corpus.utterance("one")
     assert isinstance(found.track.crops, np.memmap)
     assert isinstance(found.features.values, np.memmap)
     assert not found.features.values.flags.writeable
+
+
+def test_reading_needs_no_video_packages(corpus):
     code = (
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = sys.modules['av'] = None; "
         "from pathlib import Path; from lipmotion.corpora import Corpus; "
@@ -116,10 +119,13 @@ def test_the_bytes_do_not_depend_on_the_order(corpus, tmp_path):
         assert (corpus.path / path).read_bytes() == (other.path / path).read_bytes()
 
 
-def test_an_utterance_is_replaced_and_leftovers_of_a_killed_run_are_removed(corpus):
+def test_an_utterance_is_replaced(corpus):
     corpus.add(replace(utterance("two", "val"), words=("new",)))
     assert Corpus.open(corpus.path).utterance("two").words == ("new",)
     assert Corpus.open(corpus.path).splits == {"train": 1, "val": 1, "test": 1}
+
+
+def test_leftovers_of_a_killed_run_are_removed(corpus):
     (corpus.path / ".part-0-corpus.json").touch()
     (corpus.path / "utterances" / ".part-1-four").mkdir()
     again = Corpus.create(corpus.path)
@@ -212,15 +218,20 @@ def recordings(count: int) -> RecordingFolder:
     return RecordingFolder("folder", tuple(found))
 
 
-def test_names_without_a_recording_and_lists_of_another_folder(tmp_path: Path) -> None:
+def test_names_elsewhere_are_names_without_a_recording(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_text("name0\n/etc/passwd\n../name1\n..\nname0\n")
     found = assign_splits(recordings(2), tmp_path)
     assert [(item.name, item.split) for item in found.recordings] == [("name0", "train")]
     assert sorted(found.problems) == ["-etc-passwd", "..", "..-name1", "name1"]
+
+
+def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
     (tmp_path / "train.txt").write_text("".join(f"name{i}\n" for i in range(200)))
     found = assign_splits(recordings(50), tmp_path)
     assert (len(found.recordings), len(found.problems)) == (50, 150)
-    (tmp_path / "train.txt").unlink()
+
+
+def test_a_list_of_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MAX_MISSING_NAMES + 1)))
     with pytest.raises(CorpusError, match=f"name {MAX_MISSING_NAMES + 1} recordings .* at most {MAX_MISSING_NAMES}"):
         assign_splits(recordings(2), tmp_path)
