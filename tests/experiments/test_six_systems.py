@@ -47,12 +47,21 @@ def figures(toy_corpus: Corpus, folder: Path, work: Path) -> dict[str, Any]:
 
 
 @LONG
-def test_every_size_condition_and_system_also_in_the_text_and_pictures(figures, folder):
+@pytest.mark.usefixtures("figures")
+def test_pictures_are_written(folder):
     assert sorted(path.name for path in folder.iterdir()) == sorted(six_systems.PLOT_FILES.values())
     assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
+
+
+@LONG
+def test_the_text_names_every_system(figures):
     section = build_xie_liu_section(figures)
     assert [list(table.rows) for table in section.tables[:4]] == [SYSTEMS] * 4
     assert len(section.words["Settings, the best on val"]) == 2
+
+
+@LONG
+def test_every_size_condition_and_system(figures):
     assert [(row["names"], row["used"]) for row in figures["rows"]] == [(3, 3), (8, 8)]
     for row in figures["rows"]:
         assert list(row["conditions"]) == ["audio only", "with transcript"]
@@ -176,7 +185,7 @@ def test_two_stages_beside_one(toy_corpus):
         run_xieliu2007(toy_corpus, replace(options, voices=()), settings=SETTINGS)
 
 
-def test_systems_are_in_the_order_of_the_table_and_other_engines_are_compared_when_named():
+def test_systems_in_the_order_of_the_table():
     assert systems.select_systems(["mean pose", "ph-HMM"]) == ["ph-HMM", systems.REFERENCE_SYSTEM, "mean pose"]
     assert systems.select_systems(["ph-CHMM" + systems.ALL_PATHS]) == [
         "ph-CHMM",
@@ -186,6 +195,9 @@ def test_systems_are_in_the_order_of_the_table_and_other_engines_are_compared_wh
     assert list(systems.PAPER_FIGURES) == list(systems.COMPARED_SYSTEMS)[:6]
     with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
         systems.select_systems(["ph-RNN"])
+
+
+def test_other_engines_are_compared_when_named():
     left_out = systems.COMPARED_SYSTEMS.keys() - systems.select_systems(None)
     twice = {name for name in systems.COMPARED_SYSTEMS if systems.TWO_STAGES in name}
     assert left_out - twice == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", systems.BLSTM}

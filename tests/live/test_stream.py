@@ -141,7 +141,7 @@ def test_an_interruption_takes_back_what_is_not_heard_yet(sound: np.ndarray) -> 
     assert stream.push(sound[:16_000])[0].time_s == pytest.approx(frames[-1].time_s + STEP_S)
 
 
-def test_a_copy_goes_on_by_itself_and_sound_may_come_while_others_work(sound: np.ndarray) -> None:
+def test_a_copy_goes_on_by_itself(sound: np.ndarray) -> None:
     stream = Stream()
     stream.push(sound[:20_000])
     other = copy.deepcopy(stream)
@@ -149,6 +149,8 @@ def test_a_copy_goes_on_by_itself_and_sound_may_come_while_others_work(sound: np
     stream.push(sound)
     assert np.array_equal(values_of(other.push(sound[20_000:40_000])), first)
 
+
+def test_sound_that_comes_while_others_work(sound: np.ndarray) -> None:
     async def pieces() -> AsyncIterator[np.ndarray]:
         for first in range(0, 32_000, 640):
             await asyncio.sleep(0)
@@ -304,13 +306,16 @@ def read_osc(packet: bytes) -> list[tuple[str, list[str | float]]]:
     return [(message.address, message.params) for message in osc.OscBundle(packet)]
 
 
-def test_vmc_receivers_get_vowels_and_perfect_sync_and_osc_has_an_address_for_every_value() -> None:
+def test_vmc_receivers_get_vowels_and_perfect_sync() -> None:
     *values, last = read_osc(vmc_packet(frame()))
     assert last == ("/VMC/Ext/Blend/Apply", [])
     assert {address for address, _ in values} == {"/VMC/Ext/Blend/Val"}
     named = {name: value for _, (name, value) in values}
     assert named["A"] == pytest.approx(frame()["viseme_aa"])
     assert named["jawOpen"] == pytest.approx(frame()["jawOpen"])
+
+
+def test_osc_has_an_address_for_every_value() -> None:
     by_address = dict(read_osc(osc_packet(frame())))
     assert (len(by_address), by_address["/lipmotion/opening"]) == (2 + len(WEIGHT_NAMES), [0.125])
 
@@ -332,16 +337,19 @@ def test_live_link_packets_are_read_as_by_the_app() -> None:
     assert read.get_blendshape(face.FaceBlendShape.JawOpen) == pytest.approx(frame()["jawOpen"])
 
 
-def test_frames_reach_a_receiver_and_what_takes_none_is_refused() -> None:
+def test_frames_reach_a_receiver() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(20)
         with open_consumer(f"vmc:127.0.0.1:{receiver.getsockname()[1]}", print) as take:
             take(frame())
         assert receiver.recv(65_536) == vmc_packet(frame())
-    for to in ("nothing", "vmc:here:x", "osc:127.0.0.1:700000"):
-        with pytest.raises(InputError, match=f"--to {to}"), open_consumer(to, print):
-            pass
+
+
+@pytest.mark.parametrize("to", ["nothing", "vmc:here:x", "osc:127.0.0.1:700000"])
+def test_what_takes_no_frames_is_refused(to: str) -> None:
+    with pytest.raises(InputError, match=f"--to {to}"), open_consumer(to, print):
+        pass
 
 
 def test_words_with_odd_times_do_no_harm() -> None:
