@@ -53,9 +53,12 @@ def test_a_text_is_itself():
         assert read_text_or_file(text) == text
 
 
-def test_a_file_is_its_content_and_subtitles_keep_their_times(here):
+def test_a_file_is_its_content(here):
     (here / "words").write_text("näh\n", encoding="utf-8-sig")
     assert read_text_or_file("words") == "näh\n"
+
+
+def test_subtitles_keep_their_times(here):
     (here / "words.srt").write_text("1\n00:00:01,000 --> 00:00:02,500\n<i>Hello</i> there\n")
     transcript = read_text_or_file("words.srt")
     assert isinstance(transcript, TimedTranscript)

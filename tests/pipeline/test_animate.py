@@ -114,7 +114,7 @@ def test_pins_are_met_exactly(move, toy_sentence):
     assert same.values[far:] == pytest.approx(free.motion.values[far:], abs=1e-2)
 
 
-def test_constraints_and_units_that_are_refused(move):
+def test_a_pin_that_cannot_be_met(move):
     for pin, message in (
         (Pin(0.5, "jaw", 0.1), r"cannot pin 'jaw' \(is it jawOpen\?\); channels that can be pinned: opening, width"),
         (Pin(9.0, "opening", 0.1), r"pin at 9.0 s lies outside the recording \(0 to 2.76 s\)"),
@@ -123,6 +123,9 @@ def test_constraints_and_units_that_are_refused(move):
     ):
         with pytest.raises(InputError, match=message):
             move(constraints=Constraints((pin,)))
+
+
+def test_constraints_and_units_that_are_none(move):
     with pytest.raises(InputError, match="the constraints are a tuple, required Constraints"):
         move(constraints=(Pin(0.5, "opening", 0.1),))
     with pytest.raises(InputError, match="units: found a list, required a path, or a Timeline"):
@@ -143,6 +146,9 @@ def test_constraints_and_units_that_are_refused(move):
     ):
         with pytest.raises(InputError, match=message):
             move(units=Timeline(tuple(spans)))
+
+
+def test_units_need_no_recogniser(move):
     silent = Timeline((Span(0.0, 2.0, Unit("sil")),))
     assert move(units=silent).motion["opening"].max() < 0.01  # nothing is said
 
@@ -157,9 +163,12 @@ def test_speech_that_cannot_be_used(toy_model, tmp_path):
             animate(speech, model=toy_model)
 
 
-def test_files_may_stand_for_speech_model_and_transcript(toy_model, toy_model_file, toy_speech, tmp_path):
+def test_a_file_its_name_and_its_samples_are_the_same(toy_model, toy_speech):
     first, *others = (animate(each, model=toy_model) for each in (toy_speech, str(toy_speech), read_sound(toy_speech)))
     assert all(np.array_equal(first.motion.values, other.motion.values) for other in others)
+
+
+def test_files_may_stand_for_model_and_transcript(toy_model, toy_model_file, toy_speech, tmp_path):
     (tmp_path / "said.txt").write_text("see papa")
     by_file = animate(str(toy_speech), model=str(toy_model_file), transcript=tmp_path / "said.txt")
     assert next(span.label.word for span in by_file.units if span.label.word) == "see"

@@ -72,8 +72,11 @@ def test_models_are_one_short_line():
         assert "\n" not in repr(part)
 
 
-def test_the_shipped_model_is_read_once_and_says_whose_recordings_it_learned():
+def test_the_shipped_model_is_read_once():
     assert load_model() is load_model()
+
+
+def test_header_says_whose_recordings():
     header = read_header(find_shipped())
     assert (header["licence"], header["split"], header["utterances"]) == (["CC BY 4.0"], "all", 524)
     assert any("GRID" in line for line in header["attribution"])
@@ -111,13 +114,17 @@ def adapted(toy_model: Model, toy_speech: Path) -> Model:
 
 
 @pytest.mark.long
-def test_only_the_adaptation_changes_and_an_earlier_one_is_forgotten(toy_model, adapted, toy_speech):
+def test_only_the_adaptation_changes(toy_model, adapted):
     assert (toy_model.adaptation is None, adapted.adaptation is None) == (True, False)
     assert adapted.phones is toy_model.phones
     assert adapted.learned is toy_model.learned
     about = dict(adapted.about)
     assert about.pop("adapted")["recordings"] == 2
     assert about == toy_model.about
+
+
+@pytest.mark.long
+def test_an_earlier_adaptation_is_forgotten(adapted, toy_model, toy_speech):
     again, fresh = (adapt(model, [toy_speech]) for model in (adapted, toy_model))
     assert np.array_equal(again.adaptation.own, fresh.adaptation.own)
     assert again.about == fresh.about

@@ -140,11 +140,17 @@ def test_keys_that_others_give_are_left_out(generation, tmp_path):
     assert shown[closed] == pytest.approx(scene.tabulate()[closed], abs=1e-6)
 
 
-def test_the_shapes_of_the_head_are_those_of_its_mesh_and_the_rate_is_that_of_the_keys(generation, own_head):
+def test_the_shapes_of_the_head_are_those_of_its_mesh(own_head):
     assert own_head.mesh.shape_names == build_head_mesh(make_figure()).shape_names
     assert set(own_head.weights.names) == set(own_head.mesh.shape_names)
+
+
+def test_the_rate_is_that_of_the_keys(generation):
     slow = build_head_scene(generation, 30.0).weights
     assert (slow.rate_hz, len(slow.values)) == (pytest.approx(30.0), 61)
+
+
+def test_a_motion_without_opening_is_refused(generation):
     with pytest.raises(InputError, match="no channel 'opening'"):
         build_head_scene(generation.selected(["x_13"]))
 

@@ -75,12 +75,15 @@ def test_pins_hold_in_the_units_of_the_person(model, toy_sentence):
         animate(request(toy_sentence, "ben"), model=model, constraints=below)
 
 
-def test_unknown_speakers_and_maps_of_other_channels_are_refused(model, toy_model, toy_sentence, tmp_path):
+def test_unknown_speakers_are_refused(model, toy_model, toy_sentence):
     with pytest.raises(InputError, match="no speaker 'cleo', only: anna, ben"):
         opening(model, toy_sentence, "cleo")
     with pytest.raises(InputError, match=r"tells no speakers apart.*'cleo'"):
         opening(toy_model, toy_sentence, "cleo")
     assert toy_model.speakers is None
+
+
+def test_maps_of_other_channels_are_refused(model, toy_sentence, tmp_path):
     save_model(model, tmp_path / "people.lipmotion")
     channels = npy(np.array([("opening", "eye_distance"), ("width", "eye_distance"), ("jaw", "weight")]))
     changes = {"speakers/channels.npy": channels}
@@ -89,7 +92,7 @@ def test_unknown_speakers_and_maps_of_other_channels_are_refused(model, toy_mode
         opening(again, toy_sentence, "ben")
 
 
-def test_evaluation_compares_each_with_their_own_motion_and_names_strangers(two_people, model, tmp_path):
+def test_evaluation_compares_each_with_their_own_motion(two_people, model):
     own, mean = (
         evaluate(each, two_people, selection=Selection("test"), recogniser="own")
         for each in (model, replace(model, speakers=None))
@@ -98,10 +101,13 @@ def test_evaluation_compares_each_with_their_own_motion_and_names_strangers(two_
     assert own["conditions"][condition]["amse"] < 0.8 * mean["conditions"][condition]["amse"]
     assert own["strangers"] == []
     assert "strangers" not in mean
+
+
+def test_strangers_are_named_and_get_the_mean_person(two_people, model, tmp_path):
     cleo = replace(two_people.utterance(two_people.names("test")[0]), speaker="cleo")
     corpus = corpus_of(tmp_path / "cleo", [cleo])
     figures = evaluate(model, corpus, selection=Selection(None), recogniser="own")
-    assert figures["strangers"] == ["cleo"]  # who gets the mean person
+    assert figures["strangers"] == ["cleo"]
     mean = evaluate(replace(model, speakers=None), corpus, selection=Selection(None), recogniser="own")
     assert figures["conditions"] == mean["conditions"]
 

@@ -34,7 +34,7 @@ from speech.made_voices import laugh, pulses, recording, said, vowels
 from testing.toy import toy_sentences
 
 
-def test_several_files_at_once_and_another_rate(result, toy_model, toy_speech, tmp_path):
+def test_several_files_at_once(result, toy_model, toy_speech, tmp_path):
     paths = [tmp_path / name for name in ("a.json", "a.csv", "a.NPZ")]
     write(result, [paths[0], str(paths[1]), paths[2]], speech=toy_speech, model=toy_model)
     assert sorted(tmp_path.iterdir()) == sorted(paths)
@@ -43,6 +43,10 @@ def test_several_files_at_once_and_another_rate(result, toy_model, toy_speech, t
         assert (motion.names, motion.rate_hz) == (result.motion.names, 100)
         assert motion.values == pytest.approx(result.motion.values, abs=1e-5)
         assert len(units) == (0 if path.suffix == ".csv" else len(result.units))
+
+
+def test_another_rate(result, toy_model, tmp_path):
+    for path in (tmp_path / name for name in ("a.json", "a.csv", "a.NPZ")):
         write(result, path, model=toy_model, rate_hz=30)
         motion, _ = read_motion(path)
         assert motion.rate_hz == 30

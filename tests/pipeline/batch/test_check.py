@@ -58,10 +58,14 @@ def test_every_kind_is_found(tmp_path):
     assert "sounds/spanish" not in {each.name for each in spanish.findings if each.kind == "language"}
 
 
-def test_a_folder_has_no_orphans_and_tags_are_no_words(tmp_path):
+def test_tags_are_no_words(tmp_path):
     sound(tmp_path / "a.wav", 1.0, 0)
     line = BatchLine("a", str(tmp_path / "a.wav"), "[angry] Who is <smile> there?")
     assert check_line(line, Request()).words == ("who", "is", "there")
+
+
+def test_a_folder_has_no_orphans(tmp_path):
+    sound(tmp_path / "a.wav", 1.0, 0)
     sound(tmp_path / "deep" / "b.wav", 1.0, 1)
     assert check(tmp_path, jobs=1).text == "2 lines: nothing found"
 

@@ -357,12 +357,15 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
     return made
 
 
-def test_each_collection_has_its_own_and_curves_without_lips_are_passed_over(corpus):
+def test_curves_without_lips_are_passed_over(corpus):
     one = corpus.utterance("here0")
     jaw = Track(Motion(np.zeros((75, 1)), 25.0, (Channel("jaw"),)), np.ones(75, bool))
     corpus.add(replace(one, name="jaw", track=jaw))
+    assert set(measure_offsets(corpus).clips) == set(corpus.names()) - {"jaw"}
+
+
+def test_each_collection_has_its_own(corpus):
     found = measure_offsets(corpus)
-    assert set(found.clips) == set(corpus.names()) - {"jaw"}
     assert found.collections["there"].late_s - found.collections["here"].late_s == pytest.approx(0.12, abs=0.01)
     assert found.collections["there"].known
     assert [line.split(":")[0] for line in found.list_lines()] == ["here", "there"]
@@ -389,12 +392,15 @@ def test_sync_moves_what_is_late_once(corpus):
     assert module.move_sound(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
 
 
-def test_early_sound_gets_a_beginning_and_labels_move_with_the_sound(corpus):
+def test_early_sound_gets_a_beginning(corpus):
     late = corpus.utterance("here0")
     moved = module.move_sound(late, -0.1)
     assert moved.audio.duration_s == pytest.approx(late.audio.duration_s + 0.1)
     np.testing.assert_array_equal(moved.audio.samples[1600:], late.audio.samples)
     assert float(moved.source["offset_removed_ms"]) == -100
+
+
+def test_labels_move_with_the_sound(corpus):
     bounds = [0.0, 0.4, 1.2, 3.0]
     spans = tuple(Span(a, b, Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True))
     for late_s, expected in ((0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])):

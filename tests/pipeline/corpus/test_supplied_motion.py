@@ -248,11 +248,14 @@ def test_a_given_offset_is_used(recorded_twice_folder, tmp_path):
     assert early.phones[0].end_s == pytest.approx(1.0)
 
 
-def test_motion_of_another_length_needs_an_offset_and_what_is_not_clear_is_listed(recorded_twice_folder, tmp_path):
+def test_what_is_not_clear_is_listed(recorded_twice_folder, tmp_path):
     other = Audio(speech_like(np.random.default_rng(9), 5.0).astype(np.float32), RATE_HZ)
     write_sound(recorded_twice_folder / "take.recorder.wav", other)
     with pytest.raises(CorpusError, match=r"take\.recorder\.wav: the offset of the two sounds is not clear"):
         prepare(recorded_twice_folder, tmp_path / "corpus", workers=1)
+
+
+def test_motion_of_another_length_needs_an_offset(recorded_twice_folder, tmp_path):
     (recorded_twice_folder / "take.recorder.wav").unlink()
     write_ramp(recorded_twice_folder / "take.npz", 3.0)
     with pytest.raises(CorpusError, match="required: the same time from the same start"):

@@ -47,11 +47,15 @@ def names(found: list[takes.Take]) -> list[str]:
     return [take.name for take in found]
 
 
-def test_one_video_and_of_a_folder_with_lists_the_training_list(make_videos):
-    folder = make_videos("a", "b", "c", "d")
-    (take,) = choose_takes(folder / "a.mkv")
-    assert (take.name, take.file, take.collection, take.speaker) == ("a", folder / "a.mkv", "filmed/anna", "")
+def test_one_video(make_videos):
+    video = make_videos("a") / "a.mkv"
+    (take,) = choose_takes(video)
+    assert (take.name, take.file, take.collection, take.speaker) == ("a", video, "filmed/anna", "")
     assert (take.span.start_s, take.span.end_s) == (0.0, MAX_FOOTAGE_S)
+
+
+def test_of_a_folder_with_lists_the_training_list(make_videos):
+    folder = make_videos("a", "b", "c", "d")
     (folder / "train.txt").write_text("b\nd\n")
     (folder / "test.txt").write_text("a\n")
     (folder / "val.txt").write_text("c\n")
@@ -182,7 +186,7 @@ def test_what_was_built(built, videos, tmp_path):
     assert load_face(tmp_path / "a.face").summary == face.summary
 
 
-def test_motion_becomes_the_person_and_the_speech_is_kept_with_it(built):
+def test_motion_becomes_the_person(built):
     face, _ = built
     take = face.takes[2]
     codes = face.appearance.predict_codes(take.motion)
@@ -191,6 +195,10 @@ def test_motion_becomes_the_person_and_the_speech_is_kept_with_it(built):
     assert np.corrcoef(dark, take.motion["opening"])[0, 1] > 0.8
     lips = Motion(take.motion.values[:, :3], 25.0, take.motion.channels[:3])
     assert codes.chin_px == pytest.approx(toy_chin_px(lips), abs=3)
+
+
+def test_the_speech_is_kept_with_its_motion(built):
+    face, _ = built
     for take, sentence in zip(face.takes, toy_sentences(SENTENCES), strict=True):
         assert take.sound.duration_s == pytest.approx(sentence.audio.duration_s, abs=0.1)
         assert len(take.motion.values) / 25 == pytest.approx(take.sound.duration_s, abs=0.1)

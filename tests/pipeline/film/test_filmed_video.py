@@ -312,12 +312,15 @@ def numbers(sequence: BackgroundSequence, shown: list[Background]) -> list[int]:
     return [int(np.abs(places - each.face_to_frame.ravel()).sum(axis=1).argmin()) for each in shown]
 
 
-def test_any_length_and_rate(sequence):
-    """Short speech shows the beginning; it goes on without a jump: neither the picture nor the place of the face."""
+def test_short_speech_shows_the_beginning(sequence):
     for count in (1, 50):
         shown = list(sequence.decode(count, 25.0))
         assert numbers(sequence, shown) == list(range(count))
         assert [each.chin_px for each in shown] == pytest.approx(sequence.chin_px[:count])
+
+
+def test_any_length(sequence):
+    """It goes on without a jump: neither the picture nor the place of the face."""
     shown = list(sequence.decode(130, 25.0))
     assert len(shown) == 130
     steps = [np.abs(a.frame.astype(int) - b.frame).mean() for a, b in pairwise(shown)]
@@ -325,6 +328,9 @@ def test_any_length_and_rate(sequence):
     moves = [np.abs(a.face_to_frame - b.face_to_frame).max() for a, b in pairwise(shown)]
     assert max(moves) < 3
     assert len({each.frame.tobytes() for each in shown}) > 25
+
+
+def test_a_background_at_any_rate(sequence):
     for rate_hz, frames in ((29.97, 58), (60.0, 60), (12.5, 24)):
         shown = numbers(sequence, list(sequence.decode(frames, rate_hz)))
         assert len(shown) == frames
@@ -392,13 +398,16 @@ def shown(sequence: BackgroundSequence, count: int) -> list[int]:
 
 
 @pytest.mark.parametrize("count", [5, 80])
-def test_frames_without_a_face_are_not_shown_and_no_cut(sequence, count):
+def test_frames_without_a_face_are_not_shown(sequence, count):
     """Also where there are as many frames as are wanted."""
     gap = range(4, 12)
     found = shown(without(sequence, gap), count)
     assert len(found) == count
     assert not set(found) & set(gap)
     assert all(each.has_face for each in without(sequence, gap).decode(count, 25.0))
+
+
+def test_no_cut_is_shown(sequence):
     found = shown(replace(sequence, cuts=(10,)), 30)
     assert not {*pairwise(found)} & {(9, 10), (10, 9)}
 
@@ -429,11 +438,14 @@ def test_parts_show_the_face_without_a_cut():
     assert parts == [(0, 100), (110, 305), (305, 500), (500, 749), (749, 998)]
 
 
-def test_short_parts_are_compared_only_if_there_are_no_others_and_parts_are_of_one_size():
-    """That of most of the footage."""
+def test_short_parts_are_compared_only_if_there_are_no_others():
     seen = np.ones(400, bool)
     seen[np.r_[50:60, 110:120, 260:270]] = False
     for frames, expected in ((seen, [(120, 260), (270, 400)]), (seen[:170], [(0, 50), (60, 110), (120, 170)])):
         assert [part[1:] for part in background.choose_parts([footage(frames)])] == expected
+
+
+def test_parts_are_of_one_size():
+    """That of most of the footage."""
     small, large = footage(np.ones(100, bool)), replace(footage(np.ones(160, bool)), size=(4, 4))
     assert [part[0] for part in background.choose_parts([small, large, small])] == [small, small]

@@ -242,13 +242,19 @@ def test_texts_by_default_say_every_phone_of_the_dictionary():
     assert len(said) == 43  # 42 of the dictionary, and silence
 
 
-def test_a_quarter_is_kept_aside_and_sides_never_change():
+def test_sides_never_change():
     named = {"slt": True, "espeak-f2": True, "espeak-m7": True, "kal": False, "awb": False, "rms": False}
     assert {speaker: is_held_out_speaker(speaker) for speaker in named} == named
+
+
+def test_a_quarter_is_kept_aside():
     held_out = [is_held_out_speaker(f"speaker {number}") for number in range(2000)]
     assert np.mean(held_out) == pytest.approx(0.25, abs=0.03)
+
+
+def test_without_voices_it_says_what_to_install():
     with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
-        next(synthesise_sentences(TEXTS, ()))  # without voices
+        next(synthesise_sentences(TEXTS, ()))
 
 
 def write(path: Path, audio: Audio, text: str | None = None) -> None:

@@ -128,10 +128,13 @@ def test_licence_and_attribution_go_with_the_model(toy_corpus):
     assert about["minutes"] == pytest.approx(0.2, abs=0.05)
 
 
-def test_nothing_usable_and_voices_for_engines_that_have_no_use_for_them(toy_corpus, tmp_path):
+def test_nothing_usable(toy_corpus, tmp_path):
     wrong = corpus_of(tmp_path, [replace(u, words=("five",) * 100) for u in some(toy_corpus, 2)])
     with pytest.raises(CorpusError, match="none of 2 utterances has a transcript that fits"):
         train(wrong, recogniser=SMALL)
+
+
+def test_other_engines_have_no_use_for_voices(toy_corpus):
     with pytest.raises(InputError, match="the engine 'joint' does not learn from other voices"):
         train(toy_corpus, engine=JOINT, voices=others())
 
