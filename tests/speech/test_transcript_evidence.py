@@ -49,12 +49,15 @@ def transcript(words: list[str], end_s: float, word_s: float = 0.1) -> Timeline[
     return Timeline((*spans, Span(at_s, max(end_s, at_s + 0.1), Unit("sil"))))
 
 
-def test_a_right_transcript_is_said_and_words_that_do_not_fit_into_the_frames_are_not() -> None:
+def test_a_right_transcript_is_said() -> None:
     found = find_evidence(heard([*SAID]), FRAME_S, transcript([*SAID], 1.0))
     assert [word.word for word in found.words] == [*SAID]
     assert (found.unsaid, found.others, found.is_doubtful) == ((), (), False)
     assert found.words[0].start_s == pytest.approx(0.22)
     assert found.words[0].end_s == pytest.approx(0.36)  # four phones and the blanks between them
+
+
+def test_words_that_do_not_fit_into_the_frames_are_not_said() -> None:
     crowded = find_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
     assert (crowded.unsaid, crowded.gaps) == (crowded.words, ())
 

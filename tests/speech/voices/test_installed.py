@@ -32,11 +32,16 @@ def test_voices_are_listed() -> None:
     assert [voice.language for voice in installed.list_voices()[len(FAKED) :]] == ["de", "en", "en-gb", "en-us"]
 
 
+@pytest.mark.parametrize("voice", EACH)
 @pytest.mark.usefixtures("faked")
-def test_a_voice_says_phones_in_time_and_any_letters_reach_it() -> None:
+def test_any_letters_reach_the_synthesiser(voice: synthesiser.SyntheticVoice) -> None:
     lexicon = Lexicon({"helló": (("hh", "ax", "l", "ow"),)})
+    assert len(list(installed.speak_sentences(HARD, voice, lexicon))) == len(HARD)
+
+
+@pytest.mark.usefixtures("faked")
+def test_a_voice_says_phones_in_time() -> None:
     for voice in EACH:
-        assert len(list(installed.speak_sentences(HARD, voice, lexicon))) == len(HARD)
         audio, units, _ = next(installed.speak_sentences(["Hello"], voice))
         assert audio.rate_hz == 16_000
         assert audio.duration_s == pytest.approx(1.0)
@@ -47,7 +52,7 @@ def test_a_voice_says_phones_in_time_and_any_letters_reach_it() -> None:
         ]  # fmt: skip
 
 
-def test_errors_are_clear_and_nothing_stays_even_if_not_all_is_read(faked: Path) -> None:
+def test_errors_are_clear_and_nothing_stays(faked: Path) -> None:
     for voice, text, message in (
         *((voice, "they crash", "failed with 1 .no such sound") for voice in EACH),
         *((voice, "nonsense", "nonsense") for voice in EACH),
@@ -58,6 +63,9 @@ def test_errors_are_clear_and_nothing_stays_even_if_not_all_is_read(faked: Path)
         with pytest.raises(errors.InputError, match=message):
             list(installed.speak_sentences([text], voice))
         assert list(faked.iterdir()) == []
+
+
+def test_temporary_files_go_even_if_not_all_is_read(faked: Path) -> None:
     said = installed.speak_sentences(["hello", "hello"], FAKED[0])
     next(said)
     assert len(list(faked.iterdir())) == 1
@@ -209,12 +217,13 @@ def test_a_program_is_stopped(script: str, message: str, tmp_path: Path) -> None
 
 
 @needs_scripts
-def test_a_program_reads_what_it_is_given_and_what_it_started_ends_with_it(tmp_path: Path) -> None:
-    for name in ("reader", "starter"):
-        (tmp_path / name).mkdir()
-    reader = [str(_program(tmp_path / "reader", "exec cat"))]
-    assert synthesiser.run_program(reader, "a-package", given="Helló\n") == "Helló\n"
-    child = int(synthesiser.run_program([str(_program(tmp_path / "starter", "sleep 30 & echo $!"))], "a-package"))
+def test_a_program_reads_what_it_is_given(tmp_path: Path) -> None:
+    assert synthesiser.run_program([str(_program(tmp_path, "exec cat"))], "a-package", given="Helló\n") == "Helló\n"
+
+
+@needs_scripts
+def test_what_a_program_started_ends_with_it(tmp_path: Path) -> None:
+    child = int(synthesiser.run_program([str(_program(tmp_path, "sleep 30 & echo $!"))], "a-package"))
     for _ in range(100):
         if not _is_running(child):
             return
