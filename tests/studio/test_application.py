@@ -269,9 +269,12 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio):
     assert studio.ask("/api/project").content["count"] == 1
 
 
-def test_a_model_is_called_as_its_file_and_a_project_outlives_it(toy_model, tmp_path, caplog):
+def test_a_model_is_called_as_its_file(toy_model, tmp_path):
     save_model(replace(toy_model, about={**toy_model.about, "name": "trajectory"}), tmp_path / "Sam.lipmotion")
     assert load_known_model(tmp_path / "Sam.lipmotion").name == "Sam"
+
+
+def test_a_project_outlives_its_model(tmp_path, caplog):
     with open_folder(None, tmp_path / "project") as folder:
         folder.change(lambda project: replace(project, model="../gone.lipmotion"))
         with closing(Studio(folder)) as studio:

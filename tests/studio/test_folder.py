@@ -133,10 +133,13 @@ OLD = [
 ]
 
 
-def test_models_of_one_name_have_tallies_of_their_own_and_edits_count_where_they_differ():
+def test_models_of_one_name_have_tallies_of_their_own():
     votes = [Vote("one", (A, C), 0), Vote("two", (C, A), 0), Vote("one", (B, C), 1), Vote("one", (A, C))]
     assert tally(votes, Vote("three", (A, C))) == {"better": [1, 1], "neither": 1}
     assert tally(votes, Vote("three", (C, B))) == {"better": [1, 0], "neither": 0}
+
+
+def test_edits_count_where_they_differ_and_names_do_not():
     renamed = Side("renamed", A.model, "d" * 64)
     votes = [Vote("one", (A, C), 0), Vote("one", (A, KEPT), 1)]
     assert tally(votes, Vote("two", (renamed, Side("other", C.model, "d" * 64)))) == {"better": [1, 0], "neither": 0}

@@ -78,22 +78,30 @@ def test_a_rater_from_the_first_page_to_the_last(place, tmp_path):
     assert forget_rater(place.folder, rater) == len({(row.trial, row.question, row.condition) for row in rows})
 
 
-def test_nothing_that_raters_get_names_a_condition_or_comes_from_elsewhere(place):
-    pages = [ask(place.application, f"/{name}").body.decode() for name in PAGE]
-    for text in pages:
+def test_the_page_has_no_resource_from_elsewhere(place):
+    for name in PAGE:
+        text = ask(place.application, f"/{name}").body.decode()
         assert [word for word in text.split() if "://" in word and "www.w3.org/2000/svg" not in word] == []
         assert "innerHTML" not in text
         assert "<style" not in text
+
+
+def test_nothing_that_raters_get_names_a_condition(place):
+    pages = [ask(place.application, f"/{name}").body.decode() for name in PAGE]
     token = place.join()["token"]
     replies = [ask(place.application, path, token=token).body.decode() for path in ("/api/study", "/api/state")]
     for text in pages + replies:
         assert not [name for name in ("visemes", "phones", "recording by", "anchor") if name in text]
 
 
-def test_no_trial_is_skipped_and_who_is_not_known_or_forgotten_is_refused(place):
+def test_no_trial_is_skipped(place):
     now = place.join()
     reply = place.send(now["token"], scripted_answer(place.study, now) | {"trial": 1})
     assert (reply.status, place.store.list_sheets()) == (409, [])
+
+
+def test_a_link_that_is_not_known_and_a_rater_who_was_forgotten(place):
+    now = place.join()
     for token in ("", "x", now["token"][:-1], now["token"] + "é"):
         assert ask(place.application, "/api/state", token=token).status == 401
     place.store.forget(1)
@@ -114,13 +122,19 @@ def test_bodies_that_are_refused(place, content, headers, status):
     assert place.store.list_sheets() == []
 
 
-def test_too_many_requests_of_one_rater_do_not_stop_another_and_too_many_raters_have_to_wait(place):
+def test_nobody_joins_without_agreeing(place):
     assert ask(place.application, "/api/raters", {"agrees": False}).status == 422
-    first, second = place.join(), place.join()
-    assert first["rater"] == "r001"
-    found = [ask(place.application, "/api/state", token=first["token"]).status for _ in range(ANSWER_BURST + 30)]
+    assert place.join()["rater"] == "r001"
+
+
+def test_too_many_requests_of_one_rater_do_not_stop_another(place):
+    first, second = place.join()["token"], place.join()["token"]
+    found = [ask(place.application, "/api/state", token=first).status for _ in range(ANSWER_BURST + 30)]
     assert 429 in found
-    assert ask(place.application, "/api/state", token=second["token"]).status == 200
+    assert ask(place.application, "/api/state", token=second).status == 200
+
+
+def test_too_many_raters_at_once_have_to_wait(place):
     found = [
         ask(place.application, "/api/raters", {"agrees": True}).status for _ in range(JOIN_BURST + 60)
     ]  # a slow machine lets some more in

@@ -49,13 +49,18 @@ def test_what_is_sent_by_many_at_once_is_stored_once(store):
     assert store.list_sheets() == sheets
 
 
-def test_an_answer_is_on_the_disk_before_it_is_acknowledged_and_a_failure_passes(store, folder):
+def test_a_failure_to_write_is_reported_and_passes(store):
     number, _ = store.add_rater().result()
     store._writer.execute("PRAGMA query_only = ON")  # as if the disk were full
     with pytest.raises(ExportError, match="cannot be written"):
         store.record(AnswerSheet(number, 0, ("first",), 1.0, 2)).result()
     store._writer.execute("PRAGMA query_only = OFF")
     assert store.record(AnswerSheet(number, 0, ("first",), 1.0, 2)).result()
+
+
+def test_an_answer_is_on_the_disk_before_it_is_acknowledged(store, folder):
+    number, _ = store.add_rater().result()
+    store.record(AnswerSheet(number, 0, ("first",), 1.0, 2)).result()
     with closing(sqlite3.connect(folder / ANSWERS)) as other:
         assert other.execute("SELECT count(*) FROM answers").fetchone() == (1,)
         assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
@@ -158,18 +163,24 @@ def test_a_manifest_that_was_changed_is_refused(tmp_path, change):
         read_study(tmp_path / "study")
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_study_survives_its_file_and_what_is_none_or_has_other_videos_is_refused(tmp_path, kind):
+def test_a_folder_that_is_no_study_says_how_to_make_one(tmp_path):
     with pytest.raises(InputError, match="lipmotion study design"):
         read_study(tmp_path)
     (tmp_path / MANIFEST).write_text("[]", encoding="utf-8")
     with pytest.raises(InputError, match="not a study"):
         read_study(tmp_path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_study_survives_its_file(tmp_path, kind):
     study = small_study(tmp_path / "study", kind)
     assert read_study(tmp_path / "study") == study
-    paths = check_videos(study, tmp_path / "study")
-    assert set(paths) == {video.file for video in study.videos}
-    path = paths[study.videos[0].file]
+    assert set(check_videos(study, tmp_path / "study")) == {video.file for video in study.videos}
+
+
+def test_videos_that_are_missing_or_changed_are_noticed(tmp_path):
+    study = small_study(tmp_path / "study")
+    path = check_videos(study, tmp_path / "study")[study.videos[0].file]
     path.write_bytes(b"another video")
     with pytest.raises(InputError, match="has changed"):
         check_videos(study, tmp_path / "study")

@@ -56,13 +56,19 @@ def test_markup_and_names_of_speakers_are_named_and_not_spoken(caplog, text, wor
     assert bool(caplog.records) == bool(named)
 
 
-def test_manners_and_deeds_are_tags_every_synonym_means_a_mood_and_known_tags_can_be_taken_out():
+def test_manners_and_what_somebody_does_between_asterisks_are_tags_too():
     for text, moods in (
         ("[whispers] one </whispers> two", ["whisper", "plain"]),
         ("*laughs* {angry}no{/angry} *gasps*", ["happy", "angry", NEUTRAL, "surprised"]),
     ):
         assert [tag.mood for tag in parse_tagged_text(text).tags] == moods
+
+
+def test_known_tags_alone_can_be_taken_out():
     assert remove_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
+
+
+def test_every_synonym_means_a_mood():
     for mood, strength in SYNONYMS.values():
         MoodKey(0.0, mood, strength)
         assert strength > 0

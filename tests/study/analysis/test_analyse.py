@@ -68,9 +68,12 @@ def test_options_that_are_refused(options, error):
         analyse_study(study(), **options)  # type: ignore[arg-type]
 
 
-def test_no_rater_left_and_no_answers():
+def test_a_study_without_answers_is_refused():
     with pytest.raises(InputError, match="1 answers, none of which counts"):
         analyse_study([replace(rating(("r", "s"), "a", 3), practice=True)])
+
+
+def test_no_rater_left():
     answers = [replace(rating(("r", "s"), "a", 3), expected="4"), rating(("r", "s"), "a", 3)]
     figures = analyse_study(answers)
     assert figures["screened"] is None
@@ -160,18 +163,24 @@ def test_a_rule_finds_its_rater(rule, change, text):
     assert screen(answers)["kept"] == 9
 
 
-def test_too_few_answers_and_an_anchor_that_is_preferred():
+def test_too_few_answers():
     answers = [each for each in panel() if each.rater != "r3" or each.sentence == "s1"]
     assert left_out(answers)["r3"]["answers"] == "9 of usually 54"
+
+
+def test_an_anchor_that_is_preferred():
     draw, nothing = np.random.default_rng(1), Effects(0, 0, 0, 0, 0)
     table = comparisons(draw, np.array([5.0, -5, -5]), (6, 6), nothing)
     answers = paired_answers(replace(table, conditions=("anchor", *table.conditions[1:])))
     assert set(left_out(answers)) == {f"r{rater}" for rater in range(6)}
 
 
-def test_equal_times_exclude_nobody_and_broken_ones_and_those_of_four_are_passed_over():
+def test_equal_times_exclude_nobody_and_broken_ones_are_passed_over():
     answers = [replace(each, seconds=4.0) for each in panel()]
     assert not left_out(answers)
     assert not left_out([replace(each, seconds=float("nan") if each.rater == "r1" else 0.0) for each in answers])
+
+
+def test_four_raters_are_no_panel_for_times():
     few = [each for each in changed(lambda each: replace(each, seconds=each.seconds / 9)) if each.rater < "r4"]
     assert not left_out(few)

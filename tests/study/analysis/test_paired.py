@@ -65,13 +65,16 @@ def test_known_preferences_are_found():
     assert row["p"] <= row["p_holm"] < 0.001
 
 
-def test_answers_of_one_rater_are_not_so_many_raters_and_those_who_all_agree_count_once_each():
+def test_answers_of_one_rater_are_not_so_many_raters():
     """Raters disagree about what is better, each sure of it: the binomial test is wrong, the other is not."""
     cells = np.repeat(np.array([1.0, 1, 1, 0, 1, 0, 1, 1])[:, None], 40, axis=1)
     figures = paired.analyse_shares(cells)
     assert paired.compute_binomial_p(int(cells.sum()), cells.size) < 1e-9
     assert figures["p"] > 0.1
     assert figures["low"] < 0.5 < figures["high"]
+
+
+def test_raters_who_all_agree_count_once_each():
     figures = paired.analyse_shares(np.ones((6, 30)))
     assert figures["over"] == paired.ALL_EQUAL
     assert (figures["low"], figures["high"]) == pytest.approx(tuple(stats.binomtest(6, 6).proportion_ci()))
