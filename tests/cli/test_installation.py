@@ -69,13 +69,16 @@ def test_voices(monkeypatch):
     assert "no speech synthesiser is installed; install one: pip install" in found.text
 
 
-def test_parts_that_fail_or_are_not_there(monkeypatch):
+def test_whatever_a_part_raises(monkeypatch):
     def fails() -> str:
         raise OSError("libfoo.so: cannot open")
 
     monkeypatch.setitem(doctor_module._PARTS, "foo", fails)
     found = doctor_module.look_at("foo")
     assert found == InstalledPart("foo", "broken", "OSError: libfoo.so: cannot open; install lipmotion again")
+
+
+def test_parts_that_are_not_there(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
     monkeypatch.setattr(doctor_module, "find_spec", lambda name: name == "sounddevice")
     monkeypatch.setattr(doctor_module, "find_library", lambda _: None)

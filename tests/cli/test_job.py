@@ -224,10 +224,13 @@ def test_what_edit_refuses(run, speech, toy_model_file, tmp_path):
     assert json.loads(file.read_text())["steps"] == []
 
 
-def test_a_folder_of_recordings_or_for_one_of_them(run, takes, toy_model_file, here):
+def test_a_folder_of_recordings(run, takes, toy_model_file, here):
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "{name}.TextGrid", "--to", "json,csv")
     assert done == (0, ["out/a.json", "out/a.csv", "a.TextGrid", "out/b.json", "out/b.csv", "b.TextGrid"], [])
     assert (here / "out" / "a.csv").read_bytes() == (here / "out" / "b.csv").read_bytes()
+
+
+def test_a_folder_and_a_file_for_one_recording(run, takes, toy_model_file, here):
     (here / "made").mkdir()
     recording = next(takes.glob("a.*"))
     done = run("animate", recording, "--model", toy_model_file, "-o", "new/", "made", "b.csv")

@@ -21,7 +21,7 @@ STOPPED = "lipmotion: stopped; run the same command again to go on"
 VERBS = ["animate", "corpus", "train", "evaluate", "info"]
 
 
-def test_help(run):
+def test_help_lists_verbs_and_exit_codes(run):
     done = run("--help")
     assert (done.code, done.err) == (0, [])
     assert run() == done
@@ -30,6 +30,8 @@ def test_help(run):
         assert f" {verb} " in text
     assert "0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus, 5 align" in text
 
+
+def test_every_verb_has_help(run):
     for verb in (*VERBS, "corpus prepare", "corpus info"):
         done = run(*verb.split(), "--help")
         assert (done.code, done.err) == (0, [])
@@ -200,11 +202,14 @@ def test_the_model_inside_is_named_with_its_rights(run, toy_model_file, here):
     assert prior["attribution"].startswith("GRID corpus")
 
 
-def test_its_trees_or_chains_can_be_printed(run, toy_model_file, coupled_model_file):
+def test_its_trees_can_be_printed(run, toy_model_file):
     done = run("info", toy_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0] == "speech.0"
     assert sum("leaf (" in line for line in done.out) >= 18
+
+
+def test_the_chains_of_a_coupled_model(run, coupled_model_file):
     done = run("info", coupled_model_file, "--structure")
     assert (done.code, done.err) == (0, [])
     assert done.out[0].startswith("coupled: chains whose transitions depend on all chains")

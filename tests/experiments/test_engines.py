@@ -273,10 +273,13 @@ def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_traine
     assert (curve_figures["order"], curve_figures["seed"], curve_figures["closed_under"]) == ("shuffled", 1, 0.1)
 
 
-def test_what_cannot_be_trained_on_or_compared(toy_corpus, tmp_path):
+def test_recordings_of_the_training_are_not_compared(toy_corpus):
     for split in ("train", None):
         with pytest.raises(CorpusError, match="are in the split that is compared with"):
             compare_engines(toy_corpus, split=split, settings=SETTINGS)
+
+
+def test_what_cannot_be_trained_on(toy_corpus, tmp_path):
     with pytest.raises(InputError, match="sizes none; required: from 1 to 8"):
         run_learning_curve(toy_corpus, sizes=[])
     for order, words in (

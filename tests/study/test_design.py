@@ -174,9 +174,12 @@ def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here):
     assert set(here.iterdir()) == before
 
 
-def test_sentences_that_are_refused(here):
+def test_two_sentences_of_one_name_are_refused(here):
     with pytest.raises(errors.InputError, match="two sentences are called 'one'"):
         read_sentences([here / "said", here / "ours" / "one.mp4"])
+
+
+def test_recordings_without_pictures_cannot_be_shown():
     said = read_sentences([Path("examples/welcome.flac")])
     with pytest.raises(errors.InputError, match="has no pictures"):
         make_condition("recording", said, DRAWN)
