@@ -43,12 +43,7 @@ LINEAR = (
 LARGEST_FILE_BYTES = 1 << 28
 LAST_FRAME = 86_400 * 30  # frames of a day
 MORPHS: Mapping[str, tuple[str, ...]] = {
-    "あ": ("aa",),
-    "い": ("ih",),
-    "う": ("ou",),
-    "え": ("ee",),
-    "お": ("oh",),
-    "ん": (CLOSED,),
+    **{morph: (name,) for morph, name in zip("あいうえおん", (*VRM_VOWELS, CLOSED), strict=True)},
     "まばたき": ("eyeBlinkLeft", "eyeBlinkRight"),
     "上": ("browInnerUp",),
     "下": ("browDownLeft", "browDownRight"),
