@@ -175,6 +175,8 @@ def test_its_share_depends_on_voice_recogniser_and_noise(network, voice, mean, d
     assert distortions == pytest.approx(np.full(FRAMES, distortion), rel=1e-5)
     assert motion == pytest.approx(without + share * (beside.predict(spoken)[0] - without), abs=1e-6)
     plain, both = alone.hidden(spoken), replace(alone, posterior_network=beside).hidden(spoken)
+    assert plain is not None
+    assert both is not None
     assert both[0][:, : plain[0].shape[1]] == pytest.approx(plain[0])
     wanted = beside.hidden_units(posteriors(0), len(plain[0]))
     assert both[0][:, plain[0].shape[1] :] == pytest.approx(wanted)
