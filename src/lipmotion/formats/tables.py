@@ -15,7 +15,7 @@ from __future__ import annotations
 import logging
 import re
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 
@@ -141,19 +141,15 @@ def write_take(path: Path, generation: Generation, _source: Mapping[str, str], _
             file.write(f"{timecode(time_s)},{len(CURVES)},{form % tuple(row.tolist())}\n")
 
 
-def is_live_link(names: Sequence[str]) -> bool:
-    """Return whether the columns of a table are those of Live Link Face."""
-    lower = [name.lower() for name in names[:2]]
-    return lower[:1] == [FIRST] and (lower[1:] in ([], [COUNT]) or (is_known(names[1]) and "." not in names[1]))
-
-
 def is_live_link_file(path: Path) -> bool:
-    """Return whether a file is such a table; a file that cannot be read is none."""
+    """Return whether a file is a table with the columns of Live Link Face; a file that cannot be read is none."""
     try:
         with open_table(path) as table:
-            return is_live_link(table.names)
+            names = table.names
     except (OSError, ValueError):
         return False
+    lower = [name.lower() for name in names[:2]]
+    return lower[:1] == [FIRST] and (lower[1:] in ([], [COUNT]) or (is_known(names[1]) and "." not in names[1]))
 
 
 def read_speech_curves(motion: Motion) -> Motion:
