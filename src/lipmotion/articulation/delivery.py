@@ -100,13 +100,12 @@ def shift_in_time(generation: Generation, delivery: Delivery) -> Generation:
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
                 values[at] = motion.values[frame]
+    end_s = max(duration_s, _find_end(generation.units) + delivery.offset_ms / 1000)
     return replace(
         generation,
         motion=Motion(values, rate_hz, motion.channels),
         spread=generation.change_frames(lambda rows: rows[nearest]),
-        units=shift_units(
-            generation.units, by_s, max(duration_s, _find_end(generation.units) + delivery.offset_ms / 1000)
-        ),
+        units=shift_units(generation.units, by_s, end_s),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
         curve_edits=_shift_edits(generation.curve_edits, by_s, duration_s),
     )

@@ -209,15 +209,9 @@ def map_to_mean_person(examples: Sequence[Example], speakers: Sequence[str]) -> 
 
 def speakers_to_arrays(maps: SpeakerMaps) -> dict[str, NDArray[Any]]:
     """Serialise maps."""
-    return {
-        "channels": np.array([(channel.name, channel.unit) for channel in maps.channels]),
-        "names": np.array(maps.names),
-        "gain": maps.gain,
-        "offset": maps.offset,
-        "rest": maps.rest,
-        "habits": maps.habits,
-        "lips": np.array(maps.lips),
-    }
+    channels = np.array([(channel.name, channel.unit) for channel in maps.channels])
+    parts = {name: getattr(maps, name) for name in ("gain", "offset", "rest", "habits")}
+    return {"channels": channels, "names": np.array(maps.names), **parts, "lips": np.array(maps.lips)}
 
 
 def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
@@ -227,11 +221,7 @@ def speakers_from_arrays(arrays: Arrays) -> SpeakerMaps:
         stored = check_arrays(arrays, SPEAKERS, V=len(VISEME_NAMES))
         channels = tuple(Channel(name, unit) for name, unit in stored["channels"].tolist())
         names = tuple(stored["names"].tolist())
-        if (
-            len({channel.name for channel in channels}) < len(channels)
-            or len(set(names)) < len(names)
-            or not all(names)
-        ):
+        if len({channel.name for channel in channels}) < len(channels) or len({*names} - {""}) < len(names):
             raise ValueError("names of speakers or channels that are empty or repeat")
         closed, opened = stored["lips"].tolist()
         parts = (stored["gain"], stored["offset"], stored["rest"], stored["habits"])
