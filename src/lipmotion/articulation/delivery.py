@@ -153,8 +153,8 @@ def intensify(
     """
     motion = generation.motion
     factor = intensity = np.broadcast_to(np.asarray(intensity, np.float64), len(motion.values))
-    moved = np.flatnonzero(intensity != 1)
-    if not len(moved):
+    changed = np.flatnonzero(intensity != 1)
+    if not len(changed):
         return generation
     if opening is None and "opening" in motion.names:
         opening = motion["opening"].astype(np.float64)
@@ -176,7 +176,7 @@ def intensify(
             still = np.median(curve[rest])
             curve = still + factor * (curve - still)
             curve = np.clip(curve, 0, 1) if channel.unit == WEIGHT else curve
-        values[moved, column] = curve[moved]
+        values[changed, column] = curve[changed]
     spread = generation.change_frames(lambda rows: (rows * factor[:, None] ** 2).astype(rows.dtype))
     return replace(generation, motion=replace(motion, values=values), spread=spread)
 

@@ -373,8 +373,8 @@ def _check_no_labels(text: str, where: str) -> None:
 def _check_plain(text: str, path: Path) -> None:
     """Raise InputError for a text that is no plain text, or more than a transcript has."""
     if len(text) > LARGEST_TRANSCRIPT_BYTES:
-        most = f"required at most {LARGEST_TRANSCRIPT_BYTES}"
-        raise InputError(f"{path}: {len(text)} characters, {most}: is it a transcript?")
+        limit = f"required at most {LARGEST_TRANSCRIPT_BYTES}"
+        raise InputError(f"{path}: {len(text)} characters, {limit}: is it a transcript?")
     if is_json(text):
         raise InputError(f"{path}: {describe_json(text, str(path))}")
     _check_no_labels(remove_known_tags(text), str(path))

@@ -295,8 +295,8 @@ def _read_timecodes(codes: list[tuple[int, float, str]]) -> Array:
         last = int(frames[passed].max() if len(passed) == 1 else frames.max())
         if last >= TIMECODE_RATES[-1]:
             raise InputError(f"a timecode has frame {last}, required less than {TIMECODE_RATES[-1]}")
-        shown = next(rate for rate in TIMECODE_RATES if rate > last)
-        rate = shown if len(passed) else max(shown, APP_RATE)
+        counted = next(rate for rate in TIMECODE_RATES if rate > last)
+        rate = counted if len(passed) else max(counted, APP_RATE)
         time_s = seconds + frames / rate
         # every full minute but each tenth follows the last frame of a second with frame 2 (4 of 60)
         first = np.flatnonzero((np.diff(seconds) == 1) & (seconds[1:] % 60 == 0) & (seconds[1:] % 600 != 0)) + 1

@@ -141,8 +141,8 @@ class AcousticNetwork(Predictor):
         output = self.network.output
         distortion = np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
         if self.posterior_network is not None and speech.posteriors is not None:
-            beside = self.posterior_network.hidden_units(speech.posteriors, len(hidden))
-            hidden = np.concatenate([hidden, beside], axis=1)
+            inner = self.posterior_network.hidden_units(speech.posteriors, len(hidden))
+            hidden = np.concatenate([hidden, inner], axis=1)
         return hidden, distortion
 
     def arrays(self) -> dict[str, NDArray[Any]]:
