@@ -17,6 +17,7 @@ from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.stats.pca import Pca
 from lipmotion.testing import PHONES, examples, speech, timeline
 from lipmotion.types import GREY, WEIGHT, Channel, Constraints, Pin, Span, Timeline, Unit, silent_monitor
+from meshes.speech import said
 
 POSES = np.array([[0.0, 0.5], [0.3, 0.6], [0.1, 0.55]])
 REACH = space.measure_limits(POSES)
@@ -104,10 +105,8 @@ MODEL = ENGINE.fit(examples(), silent_monitor).model
 
 def spoken(phones, durations) -> Timeline[Unit]:
     """Phones of given lengths (10 ms frames) between half seconds of silence."""
-    edges = (50 + np.cumsum([0, *durations])) / 100
-    inner = [Span(a, b, Unit(p)) for a, b, p in zip(edges.tolist(), edges[1:].tolist(), phones, strict=False)]
-    end_s = float(edges[-1])
-    return Timeline((Span(0.0, 0.5, Unit("sil")), *inner, Span(end_s, end_s + 0.5, Unit("sil"))))
+    edges = (np.cumsum([0, 50, *durations, 50]) / 100).tolist()
+    return said(*zip(edges, edges[1:], ("sil", *phones, "sil"), strict=False))
 
 
 PHONE = st.one_of(st.sampled_from("pbm"), st.sampled_from(PHONES[1:]))

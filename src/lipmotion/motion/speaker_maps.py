@@ -288,12 +288,10 @@ def estimate_rest_poses(people: Sequence[PersonStatistics]) -> Array:
     return np.where(known[:, None], rests, spoken + usual)
 
 
-def estimate_gains(
-    people: Sequence[PersonStatistics], channels: Sequence[Channel], max_gain: float = MAX_GAIN
-) -> Array:
+def estimate_gains(people: Sequence[PersonStatistics], channels: Sequence[Channel], limit: float = MAX_GAIN) -> Array:
     """Return the range of each person as a multiple of the mean person's [shape=(S, P)].
 
-    max_gain : gains lie between its inverse and itself
+    limit : gains lie between its inverse and itself
     Points share one gain for each axis. Of people who say little, gains are drawn towards 1 (``RANGE_PRIOR_S``).
     """
     ranges = np.stack([person.range for person in people])
@@ -310,7 +308,7 @@ def estimate_gains(
     trust = speech_s / (speech_s + RANGE_PRIOR_S)
     shrunk = np.exp(np.log(ratio) * trust[:, None])
     shrunk /= np.exp(np.log(shrunk).mean(axis=0))  # the geometric mean of all gains is 1
-    return np.clip(shrunk, 1 / max_gain, max_gain)
+    return np.clip(shrunk, 1 / limit, limit)
 
 
 SPEAKERS = {
