@@ -62,8 +62,8 @@ from lipmotion.speech.features.encoding import COMPONENTS
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.sound.acoustic_conditions import apply_condition, mark_spoken
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
+from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.types import SPECTRUM_BANDS, Audio, Motion, Timeline, Track, Unit
 
 OUTPUT = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS

@@ -14,6 +14,7 @@ from children import run_child
 from formats.examples import generation, of_motion, written
 from formats.examples import written as write
 from lipmotion import read_motion
+from lipmotion import write as write_outputs
 from lipmotion.articulation.lip_points import build_mouth
 from lipmotion.errors import ExportError, InputError
 from lipmotion.formats.c3d import CENTIMETRES
@@ -22,7 +23,6 @@ from lipmotion.formats.vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import move_points, with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import gaze_to_weights, weights_to_gaze
 from lipmotion.meshes.model.mesh import ANGLES, turn_head
-from lipmotion.pipeline.outputs.motion_files import check_rate
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, Timeline, Unit
 from lipmotion_faces.characters.gltf_document import read_gltf_document
 
@@ -180,10 +180,10 @@ def test_held_poses_change_from_one_frame_to_the_next(tmp_path: Path, vmd_genera
     assert read_motion(written(tmp_path / "a.vmd", held))[0]["aa"] == pytest.approx(values[:, 0], abs=1e-6)
 
 
-def test_it_has_one_rate() -> None:
-    check_rate(Path("a.vmd"), 30.0)
+def test_it_has_one_rate(tmp_path: Path, vmd_generation: Generation) -> None:
+    write_outputs(vmd_generation, tmp_path / "a.vmd", rate_hz=30)
     with pytest.raises(ExportError, match=r"a\.vmd: 60 frames a second in \.vmd, required 30: leave --rate out"):
-        check_rate(Path("a.vmd"), 60.0)
+        write_outputs(vmd_generation, tmp_path / "a.vmd", rate_hz=60)
 
 
 def _damaged(content: bytes, at: int, new: bytes) -> bytes:

@@ -95,7 +95,7 @@ def test_drawing_the_moving_part_alone_gives_the_whole_picture():
 
 def test_marked_vertices_are_found_where_they_can_be_seen():
     mesh, canvas = ball(), Canvas(Camera(100, 100, across=2.0))
-    seen = canvas.mark_shown(mesh.vertices, mesh.vertices[:, 0] > 0, mesh.triangles)
+    seen = canvas.cover(mesh.vertices, mesh.vertices[:, 0] > 0, mesh.triangles) > 127
     assert seen[50, 60]
     assert not seen[50, 40]
     assert seen.sum() == pytest.approx(0.5 * np.pi * 25**2, rel=0.1)

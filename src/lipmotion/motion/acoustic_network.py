@@ -26,8 +26,8 @@ from lipmotion.motion.network_steps import (
 from lipmotion.motion.posterior_network import PosteriorNetwork, list_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.motion.prior_regression import EncodingRegression
-from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
+from lipmotion.stats.networks import ConvolutionalNetwork
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import SPECTRUM_BANDS, Speech, sub_monitor
 

@@ -20,10 +20,17 @@ from numpy.typing import NDArray
 
 from lipmotion.motion.articulation import ARTICULATORS
 from lipmotion.motion.predictors import PredictorTraining
-from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, make_network
 from lipmotion.stats.curves import mark_known_dynamics, with_dynamics
 from lipmotion.stats.network_training import LinearMap, SequenceNetwork, TrainingPlan, TrainingSequence, fit_network
-from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, make_recurrent_network
+from lipmotion.stats.networks import (
+    GATES,
+    TAPS,
+    ConvolutionalNetwork,
+    RecurrentLayer,
+    RecurrentNetwork,
+    make_network,
+    make_recurrent_network,
+)
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, check_arrays
 from lipmotion.types import Progress, Speech
 

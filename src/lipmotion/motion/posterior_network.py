@@ -31,9 +31,8 @@ from lipmotion.motion.network_steps import (
     stack_spectrum,
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
-from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import SequenceNetwork, TrainingPlan, TrainingSequence
-from lipmotion.stats.recurrence import RecurrentNetwork
+from lipmotion.stats.networks import ConvolutionalNetwork, RecurrentNetwork
 from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, check_arrays
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, TokenPosteriors
 

@@ -104,6 +104,7 @@ class ShownCutOut(_WithHead):
 
     def __init__(self, face: CutOut) -> None:
         self.face = face
+        self._optional = "".join(name for name in OPTIONAL if name in face.shapes)
 
     def check(self, settings: OutputSettings) -> None:  # noqa: D102
         filmed_video.refuse_film(settings.outputs)
@@ -128,10 +129,6 @@ class ShownCutOut(_WithHead):
         drawn_video.write_frames(
             path, with_progress(frames, filmed_video.RENDERING, performance.monitor, count, REPORT_INTERVAL), fps, sound
         )
-
-    @property
-    def _optional(self) -> str:
-        return "".join(name for name in OPTIONAL if name in self.face.shapes)
 
 
 class ShownPerson(_WithHead):
