@@ -296,9 +296,9 @@ class Skin:
         self.normals[len(contour) + len(edges) : len(self.face)] = find_outward(to_head, fill)
         self._before_lips = find_outward(to_head, contour)
         corners = self.rest[[0, _LEFT_CORNER]]
-        beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
+        corner_distance = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
         self._calm = np.ones((len(self.rest), 1))
-        self._calm[: len(self.face), 0] -= 0.85 * np.exp(-((beside / CALM_RADIUS) ** 2))
+        self._calm[: len(self.face), 0] -= 0.85 * np.exp(-((corner_distance / CALM_RADIUS) ** 2))
 
     def list_lip_rows(self) -> Index:
         """Return the vertices of the lips, ring by ring from the skin inwards [shape=(RINGS, COLUMNS)]."""
@@ -321,10 +321,10 @@ class Skin:
         normals[rows[VISIBLE_RINGS - 1]] += closed * (
             normals[rows[VISIBLE_RINGS - 2]] - normals[rows[VISIBLE_RINGS - 1]]
         )
-        beside = AT_CORNER * (CORNER_LIGHT_SHARE + (1 - CORNER_LIGHT_SHARE) * pose.roundness)
+        corner_share = AT_CORNER * (CORNER_LIGHT_SHARE + (1 - CORNER_LIGHT_SHARE) * pose.roundness)
         for ring in range(1, VISIBLE_RINGS):
             of_ring = normals[rows[ring]]
-            share = np.maximum(closed * _JOINED.get(ring, 0.0), beside)
+            share = np.maximum(closed * _JOINED.get(ring, 0.0), corner_share)
             normals[rows[ring]] += 0.5 * share * (of_ring[_OPPOSITE] - of_ring)
         outer = rows[1:VISIBLE_RINGS]
         normals[outer] += CORNER_SKIN_SHARE * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])

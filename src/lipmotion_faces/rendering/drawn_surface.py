@@ -69,7 +69,7 @@ class Camera:
         size = self.width, self.height
         left, top = (max(0, int(edge - 2)) for edge in screen[:, :2].min(axis=0))
         right, bottom = (
-            min(most, int(np.ceil(edge + 2))) for edge, most in zip(screen[:, :2].max(axis=0), size, strict=True)
+            min(limit, int(np.ceil(edge + 2))) for edge, limit in zip(screen[:, :2].max(axis=0), size, strict=True)
         )
         return (left, top, right, bottom) if left < right and top < bottom else None
 

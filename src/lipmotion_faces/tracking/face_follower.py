@@ -35,8 +35,8 @@ class FaceWindow:
     @staticmethod
     def place(x: float, y: float, side: float) -> FaceWindow:
         """Return the window whose middle is nearest to a point; of a side given, px."""
-        whole = max(1, round(side))
-        return FaceWindow(round(x - whole / 2), round(y - whole / 2), whole)
+        pixels = max(1, round(side))
+        return FaceWindow(round(x - pixels / 2), round(y - pixels / 2), pixels)
 
     def cut(self, image: Image) -> Image:
         """Return this part of a picture, scaled to ``SIZE_PX``; beyond the picture it is black."""

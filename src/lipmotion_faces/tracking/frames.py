@@ -184,8 +184,8 @@ def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None
         sides = f"{MIN_SIDE_PX} to {LONGEST_SIDE_PX}"
         raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {sides}; scale the video")
     if shown * height > MAX_PIXELS:
-        most = f"at most {MAX_PIXELS} in all"
-        raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {most}; scale the video")
+        required = f"at most {MAX_PIXELS} in all"
+        raise InputError(f"{path}: pictures of {shown} × {height} pixels, required {required}; scale the video")
 
 
 Array = NDArray[np.float64]
