@@ -367,12 +367,8 @@ class TestRegistration:
         def make(places, tremble, cuts=(), seen=None, contrast=4) -> Footage:
             texture = GaussianBlur(np.random.default_rng(1).uniform(0, 255, (120, 170)), (0, 0), 2.0)
             texture = 128 + contrast * (texture - texture.mean())
-            frames = [
-                np.repeat(
-                    np.clip(shift(texture, place[::-1], mode="reflect"), 0, 255).astype(np.uint8)[..., None], 3, 2
-                )
-                for place in places
-            ]
+            greys = (np.clip(shift(texture, place[::-1], mode="reflect"), 0, 255) for place in places)
+            frames = [np.repeat(grey.astype(np.uint8)[..., None], 3, 2) for grey in greys]
             path = write_frames(tmp_path / "scene.mkv", frames, options={"qp": "0"})
             count = len(places)
             shown = np.ones(count, bool) if seen is None else seen

@@ -226,10 +226,9 @@ def test_the_recorders_sound_is_used_from_the_right_moment(recorded_twice_folder
 
 
 def test_a_long_video_gets_the_recorders_sound_in_its_own_time(recorded_twice_folder):
-    recording = SourceRecording(
-        "take", recorded_twice_folder / "take.wav", None, recorder=recorded_twice_folder / "take.recorder.wav"
-    )
-    own, sound = read_sound(recorded_twice_folder / "take.wav"), supplied.separate_sound(recording)
+    take, recorder = (recorded_twice_folder / name for name in ("take.wav", "take.recorder.wav"))
+    recording = SourceRecording("take", take, None, recorder=recorder)
+    own, sound = read_sound(take), supplied.separate_sound(recording)
     assert sound is not None
     placed = supplied.align_sound(sound, own.duration_s)
     assert len(placed.samples) == len(own.samples)
@@ -322,12 +321,8 @@ def test_vocaset_becomes_a_corpus_of_lip_distances(tmp_path):
     corpus = Corpus.open(tmp_path / "corpus")
     assert list(corpus.speakers) == ["FaceTalk_170725_00137_TA", "FaceTalk_170728_03272_TA"]
     said = corpus.utterance(report.prepared[0])
-    assert (said.words, said.track.motion.rate_hz, said.source["licence"][:8]) == (
-        ("hello", "there"),
-        MESH_HZ,
-        "research",
-    )
     motion = said.track.motion
+    assert (said.words, motion.rate_hz, said.source["licence"][:8]) == (("hello", "there"), MESH_HZ, "research")
     np.testing.assert_allclose(motion["opening"], (1 + jaw) / 90, atol=1e-6)
     np.testing.assert_allclose(motion["outer"], (16 + jaw) / 90, atol=1e-6)
     np.testing.assert_allclose(motion["width"], 46 / 90, atol=1e-6)
