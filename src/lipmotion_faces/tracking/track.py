@@ -99,7 +99,7 @@ def measure_motion(points: Array) -> Array:
     """Return ``CHANNELS`` [shape=(T, len(CHANNELS))] of points in px, y down, z away [shape=(T, N, 3)]."""
     unit = measure_distance(points, EYE_CORNERS)
     distances = np.stack([measure_distance(points, pair) / unit for pair in DISTANCES.values()], axis=1)
-    head = remove_head_motion(points * (1, -1, -1), TRACKED_POINTS)
+    head = remove_head_motion(points * (1, -1, -1))
     moving = head[:, [COLUMN[index] for index in (*LIP_POINTS, *JAW_POINTS)]]
     return np.concatenate([distances, moving.reshape(len(points), -1)], axis=1)
 
