@@ -5,7 +5,7 @@ Frames are compared by descriptors: what a viewer would see change from one to a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
@@ -209,9 +209,6 @@ class LoopOrder:
 
     def __len__(self) -> int:
         return len(self.first)
-
-    def __iter__(self) -> Iterator[tuple[int, int, float]]:
-        return zip(self.first.tolist(), self.second.tolist(), self.weight.tolist(), strict=True)
 
 
 def find_loop_order(

@@ -311,7 +311,15 @@ def divide_video(
     if splits_by_time and len(spans) >= MIN_SPLIT_UTTERANCES:
         held_out = round(HELD_OUT_SHARE * len(spans))
     splits = [recording.split] * (len(spans) - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
-    return [_cut_part(span, recording, split, audio, scan) for span, split in zip(spans, splits, strict=True)]
+    result = []
+    for span, split in zip(spans, splits, strict=True):
+        minutes, seconds = divmod(round(span.start_s, 2), 60)
+        name = f"{recording.name}-{int(minutes) // 60:02}h{int(minutes) % 60:02}m{seconds:05.2f}s"
+        described = replace(recording, name=name, words=span.words, split=split, phones=None)
+        described = replace(described, start_s=span.start_s, end_s=span.end_s)
+        first, last = round(span.start_s * audio.rate_hz), round(span.end_s * audio.rate_hz)
+        result.append(VideoPart(described, Audio(audio.samples[first:last], audio.rate_hz), scan.person))
+    return result
 
 
 def _fit_to_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenPart:
@@ -320,12 +328,3 @@ def _fit_to_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenP
     is_last = span.end_s >= end_s - 1e-6
     start_s, before_s = float(scan.times_s[max(first, 0)]), float(scan.times_s[max(last, 0)])
     return replace(span, start_s=start_s, end_s=end_s if is_last else before_s)
-
-
-def _cut_part(part: SpokenPart, recording: SourceRecording, split: str, audio: Audio, scan: VideoScan) -> VideoPart:
-    minutes, seconds = divmod(round(part.start_s, 2), 60)
-    name = f"{recording.name}-{int(minutes) // 60:02}h{int(minutes) % 60:02}m{seconds:05.2f}s"
-    described = replace(recording, name=name, words=part.words, split=split, phones=None)
-    described = replace(described, start_s=part.start_s, end_s=part.end_s)
-    first, last = round(part.start_s * audio.rate_hz), round(part.end_s * audio.rate_hz)
-    return VideoPart(described, Audio(audio.samples[first:last], audio.rate_hz), scan.person)

@@ -165,10 +165,8 @@ class FaceFollower:
         of_person, cuts, last = self._find_scenes(), [], None
         for index, scene in enumerate(self._scenes):
             if scene.thumbnails:
-                if last is not None and (index in of_person, True) != (
-                    last in of_person,
-                    scene.is_near(self._scenes[last]),
-                ):
+                is_same = last is None or (index in of_person) == (last in of_person)
+                if not is_same or (last is not None and not scene.is_near(self._scenes[last])):
                     cuts.append(self._scene_of_frame.index(index))
                 last = index
         return cuts
