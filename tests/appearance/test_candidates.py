@@ -23,7 +23,7 @@ from lipmotion_faces.appearance.candidates import (
     sharpen,
     square_distances,
 )
-from oracles.components import components, share
+from oracles.statistics import components, share
 
 
 def pictures(seed: int = 0, count: int = 40, height: int = 9, width: int = 12) -> np.ndarray:

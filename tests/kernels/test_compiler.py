@@ -43,7 +43,8 @@ def sequences() -> list[np.ndarray]:
     logs = [random.normal(-20, 2, (4, 6)).astype(np.float32) for _ in range(2)]
     found: list[Any] = []
     for kind in (np.float32, np.float64):
-        given = factorial_loops.FactorialLogLikelihoods.of(*(log.astype(kind) for log in logs))
+        pairs = np.empty((4, 0), kind), np.empty((0, 2), np.intp)
+        given = factorial_loops.FactorialLogLikelihoods(*(log.astype(kind) for log in logs), *pairs)
         posteriors = factorial.infer_factorial(loop, loop, given, 2)
         found += [*posteriors[:2], *posteriors.audio_counts, posteriors.log_likelihood]
         found += factorial_loops.find_factorial_path(loop, loop, given)

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion_faces.kernels import shading
-from oracles import shading as oracle
+from oracles import drawing as oracle
 
 
 def unit(vectors):

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shorten
+from lipmotion.formats.c3d import measure_markers, to_head_frame
 from lipmotion.formats.label_files import find_labels
-from lipmotion.formats.markers import measure_markers, to_head_frame
 from lipmotion.storage.archive import take_array
 from lipmotion.storage.sources import AUDIO_SUFFIXES, check_regular
 from lipmotion.types import WEIGHT, Channel, Motion

@@ -20,7 +20,7 @@ from lipmotion.pipeline.request import Mark, Outputs
 from lipmotion.speech.sound.pauses import measure_levels_at
 from lipmotion.storage.sources import check_source, has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
-from lipmotion.types.progress import with_reports
+from lipmotion.types.progress import REPORT_INTERVAL, with_progress
 from lipmotion_faces.appearance.person import FaceCodes
 from lipmotion_faces.appearance.placing import cut
 from lipmotion_faces.film.background import open_background, open_stored_background
@@ -239,7 +239,7 @@ def write_film(
     Raises InputError: the background cannot be read to its end. Raises ExportError: the file cannot be written, or the
     face leaves no corner for a visible mark.
     """
-    frames = with_reports(film.frames, film.count, RENDERING, monitor)
+    frames = with_progress(film.frames, RENDERING, monitor, film.count, REPORT_INTERVAL)
     if mark == "visible":
         frames = mark_frames(frames, film.covered)
     tags, xmp = mark_metadata() if mark != "none" else (None, None)
