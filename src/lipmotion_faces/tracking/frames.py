@@ -98,6 +98,18 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
             yield OpenVideo(frames, tuple(rates), stated_s, damage)
 
 
+def read_stated_duration(path: Path) -> float:
+    """Return the duration that a video states, s; 0 if it states none, has no pictures or cannot be read."""
+    import av
+
+    try:
+        with open_media(path) as container:
+            streams = list_video(container)
+            return read_duration(container, streams[0]) if streams else 0.0
+    except (av.FFmpegError, ValueError, OSError):
+        return 0.0
+
+
 def damage_notes(video: OpenVideo, times_s: NDArray[np.float64], rate_hz: float) -> list[str]:
     """Return notes on pictures that cannot be decoded or are missing at the end; ``video`` was read to its end."""
     notes = []
